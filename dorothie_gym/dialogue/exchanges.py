@@ -1,0 +1,195 @@
+"""Exchange units: from an initiating act to the fulfilment or abandonment of what it expects (paper, section 4)."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from dorothie_gym.dialogue.utterances import Utterance
+from dorothie_gym.ontology import DialogueMove, Role
+
+PATIENCE = 10.0
+"""An exchange that nobody answers for this long is abandoned [s] (spec of the dialogue, phenomenon 21)."""
+
+EXPECTATIONS: Mapping[DialogueMove, frozenset[DialogueMove]] = MappingProxyType(
+    {
+        DialogueMove.INSTRUCT: frozenset(
+            {
+                DialogueMove.ACKNOWLEDGE,
+                DialogueMove.CONFIRM,
+                DialogueMove.CLARIFY,
+                DialogueMove.REPLY_Y,
+                DialogueMove.REPLY_N,
+                DialogueMove.REPLY_U,
+            }
+        ),
+        DialogueMove.EXPLAIN: frozenset(
+            {DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.CLARIFY, DialogueMove.REPLY_Y}
+        ),
+        DialogueMove.ALIGN: frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.REPLY_Y, DialogueMove.REPLY_N}),
+        DialogueMove.CHECK: frozenset(
+            {
+                DialogueMove.CONFIRM,
+                DialogueMove.REPLY_Y,
+                DialogueMove.REPLY_N,
+                DialogueMove.REPLY_U,
+                DialogueMove.CLARIFY,
+            }
+        ),
+        DialogueMove.QUERY_YN: frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U}),
+        DialogueMove.QUERY_W: frozenset({DialogueMove.REPLY_W, DialogueMove.REPLY_U}),
+    }
+)
+"""For each initiating move, the responses that fulfil it. Confuse answers any of them and fulfils none."""
+
+_REPAIRS = frozenset({DialogueMove.CLARIFY, DialogueMove.CONFIRM, DialogueMove.REPLY_W})
+"""What the initiator says after a Confuse to get the exchange going again."""
+
+
+class ExchangeState(enum.StrEnum):
+    """Where an exchange stands."""
+
+    OPEN = "open"
+    FULFILLED = "fulfilled"
+    ABANDONED = "abandoned"
+
+
+@dataclass
+class Exchange:
+    """One exchange unit.
+
+    Attributes:
+        id: counts from 0 in order of beginning.
+        initiator: who opened it.
+        move: the latest initiating move; of an unprompted exchange, the response it consists of.
+        start: start of its first utterance [s].
+        end: end of its last utterance [s].
+        state: open, fulfilled or abandoned.
+        unprompted: whether it began with a response (or irrelevant talk) that nothing had asked for.
+        acts: number of acts in it.
+        confused: whether the other side has not understood and the initiator has to repair.
+    """
+
+    id: int
+    initiator: Role
+    move: DialogueMove
+    start: float
+    end: float
+    state: ExchangeState = ExchangeState.OPEN
+    unprompted: bool = False
+    acts: int = field(default=0)
+    confused: bool = False
+
+    def accepts(self, speaker: Role, move: DialogueMove) -> bool:
+        """Returns whether `move` by `speaker` answers, or goes on with, this exchange."""
+        if self.unprompted:
+            return False
+        if speaker is self.initiator:
+            return self.confused and move in _REPAIRS
+        return move is DialogueMove.CONFUSE or move in EXPECTATIONS[self.move]
+
+
+class ExchangeTracker:
+    """Assigns each act to an exchange, as utterances are delivered.
+
+    Initiating acts of one utterance share an exchange (a reason and the command it leads to are one initiative), and an
+    Explain behind a response in the same breath elaborates on that response. Overlapping exchanges are allowed.
+    """
+
+    def __init__(self, patience: float = PATIENCE) -> None:
+        """Starts without exchanges.
+
+        Args:
+            patience: time without an answer after which an exchange is abandoned [s], positive.
+
+        Raises:
+            ValueError: if `patience` is not positive.
+        """
+        if patience <= 0:
+            raise ValueError(f"patience must be positive, not {patience}")
+        self.patience = patience
+        self.exchanges: list[Exchange] = []
+
+    def update(self, utterance: Utterance) -> tuple[int, ...]:
+        """Places every act of a delivered utterance.
+
+        Args:
+            utterance: heard to its end; utterances come in the order of delivery.
+
+        Returns:
+            The id of an exchange for each act, in order.
+        """
+        opened: Exchange | None = None
+        answered: Exchange | None = None
+        ids = []
+        for act in utterance.acts:
+            move = act.move
+            if move is DialogueMove.EXPLAIN and answered is not None and opened is None:
+                exchange = answered
+            elif move in EXPECTATIONS:
+                exchange = opened = self._initiate(utterance, move, opened)
+            else:
+                exchange = answered = self._respond(utterance, move)
+            exchange.acts += 1
+            exchange.end = max(exchange.end, utterance.end)
+            ids.append(exchange.id)
+        return tuple(ids)
+
+    def tick(self, now: float) -> None:
+        """Abandons the exchanges that have waited too long at `now` [s]; an Explain owed no answer and is fulfilled."""
+        for exchange in self.exchanges:
+            if exchange.state is ExchangeState.OPEN and now - exchange.end > self.patience:
+                optional = exchange.move is DialogueMove.EXPLAIN and not exchange.confused
+                exchange.state = ExchangeState.FULFILLED if optional else ExchangeState.ABANDONED
+
+    def open(self) -> list[Exchange]:
+        """Returns the exchanges that still wait for an answer, oldest first."""
+        return [exchange for exchange in self.exchanges if exchange.state is ExchangeState.OPEN]
+
+    def _initiate(self, utterance: Utterance, move: DialogueMove, opened: Exchange | None) -> Exchange:
+        if opened is not None:
+            # An Explain behind a question does not replace what the question expects.
+            if move is not DialogueMove.EXPLAIN:
+                opened.move = move
+            return opened
+        return self._begin(utterance, move)
+
+    def _respond(self, utterance: Utterance, move: DialogueMove) -> Exchange:
+        exchange = self._awaiting(utterance, move)
+        if exchange is not None:
+            self._settle(exchange, utterance.speaker, move)
+            return exchange
+        last = self.exchanges[-1] if self.exchanges else None
+        if last is not None and utterance.start - last.end <= self.patience:
+            return last
+        exchange = self._begin(utterance, move)
+        exchange.unprompted = True
+        exchange.state = ExchangeState.FULFILLED
+        return exchange
+
+    def _awaiting(self, utterance: Utterance, move: DialogueMove) -> Exchange | None:
+        """Returns the latest exchange that `move` fits and that was still alive when the utterance began."""
+        for exchange in reversed(self.exchanges):
+            # `tick` may have given an exchange up while its answer was already in the air: the start decides.
+            in_time = utterance.start - exchange.end <= self.patience
+            if exchange.state is not ExchangeState.FULFILLED and in_time and exchange.accepts(utterance.speaker, move):
+                return exchange
+        return None
+
+    def _settle(self, exchange: Exchange, speaker: Role, move: DialogueMove) -> None:
+        if move is DialogueMove.CONFUSE:
+            exchange.confused = True
+        elif speaker is exchange.initiator:
+            exchange.confused = False
+        else:
+            exchange.confused = False
+            exchange.state = ExchangeState.FULFILLED
+            return
+        exchange.state = ExchangeState.OPEN
+
+    def _begin(self, utterance: Utterance, move: DialogueMove) -> Exchange:
+        exchange = Exchange(len(self.exchanges), utterance.speaker, move, utterance.start, utterance.end)
+        self.exchanges.append(exchange)
+        return exchange

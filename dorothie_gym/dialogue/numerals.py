@@ -1,0 +1,73 @@
+"""Numbers as people say them: cardinals below a thousand and the first few ordinals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+_ONES = (
+    "zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen seventeen "
+    "eighteen nineteen"
+).split()
+_TENS = "zero ten twenty thirty forty fifty sixty seventy eighty ninety".split()
+_ORDINALS = "zeroth first second third fourth fifth sixth seventh eighth ninth".split()
+_DIGIT_ORDINALS = {"1st": 1, "2nd": 2, "3rd": 3, "4th": 4, "5th": 5, "6th": 6, "7th": 7, "8th": 8, "9th": 9}
+_UNITS = {word: number for number, word in enumerate(_ONES)}
+_ROUND = {word: 10 * number for number, word in enumerate(_TENS) if number > 1}
+
+
+def cardinal(number: int) -> str:
+    """Returns the words for a whole number, e.g. 25 -> "twenty-five"; digits from 1000 on.
+
+    Raises:
+        ValueError: if `number` is negative.
+    """
+    if number < 0:
+        raise ValueError(f"number must not be negative, not {number}")
+    if number < 20:
+        return _ONES[number]
+    if number < 100:
+        tens, ones = divmod(number, 10)
+        return _TENS[tens] + (f"-{_ONES[ones]}" if ones else "")
+    if number < 1000:
+        hundreds, rest = divmod(number, 100)
+        return f"{_ONES[hundreds]} hundred" + (f" {cardinal(rest)}" if rest else "")
+    return str(number)
+
+
+def ordinal(number: int) -> str:
+    """Returns the word for a place in a row, e.g. 2 -> "second"; 1 to 9.
+
+    Raises:
+        ValueError: if `number` is not within 1 to 9.
+    """
+    if not 1 <= number < len(_ORDINALS):
+        raise ValueError(f"ordinal must be 1 to 9, not {number}")
+    return _ORDINALS[number]
+
+
+def read_ordinal(word: str) -> int | None:
+    """Returns the place that a word names ("next", "first", "2nd"), or None."""
+    if word == "next":
+        return 1
+    if word in _DIGIT_ORDINALS:
+        return _DIGIT_ORDINALS[word]
+    return _ORDINALS.index(word) if word in _ORDINALS[1:] else None
+
+
+def read_cardinals(words: Sequence[str]) -> list[int]:
+    """Returns the numbers spoken in a row of lower-case words, in order ("twenty five" -> 25, "30" -> 30)."""
+    found: list[int] = []
+    current: int | None = None
+    for word in (*words, ""):
+        value = _UNITS.get(word, _ROUND.get(word))
+        if word.isdecimal() and len(word) < 6:
+            value = int(word)
+        if value is not None and current is not None and current % 10 == 0 and 0 < value < (current % 100 or 100):
+            current += value
+        elif word == "hundred" and current is not None and 0 < current < 10:
+            current *= 100
+        else:
+            if current is not None:
+                found.append(current)
+            current = value
+    return found

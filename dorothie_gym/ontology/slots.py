@@ -1,0 +1,186 @@
+"""The slots of a dialogue act and the values that each may take; ids as in SDN."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import Enum
+from types import MappingProxyType
+from typing import Self, TypeAlias
+
+from dorothie_gym.ontology.labelled import LabelledInt
+
+ARRIVAL_DISTANCE = 2.0
+"""A subgoal is reached when the car stops within this distance of the landmark's waypoint [m]."""
+
+
+class Slot(LabelledInt):
+    """A parameter of a dialogue act."""
+
+    NULL = 0, "Null"
+    ACTION = 1, "Action"
+    STREET = 2, "Street"
+    LANDMARK = 3, "Landmark"
+    STATUS = 4, "Status"
+    OBJECT = 5, "Object"
+
+
+class SlotEnum(Enum):
+    """What the five enums of slot values share. Not an IntEnum: values of different slots are never equal.
+
+    Attributes:
+        label: the spelling in SDN.
+    """
+
+    label: str
+
+    # The default is never used by a member: it lets type checkers accept the look-up by number, `Enum(3)`.
+    def __new__(cls, value: int, label: str = "") -> Self:
+        """Makes a member from its number and its spelling."""
+        member = object.__new__(cls)
+        member._value_ = value
+        member.label = label
+        return member
+
+    # Enum hashes the member's name, which Python salts anew in each process: sets would print in another order.
+    def __hash__(self) -> int:
+        """Returns a number that is the same in every process."""
+        return 32 * self.slot.value + int(self.value)
+
+    @property
+    def slot(self) -> Slot:
+        """The slot that the value fills."""
+        raise NotImplementedError
+
+
+class ActionValue(SlotEnum):
+    """Values of Slot.ACTION; ids 1 to 8 are those of `PhysicalAction`."""
+
+    UNKNOWN = 0, "Unknown"
+    LANE_FOLLOW = 1, "LaneFollow"
+    LANE_SWITCH = 2, "LaneSwitch"
+    U_TURN = 3, "UTurn"
+    J_TURN = 4, "JTurn"
+    STOP = 5, "Stop"
+    START = 6, "Start"
+    SPEED_CHANGE = 7, "SpeedChange"
+    LIGHT_CHANGE = 8, "LightChange"
+    QUERIED = 9, "Queried"
+
+    @property
+    def slot(self) -> Slot:
+        """The slot that the value fills."""
+        return Slot.ACTION
+
+
+class StreetName(SlotEnum):
+    """Values of Slot.STREET."""
+
+    UNKNOWN = 0, "Unknown"
+    BAITS = 1, "Baits"
+    BEAL = 2, "Beal"
+    BISHOP = 3, "Bishop"
+    BONISTEEL = 4, "Bonisteel"
+    BROADWAY = 5, "Broadway"
+    DIVISION = 6, "Division"
+    DRAPER = 7, "Draper"
+    DUFFIELD = 8, "Duffield"
+    FULLER = 9, "Fuller"
+    HAYWARD = 10, "Hayward"
+    HUBBARD = 11, "Hubbard"
+    MURFIN = 12, "Murfin"
+    PLYMOUTH = 13, "Plymouth"
+    UPLAND = 14, "Upland"
+    QUERIED = 15, "Queried"
+    HIGHWAY = 16, "Highway"
+
+    @property
+    def slot(self) -> Slot:
+        """The slot that the value fills."""
+        return Slot.STREET
+
+
+class LandmarkName(SlotEnum):
+    """Values of Slot.LANDMARK."""
+
+    UNKNOWN = 0, "Unknown"
+    BURGER_KING = 1, "BurgerKing"
+    COCO = 2, "Coco"
+    IKEA = 3, "Ikea"
+    KFC = 4, "KFC"
+    PANERA = 5, "Panera"
+    QDOBA = 6, "Qdoba"
+    SEVEN_ELEVEN = 7, "SevenEleven"
+    SHELL = 8, "Shell"
+    HOUSE = 9, "House"
+    PERSON = 10, "Person"
+    QUERIED = 11, "Queried"
+
+    @property
+    def slot(self) -> Slot:
+        """The slot that the value fills."""
+        return Slot.LANDMARK
+
+
+class GoalStatus(SlotEnum):
+    """Values of Slot.STATUS, and how far a subgoal has got."""
+
+    UNKNOWN = 0, "Unknown"
+    ONGOING = 1, "Ongoing"
+    COMPLETE = 2, "Complete"
+    ABANDONED = 3, "Abandoned"
+    PENDING = 4, "Pending"
+    QUERIED = 5, "Queried"
+
+    @property
+    def slot(self) -> Slot:
+        """The slot that the value fills."""
+        return Slot.STATUS
+
+
+class ObjectClass(SlotEnum):
+    """Values of Slot.OBJECT: the semantic classes of CARLA's cameras, and Queried."""
+
+    UNLABELED = 0, "Unlabeled"
+    BUILDING = 1, "Building"
+    FENCE = 2, "Fence"
+    OTHER = 3, "Other"
+    PEDESTRIAN = 4, "Pedestrian"
+    POLE = 5, "Pole"
+    ROAD_LINE = 6, "RoadLine"
+    ROAD = 7, "Road"
+    SIDE_WALK = 8, "SideWalk"
+    VEGETATION = 9, "Vegetation"
+    VEHICLES = 10, "Vehicles"
+    WALL = 11, "Wall"
+    TRAFFIC_SIGN = 12, "TrafficSign"
+    SKY = 13, "Sky"
+    GROUND = 14, "Ground"
+    BRIDGE = 15, "Bridge"
+    RAIL_TRACK = 16, "RailTrack"
+    GUARD_RAIL = 17, "GuardRail"
+    TRAFFIC_LIGHT = 18, "TrafficLight"
+    STATIC = 19, "Static"
+    DYNAMIC = 20, "Dynamic"
+    WATER = 21, "Water"
+    TERRAIN = 22, "Terrain"
+    QUERIED = 23, "Queried"
+
+    @property
+    def slot(self) -> Slot:
+        """The slot that the value fills."""
+        return Slot.OBJECT
+
+
+SlotValue: TypeAlias = ActionValue | StreetName | LandmarkName | GoalStatus | ObjectClass
+
+SLOT_VALUES: Mapping[Slot, tuple[SlotValue, ...]] = MappingProxyType(
+    {
+        Slot.NULL: (),
+        Slot.ACTION: tuple(ActionValue),
+        Slot.STREET: tuple(StreetName),
+        Slot.LANDMARK: tuple(LandmarkName),
+        Slot.STATUS: tuple(GoalStatus),
+        Slot.OBJECT: tuple(ObjectClass),
+    }
+)
+"""The values of each slot, by id; Null has none."""

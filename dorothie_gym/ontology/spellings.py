@@ -1,0 +1,184 @@
+"""Reading the vocabularies from text, in our spelling and in every spelling that SDN files are known to use.
+
+Case, spaces and punctuation never count, so only words that differ are listed as aliases here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import Protocol, TypeVar
+
+from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
+from dorothie_gym.ontology.acts import DialogueAct
+from dorothie_gym.ontology.errors import OntologyError
+from dorothie_gym.ontology.exceptions import ExceptionKind, Sensor
+from dorothie_gym.ontology.moves import DialogueMove
+from dorothie_gym.ontology.props import PropKind
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import (
+    ActionValue,
+    GoalStatus,
+    LandmarkName,
+    ObjectClass,
+    Slot,
+    SlotValue,
+    StreetName,
+)
+from dorothie_gym.ontology.vocabulary import Vocabulary, normalise
+from dorothie_gym.ontology.weather import WeatherParameter
+
+
+class _Labelled(Protocol):
+    label: str
+
+
+_Member = TypeVar("_Member", bound=_Labelled)
+
+
+def _labelled(
+    name: str, members: Iterable[_Member], aliases: Mapping[str, _Member] | None = None
+) -> Vocabulary[_Member]:
+    """Returns the vocabulary of the members' labels and the aliases."""
+    return Vocabulary(name, [*((member.label, member) for member in members), *(aliases or {}).items()])
+
+
+_MOVES = _labelled("dialogue move", DialogueMove)
+_SLOTS = _labelled("slot", Slot, {"StreetName": Slot.STREET})
+_ACTION_VALUES = _labelled("value of slot Action", ActionValue)
+_STREETS = _labelled("value of slot Street", StreetName)
+_LANDMARKS = _labelled("value of slot Landmark", LandmarkName)
+_STATUSES = _labelled("value of slot Status", GoalStatus, {"Completed": GoalStatus.COMPLETE})
+_OBJECTS = _labelled("value of slot Object", ObjectClass, {"Vehicle": ObjectClass.VEHICLES})
+_PHYSICAL_ACTIONS = _labelled("physical action", PhysicalAction)
+_MENTAL_ACTIONS = _labelled("mental action", MentalAction, {"LandmarkUpdate": MentalAction.KNOWLEDGE_UPDATE})
+_EXCEPTIONS = _labelled(
+    "exception",
+    ExceptionKind,
+    # The types of rows in SDN's ad_wizardlog.csv.
+    {
+        "set_weather": ExceptionKind.WEATHER,
+        "make_cars": ExceptionKind.SPAWN_VEHICLES,
+        "make_peds": ExceptionKind.SPAWN_PEDESTRIANS,
+        "prop_create": ExceptionKind.PLACE_PROP,
+    },
+)
+_ROLES = Vocabulary("role", [(name, role) for role in Role for name in (role.value, *role.sdn_names)])
+_WEATHER = Vocabulary("weather parameter", [(parameter.value, parameter) for parameter in WeatherParameter])
+_PROPS = Vocabulary("prop", [(name, kind) for kind in PropKind for name in (kind.value, kind.blueprint)])
+_SENSORS = Vocabulary("sensor", [(sensor.value, sensor) for sensor in Sensor])
+
+
+def parse_role(text: str) -> Role:
+    """Returns the role that `text` names; raises OntologyError if none."""
+    return _ROLES.parse(text)
+
+
+def parse_move(text: str) -> DialogueMove:
+    """Returns the dialogue move that `text` spells; raises OntologyError if none."""
+    return _MOVES.parse(text)
+
+
+def parse_slot(text: str) -> Slot:
+    """Returns the slot that `text` spells; raises OntologyError if none."""
+    return _SLOTS.parse(text)
+
+
+def parse_action_value(text: str) -> ActionValue:
+    """Returns the value of Slot.ACTION that `text` spells; raises OntologyError if none."""
+    return _ACTION_VALUES.parse(text)
+
+
+def parse_street(text: str) -> StreetName:
+    """Returns the street that `text` spells; raises OntologyError if none."""
+    return _STREETS.parse(text)
+
+
+def parse_landmark(text: str) -> LandmarkName:
+    """Returns the landmark that `text` spells; raises OntologyError if none."""
+    return _LANDMARKS.parse(text)
+
+
+def parse_goal_status(text: str) -> GoalStatus:
+    """Returns the goal status that `text` spells; raises OntologyError if none."""
+    return _STATUSES.parse(text)
+
+
+def parse_object_class(text: str) -> ObjectClass:
+    """Returns the class of objects that `text` spells; raises OntologyError if none."""
+    return _OBJECTS.parse(text)
+
+
+def parse_physical_action(text: str) -> PhysicalAction:
+    """Returns the physical action that `text` spells; raises OntologyError if none."""
+    return _PHYSICAL_ACTIONS.parse(text)
+
+
+def parse_mental_action(text: str) -> MentalAction:
+    """Returns the mental action that `text` spells; raises OntologyError if none."""
+    return _MENTAL_ACTIONS.parse(text)
+
+
+def parse_exception(text: str) -> ExceptionKind:
+    """Returns the kind of exception that `text` spells; raises OntologyError if none."""
+    return _EXCEPTIONS.parse(text)
+
+
+def parse_sensor(text: str) -> Sensor:
+    """Returns the sensor that `text` spells; raises OntologyError if none."""
+    return _SENSORS.parse(text)
+
+
+def parse_weather_parameter(text: str) -> WeatherParameter:
+    """Returns the weather parameter that `text` spells; raises OntologyError if none."""
+    return _WEATHER.parse(text)
+
+
+def parse_prop(text: str) -> PropKind:
+    """Returns the kind of prop that `text` spells, as a name or as CARLA's blueprint; raises OntologyError if none."""
+    return _PROPS.parse(text)
+
+
+_VALUES: Mapping[Slot, Vocabulary[SlotValue]] = MappingProxyType(
+    {
+        Slot.ACTION: _ACTION_VALUES,
+        Slot.STREET: _STREETS,
+        Slot.LANDMARK: _LANDMARKS,
+        Slot.STATUS: _STATUSES,
+        Slot.OBJECT: _OBJECTS,
+    }
+)
+
+
+def parse_slot_value(slot: Slot, text: str) -> SlotValue:
+    """Returns the value of `slot` that `text` spells.
+
+    Raises:
+        OntologyError: `text` spells none, or `slot` is Null, which has no values.
+    """
+    if slot not in _VALUES:
+        raise OntologyError(f"value of slot {slot.label}: {text!r} is unknown; the slot has no values")
+    return _VALUES[slot].parse(text)
+
+
+def parse_act(move: str, slots: Mapping[str, Iterable[str] | str | None] | None = None) -> DialogueAct:
+    """Returns the act of a move and its slots, both in SDN's spelling.
+
+    Args:
+        move: spelling of the move.
+        slots: the values of each slot: several, one as a plain text, or none. Null and empty texts count as no value.
+
+    Raises:
+        OntologyError: a move, slot or value is unknown.
+    """
+    values: list[SlotValue] = []
+    for slot_text, given in (slots or {}).items():
+        slot = parse_slot(slot_text)
+        texts = () if given is None else (given,) if isinstance(given, str) else given
+        values.extend(parse_slot_value(slot, text) for text in texts if not _is_blank(text))
+    return DialogueAct.of(parse_move(move), *values)
+
+
+def _is_blank(text: object) -> bool:
+    """Whether a file means "no value" by `text`."""
+    return text is None or (isinstance(text, str) and normalise(text) in ("", "null"))

@@ -1,0 +1,60 @@
+"""Sessions: what happened, written as it happens, read by everything else."""
+
+from dorothie_gym.sessions.corpus import load_readable, load_sessions, session_folders, split_by_name
+from dorothie_gym.sessions.errors import SessionError
+from dorothie_gym.sessions.events import FRAME_RATE, Event, EventType
+from dorothie_gym.sessions.header import FORMAT_VERSION, LandmarkRow, SessionHeader, SubgoalRow
+from dorothie_gym.sessions.points import (
+    CarState,
+    DecisionPoint,
+    InferencePoint,
+    Point,
+    Task,
+    View,
+    final_view,
+    history_angle,
+    nfd_points,
+    rfn_points,
+    task_points,
+    ufn_points,
+)
+from dorothie_gym.sessions.records import ActionRecord, MoveRecord, UtteranceRecord
+from dorothie_gym.sessions.session import Session
+from dorothie_gym.sessions.trajectory import TRAJECTORY_COLUMNS, TRAJECTORY_DTYPE, Trajectory, trajectory_of
+from dorothie_gym.sessions.writer import SessionWriter
+
+__all__ = [
+    "ActionRecord",
+    "CarState",
+    "DecisionPoint",
+    "Event",
+    "EventType",
+    "FORMAT_VERSION",
+    "FRAME_RATE",
+    "InferencePoint",
+    "LandmarkRow",
+    "MoveRecord",
+    "Point",
+    "Session",
+    "SessionError",
+    "SessionHeader",
+    "SessionWriter",
+    "SubgoalRow",
+    "TRAJECTORY_COLUMNS",
+    "TRAJECTORY_DTYPE",
+    "Task",
+    "Trajectory",
+    "UtteranceRecord",
+    "View",
+    "final_view",
+    "history_angle",
+    "load_readable",
+    "load_sessions",
+    "nfd_points",
+    "rfn_points",
+    "session_folders",
+    "split_by_name",
+    "task_points",
+    "trajectory_of",
+    "ufn_points",
+]

@@ -1,0 +1,66 @@
+"""What happens in a session, one event at a time."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from dorothie_gym.ontology import Role
+
+FRAME_RATE = 30
+"""Frames a second of physics and of a recording (paper, appendix B.2)."""
+
+
+class EventType(enum.StrEnum):
+    """Kinds of events and what their `data` holds (JSON types only)."""
+
+    DIALOGUE_MOVE = "DialogueMove"
+    """One act: utterance (number), text (of the whole utterance), span (this act's words), move, slots
+    ({slot label: [value labels]}), exchange (number), start and end [s]."""
+    PHYSICAL_ACTION = "PhysicalAction"
+    """Of the Co-Wizard, that changed something: action (label), angle (degrees, positive left, or null), up (or null)."""
+    BELIEF_UPDATE = "BeliefUpdate"
+    """Mental action: action (label) and its arguments (junctions, landmarks, landmark, status, x, y)."""
+    EXCEPTION = "Exception"
+    """Of the Ad-Wizard, that took effect: kind (lower-case name) and its arguments."""
+    MESSAGE = "Message"
+    """From the Ad-Wizard to the participant: text."""
+    REFUSAL = "Refusal"
+    """A well-formed action that was not carried out: action, reason."""
+    HAZARD_STOP = "HazardStop"
+    """The car begins to brake for something ahead: reason (object class label), distance [m]."""
+    HAZARD_END = "HazardEnd"
+    """The car goes on: reason, seconds."""
+    SUBGOAL = "Subgoal"
+    """A subgoal changes: subgoal (number), landmark (label), status (label), and cause (arrival, trigger, ...)."""
+    COLLISION = "Collision"
+    """The car touches something: other (class label), own_fault (bool), speed [m/s]."""
+    END = "End"
+    """The session is over: success (bool), reason."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Event:
+    """Something that happened.
+
+    Attributes:
+        frame: physics frame at 30 Hz at which it happened (a dialogue move: at which its utterance was over).
+        type: kind of event.
+        source: who did it; the car itself is `Role.AGENT`.
+        flagged: whether it is a point of the benchmark (dialogue moves of the participant and the Co-Wizard,
+            navigation actions of the Co-Wizard).
+        data: JSON-able details, see `EventType`.
+    """
+
+    frame: int
+    type: EventType
+    source: Role
+    flagged: bool = False
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def time(self) -> float:
+        """Seconds since the start of the session."""
+        return self.frame / FRAME_RATE

@@ -1,0 +1,221 @@
+"""The points of the three tasks, each with exactly what may be seen there (teacher forcing).
+
+Visible is what was recorded on frames strictly before the point. At a UfN point, in addition, the words of the
+utterance and the acts of its earlier spans; at an RfN point no act of the point's own utterance, which would give its
+words away. Hidden landmarks, which the car does not know, are never visible.
+"""
+
+from __future__ import annotations
+
+import bisect
+import enum
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from dorothie_gym.ontology import NAVIGATION_ACTIONS, U_TURN_ANGLE, ArgumentKind, DialogueAct, PhysicalAction, Role
+from dorothie_gym.sessions.events import FRAME_RATE
+from dorothie_gym.sessions.header import LandmarkRow
+from dorothie_gym.sessions.records import ActionRecord, MoveRecord
+from dorothie_gym.sessions.session import Session
+
+
+class Task(enum.StrEnum):
+    """What is to be predicted (paper, section 5)."""
+
+    UFN = "ufn"
+    """Understanding from navigation: the act of what the participant says."""
+    RFN = "rfn"
+    """Response from navigation: the act of what the Co-Wizard says next."""
+    NFD = "nfd"
+    """Navigation from dialogue: the next navigation action and its angle."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CarState:
+    """The car in one frame: place [m], heading [rad, clockwise], speed [m/s]."""
+
+    frame: int
+    x: float
+    y: float
+    heading: float
+    speed: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """What may be seen at a point: all that a model is given.
+
+    Attributes:
+        task: what is to be predicted.
+        session: name of the session.
+        frame: frame of the point.
+        time: the same in seconds.
+        moves: past dialogue moves of both speakers, oldest first.
+        actions: past physical actions, oldest first.
+        car: the last recorded state of the car; None before the first.
+        utterance: words of the current utterance at a UfN point, else empty.
+        street_names: label of each street's name.
+        landmarks: those that are not hidden.
+    """
+
+    task: Task
+    session: str
+    frame: int
+    time: float
+    moves: tuple[MoveRecord, ...]
+    actions: tuple[ActionRecord, ...]
+    car: CarState | None
+    utterance: str
+    street_names: tuple[str, ...]
+    landmarks: tuple[LandmarkRow, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class InferencePoint:
+    """A dialogue move to be predicted (UfN, RfN): `index` of its event, what may be seen, and the label."""
+
+    index: int
+    view: View
+    act: DialogueAct
+
+
+@dataclass(frozen=True, kw_only=True)
+class DecisionPoint:
+    """A navigation action to be predicted (NfD).
+
+    Attributes:
+        index: number of its event.
+        view: what may be seen.
+        action: the label.
+        angle: its argument [degrees, positive left, in [-180, 180)]: 0 for actions that take none, NaN where the
+            recording does not know it.
+    """
+
+    index: int
+    view: View
+    action: PhysicalAction
+    angle: float
+
+
+Point: TypeAlias = InferencePoint | DecisionPoint
+
+
+def ufn_points(session: Session) -> Iterator[InferencePoint]:
+    """Yields a point for each flagged dialogue move of the participant."""
+    yield from _inference_points(session, Task.UFN, Role.PARTICIPANT)
+
+
+def rfn_points(session: Session) -> Iterator[InferencePoint]:
+    """Yields a point for each flagged dialogue move of the Co-Wizard."""
+    yield from _inference_points(session, Task.RFN, Role.CO_WIZARD)
+
+
+def nfd_points(session: Session) -> Iterator[DecisionPoint]:
+    """Yields a point for each flagged navigation action of the Co-Wizard."""
+    history = _History(session, Task.NFD)
+    for record in session.physical_actions:
+        if record.flagged and record.source is Role.CO_WIZARD and record.action in NAVIGATION_ACTIONS:
+            yield DecisionPoint(
+                index=record.index,
+                view=history.view(record.frame),
+                action=record.action,
+                angle=_label_angle(record),
+            )
+
+
+def task_points(session: Session, task: Task) -> tuple[Point, ...]:
+    """Returns the points of a task in a session."""
+    match task:
+        case Task.UFN:
+            return tuple(ufn_points(session))
+        case Task.RFN:
+            return tuple(rfn_points(session))
+        case Task.NFD:
+            return tuple(nfd_points(session))
+
+
+def final_view(session: Session, task: Task) -> View:
+    """Returns what may be seen when the session is over: everything, and no utterance."""
+    last_frame = round(session.duration * FRAME_RATE)
+    return _History(session, task).view(last_frame + 1)
+
+
+def history_angle(record: ActionRecord) -> float:
+    """Returns the angle under which an action stands in a history [degrees]: a U-turn's is -180 (SDN), unknown is 0."""
+    if record.action is PhysicalAction.U_TURN:
+        return U_TURN_ANGLE
+    return _wrap(record.angle or 0.0)
+
+
+class _History:
+    """What was recorded before each frame of a session."""
+
+    def __init__(self, session: Session, task: Task) -> None:
+        self._session = session
+        self._task = task
+        self._moves = session.moves()
+        self._actions = session.physical_actions
+        self._move_frames = [move.frame for move in self._moves]
+        self._action_frames = [action.frame for action in self._actions]
+        self._landmarks = tuple(row for row in session.header.landmarks if not row["hidden"])
+
+    def view(self, frame: int, move: MoveRecord | None = None) -> View:
+        """The view at a frame; `move` is the one to be predicted, if it is one."""
+        moves = self._moves[: bisect.bisect_left(self._move_frames, frame)]
+        utterance = ""
+        if move is not None:
+            moves = tuple(past for past in moves if not _same_utterance(past, move))
+        if move is not None and self._task is Task.UFN:
+            utterance = move.text
+            moves += tuple(past for past in self._moves if _same_utterance(past, move) and past.index < move.index)
+        return View(
+            task=self._task,
+            session=self._session.name,
+            frame=frame,
+            time=frame / FRAME_RATE,
+            moves=moves,
+            actions=self._actions[: bisect.bisect_left(self._action_frames, frame)],
+            car=self._car(frame),
+            utterance=utterance,
+            street_names=tuple(self._session.header.street_names),
+            landmarks=self._landmarks,
+        )
+
+    def _car(self, frame: int) -> CarState | None:
+        trajectory = self._session.trajectory
+        row = int(np.searchsorted(trajectory["frame"], frame, side="left")) - 1
+        if row < 0:
+            return None
+        last = trajectory[row]
+        return CarState(
+            frame=int(last["frame"]),
+            x=float(last["x"]),
+            y=float(last["y"]),
+            heading=float(last["heading"]),
+            speed=float(last["speed"]),
+        )
+
+
+def _inference_points(session: Session, task: Task, speaker: Role) -> Iterator[InferencePoint]:
+    history = _History(session, task)
+    for move in session.moves(speaker):
+        if move.flagged:
+            yield InferencePoint(index=move.index, view=history.view(move.frame, move), act=move.act)
+
+
+def _same_utterance(one: MoveRecord, other: MoveRecord) -> bool:
+    return one.utterance == other.utterance and one.speaker is other.speaker
+
+
+def _label_angle(record: ActionRecord) -> float:
+    if record.action.argument not in (ArgumentKind.ANGLE, ArgumentKind.SIDE):
+        return 0.0
+    return math.nan if record.angle is None else _wrap(record.angle)
+
+
+def _wrap(degrees: float) -> float:
+    return (degrees + 180.0) % 360.0 - 180.0

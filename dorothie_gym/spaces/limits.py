@@ -1,0 +1,53 @@
+"""Sizes of the spaces: the same for every town, so that a policy trained in one can act in another."""
+
+from __future__ import annotations
+
+import string
+from dataclasses import dataclass, replace
+
+TEXT_CHARACTERS = string.ascii_letters + string.digits + string.punctuation + " \n"
+"""What utterances, messages and stories may be written with."""
+
+UTTERANCE_LENGTH = 160
+MESSAGE_LENGTH = 240
+STORY_LENGTH = 2400
+
+METRES = 1024
+"""Places on a lane are given in whole metres; no lane of a known town is longer than this [m]."""
+
+PERCENT = 101
+"""Steps of a quantity that the Ad-Wizard sets, as a share of its range."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpaceLimits:
+    """How many of each thing an observation or action can name.
+
+    The defaults hold the paper's four towns (at most 486 lanes, 33 junctions, 14 streets; appendix C) and ours.
+    """
+
+    lanes: int = 640
+    junctions: int = 64
+    streets: int = 32
+    landmarks: int = 16
+    subgoals: int = 8
+    objects: int = 16
+    exits: int = 8
+    waypoints: int = 20
+    spans: int = 4
+    plan: int = 12
+    props: int = 16
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if value < 1:
+                raise ValueError(f"SpaceLimits.{name} is {value}; it must be at least 1")
+
+    def grown_for(self, *, lanes: int, junctions: int, streets: int) -> SpaceLimits:
+        """The same limits, larger where a town needs it."""
+        return replace(
+            self,
+            lanes=max(self.lanes, lanes),
+            junctions=max(self.junctions, junctions),
+            streets=max(self.streets, streets),
+        )

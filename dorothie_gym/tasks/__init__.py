@@ -1,0 +1,28 @@
+"""What the participant has to do: landmarks, storyboard templates, their binding to a town, and the task's state."""
+
+from dorothie_gym.tasks.binding import bind
+from dorothie_gym.tasks.catalogue import LandmarkKind, catalogue
+from dorothie_gym.tasks.errors import StoryboardError
+from dorothie_gym.tasks.parsing import load_template, parse_template, template_names
+from dorothie_gym.tasks.state import TaskState
+from dorothie_gym.tasks.storyboard import Landmark, Place, Storyboard, Subgoal
+from dorothie_gym.tasks.templates import Dependent, StoryboardTemplate, SubgoalTemplate, Variable
+
+__all__ = [
+    "Dependent",
+    "Landmark",
+    "LandmarkKind",
+    "Place",
+    "Storyboard",
+    "StoryboardError",
+    "StoryboardTemplate",
+    "Subgoal",
+    "SubgoalTemplate",
+    "TaskState",
+    "Variable",
+    "bind",
+    "catalogue",
+    "load_template",
+    "parse_template",
+    "template_names",
+]

@@ -1,0 +1,168 @@
+"""How far a storyboard has been played: what is live, reached, deleted and changed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from dorothie_gym.ontology import GoalStatus
+from dorothie_gym.tasks.errors import StoryboardError
+from dorothie_gym.tasks.storyboard import Storyboard
+
+
+class TaskState:
+    """The task as it stands.
+
+    A subgoal is live unless it waits for its trigger or has been deleted. The last live subgoal of the storyboard's
+    list is the destination: it is reached after all others, and ends the task. A subgoal that is triggered and stands
+    behind it in the list becomes the destination in its place. `after` binds by live subgoals only.
+    """
+
+    def __init__(self, storyboard: Storyboard) -> None:
+        self.storyboard = storyboard
+        count = len(storyboard.subgoals)
+        self._waiting = [subgoal.trigger for subgoal in storyboard.subgoals]
+        self._deleted = [False] * count
+        self._changed = [False] * count
+        self._reached = [False] * count
+
+    @property
+    def live(self) -> tuple[int, ...]:
+        """Subgoals that are part of the task now, reached ones included, in the storyboard's order."""
+        return tuple(i for i, waits in enumerate(self._waiting) if not waits and not self._deleted[i])
+
+    @property
+    def destination(self) -> int:
+        """The last live subgoal."""
+        return self.live[-1]
+
+    @property
+    def done(self) -> bool:
+        """Whether the destination has been reached, which ends the task."""
+        return self._reached[self.destination]
+
+    @property
+    def success(self) -> bool:
+        """Whether every live subgoal has been reached."""
+        return all(self._reached[i] for i in self.live)
+
+    def reached(self, i: int) -> bool:
+        """Whether a subgoal has been reached."""
+        return self._reached[i]
+
+    def changed(self, i: int) -> bool:
+        """Whether a subgoal has been changed by the Ad-Wizard."""
+        return self._changed[i]
+
+    def allowed(self, i: int) -> bool:
+        """Whether stopping at its landmark would complete a subgoal now."""
+        live = self.live
+        if i not in live or self._reached[i]:
+            return False
+        before = live[:-1] if i == live[-1] else self.storyboard.subgoals[i].after
+        return all(self._reached[k] for k in before if k in live)
+
+    def status(self, i: int) -> GoalStatus:
+        """Complete (reached), Abandoned (deleted), Ongoing (may be completed now) or Pending (waits for something)."""
+        if self._reached[i]:
+            return GoalStatus.COMPLETE
+        if self._deleted[i]:
+            return GoalStatus.ABANDONED
+        return GoalStatus.ONGOING if self.allowed(i) else GoalStatus.PENDING
+
+    def landmark_of(self, i: int) -> int:
+        """Where a subgoal is now, as an index in `Storyboard.landmarks`."""
+        subgoal = self.storyboard.subgoals[i]
+        if self._changed[i] and subgoal.change_landmark is not None:
+            return subgoal.change_landmark
+        return subgoal.landmark
+
+    def description(self, i: int) -> str:
+        """What a subgoal says now."""
+        subgoal = self.storyboard.subgoals[i]
+        return subgoal.change if self._changed[i] and subgoal.change is not None else subgoal.description
+
+    def arrive(self, landmark: int) -> list[int]:
+        """The car has stopped at a landmark: completes every subgoal there that is allowed.
+
+        Args:
+            landmark: index in `Storyboard.landmarks`.
+
+        Returns:
+            The subgoals completed, in the order in which they were. One may allow the next at the same place.
+        """
+        completed: list[int] = []
+        while here := [i for i in self.live if self.landmark_of(i) == landmark and self.allowed(i)]:
+            self._reached[here[0]] = True
+            completed.append(here[0])
+        return completed
+
+    def trigger(self, i: int) -> None:
+        """Adds a subgoal that waits for its trigger; raises `StoryboardError` with the reason if it must not."""
+        self._require(i, self._refuse_trigger)
+        self._waiting[i] = False
+
+    def delete(self, i: int) -> None:
+        """Deletes a live subgoal; raises `StoryboardError` with the reason if it must not."""
+        self._require(i, self._refuse_delete)
+        self._deleted[i] = True
+
+    def change(self, i: int) -> None:
+        """Gives a live subgoal its other description and place; raises `StoryboardError` if it must not."""
+        self._require(i, self._refuse_change)
+        self._changed[i] = True
+
+    def possible_triggers(self) -> tuple[int, ...]:
+        """Subgoals that `trigger` would accept now."""
+        return self._accepted(self._refuse_trigger)
+
+    def possible_deletions(self) -> tuple[int, ...]:
+        """Subgoals that `delete` would accept now."""
+        return self._accepted(self._refuse_delete)
+
+    def possible_changes(self) -> tuple[int, ...]:
+        """Subgoals that `change` would accept now."""
+        return self._accepted(self._refuse_change)
+
+    def _accepted(self, refuse: Callable[[int], str | None]) -> tuple[int, ...]:
+        return tuple(i for i in range(len(self.storyboard.subgoals)) if refuse(i) is None)
+
+    def _require(self, i: int, refuse: Callable[[int], str | None]) -> None:
+        count = len(self.storyboard.subgoals)
+        reason = refuse(i) if 0 <= i < count else f"there is no such subgoal; use 0 to {count - 1}"
+        if reason is not None:
+            raise StoryboardError(self.storyboard.name, f"subgoals[{i}]", reason)
+
+    def _refuse_trigger(self, i: int) -> str | None:
+        if not self.storyboard.subgoals[i].trigger:
+            return "is part of the task from the start; only subgoals marked `trigger` can be triggered"
+        if not self._waiting[i]:
+            return "has been triggered already"
+        return "cannot be triggered, as the task is done" if self.done else None
+
+    def _refuse_delete(self, i: int) -> str | None:
+        subgoal = self.storyboard.subgoals[i]
+        if not subgoal.delete:
+            return "cannot be deleted, as the template does not mark it `delete`"
+        if (reason := self._not_open(i)) is not None:
+            return f"cannot be deleted, as {reason}"
+        if i == self.destination:
+            return "cannot be deleted, as it is the destination"
+        until = subgoal.delete_after_subgoal
+        if until is not None and not self._reached[until]:
+            return f"cannot be deleted before subgoal {until} is reached"
+        return None
+
+    def _refuse_change(self, i: int) -> str | None:
+        if self.storyboard.subgoals[i].change is None:
+            return "cannot be changed, as the template does not mark it `change`"
+        if (reason := self._not_open(i)) is not None:
+            return f"cannot be changed, as {reason}"
+        return "has been changed already" if self._changed[i] else None
+
+    def _not_open(self, i: int) -> str | None:
+        """Why a subgoal is no longer, or not yet, to be reached."""
+        if self._waiting[i]:
+            return "it is not part of the task yet"
+        if self._deleted[i]:
+            return "it has been deleted"
+        return "it has been reached" if self._reached[i] else None

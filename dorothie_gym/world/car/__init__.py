@@ -1,0 +1,1 @@
+"""The car: path, local planner, controller, hazard stop."""

@@ -1,0 +1,438 @@
+"""The local planner: turns physical actions into a path (paper, section 3.1).
+
+By default the car follows its lane and goes on where there is one way only. Where a lane ends at a junction with a
+choice, and no turn was asked for, the path ends there and the car waits.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from dorothie_gym.ontology import PhysicalAction
+from dorothie_gym.world.car.path import TURNING_RADIUS, Path, Piece, follow, switch, u_turn
+from dorothie_gym.world.town.model import Exit, LinkType, Town, wrap_degrees
+from dorothie_gym.world.town.oncoming import Oncoming, oncoming_lanes
+
+HORIZON = 120.0
+"""Length of path kept ahead [m]."""
+
+SWITCH_TIME = 3.0
+"""A lane switch takes about this long [s]."""
+
+MIN_SWITCH = 14.0
+"""Shortest lane switch [m]."""
+
+SWITCH_COST = 20.0
+"""Degrees by which an exit of the own lane may fit worse than that of a lane beside it and still be taken."""
+
+EXACT = 5.0
+"""An exit within this many degrees is the one that was meant."""
+
+LEAD = 1.0
+"""Room that a manoeuvre leaves to the car before it begins [m]."""
+
+LANDING = 6.0
+"""Oncoming lane left after a U-turn, so that the car stands straight before it waits at the lane's end [m]."""
+
+U_TURN_SPEED = 3.5
+"""Speed of a U-turn [m/s]."""
+
+BRAKING = 3.0
+"""Deceleration that plans count on [m/s^2]."""
+
+
+@dataclass(frozen=True)
+class _Step:
+    """A lane of the plan and how it is entered."""
+
+    lane: int
+    change: bool = False
+
+
+class LocalPlanner:
+    """Keeps the path of the car, and changes it by physical actions.
+
+    Attributes:
+        path: the present path; it is laid anew by every manoeuvre, `s` is always measured on the present one.
+        s: how far along the path the car is [m].
+        offset: its distance from the path, positive right [m].
+        held: whether the car stands by the action Stop.
+    """
+
+    def __init__(self, town: Town, lane: int, station: float) -> None:
+        self._town = town
+        self._oncoming = oncoming_lanes(town)
+        self.held = False
+        self.offset = 0.0
+        self._pending: int | None = None  # angle of the turn asked for
+        self._manoeuvre: PhysicalAction | None = None
+        self._manoeuvre_angle = 0
+        self._manoeuvre_end = 0.0
+        self._lay([_Step(lane)], station)
+
+    # --- where the car is -------------------------------------------------------------------------------------------
+
+    @property
+    def lane(self) -> int:
+        """Lane that the car counts as being on."""
+        return int(self.path.lanes[self.path.index_at(self.s)])
+
+    @property
+    def station(self) -> float:
+        """Distance along that lane [m]."""
+        k = self.path.index_at(self.s)
+        ahead = self.s - float(self.path.s[k]) if not self.path.manoeuvre[k] else 0.0
+        return float(min(self.path.stations[k] + ahead, self._town.lanes[self.lane].length))
+
+    @property
+    def height(self) -> float:
+        """Height of the road under the car [m]."""
+        return float(self.path.heights[self.path.index_at(self.s)])
+
+    @property
+    def waits_at_end(self) -> bool:
+        """Whether the path ends where a turn has to be chosen (or the map ends)."""
+        return self._open_end
+
+    @property
+    def room(self) -> float:
+        """Path left ahead of the car's middle [m]."""
+        return self.path.length - self.s
+
+    @property
+    def manoeuvre(self) -> tuple[PhysicalAction | None, int]:
+        """Manoeuvre being prepared or driven, and its angle [degrees]."""
+        return self._manoeuvre, self._manoeuvre_angle
+
+    @property
+    def lanes_ahead(self) -> list[int]:
+        """Lanes of the path from here on, each once, in order."""
+        lanes = self.path.lanes[self.path.index_at(self.s) :]
+        change = np.concatenate(([True], lanes[1:] != lanes[:-1]))
+        return [int(lane) for lane in lanes[change]]
+
+    @property
+    def in_manoeuvre(self) -> bool:
+        """Whether the car is off the centre lines: switching or turning round."""
+        return bool(self.path.manoeuvre[self.path.index_at(self.s)])
+
+    def advance(self, x: float, y: float) -> None:
+        """Takes note of where the car is now [m]."""
+        self.s, self.offset = self.path.project(x, y, self.s)
+        if self._manoeuvre is not None and self.s >= self._manoeuvre_end:
+            self._manoeuvre, self._manoeuvre_angle = None, 0
+
+    def extend(self, speed: float) -> None:
+        """Lengthens the path ahead where the way is clear; to be called once a decision, with the speed [m/s]."""
+        if self.room < HORIZON and not self._open_end:
+            self._lay_from_here(self._steps_ahead(), speed)
+
+    # --- turn options -----------------------------------------------------------------------------------------------
+
+    def exits(self) -> tuple[tuple[Exit, ...], float]:
+        """Turn options at the next junction with a choice, and the distance to it along the path [m].
+
+        While the turn for that junction is already in the plan, the options and distance are still those of that
+        junction, until the car enters it.
+        """
+        k = self.path.index_at(self.s)
+        lanes = self.path.lanes
+        for lane in self.lanes_ahead:
+            if self._town.lanes[lane].in_junction:
+                continue
+            if self._is_choice(lane):
+                last = k + int(np.flatnonzero(lanes[k:] == lane)[-1])
+                left = self._town.lanes[lane].length - float(self.path.stations[last])
+                return self._town.exits(lane), float(self.path.s[last]) + left - self.s
+        return (), 0.0
+
+    def _is_choice(self, lane: int) -> bool:
+        exits = self._town.exits(lane)
+        return len(exits) > 1 and any(way.junction_id >= 0 for way in exits)
+
+    # --- actions ----------------------------------------------------------------------------------------------------
+
+    def command(self, action: PhysicalAction, angle: int, speed: float) -> str | None:
+        """Carries out a navigation action.
+
+        Args:
+            action: one of the six navigation actions.
+            angle: degrees, positive left; for JTurn and LaneSwitch.
+            speed: of the car [m/s].
+
+        Returns:
+            None, or the reason why nothing was changed.
+        """
+        if action is PhysicalAction.STOP:
+            if self.held:
+                return "the car is stopped already"
+            self.held = True
+            return None
+        if action is PhysicalAction.START:
+            if not self.held:
+                return "the car is not stopped"
+            self.held = False
+            return None
+        handlers = {
+            PhysicalAction.LANE_FOLLOW: self._follow_lane,
+            PhysicalAction.LANE_SWITCH: self._switch_lane,
+            PhysicalAction.U_TURN: self._turn_round,
+            PhysicalAction.J_TURN: self._turn,
+        }
+        if action not in handlers:
+            return f"{action.label} is no navigation action"
+        reason = handlers[action](angle, speed)
+        if reason is None:
+            self.held = False
+        return reason
+
+    def _follow_lane(self, angle: int, speed: float) -> str | None:
+        if self.in_manoeuvre or self._town.lanes[self.lane].in_junction:
+            return None if self.held else "the car is in the middle of a manoeuvre"
+        if self._manoeuvre is None and not self.held:
+            return "the car follows its lane already"
+        self._clear()
+        self._lay([_Step(self.lane)], self.station)
+        return None
+
+    def _switch_lane(self, angle: int, speed: float) -> str | None:
+        if angle == 0:
+            return "a lane switch needs a side: a positive angle is left, a negative one right"
+        side = LinkType.LANE_CHANGE_LEFT if angle > 0 else LinkType.LANE_CHANGE_RIGHT
+        name = "left" if angle > 0 else "right"
+        if self.in_manoeuvre or self._town.lanes[self.lane].in_junction:
+            return "the car is in the middle of a manoeuvre"
+        target = self._town.neighbour(self.lane, side)
+        if target is None:
+            return f"there is no lane to the {name}"
+        if self._town.lanes[self.lane].length - self.station < MIN_SWITCH + LEAD:
+            return f"there is no room left to switch to the {name}"
+        self._clear()
+        self._manoeuvre, self._manoeuvre_angle = PhysicalAction.LANE_SWITCH, 90 if angle > 0 else -90
+        self._lay([_Step(self.lane), _Step(target, change=True)], self.station, speed)
+        return None
+
+    def _turn_round(self, angle: int, speed: float) -> str | None:
+        if self.in_manoeuvre or self._town.lanes[self.lane].in_junction:
+            return "the car is in the middle of a manoeuvre"
+        lane = self._town.lanes[self.lane]
+        begin = self.station + LEAD * (speed > 0.5) + max(0.0, speed**2 - U_TURN_SPEED**2) / (2 * BRAKING)
+        oncoming = self._oncoming.at(self.lane, min(begin, lane.length))
+        if oncoming is not None:
+            # just behind a junction: go on a little, so that the turn ends before the oncoming lane does
+            short = LANDING - (self._town.lanes[oncoming.lane].length - oncoming.station)
+            if short > 0.0:
+                begin += short
+                oncoming = self._oncoming.at(self.lane, min(begin, lane.length))
+        if oncoming is None:
+            if self._town.neighbour(self.lane, LinkType.LANE_CHANGE_LEFT) is not None:
+                return "a U-turn begins on the leftmost lane"
+            return "there is no oncoming lane beside this one"
+        if begin > lane.length + 0.5:
+            return "there is no room left to turn round"
+        self._clear()
+        self._manoeuvre = PhysicalAction.U_TURN
+        self._lay_u_turn(oncoming, min(begin, lane.length))
+        return None
+
+    def _turn(self, angle: int, speed: float) -> str | None:
+        found = self._find_turn(angle, speed)
+        if found is None:
+            return "there is no junction with a choice ahead"
+        steps, way = found
+        same = self._manoeuvre is PhysicalAction.J_TURN and self._chosen == (way.connector, way.lane)
+        if same and not self.held:
+            return "the car is about to take that turn already"
+        self._clear()
+        self._manoeuvre, self._manoeuvre_angle = PhysicalAction.J_TURN, way.angle
+        self._chosen = (way.connector, way.lane)
+        self._lay_from_here(steps, speed)
+        return None
+
+    def _clear(self) -> None:
+        self._manoeuvre, self._manoeuvre_angle, self._chosen = None, 0, (-1, -1)
+
+    _chosen: tuple[int, int] = (-1, -1)
+
+    def _find_turn(self, angle: int, speed: float) -> tuple[list[_Step], Exit] | None:
+        """Lanes to the exit that fits the angle best, changing lanes before the junction if that fits much better."""
+        first = self._current_steps()
+        own = first[-1].lane
+        if not self._is_choice(own):
+            # where the lane itself leads on as asked, it is kept to its end: a lane is changed further on, if at all
+            fits = [way for way in self._town.exits(own) if abs(wrap_degrees(way.angle - angle)) <= EXACT]
+            if fits:
+                first = [*first, _Step(fits[0].connector), *self._onward(fits[0])]
+        best: tuple[float, list[_Step], Exit] | None = None
+        # lanes that go on are looked at before lanes beside, so that a lane is changed as late as there is room for it
+        queue: deque[tuple[list[_Step], int]] = deque([(first, 0)])
+        seen = {first[-1].lane}
+        while queue:
+            steps, changes = queue.popleft()
+            lane = steps[-1].lane
+            if self._is_choice(lane):
+                for way in self._town.exits(lane):
+                    misfit = abs(wrap_degrees(way.angle - angle)) + SWITCH_COST * changes
+                    if best is None or misfit < best[0]:
+                        best = (misfit, [*steps, _Step(way.connector), *self._onward(way)], way)
+            else:
+                on = self._default_successor(lane)
+                if on is not None and on not in seen:
+                    seen.add(on)
+                    queue.appendleft(([*steps, _Step(on)], changes))
+            for side in (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT):
+                beside = self._town.neighbour(lane, side)
+                if beside is not None and beside not in seen and self._room_to_switch(steps) and changes < 3:
+                    seen.add(beside)
+                    queue.append(([*steps, _Step(beside, change=True)], changes + 1))
+        return None if best is None else (best[1], best[2])
+
+    def _onward(self, way: Exit) -> list[_Step]:
+        """Connectors and lane from the entered one to the exit's lane."""
+        steps, lane = [], way.connector
+        while lane != way.lane:
+            lane = self._town.successors(lane)[0].target
+            steps.append(_Step(lane))
+        return steps
+
+    def _room_to_switch(self, steps: list[_Step]) -> bool:
+        lane = self._town.lanes[steps[-1].lane]
+        changes = 1
+        for step in reversed(steps):
+            if not step.change:
+                break
+            changes += 1
+        first = steps[-changes] if changes <= len(steps) else steps[0]
+        start = self.station if first.lane == self.lane else 0.0
+        return lane.length - start >= changes * (MIN_SWITCH + LEAD) and not lane.in_junction
+
+    # --- laying the path --------------------------------------------------------------------------------------------
+
+    def _current_steps(self) -> list[_Step]:
+        """The plan up to where the next choice may be changed: the present lane, or the rest of a manoeuvre."""
+        lane = self.lane
+        if not self._town.lanes[lane].in_junction:
+            return [_Step(lane)]
+        steps = [_Step(lane)]
+        while self._town.lanes[steps[-1].lane].in_junction:
+            on = self._default_successor(steps[-1].lane)
+            if on is None:
+                break
+            steps.append(_Step(on))
+        return steps
+
+    def _steps_ahead(self) -> list[_Step]:
+        steps = [_Step(lane) for lane in self.lanes_ahead]
+        for k in range(1, len(steps)):
+            beside = (
+                self._town.neighbour(steps[k - 1].lane, LinkType.LANE_CHANGE_LEFT),
+                self._town.neighbour(steps[k - 1].lane, LinkType.LANE_CHANGE_RIGHT),
+            )
+            if steps[k].lane in beside:
+                steps[k] = _Step(steps[k].lane, change=True)
+        return steps
+
+    def _default_successor(self, lane: int) -> int | None:
+        """The lane that follows without being asked: the only one, or outside junctions the straightest."""
+        exits = self._town.exits(lane)
+        if not exits or self._is_choice(lane):
+            return None
+        return min(exits, key=lambda way: (abs(way.angle), way.connector)).connector
+
+    def _grow(self, steps: list[_Step], ahead: float) -> bool:
+        """Adds the lanes that follow until there is path enough; tells whether the path has an open end."""
+        while ahead < HORIZON:
+            on = self._default_successor(steps[-1].lane)
+            if on is None:
+                return True
+            steps.append(_Step(on))
+            ahead += self._town.lanes[on].length
+        return False
+
+    def _lay(self, steps: list[_Step], station: float, speed: float = 0.0, head: list[Piece] | None = None) -> None:
+        """Lays the path anew: `steps[0]` from `station` on, behind the pieces of `head`."""
+        steps = list(steps)
+        pieces = list(head or [])
+        lengths = [self._town.lanes[step.lane].length for step in steps if not step.change]
+        self._open_end = self._grow(steps, sum(lengths) - station)
+        at = station
+        for k, step in enumerate(steps):
+            lane = self._town.lanes[step.lane]
+            following = steps[k + 1] if k + 1 < len(steps) else None
+            if following is None or not following.change:
+                if at < lane.length - 1e-3:
+                    pieces.append(follow(lane, at))
+                at = 0.0
+                continue
+            target = self._town.lanes[following.lane]
+            changes = 1
+            while k + 1 + changes < len(steps) and steps[k + 1 + changes].change:
+                changes += 1
+            room = max((lane.length - at) / changes - LEAD, 2.0)
+            distance = min(max(MIN_SWITCH, SWITCH_TIME * speed), room)
+            begin = min(at + LEAD, lane.length - distance)
+            if begin > at + 1e-3:
+                pieces.append(follow(lane, at, begin))
+            pieces.append(switch(lane, target, max(begin, at), distance))
+            at = float(pieces[-1].stations[-1])
+        self._set_path(pieces)
+
+    def _lay_from_here(self, steps: list[_Step], speed: float = 0.0) -> None:
+        """Lays the path anew from the car's place, keeping the rest of a lane switch or U-turn under way."""
+        head, station = self._under_way()
+        self._lay(steps, station, speed, head)
+
+    def _under_way(self) -> tuple[list[Piece], float]:
+        k = self.path.index_at(self.s)
+        if not self.path.manoeuvre[k]:
+            return [], self.station
+        end = k + int(np.argmin(self.path.manoeuvre[k:])) if not self.path.manoeuvre[k:].all() else len(self.path.s)
+        cut = slice(k, end)
+        piece = Piece(
+            lane=self.lane,
+            points=self.path.points[cut],
+            heights=self.path.heights[cut],
+            stations=self.path.stations[cut],
+            limit=float(self.path.limits[k]),
+            manoeuvre=True,
+        )
+        if len(piece.points) < 2:
+            return [], self.station
+        return [piece], float(self.path.stations[end - 1])
+
+    def _lay_u_turn(self, oncoming: Oncoming, begin: float) -> None:
+        lane, target = self._town.lanes[self.lane], self._town.lanes[oncoming.lane]
+        head: list[Piece] = []
+        if begin > self.station + 1e-3:
+            head.append(follow(lane, self.station, begin))
+        head.append(u_turn(lane, target, begin, TURNING_RADIUS))
+        landing = min(oncoming.station + 0.5, target.length)
+        self._lay([_Step(target.id)], landing, head=head)
+
+    def _set_path(self, pieces: list[Piece]) -> None:
+        if not pieces:  # the very end of a lane: its last half metre
+            lane = self._town.lanes[self.lane]
+            pieces = [follow(lane, lane.length - 0.5)]
+        x, y = self._car_position()
+        self.path = Path(pieces)
+        self.s, self.offset = self.path.project(x, y, 0.0) if x is not None and y is not None else (0.0, 0.0)
+        off_line = np.flatnonzero(self.path.manoeuvre)
+        if self._manoeuvre is PhysicalAction.J_TURN:
+            entered = np.flatnonzero(self.path.lanes == self._chosen[1])
+            self._manoeuvre_end = float(self.path.s[entered[0]]) if len(entered) else math.inf
+        elif self._manoeuvre is not None and len(off_line):
+            self._manoeuvre_end = float(self.path.s[off_line[-1]])
+
+    path: Path | None = None  # type: ignore[assignment]
+    s: float = 0.0
+
+    def _car_position(self) -> tuple[float, float] | tuple[None, None]:
+        if self.path is None:
+            return None, None
+        x, y = self.path.position_at(self.s)
+        heading = self.path.heading_at(self.s)
+        return x - self.offset * math.sin(heading), y + self.offset * math.cos(heading)

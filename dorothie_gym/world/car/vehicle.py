@@ -1,0 +1,40 @@
+"""The car that the session is about: highway-env's bicycle, driven by normalised controls."""
+
+from __future__ import annotations
+
+from highway_env.vehicle.kinematics import Vehicle
+
+from dorothie_gym.world.car.control import MAX_BRAKING, Control
+from dorothie_gym.world.network.road import TownRoad
+from dorothie_gym.world.town.model import Array
+
+
+class Car(Vehicle):
+    """A highway-env vehicle that takes throttle, steering wheel and brake, and never rolls backwards.
+
+    Attributes:
+        control: what the actuators were told last.
+        height: of the road under it [m].
+    """
+
+    MAX_SPEED = 40.0
+
+    def __init__(self, road: TownRoad, position: Array, heading: float, height: float) -> None:
+        self.height = height
+        super().__init__(road, position, heading, 0.0)
+        self.control = Control(throttle=0.0, steer=0.0, brake=0.0)
+        self.friction = 1.0
+
+    def drive(self, control: Control, dt: float) -> None:
+        """Sets the controls for the next substep of `dt` seconds; brakes stop the car, they do not reverse it."""
+        self.control = control
+        acceleration = control.acceleration
+        if acceleration < 0.0:
+            acceleration = max(acceleration, -MAX_BRAKING * self.friction, -self.speed / dt)
+        self.act({"acceleration": acceleration, "steering": control.steering_angle})
+
+    def on_state_update(self) -> None:
+        """Matches the car to the closest lane of its height."""
+        network = self.road.network
+        self.lane_index = network.get_closest_lane_index(self.position, self.heading, height=self.height)
+        self.lane = network.get_lane(self.lane_index)

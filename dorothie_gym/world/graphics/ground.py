@@ -1,0 +1,136 @@
+"""What the road network encloses: blocks between streets, and the asphalt inside junctions that no lane covers."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dorothie_gym.world.graphics import palette
+from dorothie_gym.world.graphics.palette import Colour
+from dorothie_gym.world.graphics.shapes import Shape, disc, ribbon
+from dorothie_gym.world.town.model import Array, Town
+
+# Larger holes between connectors are islands (the middle of a roundabout), not asphalt [m2].
+_LARGEST_HOLE = 160.0
+_BLOCK_SCALE = 1.0  # [px/m]: the edges of blocks lie under roads, so a metre is fine enough
+_HOLE_SCALE = 4.0
+_TREE_SPACING = 13.0  # [m]
+_SLIVER = 500.0  # [m2]
+_SMALLEST_PARK = 1500.0  # [m2]
+
+
+def town_bounds(town: Town, margin: float = 0.0) -> tuple[float, float, float, float]:
+    """Smallest x, y and largest x, y [m] of all lanes, widened by a margin [m]."""
+    points = np.concatenate([lane.points[:, :2] for lane in town.lanes])
+    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """A piece of ground that polygons leave free.
+
+    Attributes:
+        mask: a `pygame.mask.Mask` of it.
+        low: world position (2,) of the mask's corner [m].
+        scale: of the mask [px/m].
+        outside: whether it reaches the border.
+    """
+
+    mask: Any
+    low: Array
+    scale: float
+    outside: bool
+
+    @property
+    def area(self) -> float:
+        """Its area [m2]."""
+        return float(self.mask.count()) / self.scale**2
+
+    @property
+    def outline(self) -> Array:
+        """Its outline (n, 2) [m]; a small disc where it is too small to have one."""
+        line = np.array(self.mask.outline(), dtype=float).reshape(-1, 2)
+        if len(line) < 4:
+            return disc(np.array(self.mask.centroid()) / self.scale + self.low, 1.0 / self.scale, 8)
+        return (line + 0.5) / self.scale + self.low
+
+
+def _free(outlines: Sequence[Array], scale: float, border: float) -> list[_Piece]:
+    """What polygons (n, 2) [m] leave free inside a frame that is wider than they are by a border [m]."""
+    import pygame
+
+    points = np.concatenate(outlines)
+    low, high = points.min(axis=0) - border, points.max(axis=0) + border
+    width, height = (int(n) for n in np.ceil((high - low) * scale))
+    surface = pygame.Surface((width, height), pygame.SRCALPHA, 32)
+    for outline in outlines:
+        pygame.draw.polygon(surface, (255, 255, 255, 255), ((outline - low) * scale).tolist())
+    free = pygame.mask.from_surface(surface)
+    free.invert()
+    pieces = []
+    for mask in free.connected_components(minimum=1):
+        rectangles: list[Any] = mask.get_bounding_rects()
+        box = rectangles[0].unionall(rectangles[1:])
+        outside = box.left == 0 or box.top == 0 or box.right == width or box.bottom == height
+        pieces.append(_Piece(mask, low, scale, outside))
+    return pieces
+
+
+def junction_fillings(town: Town) -> list[Array]:
+    """Outlines (n, 2) [m] of the asphalt that lies between the connectors of junctions."""
+    fillings = []
+    for junction in town.junctions:
+        outlines = [ribbon(town.lanes[k], 0.15) for k in junction.connectors]
+        if outlines:
+            pieces = _free(outlines, _HOLE_SCALE, 1.0)
+            fillings += [piece.outline for piece in pieces if not piece.outside and piece.area < _LARGEST_HOLE]
+    return fillings
+
+
+def landscape(town: Town, border: float) -> list[Shape]:
+    """What lies between and around the streets: blocks, parks with trees, and the country.
+
+    The scenery is made up, from the town's name alone; nothing drives into it.
+
+    Args:
+        town: whose streets.
+        border: how far the country reaches beyond the streets [m].
+    """
+    pieces = _free([ribbon(lane, 0.5) for lane in town.lanes], _BLOCK_SCALE, border)
+    rng = np.random.default_rng(zlib.crc32(town.name.encode()))
+    inner = sorted((p for p in pieces if not p.outside and p.area > 12.0), key=lambda p: -p.area)
+    shapes = []
+    for rank, piece in enumerate(inner):
+        # Every third large block is a park; slivers (medians, islands) are grass.
+        park = piece.area < _SLIVER or (piece.area > _SMALLEST_PARK and rank % 3 == 1)
+        shapes.append(Shape(piece.outline, palette.PARK if park else palette.BLOCK))
+        if park and piece.area > _SMALLEST_PARK:
+            shapes += _trees(town, piece, rng, 0.8, palette.TREE)
+    for piece in pieces:
+        if piece.outside and piece.area > _SMALLEST_PARK:
+            shapes += _trees(town, piece, rng, 0.3, palette.COUNTRY_TREE)
+    return shapes
+
+
+def _trees(town: Town, piece: _Piece, rng: np.random.Generator, share: float, colour: Colour) -> Iterator[Shape]:
+    """Trees on a jittered grid inside a piece of ground, well away from its edge and from landmark sites."""
+    sites = np.array([site.position for site in town.sites]).reshape(-1, 2)
+    low = piece.low
+    size = np.array(piece.mask.get_size())
+    for x in np.arange(low[0], low[0] + size[0] / piece.scale, _TREE_SPACING):
+        for y in np.arange(low[1], low[1] + size[1] / piece.scale, _TREE_SPACING):
+            centre = np.array([x, y]) + rng.uniform(-4.5, 4.5, 2)
+            radius = float(rng.uniform(1.6, 3.4))
+            wanted = rng.random() < share
+            ring = ((disc(centre, radius + 5.0, 12) - low) * piece.scale).astype(int)
+            if not wanted or (ring < 0).any() or (ring >= size).any():
+                continue
+            if len(sites) and np.hypot(*(sites - centre).T).min() < radius + 6.0:
+                continue
+            if all(piece.mask.get_at(corner) for corner in ring.tolist()):
+                yield Shape(disc(centre, radius), colour)

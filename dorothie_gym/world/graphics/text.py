@@ -1,0 +1,97 @@
+"""Words on a picture: straight ones, ones with a halo, and ones set along a line."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from dorothie_gym.world.graphics.fonts import font
+from dorothie_gym.world.graphics.palette import Colour
+from dorothie_gym.world.town.model import Array
+
+_RING = tuple((np.cos(a), np.sin(a)) for a in np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False))
+
+
+@lru_cache(maxsize=512)
+def words(text: str, size: int, colour: Colour, bold: bool = False, halo: int = 0, around: Colour = (255, 255, 255)) -> Any:
+    """A surface with a line of text, with a halo of that many pixels around its letters."""
+    import pygame
+
+    face = font(size, bold)
+    inner = face.render(text, True, colour)
+    if not halo:
+        return inner
+    surface = pygame.Surface((inner.get_width() + 2 * halo, inner.get_height() + 2 * halo), pygame.SRCALPHA, 32)
+    outer = face.render(text, True, around)
+    for dx, dy in _RING:
+        surface.blit(outer, (round(halo + halo * dx), round(halo + halo * dy)))
+    surface.blit(inner, (halo, halo))
+    return surface
+
+
+def set_along(
+    surface: Any, text: str, path: Array, size: int, colour: Colour, *, halo: int, around: Colour, bold: bool = True
+) -> None:
+    """Sets a text along a path (n, 2) [px], its letters centred on the line.
+
+    A straight path takes the whole line of text at once, which keeps the spacing of its letters exact.
+    """
+    steps = np.diff(path, axis=0)
+    angle = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    stations = np.concatenate(([0.0], np.cumsum(np.hypot(*steps.T))))
+    if angle.max() - angle.min() < 0.03:
+        _stamp(surface, words(text, size, colour, bold, halo, around), path.mean(axis=0), float(angle.mean()))
+        return
+    face = font(size, bold)
+    total = face.size(text)[0]
+    start = (stations[-1] - total) / 2.0
+    middles = stations[:-1] + np.diff(stations) / 2.0
+    # Halos first: none may lie over the neighbouring letter.
+    for ring in (halo, 0):
+        for k, letter in enumerate(text):
+            s = start + (face.size(text[:k])[0] + face.size(text[: k + 1])[0]) / 2.0
+            at = np.array([np.interp(s, stations, path[:, 0]), np.interp(s, stations, path[:, 1])])
+            ink = around if ring else colour
+            _stamp(surface, words(letter, size, ink, bold, ring, around), at, float(np.interp(s, middles, angle)))
+
+
+def _stamp(surface: Any, piece: Any, centre: Array, angle: float) -> None:
+    """Draws a surface turned clockwise by an angle [rad] around its own centre."""
+    import pygame
+
+    turned = pygame.transform.rotozoom(piece, -float(np.degrees(angle)), 1.0) if abs(angle) > 1e-3 else piece
+    surface.blit(turned, turned.get_rect(center=(round(float(centre[0])), round(float(centre[1])))))
+
+
+def wrap(text: str, size: int, width: int, bold: bool = False) -> list[str]:
+    """Lines of a text that are no wider than a width [px]; a longer word is cut."""
+    face = font(size, bold)
+    lines: list[str] = []
+    line = ""
+    for word in text.split():
+        while face.size(word)[0] > width and len(word) > 1:
+            cut = next(k for k in range(len(word) - 1, 0, -1) if k == 1 or face.size(word[:k])[0] <= width)
+            if line:
+                lines.append(line)
+                line = ""
+            lines.append(word[:cut])
+            word = word[cut:]
+        longer = f"{line} {word}".strip()
+        if face.size(longer)[0] <= width:
+            line = longer
+        else:
+            lines.append(line)
+            line = word
+    return [*lines, line] if line else lines
+
+
+def shorten(text: str, size: int, width: int, bold: bool = False) -> str:
+    """The text, cut with an ellipsis where it is wider than a width [px]."""
+    face = font(size, bold)
+    if face.size(text)[0] <= width:
+        return text
+    while text and face.size(text.rstrip() + "…")[0] > width:
+        text = text[:-1]
+    return text.rstrip() + "…"

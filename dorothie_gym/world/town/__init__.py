@@ -1,0 +1,40 @@
+"""Towns to drive in: the model, towns that are shipped or read from files, and a town in figures."""
+
+from dorothie_gym.world.town.catalogue import load_town, town_names
+from dorothie_gym.world.town.describe import describe
+from dorothie_gym.world.town.model import (
+    NO_JUNCTION,
+    NO_STREET,
+    Crosswalk,
+    Exit,
+    Junction,
+    Lane,
+    LaneLink,
+    LinkType,
+    Signal,
+    SignalKind,
+    Site,
+    Street,
+    Town,
+    TownError,
+)
+
+__all__ = [
+    "NO_JUNCTION",
+    "NO_STREET",
+    "Crosswalk",
+    "Exit",
+    "Junction",
+    "Lane",
+    "LaneLink",
+    "LinkType",
+    "Signal",
+    "SignalKind",
+    "Site",
+    "Street",
+    "Town",
+    "TownError",
+    "describe",
+    "load_town",
+    "town_names",
+]

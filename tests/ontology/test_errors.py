@@ -1,0 +1,21 @@
+import pickle
+
+from dorothie_gym.ontology import OntologyError
+
+
+def test_error_names_text_vocabulary_and_nearest_spelling() -> None:
+    message = str(OntologyError.unknown("instrukt", "dialogue move", ["Explain", "Instruct"]))
+    assert "'instrukt'" in message and "dialogue move" in message and "'Instruct'" in message
+
+
+def test_error_shows_a_spelling_even_when_none_is_near() -> None:
+    assert "'Explain'" in str(OntologyError.unknown("%%%", "dialogue move", ["Explain"]))
+
+
+def test_error_for_what_is_no_text_names_its_type() -> None:
+    assert "int" in str(OntologyError.unknown(3, "dialogue move", ["Explain"]))
+
+
+def test_error_is_a_value_error_and_survives_pickling() -> None:
+    error = pickle.loads(pickle.dumps(OntologyError("message")))
+    assert isinstance(error, ValueError) and str(error) == "message"

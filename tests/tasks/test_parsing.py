@@ -1,0 +1,160 @@
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from dorothie_gym.tasks import StoryboardError, bind, load_template, parse_template, template_names
+
+from .builders import grid_places, parse, plain, templates
+
+PAPER = Path(__file__).parents[2] / "../shared/paper/dorothie.tex"
+VERBATIM = re.compile(r"\\begin\{verbatim\}(.*?)\\end\{verbatim\}", re.DOTALL)
+
+
+def printed_template() -> str:
+    """The two parts of the template that the paper prints, put together as they stand."""
+    if not PAPER.exists():
+        pytest.skip("the paper's text is not beside the repository")
+    text = PAPER.read_text(encoding="utf-8")
+    start = text.index(r"\paragraph{Task Configuration}")
+    main, hidden = VERBATIM.findall(text, start)[:2]
+    return main.rstrip().removesuffix("}") + hidden.strip().removeprefix("{")
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_template_that_the_paper_prints_loads_and_binds(seed):
+    template = parse_template(printed_template(), "paper")
+    assert len(template.subgoals) == 3 and len(template.dependents) == 3
+    storyboard = bind(template, grid_places(24), np.random.default_rng(seed))
+    places = [storyboard.landmarks[subgoal.landmark] for subgoal in storyboard.subgoals]
+    assert {place.name.label for place in places[:2]} == {"Ikea", "SevenEleven"}
+    assert places[2].name.label == "House" and places[2].hidden
+    assert sum(landmark.hidden for landmark in storyboard.landmarks) == 1
+    assert "$" not in storyboard.story and "\n" not in storyboard.story
+
+
+def test_ten_templates_or_more_come_with_the_package():
+    assert len(template_names()) >= 10
+
+
+@pytest.mark.parametrize("name", template_names())
+def test_every_template_of_the_package_starts_with_two_to_six_subgoals(name):
+    template = load_template(name)
+    assert template.name == name
+    assert 2 <= sum(not subgoal.trigger for subgoal in template.subgoals) <= 6
+
+
+def test_the_templates_of_the_package_use_every_feature():
+    subgoals = [subgoal for name in template_names() for subgoal in load_template(name).subgoals]
+    for feature in ("after", "trigger", "delete", "change", "change_destination", "delete_after_subgoal", "leaves"):
+        assert len({getattr(subgoal, feature) for subgoal in subgoals}) > 1, feature
+    assert sum(bool(load_template(name).hidden) for name in template_names()) >= 5
+
+
+@given(templates())
+@settings(max_examples=60, deadline=None)
+def test_any_template_that_follows_the_rules_is_read(fields):
+    template = parse(fields)
+    assert [subgoal.destination for subgoal in template.subgoals] == [row["destination"] for row in fields["subgoals"]]
+    assert set(template.hidden) == set(fields["hidden_from_wizard"])
+
+
+def test_a_file_is_read_and_named_for_its_stem(tmp_path):
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(plain({}, {})), encoding="utf-8-sig")
+    assert load_template(path) == load_template(str(path))
+    assert load_template(path).name == "mine"
+
+
+def test_an_unknown_name_lists_those_known():
+    with pytest.raises(StoryboardError, match="storyboard nonesuch: name: .*school_run"):
+        load_template("nonesuch")
+
+
+def test_a_missing_file_is_named(tmp_path):
+    path = tmp_path / "none.json"
+    with pytest.raises(StoryboardError, match=f"{re.escape(str(path))}: file: cannot be read .No such file"):
+        load_template(path)
+
+
+def test_a_folder_is_no_template(tmp_path):
+    with pytest.raises(StoryboardError, match="file: cannot be read"):
+        load_template(tmp_path)
+
+
+def test_a_file_that_is_no_text_is_refused(tmp_path):
+    path = tmp_path / "bytes.json"
+    path.write_bytes(b"{\xff}")
+    with pytest.raises(StoryboardError, match="not UTF-8 text .byte 1"):
+        load_template(path)
+
+
+def test_errors_in_a_file_name_its_path(tmp_path):
+    path = tmp_path / "bad.json"
+    path.write_text('{"story": 5}', encoding="utf-8")
+    with pytest.raises(StoryboardError) as caught:
+        load_template(path)
+    assert caught.value.template == str(path)
+    assert caught.value.field == "story"
+
+
+def test_names_in_any_spelling_are_kept_as_the_ontology_spells_them():
+    template = parse(plain({"destination": "Seven Eleven"}, {"destination": "burger king"}))
+    assert [subgoal.destination for subgoal in template.subgoals] == ["SevenEleven", "BurgerKing"]
+
+
+def test_both_hidden_fields_count_and_a_dollar_sign_does_not():
+    fields = plain({}, {}, variables=[["A", "people"], ["B", "places.residential"]])
+    template = parse(fields | {"hidden_from_wizard": ["$A"], "hidden_from_co_wizard": ["B", "A"]})
+    assert template.hidden == ("A", "B")
+
+
+def test_delete_after_a_subgoal_permits_the_deletion():
+    template = parse(plain({}, {"delete_after_subgoal": 0}, {}))
+    assert template.subgoals[1].delete and template.subgoals[1].delete_after_subgoal == 0
+
+
+def test_delete_after_as_a_flag_means_that_the_landmark_leaves():
+    subgoal = parse(plain({"delete_after_subgoal": True}, {})).subgoals[0]
+    assert (subgoal.leaves, subgoal.delete, subgoal.delete_after_subgoal) == (True, False, None)
+
+
+MALFORMED = {
+    "top is a list": ([], "template: must be an object"),
+    "no story": ({"subgoals": []}, "story: is missing or empty"),
+    "story of blanks": (plain({}, {}, story=" \n"), "story: is missing or empty"),
+    "story is a number": (plain({}, {}, story=3), r"story: must be a text, not a number \(3\)"),
+    "unknown field": (plain({}, {}, hiden=[]), "hiden: unknown field; the fields are story"),
+    "subgoals is an object": (plain(subgoals={}), "subgoals: must be a list, not an object"),
+    "subgoal is a text": (plain(subgoals=["KFC"]), r"subgoals\[0\]: must be an object"),
+    "unknown subgoal field": (plain({}, {"afer": []}), r"subgoals\[1\]\.afer: unknown field"),
+    "no destination": (plain({}, {"destination": None}), r"subgoals\[1\]\.destination: must be a text, not null"),
+    "empty destination": (plain({}, {"destination": ""}), r"subgoals\[1\]\.destination: is missing"),
+    "destination is nothing": (plain({}, {"destination": "Moon"}), r"subgoals\[1\]\.destination: 'Moon' is neither"),
+    "unknown type": (plain({}, {"type": "fly"}), r"subgoals\[1\]\.type: 'fly' is no type"),
+    "after is a number": (plain({}, {"after": 0}), r"subgoals\[1\]\.after: must be a list, not a number"),
+    "after holds a text": (plain({}, {"after": ["0"]}), r"subgoals\[1\]\.after: must be a list of subgoal numbers"),
+    "after holds a flag": (plain({}, {"after": [True]}), r"subgoals\[1\]\.after: must be a list of subgoal numbers"),
+    "trigger is a text": (plain({"trigger": "yes"}, {}), r"subgoals\[0\]\.trigger: must be true or false, not a text"),
+    "change without text": (plain({"change_destination": "Coco"}, {}), r"subgoals\[0\]\.change: is missing beside"),
+    "change to nothing": (
+        plain({"change": "x", "change_destination": "Moon"}, {}),
+        r"subgoals\[0\]\.change_destination: 'Moon' is neither",
+    ),
+    "delete after a text": (plain({"delete_after_subgoal": "1"}, {}), r"subgoals\[0\]\.delete_after_subgoal: must be"),
+    "variable is a text": (plain({}, {}, variables=["P1"]), r"variables\[0\]: must be \[\"NAME\", \"category\"\]"),
+    "variable is no name": (plain({}, {}, variables=[["1 P", "people"]]), r"variables\[0\]: '1 P' is no name"),
+    "category is empty": (plain({}, {}, variables=[["P", " "]]), r"variables\[0\]: P has an empty category"),
+    "dependent without attribute": (plain({}, {}, dependents=[["I", "P1"]]), r"dependents\.I: 'P1' must read"),
+    "hidden holds a number": (plain({}, {}, hidden_from_wizard=[1]), "hidden_from_wizard: must be a list of variables"),
+}
+
+
+@pytest.mark.parametrize("case", MALFORMED)
+def test_a_malformed_template_is_refused_with_field_and_reason(case):
+    fields, message = MALFORMED[case]
+    with pytest.raises(StoryboardError, match="^storyboard test: " + message):
+        parse_template(json.dumps(fields), "test")

@@ -1,0 +1,72 @@
+import pytest
+
+from dorothie_gym.tasks import StoryboardError
+
+from .builders import parse, plain
+
+STORE = ["P", "places.stores"]
+REFUSED = {
+    "unknown category": (
+        plain({}, {}, variables=[["P", "places.hospital"]]),
+        r"variables\.P: no landmark is of category 'places.hospital'; use one of places, people",
+    ),
+    "destination undefined": (
+        plain({}, {"destination": "$Q"}, variables=[STORE]),
+        r"subgoals\[1\]\.destination: 'Q' is no variable; define it, or use one of: P",
+    ),
+    "change undefined": (
+        plain({"change": "x", "change_destination": "$Q"}, {}),
+        r"subgoals\[0\]\.change_destination: 'Q' is no variable.*none",
+    ),
+    "destination is a dependent": (
+        plain({}, {"destination": "$I"}, variables=[STORE], dependents=[["I", "P.items"]]),
+        r"subgoals\[1\]\.destination: 'I' is no variable",
+    ),
+    "story undefined": (plain({}, {}, story="Go to $X."), "story: 'X' is no variable or dependent"),
+    "description undefined": (plain({}, {"description": "$X"}), r"subgoals\[1\]\.description: 'X' is no variable"),
+    "change text undefined": (plain({}, {"change": "$X"}), r"subgoals\[1\]\.change: 'X' is no variable"),
+    "dependent undefined": (plain({}, {}, dependents=[["I", "P.items"]]), r"dependents\.I: 'P' is no variable"),
+    "hidden undefined": (plain({}, {}, hidden_from_co_wizard=["P"]), "hidden_from_wizard: 'P' is no variable"),
+    "name defined twice": (
+        plain({}, {}, variables=[STORE], dependents=[["P", "P.items"]]),
+        r"dependents\.P: the name P is defined twice",
+    ),
+    "one subgoal": (plain({}), "subgoals: a template has at least 2 subgoals"),
+    "no subgoal": (plain(), "subgoals: a template has at least 2 subgoals"),
+    "none live": (plain({"trigger": True}, {"trigger": True}), "subgoals: 1 to 6 subgoals must be without `trigger`"),
+    "seven live": (plain({}, {}, {}, {}, {}, {}, {}), "subgoals: 1 to 6 subgoals .* not 7"),
+    "after out of range": (plain({}, {"after": [2]}), r"subgoals\[1\]\.after: there is no subgoal 2; use 0 to 1"),
+    "after negative": (plain({}, {"after": [-1]}), r"subgoals\[1\]\.after: there is no subgoal -1"),
+    "after itself": (plain({"after": [0]}, {}), r"subgoals\[0\]\.after: subgoal 0 refers to itself"),
+    "deletable after out of range": (
+        plain({"delete_after_subgoal": 9}, {}),
+        r"subgoals\[0\]\.delete_after_subgoal: there is no subgoal 9",
+    ),
+    "after in a circle": (
+        plain({"after": [2]}, {"after": [0]}, {"after": [1]}, {}),
+        r"subgoals\[0\]\.after: the subgoals 0, 1, 2 wait for one another in a circle",
+    ),
+    "after the destination": (
+        plain({"after": [1]}, {}),
+        r"subgoals\[0\]\.after: subgoal 0 cannot come after subgoal 1: that is the destination",
+    ),
+    "after what is the destination until a trigger": (
+        plain({"after": [1]}, {}, {"trigger": True}),
+        r"subgoals\[0\]\.after: subgoal 0 cannot come after subgoal 1",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_template_that_does_not_hold_together_is_refused(case):
+    fields, message = REFUSED[case]
+    with pytest.raises(StoryboardError, match="^storyboard test: " + message):
+        parse(fields)
+
+
+def test_after_may_look_ahead_to_what_is_never_the_destination():
+    assert parse(plain({"after": [1]}, {}, {})).subgoals[0].after == (1,)
+
+
+def test_a_price_in_dollars_is_no_reference():
+    assert parse(plain({}, {}, story="It costs $5.")).story == "It costs $5."
