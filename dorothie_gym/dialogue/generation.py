@@ -58,9 +58,7 @@ def word_act(act: DialogueAct, speaker: Role, rng: np.random.Generator, context:
 class _Writer:
     """Writes one sentence."""
 
-    def __init__(
-        self, act: DialogueAct, voice: Role, rng: np.random.Generator, wording: Wording, names: int
-    ) -> None:
+    def __init__(self, act: DialogueAct, voice: Role, rng: np.random.Generator, wording: Wording, names: int) -> None:
         self._lexicon = load_lexicon()
         self._grammar = load_grammar()
         self._act = act
@@ -73,9 +71,7 @@ class _Writer:
 
     def text(self) -> str:
         template = self._choose()
-        body, mark = self._fill(template), ""
-        if body.endswith("?"):
-            body, mark = body[:-1], "?"
+        body, close = _split_close(self._fill(template))
         manners = self._grammar.manners.get((self._voice, self._act.move))
         # A bare answer or a set phrase stands as it is: manners go with what has content.
         if manners is not None and template.covers:
@@ -83,9 +79,9 @@ class _Writer:
         for slot in SPOKEN_SLOTS:
             if slot in self._values and slot not in template.covers:
                 tail = self._tail(slot)
-                if len(body) + len(tail) + len(mark) < MAX_CHARACTERS:
+                if len(body) + len(tail) + len(close) < MAX_CHARACTERS:
                     body += tail
-        return self._punctuate(body, mark)
+        return self._punctuate(body + close)
 
     def _choose(self) -> Template:
         fitting = [template for template in self._grammar.templates[self._act.move] if self._fits(template)]
@@ -179,12 +175,11 @@ class _Writer:
             body = f"{body}{self._pick(manners.closers)}"
         return body
 
-    def _punctuate(self, body: str, mark: str) -> str:
+    def _punctuate(self, sentence: str) -> str:
         # Typed transcripts of people are half in lower case without a stop; what the car says is set properly.
-        formal = self._voice is Role.CO_WIZARD or bool(self._rng.random() < 0.5)
-        if formal:
-            return body[0].upper() + body[1:] + (mark or ".")
-        return body + mark
+        if self._voice is Role.PARTICIPANT and self._rng.random() < 0.5:
+            return sentence
+        return sentence[0].upper() + sentence[1:] + ("" if sentence.endswith("?") else ".")
 
     def _join(self, phrases: Sequence[str]) -> str:
         unique = list(dict.fromkeys(phrases))
@@ -194,6 +189,14 @@ class _Writer:
 
     def _pick(self, options: Sequence[_Option]) -> _Option:
         return options[int(self._rng.integers(len(options)))]
+
+
+def _split_close(sentence: str) -> tuple[str, str]:
+    """Returns what comes before and behind the place for afterthoughts: a "|", else the end but for a question mark."""
+    if "|" in sentence:
+        body, _, close = sentence.partition("|")
+        return body, close
+    return (sentence[:-1], "?") if sentence.endswith("?") else (sentence, "")
 
 
 def _side(wording: Wording) -> str | None:

@@ -9,7 +9,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from dorothie_gym.dialogue.lexicon import LexiconError, read_data, strings
-from dorothie_gym.ontology import SLOT_VALUES, DialogueMove, OntologyError, Role, Slot, parse_move, parse_role, parse_slot
+from dorothie_gym.ontology import (
+    SLOT_VALUES,
+    DialogueMove,
+    OntologyError,
+    Role,
+    Slot,
+    parse_move,
+    parse_role,
+    parse_slot,
+)
 
 FIELD = re.compile(r"{(\w+)}")
 """A gap in a template."""

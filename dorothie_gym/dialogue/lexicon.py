@@ -88,7 +88,7 @@ class Lexicon:
 
         Returns:
             The mentions in order, and the words with each mention replaced by "#landmark", "#street", "#object" or
-            "#status".
+            "#status"; by "#what" if it is what somebody asks for.
         """
         mentions: list[Mention] = []
         masked: list[str] = []
@@ -99,9 +99,9 @@ class Lexicon:
                 masked.append(words[place])
             else:
                 mentions.append(Mention(value, len(masked)))
-                masked.append(f"#{value.slot.label.lower()}")
-                if value.slot is Slot.STREET and words[place + length : place + length + 1] != []:
-                    length += words[place + length] in _STREET_KINDS
+                masked.append("#what" if value.label == "Queried" else f"#{value.slot.label.lower()}")
+                if value.slot is Slot.STREET:
+                    length += " ".join(words[place + length : place + length + 1]) in _STREET_KINDS
             place += length
         return mentions, masked
 

@@ -29,6 +29,9 @@ MIN_SWITCH = 14.0
 SWITCH_COST = 20.0
 """Degrees by which an exit of the own lane may fit worse than that of a lane beside it and still be taken."""
 
+SETTLE = 15.0
+"""A lane that was just entered is followed for this long before it is changed, where there is room [m]."""
+
 EXACT = 5.0
 """An exit within this many degrees is the one that was meant."""
 
@@ -374,7 +377,9 @@ class LocalPlanner:
                 changes += 1
             room = max((lane.length - at) / changes - LEAD, 2.0)
             distance = min(max(MIN_SWITCH, SWITCH_TIME * speed), room)
-            begin = min(at + LEAD, lane.length - distance)
+            spare = (lane.length - at) - changes * (distance + LEAD)
+            lead = LEAD if k == 0 else min(max(spare, LEAD), SETTLE)
+            begin = min(at + lead, lane.length - distance)
             if begin > at + 1e-3:
                 pieces.append(follow(lane, at, begin))
             pieces.append(switch(lane, target, max(begin, at), distance))

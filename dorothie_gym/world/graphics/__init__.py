@@ -1,6 +1,11 @@
 """Pictures of towns, drawn with pygame on surfaces that need no display."""
 
-from dorothie_gym.world.graphics.labels import Label
-from dorothie_gym.world.graphics.map import MapPainter, town_picture
+import os
+
+# Before anybody imports pygame: its greeting on standard output would spoil what commands print for programs.
+os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+
+from dorothie_gym.world.graphics.labels import Label  # noqa: E402
+from dorothie_gym.world.graphics.map import MapPainter, town_picture  # noqa: E402
 
 __all__ = ["Label", "MapPainter", "town_picture"]

@@ -119,18 +119,22 @@ def landscape(town: Town, border: float) -> list[Shape]:
 
 def _trees(town: Town, piece: _Piece, rng: np.random.Generator, share: float, colour: Colour) -> Iterator[Shape]:
     """Trees on a jittered grid inside a piece of ground, well away from its edge and from landmark sites."""
-    sites = np.array([site.position for site in town.sites]).reshape(-1, 2)
-    low = piece.low
+    import pygame
+
     size = np.array(piece.mask.get_size())
-    for x in np.arange(low[0], low[0] + size[0] / piece.scale, _TREE_SPACING):
-        for y in np.arange(low[1], low[1] + size[1] / piece.scale, _TREE_SPACING):
-            centre = np.array([x, y]) + rng.uniform(-4.5, 4.5, 2)
-            radius = float(rng.uniform(1.6, 3.4))
-            wanted = rng.random() < share
-            ring = ((disc(centre, radius + 5.0, 12) - low) * piece.scale).astype(int)
-            if not wanted or (ring < 0).any() or (ring >= size).any():
-                continue
-            if len(sites) and np.hypot(*(sites - centre).T).min() < radius + 6.0:
-                continue
-            if all(piece.mask.get_at(corner) for corner in ring.tolist()):
-                yield Shape(disc(centre, radius), colour)
+    free = pygame.surfarray.array_red(piece.mask.to_surface()) > 0  # (width, height)
+    grid = np.stack(np.meshgrid(*(np.arange(0.0, n / piece.scale, _TREE_SPACING) for n in size)), axis=-1).reshape(
+        -1, 2
+    )
+    centres = piece.low + grid + rng.uniform(-4.5, 4.5, grid.shape)
+    radii = rng.uniform(1.6, 3.4, len(grid))
+    wanted = rng.random(len(grid)) < share
+    rings = centres[:, None] + (radii[:, None, None] + 5.0) * disc((0.0, 0.0), 1.0, 12)  # (n, 12, 2)
+    pixels = ((rings - piece.low) * piece.scale).astype(int)
+    inside = ((pixels >= 0) & (pixels < size)).all(axis=(1, 2))
+    pixels = np.clip(pixels, 0, size - 1)
+    wanted &= inside & free[pixels[..., 0], pixels[..., 1]].all(axis=1)
+    for site in town.sites:
+        wanted &= np.hypot(*(centres - np.array(site.position)).T) > radii + 6.0
+    for k in np.flatnonzero(wanted).tolist():
+        yield Shape(disc(centres[k], float(radii[k])), colour)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,9 +10,11 @@ import numpy as np
 from dorothie_gym.world.graphics.fonts import font
 from dorothie_gym.world.graphics.plan import Edge, Plan
 from dorothie_gym.world.graphics.shapes import sample, side_line, widths_at
-from dorothie_gym.world.town.model import NO_STREET, Array, Town
+from dorothie_gym.world.town.model import NO_STREET, Array, Lane, Town
 
 _MOST_LANES = 8  # of one carriageway
+_MOST_BENT = 0.9  # [rad] that the line under a name may turn
+_ARROWS = 9.0  # [m] of a lane's end that its arrow takes
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,31 +73,48 @@ class LabelPlacer:
         """
         right_of = {edge.beyond: edge.lane for edge in plan.edges if edge.kind == "lane"}
         axes = [axis for edge in plan.edges if (axis := self._axis(edge, right_of)) is not None]
-        junctions = self._obstacles(plan)
+        bridges = self._obstacles((self.town.lanes[k], start, end) for _, k, start, end in plan.bridges)
+        junctions = self._obstacles((lane, 0.0, lane.length) for lane in self.town.lanes if lane.in_junction)
+        arrows = self._obstacles(self._arrows())
+        # What a name keeps clear of: everything, if it can; then it may touch arrows, then junctions' edges, then all.
+        free = [
+            np.concatenate(parts)
+            for parts in (
+                (bridges, junctions, arrows),
+                (bridges, junctions),
+                (bridges, junctions * np.array([1.0, 1.0, 0.4])),
+                (bridges,),
+            )
+        ]
         # Circles (x, y, radius) that names keep clear of.
         taken = np.zeros((0, 3))
-        by_street = {k: sorted((a for a in axes if a.street == k), key=_length, reverse=True) for k in range(len(self.names))}
+        by_street = {
+            k: sorted((a for a in axes if a.street == k), key=_length, reverse=True) for k in range(len(self.names))
+        }
         order = sorted(by_street, key=lambda k: (sum(_length(a) for a in by_street[k]), k))
         self.placed = []
         for street in order:
-            taken = self._place_first(street, by_street[street], junctions, taken)
+            taken = self._place_first(street, by_street[street], free, taken)
         for street in order:
-            taken = self._place_more(street, by_street[street], junctions, taken)
+            taken = self._place_more(street, by_street[street], free[0], taken)
         return self.placed
 
-    def _place_first(self, street: int, axes: list[_Axis], junctions: Array, taken: Array) -> Array:
+    def _place_first(self, street: int, axes: list[_Axis], free: Sequence[Array], taken: Array) -> Array:
         large, small = self.sizes
-        for blocked in (junctions, junctions * np.array([1.0, 1.0, 0.5]), junctions[:0]):
-            for size in dict.fromkeys((large, (2 * large + small) // 3, (large + small) // 2, small)):
-                circles = self._try(street, axes, size, np.concatenate((blocked, taken)), force=size == small)
+        middle = (large + small + 1) // 2
+        tries = [(free[0], large), (free[0], middle), (free[1], large), (free[1], middle)]
+        tries += [(blocked, size) for blocked in free for size in (middle, small)]
+        for force in (False, True):
+            for blocked, size in tries:
+                circles = self._try(street, axes, size, np.concatenate((blocked, taken)), force)
                 if circles is not None:
                     return np.concatenate((taken, circles))
         return taken
 
-    def _place_more(self, street: int, axes: list[_Axis], junctions: Array, taken: Array) -> Array:
+    def _place_more(self, street: int, axes: list[_Axis], blocked: Array, taken: Array) -> Array:
         first = next((label for label in self.placed if label.street == street), None)
         while first is not None:
-            circles = self._try(street, axes, first.size, np.concatenate((junctions, taken)), force=False)
+            circles = self._try(street, axes, first.size, np.concatenate((blocked, taken)), force=False)
             if circles is None:
                 break
             taken = np.concatenate((taken, circles))
@@ -109,9 +128,11 @@ class LabelPlacer:
             if axis.room < 0.78 * size and not force:
                 continue
             for path in _windows(axis.line, width):
-                if not self._inside(path, size) or _bent(path) > 0.9:
+                if not self._inside(path, size):
                     continue
                 if len(same) and np.hypot(*(same - path.mean(axis=0)).T).min() < self.spacing:
+                    continue
+                if _bent(path) > _MOST_BENT:
                     continue
                 circles = _circles(path, size)
                 gap = np.hypot(circles[:, None, 0] - blocked[:, 0], circles[:, None, 1] - blocked[:, 1])
@@ -144,10 +165,14 @@ class LabelPlacer:
             line = side_line(lane, s, room / 2.0 - widths / 2.0)
         return _Axis(lane.street, (line - self.origin) * self.scale, room * self.scale)
 
-    def _obstacles(self, plan: Plan) -> Array:
-        """Circles (n, 3) [px] over junctions and bridges."""
-        stretches = [(lane, 0.0, lane.length) for lane in self.town.lanes if lane.in_junction]
-        stretches += [(self.town.lanes[k], start, end) for _, k, start, end in plan.bridges]
+    def _arrows(self) -> Iterator[tuple[Lane, float, float]]:
+        """Stretches of lanes that their arrows take."""
+        for lane in self.town.lanes:
+            if not lane.in_junction and lane.length > 3.0 * _ARROWS and len(self.town.exits(lane.id)) > 1:
+                yield lane, lane.length - _ARROWS, lane.length
+
+    def _obstacles(self, stretches: Iterable[tuple[Lane, float, float]]) -> Array:
+        """Circles (n, 3) [px] along stretches of lanes [m]."""
         rows = [np.zeros((0, 3))]
         for lane, start, end in stretches:
             s = sample(lane, start, end, 2.0)
@@ -166,7 +191,7 @@ def _windows(line: Array, width: float) -> Iterator[Array]:
     spare = float(stations[-1]) - width * 1.08
     if spare < 0:
         return
-    starts = np.linspace(0.0, spare, max(1, int(spare // 12) + 1))
+    starts = np.linspace(0.0, spare, max(1, int(spare // 16) + 1))
     for start in sorted(starts.tolist(), key=lambda s: abs(s - spare / 2.0)):
         s = np.linspace(start + 0.04 * width, start + 1.04 * width, 24)
         yield np.stack((np.interp(s, stations, line[:, 0]), np.interp(s, stations, line[:, 1])), axis=-1)

@@ -44,6 +44,7 @@ class MapPainter:
         margin: int | tuple[int, int, int, int] = 24,
         type_sizes: tuple[int, int] = (20, 11),
         label_spacing: float = 380.0,
+        border: float | None = None,
     ) -> None:
         """Fits a town into a picture.
 
@@ -54,6 +55,7 @@ class MapPainter:
             margin: pixels free of roads, all around or (left, top, right, bottom).
             type_sizes: largest and smallest type of street names [px].
             label_spacing: distance between two settings of one name [px].
+            border: how far trees stand beyond the roads [m]; to the edge of the picture where absent.
 
         Raises:
             ValueError: `size` leaves no room inside `margin`, or there are too few names.
@@ -69,8 +71,11 @@ class MapPainter:
         x0, y0, x1, y1 = town_bounds(town, _GROUND)
         extent = np.array([x1 - x0, y1 - y0])
         self.scale = float((room / extent).min())
-        self.origin: Array = np.array([x0, y0]) - (np.array([left, top]) + (room - extent * self.scale) / 2.0) / self.scale
-        plan = Plan(town, pen=0.8 / self.scale, border=float(max(size)) / self.scale / 3.0)
+        self.origin: Array = (
+            np.array([x0, y0]) - (np.array([left, top]) + (room - extent * self.scale) / 2.0) / self.scale
+        )
+        border = float(max(size)) / self.scale / 3.0 if border is None else border
+        plan = Plan(town, pen=0.8 / self.scale, border=border)
         placer = LabelPlacer(
             town=town,
             names=names[: len(town.streets)],
@@ -90,7 +95,7 @@ class MapPainter:
         left, top, right, bottom = (margin,) * 4 if isinstance(margin, int) else margin
         x0, y0, x1, y1 = town_bounds(town, _GROUND)
         size = (round((x1 - x0) * scale) + left + right, round((y1 - y0) * scale) + top + bottom)
-        return cls(town, size=size, **options)
+        return cls(town, size=size, border=_GROUND + min(left, top, right, bottom) / scale, **options)
 
     def surface(self) -> Any:
         """A copy of the base map, a `pygame.Surface`, to draw on."""

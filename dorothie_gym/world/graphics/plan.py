@@ -62,7 +62,7 @@ class Samples:
     def side(self, sign: float) -> Array:
         """Points (n, 2) [m] on the right (+1) or left (-1) edges."""
         normal = np.stack((-np.sin(self.heading), np.cos(self.heading)), axis=-1)
-        return self.centre[:, :2] + sign * self.half_width[:, None] * normal
+        return np.asarray(self.centre[:, :2] + sign * self.half_width[:, None] * normal)
 
 
 def bridges(town: Town, samples: Samples) -> list[tuple[int, int, float, float]]:
@@ -110,6 +110,8 @@ class Edge:
 def edges(town: Town, samples: Samples) -> list[Edge]:
     """What lies beyond the sides of the lanes outside junctions; a line between two lanes is given once."""
     outside = np.array([not lane.in_junction for lane in town.lanes])[samples.lane]
+    if not outside.any():
+        return []
     left, right = samples.side(-1.0), samples.side(1.0)
     found = []
     for sign, own, same, oncoming in ((-1, left, right, left), (1, right, left, right)):
@@ -234,13 +236,16 @@ class Plan:
 
     def _bridge(self, stretches: list[tuple[int, float, float]]) -> Iterator[Shape]:
         lanes = self.town.lanes
-        for margin, colour in ((2.0, palette.BRIDGE_SHADOW), (0.9, palette.BRIDGE_EDGE), (0.25, palette.ROAD)):
+        layers = ((2.0, 0.0, palette.BRIDGE_SHADOW), (0.9, 0.0, palette.BRIDGE_EDGE), (0.05, 6.0, palette.ROAD))
+        for margin, further, colour in layers:
             for k, start, end in stretches:
-                yield Shape(ribbon(lanes[k], margin, start, end), colour)
+                # The asphalt goes on further: lanes side by side do not start their bridges at the same place.
+                reach = max(0.0, start - further), min(lanes[k].length, end + further)
+                yield Shape(ribbon(lanes[k], margin, *reach), colour)
         for k, start, end in stretches:
             for edge in self.edges:
                 if edge.lane == k:
-                    yield from self._line(edge, max(start, edge.start), min(end, edge.end))
+                    yield from self._line(edge, max(start - 6.0, edge.start), min(end + 6.0, edge.end))
 
     def _sites(self) -> Iterator[Shape]:
         """A small plot for each place where a landmark may stand, and the drive that leads to it."""

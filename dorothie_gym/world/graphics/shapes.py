@@ -46,7 +46,7 @@ def side_line(lane: Lane, stations: Array, lateral: Array | float) -> Array:
 
 def widths_at(lane: Lane, stations: Array) -> Array:
     """Widths (n,) [m] of a lane at stations (n,)."""
-    return np.interp(stations, lane.stations, lane.widths)
+    return np.asarray(np.interp(stations, lane.stations, lane.widths))
 
 
 def sparse_stations(lane: Lane, start: float = 0.0, end: float | None = None) -> Array:
@@ -59,7 +59,7 @@ def sparse_stations(lane: Lane, start: float = 0.0, end: float | None = None) ->
     amount = np.abs(np.diff(headings)) / 0.026 + np.abs(np.diff(widths)) / 0.1 + np.diff(fine) / 40.0
     total = np.concatenate(([0.0], np.cumsum(amount)))
     keep = np.flatnonzero(np.diff(np.floor(total)) > 0) + 1
-    return fine[np.unique(np.concatenate(([0], keep, [len(fine) - 1])))]
+    return np.asarray(fine[np.unique(np.concatenate(([0], keep, [len(fine) - 1])))])
 
 
 def ribbon(lane: Lane, margin: float = 0.0, start: float = 0.0, end: float | None = None) -> Array:
@@ -106,7 +106,7 @@ def place(points: Array, origin: Array, heading: float) -> Array:
     """Points given as (forward, right) [m] seen from an origin with a heading, in world coordinates (n, 2)."""
     forward = np.array([np.cos(heading), np.sin(heading)])
     right = np.array([-np.sin(heading), np.cos(heading)])
-    return origin + points[:, :1] * forward + points[:, 1:] * right
+    return np.asarray(origin + points[:, :1] * forward + points[:, 1:] * right)
 
 
 _SHAFT = {

@@ -15,7 +15,9 @@ _RING = tuple((np.cos(a), np.sin(a)) for a in np.linspace(0.0, 2.0 * np.pi, 12, 
 
 
 @lru_cache(maxsize=512)
-def words(text: str, size: int, colour: Colour, bold: bool = False, halo: int = 0, around: Colour = (255, 255, 255)) -> Any:
+def words(
+    text: str, size: int, colour: Colour, bold: bool = False, halo: int = 0, around: Colour = (255, 255, 255)
+) -> Any:
     """A surface with a line of text, with a halo of that many pixels around its letters."""
     import pygame
 

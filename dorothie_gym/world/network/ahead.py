@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeAlias
@@ -28,7 +29,12 @@ _Rest: TypeAlias = tuple[tuple[str, str, int | None], ...]
 
 
 class Chain(NamedTuple):
-    """Lanes one after the other: rows (n,) in the network's table, and where each begins [m] from the first one's start."""
+    """Lanes one after the other.
+
+    Attributes:
+        rows: (n,) in the network's table.
+        offsets: (n,) where each begins, from the start of the first one [m].
+    """
 
     rows: IntArray
     offsets: Array
@@ -74,7 +80,7 @@ class LaneChains:
             route = route[1:]
         successors = self._network.successors(index)
         planned = self._network.along_route(successors, route)
-        return [(lane, route) for lane in planned[:1]] or [(lane, ()) for lane in successors]
+        return [(planned[0], route)] if planned else [(lane, ()) for lane in successors]
 
     def _back(self, index: LaneIndex, route: _Rest) -> list[tuple[LaneIndex, _Rest]]:
         return [(lane, route) for lane in self._network.predecessors(index)]
@@ -88,15 +94,13 @@ class LaneChains:
     ) -> list[tuple[int, float]]:
         """Rows and distances of the lanes that one comes to, nearest first (Dijkstra's search)."""
         seen = {self._network.row(index)}
-        count = 0
+        order = itertools.count()  # so that lanes equally far keep the order of the links
         found: list[tuple[int, float]] = []
         queue: list[tuple[float, int, LaneIndex, _Rest]] = []
 
         def push(at: float, lane: LaneIndex, rest: _Rest) -> None:
-            nonlocal count
             for following, remaining in step(lane, rest):
-                heapq.heappush(queue, (at, count, following, remaining))
-                count += 1
+                heapq.heappush(queue, (at, next(order), following, remaining))
 
         push(start, index, tuple(route or ()))
         while queue:
@@ -177,10 +181,11 @@ def neighbours_on(
                 continue
             at += starts[j]
             if j > 0 and abs(at - s) > HORIZON:
-                break
+                continue
             if s <= at and at <= s_front:
                 front, s_front = i, at
             if at < s and at > s_rear:
                 rear, s_rear = i, at
-            break
+            if j == 0:
+                break  # as in highway-env; elsewhere it may be met by several ways, round a block even ahead and behind
     return front, s_front - s, rear, s - s_rear

@@ -18,6 +18,9 @@ def compiled(function: F) -> F:
 
     With ``NUMBA_DISABLE_JIT=1`` the function stays plain Python. Where numba finds no folder to cache in, the function
     is compiled anew in every process, and one ``RuntimeWarning`` says how to avoid it.
+
+    numba recompiles a function when its own file changes, not when a compiled function that it calls does: after an
+    edit of `polyline.py` delete the ``*.nbi`` files beside its callers (an installation renews all files at once).
     """
     try:
         return numba.njit(cache=True, fastmath=False)(function)  # type: ignore[no-any-return]

@@ -225,7 +225,7 @@ class TownNetwork(RoadNetwork):
 
 
 def _line_types(town: Town, lane: Lane) -> list[int]:
-    """Marks left and right: stripes between lanes (drawn by the right one of both), solid lines outside, none in junctions."""
+    """Marks left and right: stripes between lanes (drawn once), solid lines outside, none in junctions."""
     if lane.in_junction:
         return [LineType.NONE, LineType.NONE]
     left = town.neighbour(lane.id, LinkType.LANE_CHANGE_LEFT)

@@ -19,6 +19,9 @@ class TownRoad(Road):
     """A highway-env road on which heights count and neighbours are found across lane ends.
 
     Vehicles and objects are highway-env's. One may carry a `height` [m] of its own, else it has that of its lane.
+
+    Attributes:
+        time: simulated time [s], counted by `step`.
     """
 
     def __init__(
@@ -48,6 +51,7 @@ class TownRoad(Road):
             record_history=record_history,
             neighbour_vehicles_connected_lanes=neighbour_vehicles_connected_lanes,
         )
+        self.time = 0.0
         self._chains = LaneChains(network)
         self._zones = lane_zones(network.table)
 
@@ -73,6 +77,7 @@ class TownRoad(Road):
 
         Same as highway-env's for things at one height; pairs that its own first check would dismiss are not visited.
         """
+        self.time += dt
         for vehicle in self.vehicles:
             vehicle.step(dt)
         things = self.vehicles + self.objects

@@ -154,8 +154,8 @@ def _pair(a: int, b: int) -> tuple[int, int]:
 def _divide(streets: list[list[int]], joints: list[_Joint], length: dict[int, float]) -> list[list[int]]:
     """Divides streets until there are enough or parts get too short.
 
-    The longest street that crosses a junction is cut at the junction nearest its middle; where none is left, the longest
-    one of several roads is cut where two of them touch (exporters begin a new road at corners).
+    The longest street that crosses a junction is cut at the junction nearest its middle; where none is left, the
+    longest one of several roads is cut where two of them touch (exporters begin a new road at corners).
     """
     streets = [list(roads) for roads in streets]
     unbroken = _unbroken(joints)
@@ -246,7 +246,7 @@ def lay_sites(lanes: Sequence[Lane], links: Sequence[LaneLink], count: int = 24)
         places = _candidates([lane for lane in usable if lane.length >= shortest], margin)
         if len(places):
             places = places[_is_clear(lanes, places)]
-        if len(places) >= 2 * count:
+        if len(places) >= count:
             break
     chosen = _spread(places[:, 2:4], count) if len(places) else []
     return tuple(_site(k, lanes[int(places[row, 0])], places[row]) for k, row in enumerate(sorted(chosen)))

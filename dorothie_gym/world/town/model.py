@@ -20,6 +20,9 @@ Array: TypeAlias = NDArray[np.float64]
 NO_JUNCTION = -1
 NO_STREET = -1
 
+STRAIGHT_RATIO = 3.0
+"""A segment this many times longer than the one beside it is a straight that meets a curve."""
+
 
 class LinkType(enum.StrEnum):
     """How a lane goes on in another one."""
@@ -71,16 +74,20 @@ class Lane:
     def headings(self) -> Array:
         """Direction of the centre line at each point (n,) [rad], unwrapped.
 
-        An inner point takes the mean of its two segments; the ends are extrapolated from a constant curvature.
+        An inner point takes the mean of its two segments as on an arc; beside a much longer segment it takes that one's
+        direction, which is a straight, for it would have been cut finer otherwise. The ends go on with the curvature.
         """
         steps = np.diff(self.points[:, :2], axis=0)
         segment = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))  # (n-1,)
         if len(segment) == 1:
             return np.repeat(segment, 2)
         length = np.diff(self.stations)
-        inner = (segment[:-1] * length[1:] + segment[1:] * length[:-1]) / (length[:-1] + length[1:])
-        first = segment[0] - (inner[0] - segment[0])
-        last = segment[-1] + (segment[-1] - inner[-1])
+        before, after = length[:-1], length[1:]
+        inner = (segment[:-1] * after + segment[1:] * before) / (before + after)
+        inner = np.where(before > STRAIGHT_RATIO * after, segment[:-1], inner)
+        inner = np.where(after > STRAIGHT_RATIO * before, segment[1:], inner)
+        first = segment[0] if length[0] > STRAIGHT_RATIO * length[1] else 2 * segment[0] - inner[0]
+        last = segment[-1] if length[-1] > STRAIGHT_RATIO * length[-2] else 2 * segment[-1] - inner[-1]
         return np.concatenate(([first], inner, [last]))
 
     @property
@@ -94,7 +101,7 @@ class Lane:
         return self.junction_id != NO_JUNCTION
 
     def position(self, longitudinal: float, lateral: float = 0.0) -> Array:
-        """World position (2,) [m] at a distance along the lane and to its RIGHT; beyond the ends it goes on straight."""
+        """World position (2,) [m] at a distance along the lane and to its RIGHT; straight on beyond the ends."""
         s = float(np.clip(longitudinal, 0.0, self.length))
         x = np.interp(s, self.stations, self.points[:, 0])
         y = np.interp(s, self.stations, self.points[:, 1])

@@ -6,7 +6,6 @@ import warnings
 import numba
 import pytest
 
-from dorothie_gym.world.network import compiled as module
 from dorothie_gym.world.network.compiled import compiled
 
 
@@ -27,7 +26,7 @@ def test_unwritable_cache_falls_back_with_one_warning(monkeypatch):
         return njit(*args, **options)
 
     monkeypatch.setattr(numba, "njit", refusing)
-    monkeypatch.setattr(module, "_warned", False)
+    monkeypatch.setattr(sys.modules[compiled.__module__], "_warned", False)
     with pytest.warns(RuntimeWarning, match="NUMBA_CACHE_DIR") as caught:
         half = compiled(lambda x: x / 2)
     assert len(caught) == 1

@@ -59,7 +59,9 @@ def overpass_town() -> Town:
     return town([lane(0, under), lane(1, over, road=1)])
 
 
-def bend(start: tuple[float, float], corner: tuple[float, float], end: tuple[float, float]) -> list[tuple[float, float]]:
+def bend(
+    start: tuple[float, float], corner: tuple[float, float], end: tuple[float, float]
+) -> list[tuple[float, float]]:
     """A turn: points of a quadratic Bezier curve."""
     a, b, c = (np.array(p, dtype=float) for p in (start, corner, end))
     return [tuple((1 - t) ** 2 * a + 2 * t * (1 - t) * b + t**2 * c) for t in np.linspace(0, 1, 13)]

@@ -22,6 +22,8 @@ _CHORD_ERROR = 0.005
 _STRAIGHT = 1e-4
 # Ends of linked lanes further apart than this [m] are no slip of rounding: they are left as the file has them.
 _LARGEST_STITCH = 1.0
+# A lane's own centre line may not jump further than this from one sample to the next [m].
+_LARGEST_JUMP = 10.0
 # Length over which a lane gives way to its moved end [m].
 _STITCH_LENGTH = 10.0
 
@@ -45,7 +47,7 @@ def sample_centrelines(records: OpenDriveRecords, topology: Topology) -> list[Ar
         One array (n, 4) a lane: x, y, z and width [m].
 
     Raises:
-        TownError: a lane's centre line has no length.
+        TownError: a lane's centre line has no length, or leaves a gap that no rounding explains.
     """
     samples: dict[int, _RoadSamples] = {}
     lines = []
@@ -54,12 +56,21 @@ def sample_centrelines(records: OpenDriveRecords, topology: Topology) -> list[Ar
         if road.id not in samples:
             samples[road.id] = _sample_road(road)
         dense = _dense_line(road, samples[road.id], chain)
-        if np.hypot(*np.ptp(dense[:, :2], axis=0)) < SHORTEST_LANE / 2:
+        fault = _fault(dense)
+        if fault:
             element = f"road {road.id} / laneSection {chain[0].section} / lane {chain[0].lane}"
-            raise TownError(records.source, element, "its centre line shrinks to a point: the bend is too sharp for it")
+            raise TownError(records.source, element, fault)
         lines.append(_thin(dense))
     _stitch(lines, topology.links)
     return lines
+
+
+def _fault(dense: Array) -> str:
+    """What makes a centre line (n, 4) impossible to drive; empty if nothing does."""
+    if np.hypot(*np.ptp(dense[:, :2], axis=0)) < SHORTEST_LANE / 2:
+        return "its centre line shrinks to a point: the bend is too sharp for it"
+    jump = float(np.max(np.hypot(*np.diff(dense[:, :2], axis=0).T)))
+    return f"its centre line jumps by {jump:.1f} m; check geometry, offsets and widths" if jump > _LARGEST_JUMP else ""
 
 
 def _sample_road(road: RoadRecord) -> _RoadSamples:

@@ -28,7 +28,11 @@ Element: TypeAlias = etree._Element
 # Metres per second in one unit; a limit without a unit is in m/s (OpenDRIVE 1.4, section 5.3.2.2).
 SPEED_UNITS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 
-NO_ID = -1
+# A longer road is a slip of the pen, and would be sampled until memory ends [m].
+LONGEST_ROAD = 100_000.0
+
+# How far behind the end of its road a lane section may start: exporters round [m].
+ROUNDING = 0.1
 
 
 def parse_opendrive(path: str | Path) -> OpenDriveRecords:
@@ -82,8 +86,9 @@ class _Parser:
         parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True)
         try:
             text = Path(self.source).read_bytes()
-        except OSError as error:
-            raise TownError(self.source, "file", f"cannot be opened: {error.strerror}") from error
+        except (OSError, ValueError) as error:  # ValueError: a null character in the path
+            reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+            raise TownError(self.source, "file", f"cannot be opened: {reason}") from error
         try:
             root = etree.fromstring(text, parser)
         except etree.XMLSyntaxError as error:
@@ -105,11 +110,11 @@ class _Parser:
         return text
 
     def _number(self, element: Element, name: str, default: float | None = None) -> float:
-        text = element.get(name)
-        if text is None and default is not None:
+        if default is not None and element.get(name) is None:
             return default
+        text = self._text(element, name)
         try:
-            value = float(self._text(element, name))
+            value = float(text)
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
@@ -130,6 +135,8 @@ class _Parser:
 
     def _road(self, road: Element) -> RoadRecord:
         length = self._number(road, "length")
+        if not 0.0 <= length <= LONGEST_ROAD:
+            self._fail(road, f"attribute length must lie in 0 to {LONGEST_ROAD:g} m, but is {length:g}")
         return RoadRecord(
             id=self._integer(road, "id"),
             length=length,
@@ -199,6 +206,8 @@ class _Parser:
         starts = [self._number(e, "s") for e in elements]
         if any(later < earlier for earlier, later in zip(starts, starts[1:], strict=False)):
             self._fail(road, "its lane sections are not in the order of s")
+        if starts[0] < -ROUNDING or starts[-1] > length + ROUNDING:
+            self._fail(road, f"its lane sections must start between 0 and its length of {length:g} m")
         ends = [*starts[1:], max(length, starts[-1])]
         return tuple(
             SectionRecord(start=start, end=end, lanes={lane.id: lane for lane in map(self._lane, e.iterfind("*/lane"))})

@@ -1,0 +1,215 @@
+"""Everybody and everything on the road besides the car: traffic, pedestrians, props."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from dorothie_gym.ontology import ObjectClass, PropKind
+from dorothie_gym.world.car.hazards import Body
+from dorothie_gym.world.car.vehicle import Car
+from dorothie_gym.world.junctions import JunctionControl
+from dorothie_gym.world.network.road import TownRoad
+from dorothie_gym.world.pedestrians import Pedestrian
+from dorothie_gym.world.props import Prop
+from dorothie_gym.world.town.model import Array
+from dorothie_gym.world.town.oncoming import oncoming_lanes
+from dorothie_gym.world.traffic import CurveSpeeds, TrafficVehicle, free_places
+
+TOW_CRASHED = 3.0
+"""A crashed vehicle is towed away after this long [s]."""
+
+TOW_BLOCKED = 15.0
+"""A vehicle that stands before a prop gives up after this long [s]."""
+
+TOW_STUCK = 60.0
+"""Any vehicle that stands for this long is towed away, so that no knot lasts for ever [s]."""
+
+CLEAR_OF_CAR = 25.0
+"""Nobody appears closer to the car than this [m]."""
+
+CLEAR_OF_OTHERS = 14.0
+"""Nobody appears closer to others than this [m]."""
+
+OUT_OF_SIGHT = 60.0
+"""A towed vehicle comes back no closer to the car than this [m]."""
+
+
+class Actors:
+    """Traffic, pedestrians and props of a road.
+
+    Attributes:
+        vehicles: background traffic, in the order of their keys.
+        pedestrians: people on foot.
+        props: things placed by the Ad-Wizard.
+    """
+
+    def __init__(
+        self, road: TownRoad, junctions: JunctionControl, car: Car, *,
+        traffic_rng: np.random.Generator, walk_rng: np.random.Generator,
+    ) -> None:  # fmt: skip
+        self._road, self._junctions, self._car = road, junctions, car
+        self._traffic_rng, self._walk_rng = traffic_rng, walk_rng
+        self._town = road.network.town
+        self._curve_speeds = CurveSpeeds(self._town)
+        self._next_key = 1
+        self.vehicles: list[TrafficVehicle] = []
+        self.pedestrians: list[Pedestrian] = []
+        self.props: list[Prop] = []
+
+    # --- coming and going -------------------------------------------------------------------------------------------
+
+    def populate(self, *, vehicles: int, pedestrians: int) -> None:
+        """Brings traffic and pedestrians to random places, as many as fit."""
+        for lane, station in free_places(self._town, self._traffic_rng, 12 * vehicles):
+            if len(self.vehicles) == vehicles:
+                break
+            self.add_vehicle(lane, station, distance=CLEAR_OF_CAR)
+        for lane, station in free_places(self._town, self._walk_rng, pedestrians):
+            self.add_pedestrian(lane, station)
+
+    def add_vehicle(self, lane: int, station: float, *, distance: float) -> bool:
+        """Puts a vehicle on a lane if there is room and the car is farther than `distance` [m]."""
+        place = self._town.lanes[lane].position(station)
+        if not self._is_clear(place, distance):
+            return False
+        vehicle = TrafficVehicle(
+            self._road, lane, station, key=self._new_key(), speed=0.0,
+            desired_speed=float(self._traffic_rng.uniform(6.5, 10.0)),
+            junctions=self._junctions, curve_speeds=self._curve_speeds, rng=self._traffic_rng,
+        )  # fmt: skip
+        self._road.vehicles.append(vehicle)
+        self.vehicles.append(vehicle)
+        return True
+
+    def add_pedestrian(self, lane: int, station: float) -> bool:
+        """Puts a pedestrian beside a lane if nobody is there."""
+        town_lane = self._town.lanes[lane]
+        place = town_lane.position(station, town_lane.width_at(station) / 2 + 1.6)
+        if math.hypot(*(place - self._car.position)) < 8.0:
+            return False
+        if any(math.hypot(*(place - p.position)) < 1.0 for p in self.pedestrians):
+            return False
+        pedestrian = Pedestrian(self._road, lane, station, key=self._new_key(), rng=self._walk_rng)
+        self._road.objects.append(pedestrian)
+        self.pedestrians.append(pedestrian)
+        return True
+
+    def add_prop(self, kind: PropKind, lane: int, station: float) -> Prop:
+        """Puts a prop on a lane; whether it may stand there is the caller's business."""
+        prop = Prop(self._road, kind, lane, station)
+        self._road.objects.append(prop)
+        self.props.append(prop)
+        return prop
+
+    def remove_prop(self, prop: Prop) -> None:
+        """Takes a prop away."""
+        self._road.objects.remove(prop)
+        self.props.remove(prop)
+
+    def tidy(self) -> None:
+        """Tows crashed and stuck vehicles away and brings others in; to be called once a decision."""
+        for vehicle in list(self.vehicles):
+            blocked = vehicle.standing > TOW_BLOCKED and self._before_prop(vehicle)
+            if vehicle.crash_age > TOW_CRASHED or vehicle.standing > TOW_STUCK or blocked:
+                self._remove(vehicle)
+                self._replace()
+        self.pedestrians = [p for p in self.pedestrians if not p.crashed]
+        self._road.objects = [o for o in self._road.objects if not (isinstance(o, Pedestrian) and o.crashed)]
+
+    def take_crashed(self, car: Car) -> list[tuple[ObjectClass, Any]]:
+        """Those that the car has just touched, with their class; all but props stay until they are towed away."""
+        hit: list[tuple[ObjectClass, Any]] = []
+        reach = car.LENGTH
+        for vehicle in self.vehicles:
+            if vehicle.crashed and _near(vehicle, car, reach + 1.5) and vehicle.collidable:
+                hit.append((ObjectClass.VEHICLES, vehicle))
+        for pedestrian in self.pedestrians:
+            if pedestrian.crashed and _near(pedestrian, car, reach) and pedestrian.collidable:
+                hit.append((ObjectClass.PEDESTRIAN, pedestrian))
+        for prop in list(self.props):
+            if prop.crashed and _near(prop, car, reach + 1.5):
+                hit.append((ObjectClass.STATIC, prop))
+                self.remove_prop(prop)
+        for _, other in hit:
+            other.collidable = False  # touched once: it does not count again until it is towed
+        return hit
+
+    # --- moving and seeing ------------------------------------------------------------------------------------------
+
+    def act(self, dt: float) -> None:
+        """Lets traffic decide and pedestrians walk for `dt` [s]; `road.step` then moves the traffic."""
+        for vehicle in self.vehicles:
+            vehicle.act()
+        for pedestrian in self.pedestrians:
+            pedestrian.walk(dt, self._across(pedestrian))
+
+    def bodies(self, position: Array, sight: float) -> list[Body]:
+        """Bodies within sight of a position, nearest first."""
+        found: list[tuple[float, int, ObjectClass, Any]] = []
+        x, y = float(position[0]), float(position[1])
+        for kind, group in (
+            (ObjectClass.VEHICLES, self.vehicles),
+            (ObjectClass.PEDESTRIAN, self.pedestrians),
+            (ObjectClass.STATIC, self.props),
+        ):
+            for thing in group:
+                dx, dy = thing.position[0] - x, thing.position[1] - y
+                if dx * dx + dy * dy < sight * sight:
+                    found.append((dx * dx + dy * dy, getattr(thing, "key", -3), kind, thing))
+        found.sort(key=lambda row: row[:2])
+        return [_body(kind, key, thing) for _, key, kind, thing in found]
+
+    def _across(self, pedestrian: Pedestrian) -> float:
+        """How far it is to the other side of the road [m]."""
+        lane = self._town.lanes[pedestrian.lane_id]
+        station, _ = lane.project(pedestrian.position)
+        oncoming = oncoming_lanes(self._town).at(lane.id, station)
+        width = lane.width_at(station)
+        return width + 3.2 + (oncoming.gap if oncoming is not None else 0.0)
+
+    def _before_prop(self, vehicle: TrafficVehicle) -> bool:
+        return any(
+            math.hypot(*(prop.position - vehicle.position)) < 40.0 and vehicle.front_distance_to(prop) > 0.0
+            for prop in self.props
+        )
+
+    def _is_clear(self, place: Array, distance: float) -> bool:
+        if math.hypot(*(place - self._car.position)) < distance:
+            return False
+        others = [*self.vehicles, *self.props]
+        return all(math.hypot(*(place - other.position)) >= CLEAR_OF_OTHERS for other in others)
+
+    def _remove(self, vehicle: TrafficVehicle) -> None:
+        self._junctions.release(vehicle.key)
+        self._road.vehicles.remove(vehicle)
+        self.vehicles.remove(vehicle)
+
+    def _replace(self) -> None:
+        for lane, station in free_places(self._town, self._traffic_rng, 20):
+            if self.add_vehicle(lane, station, distance=OUT_OF_SIGHT):
+                return
+
+    def _new_key(self) -> int:
+        self._next_key += 1
+        return self._next_key
+
+
+def _near(thing: Any, car: Car, reach: float) -> bool:
+    return math.hypot(*(thing.position - car.position)) < reach + thing.diagonal / 2
+
+
+def _body(kind: ObjectClass, key: int, thing: Any) -> Body:
+    return Body(
+        key=key,
+        kind=kind,
+        x=float(thing.position[0]),
+        y=float(thing.position[1]),
+        heading=float(thing.heading),
+        length=float(thing.LENGTH),
+        width=float(thing.WIDTH),
+        speed=float(thing.speed),
+        height=float(thing.height),
+    )

@@ -1,0 +1,89 @@
+"""People on foot: they walk along a lane's edge and now and then cross, when nobody drives close by."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from highway_env.vehicle.objects import RoadObject
+
+from dorothie_gym.world.network.road import TownRoad
+
+WALKING_SPEED = 1.3
+"""[m/s], the usual design value for pedestrians (MUTCD takes 1.1)."""
+
+KERB = 1.6
+"""Distance from the lane's edge at which they walk [m]."""
+
+CROSSING_RATE = 1 / 45
+"""How often a pedestrian wants to cross [1/s]."""
+
+SAFE_TIME = 5.0
+"""Time gap to vehicles that they want before stepping out [s]."""
+
+SAFE_DISTANCE = 14.0
+"""And distance [m]."""
+
+
+class Pedestrian(RoadObject):
+    """A pedestrian beside (or crossing) a lane.
+
+    Attributes:
+        key: tells it apart from other bodies.
+        height: of the road beside it [m].
+    """
+
+    LENGTH, WIDTH = 0.5, 0.5
+
+    def __init__(self, road: TownRoad, lane_id: int, station: float, *, key: int, rng: np.random.Generator) -> None:
+        self._lane = road.network.town.lanes[lane_id]
+        self._rng = rng
+        self.key = key
+        self._station = station
+        self._home = self._lane.width_at(station) / 2 + KERB
+        self._lateral = self._home
+        self._target = self._home
+        self._direction = 1.0 if rng.random() < 0.5 else -1.0
+        self.height = self._lane.height_at(station)
+        self.lane_id = lane_id
+        super().__init__(road, self._lane.position(station, self._lateral), self._heading(), WALKING_SPEED)
+        self._place()
+
+    def walk(self, dt: float, across: float) -> None:
+        """Moves on by `dt` [s]; `across` is the way to the far side [m], used where the pedestrian wants to cross."""
+        if self.crashed:
+            self.speed = 0.0
+            return
+        crossing = abs(self._target - self._lateral) > 0.05
+        if crossing:
+            step = math.copysign(
+                min(WALKING_SPEED * dt, abs(self._target - self._lateral)), self._target - self._lateral
+            )
+            self._lateral += step
+        else:
+            self._station += self._direction * WALKING_SPEED * dt
+            if not 4.0 < self._station < self._lane.length - 4.0:
+                self._direction = 1.0 if self._station <= 4.0 else -1.0
+            if self._rng.random() < CROSSING_RATE * dt and self._is_clear():
+                near = abs(self._lateral - self._home) < 0.1
+                self._target = self._home - across if near else self._home
+        self._place()
+
+    def _is_clear(self) -> bool:
+        for vehicle in self.road.vehicles:
+            distance = math.hypot(*(vehicle.position - self.position))
+            if distance < SAFE_DISTANCE + SAFE_TIME * max(vehicle.speed, 0.0):
+                return False
+        return True
+
+    def _heading(self) -> float:
+        along = self._lane.heading_at(self._station)
+        if abs(self._target - self._lateral) > 0.05:
+            return along + math.copysign(math.pi / 2, self._target - self._lateral)
+        return along if self._direction > 0 else along + math.pi
+
+    def _place(self) -> None:
+        self.position = self._lane.position(self._station, self._lateral)
+        self.heading = self._heading()
+        self.speed = WALKING_SPEED
+        self.height = self._lane.height_at(self._station)

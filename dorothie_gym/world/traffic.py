@@ -1,0 +1,242 @@
+"""Background traffic: stock IDM vehicles that keep to the town's lanes and wait their turn at junctions."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from highway_env.vehicle.behavior import IDMVehicle
+from highway_env.vehicle.kinematics import Vehicle
+
+from dorothie_gym.world.junctions import JunctionControl
+from dorothie_gym.world.network.network import LaneIndex
+from dorothie_gym.world.network.road import TownRoad
+from dorothie_gym.world.town.model import Lane, Town
+
+ROUTE_AHEAD = 70.0
+"""Length of route that a vehicle keeps planned [m]."""
+
+CURVE_ACCELERATION = 2.5
+"""Lateral acceleration in curves [m/s^2]."""
+
+CURVE_BRAKING = 2.0
+"""Deceleration towards a curve [m/s^2]."""
+
+STOP_BRAKING = 3.0
+"""Deceleration towards a junction [m/s^2]."""
+
+ROOM_BEHIND = 9.0
+"""Free lane that a vehicle wants behind a junction before it enters [m]."""
+
+STUCK_SPEED = 0.3
+"""Slower than this a vehicle counts as standing [m/s]."""
+
+
+def curve_speed(lane: Lane) -> float:
+    """Speed at which the tightest bend of a lane is driven, at most its limit [m/s]."""
+    bend = np.abs(np.diff(lane.headings) / np.diff(lane.stations))
+    tightest = float(np.convolve(bend, np.full(3, 1 / 3), mode="same").max()) if len(bend) >= 3 else float(bend.max())
+    return min(lane.speed_limit, math.sqrt(CURVE_ACCELERATION / max(tightest, 1e-4)))
+
+
+class CurveSpeeds:
+    """Curve speeds of all lanes of a town [m/s]."""
+
+    def __init__(self, town: Town) -> None:
+        self._speeds = [curve_speed(lane) for lane in town.lanes]
+
+    def __getitem__(self, lane: int) -> float:
+        return self._speeds[lane]
+
+
+class TrafficVehicle(IDMVehicle):
+    """highway-env's IDM vehicle with a planned route, slow in curves, asking before it crosses a junction.
+
+    Attributes:
+        key: tells it apart; keys of bodies in the world are unique.
+        height: of the road under it [m].
+        standing: how long it has been standing [s].
+    """
+
+    def __init__(
+        self,
+        road: TownRoad,
+        lane_id: int,
+        station: float,
+        *,
+        key: int,
+        speed: float,
+        desired_speed: float,
+        junctions: JunctionControl,
+        curve_speeds: CurveSpeeds,
+        rng: np.random.Generator,
+    ) -> None:
+        lane = road.network.town.lanes[lane_id]
+        self.height = lane.height_at(station)
+        self.key = key
+        self._network, self._junctions, self._curve_speeds, self._rng = road.network, junctions, curve_speeds, rng
+        self._desired = desired_speed
+        self._front: Any | None = None
+        self._front_gap = math.inf
+        self.standing = 0.0
+        self.crash_age = 0.0
+        super().__init__(
+            road,
+            lane.position(station),
+            lane.heading_at(station),
+            speed,
+            target_lane_index=road.network.index_of(lane_id),
+            target_speed=desired_speed,
+            route=[road.network.index_of(lane_id)],
+        )
+        self._extend_route()
+
+    def on_state_update(self) -> None:
+        """Matches the vehicle to the closest lane of its height."""
+        self.lane_index = self._network.get_closest_lane_index(self.position, self.heading, height=self.height)
+        self.lane = self._network.get_lane(self.lane_index)
+        self.height = self.lane.height_at(self.lane.local_coordinates(self.position)[0])
+
+    def step(self, dt: float) -> None:
+        """Moves on by `dt` [s] and counts how long it has been standing."""
+        super().step(dt)
+        self.standing = self.standing + dt if self.speed < STUCK_SPEED else 0.0
+        self.crash_age = self.crash_age + dt if self.crashed else 0.0
+
+    def act(self, action: dict[str, float] | str | None = None) -> None:
+        """Steers along its lane and keeps its distance: IDM, MOBIL, curves, junctions."""
+        if self.crashed:
+            Vehicle.act(self, {"acceleration": -max(self.speed, 0.0), "steering": 0.0})
+            return
+        self.follow_road()
+        if self.enable_lane_change and not self.lane.town_lane.in_junction:
+            before = self.target_lane_index
+            self.change_lane_policy()
+            if self.target_lane_index != before:
+                self.route = [self.target_lane_index]
+        self._extend_route()
+        station = self._network.get_lane(self.target_lane_index).local_coordinates(self.position)[0]
+        self.target_speed = self._speed_ahead(station)
+        (self._front, self._front_gap), _ = self.road.neighbours(self, self.lane_index)
+        acceleration = self.acceleration(self, self._front)
+        if self.lane_index != self.target_lane_index:
+            (self._front, self._front_gap), _ = self.road.neighbours(self, self.target_lane_index)
+            acceleration = min(acceleration, self.acceleration(self, self._front))
+        self._front = None
+        acceleration = min(acceleration, self._junction_acceleration(station))
+        steering = self.steering_control(self.target_lane_index)
+        Vehicle.act(
+            self,
+            {
+                "acceleration": float(np.clip(acceleration, -self.ACC_MAX, self.ACC_MAX)),
+                "steering": float(np.clip(steering, -self.MAX_STEERING_ANGLE, self.MAX_STEERING_ANGLE)),
+            },
+        )
+
+    def clip_actions(self) -> None:
+        """As stock, but brakes stop a vehicle and do not reverse it."""
+        super().clip_actions()
+        if self.action["acceleration"] < 0.0 and self.speed <= 0.05:
+            self.action["acceleration"] = 0.0
+            self.speed = 0.0
+
+    def lane_distance_to(self, other: Any, lane: Any = None) -> float:
+        """Distance to another vehicle [m]; to the one in front, as found along the lanes."""
+        if other is not None and other is self._front:
+            return self._front_gap
+        return float(super().lane_distance_to(other, lane))
+
+    def follow_road(self) -> None:
+        """Goes on to the next lane of the route at the end of the present one."""
+        lane = self._network.get_lane(self.target_lane_index)
+        if lane.local_coordinates(self.position)[0] > lane.length - 0.5 and len(self.route) > 1:
+            self.route.pop(0)
+            self.target_lane_index = self.route[0]
+
+    @property
+    def lane_id(self) -> int:
+        """Lane that it is on."""
+        return int(self.lane.town_lane.id)
+
+    def _extend_route(self) -> None:
+        length = sum(self._network.get_lane(index).length for index in self.route[1:])
+        while length < ROUTE_AHEAD:
+            onward: list[LaneIndex] = self._network.successors(self.route[-1])
+            if not onward:
+                return
+            self.route.append(onward[int(self._rng.integers(len(onward)))] if len(onward) > 1 else onward[0])
+            length += self._network.get_lane(self.route[-1]).length
+
+    def _speed_ahead(self, station: float) -> float:
+        """Desired speed, less where a bend ahead asks for it [m/s]."""
+        speed, distance = self._desired, -station
+        for index in self.route:
+            lane = self._network.get_lane(index)
+            bend = self._curve_speeds[lane.town_lane.id]
+            speed = min(speed, math.sqrt(bend**2 + 2 * CURVE_BRAKING * max(distance, 0.0)))
+            distance += lane.length
+            if distance > ROUTE_AHEAD:
+                break
+        return max(speed, 0.5)
+
+    def _junction_acceleration(self, station: float) -> float:
+        """Acceleration that stops the vehicle before a junction it may not enter [m/s^2]; inf where it may."""
+        now = self.road.time
+        self._junctions.note(self.key, self.lane_id, self.speed, now)
+        distance = -station
+        for k, index in enumerate(self.route):
+            lane = self._network.get_lane(index)
+            if lane.town_lane.in_junction and k > 0:
+                stopping = self.speed**2 / (2 * STOP_BRAKING)
+                if distance > stopping + 12.0:
+                    return math.inf
+                if self._junctions.request(self.key, lane.town_lane.id, now, room=self._room_after(k)):
+                    return math.inf
+                return self._brake_to(distance - self.LENGTH / 2 - 1.0)
+            if lane.town_lane.in_junction:
+                return math.inf  # on its way across
+            distance += lane.length
+        return math.inf
+
+    def _brake_to(self, distance: float) -> float:
+        if distance <= 0.3:
+            return -self.ACC_MAX if self.speed > 0 else 0.0
+        needed = self.speed**2 / (2 * distance)
+        if needed < 0.6 * STOP_BRAKING:
+            return math.inf if self.speed > 2.0 else 0.5 * min(distance, 1.0)
+        return -needed
+
+    def _room_after(self, k: int) -> bool:
+        """Whether the lane behind the junction has room for one more vehicle."""
+        after = next((i for i in self.route[k:] if not self._network.get_lane(i).town_lane.in_junction), None)
+        if after is None:
+            return True
+        return room_at_start(self.road, self._network.get_lane(after), exclude=self)
+
+
+def room_at_start(road: TownRoad, lane: Any, exclude: Any) -> bool:
+    """Whether nothing slow stands on the first metres of a lane."""
+    start = lane.position(0.0, 0.0)
+    for other in [*road.vehicles, *road.objects]:
+        if other is exclude or other.speed > 2.5:
+            continue
+        dx, dy = other.position[0] - start[0], other.position[1] - start[1]
+        if dx * dx + dy * dy > (ROOM_BEHIND + 6.0) ** 2:
+            continue
+        station, lateral = lane.local_coordinates(other.position)
+        if abs(lateral) < lane.width / 2 and -1.0 < station < ROOM_BEHIND + other.LENGTH / 2:
+            return False
+    return True
+
+
+def free_places(town: Town, rng: np.random.Generator, count: int) -> list[tuple[int, float]]:
+    """Places on lanes outside junctions, drawn evenly along the road, candidates for spawning."""
+    lanes = [lane for lane in town.lanes if not lane.in_junction and lane.length > 12.0]
+    weights = np.array([lane.length for lane in lanes])
+    chosen = rng.choice(len(lanes), size=count, p=weights / weights.sum())
+    shares = rng.uniform(size=count)
+    return [
+        (lanes[int(i)].id, float(5.0 + share * (lanes[int(i)].length - 10.0)))
+        for i, share in zip(chosen, shares, strict=True)
+    ]

@@ -1,0 +1,300 @@
+"""The world of a session: a town, the car, what drives, walks and stands there, weather and faults."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from dorothie_gym.ontology import ObjectClass, PhysicalAction, Sensor
+from dorothie_gym.world.actors import Actors
+from dorothie_gym.world.car.driver import Driver
+from dorothie_gym.world.car.hazards import Body, Hazard, bodies_ahead
+from dorothie_gym.world.car.planner import BRAKING, LocalPlanner
+from dorothie_gym.world.car.vehicle import Car
+from dorothie_gym.world.config import FRAME_RATE, WorldConfig
+from dorothie_gym.world.junctions import JunctionControl
+from dorothie_gym.world.localizer import Localizer
+from dorothie_gym.world.network.network import TownNetwork
+from dorothie_gym.world.network.road import TownRoad
+from dorothie_gym.world.town.model import Array, Town
+from dorothie_gym.world.traffic import room_at_start
+from dorothie_gym.world.weather import Weather
+
+CAR = 0
+"""Key of the car among bodies and at junctions."""
+
+FAULT_SECONDS = 30.0
+"""A sensor fault ends by itself after this long [s] (design)."""
+
+BLUR = 0.5
+"""Share of the sight that is left when the view is blurred."""
+
+HARD = 3.5
+"""Braking harder than this for something ahead is a hazard stop [m/s^2]."""
+
+FRAME_COLUMNS = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "brake", "lane")
+"""Columns of `World.frames`; `lane` is the lane's id, heading in radians, speed in m/s."""
+
+
+class WorldEventKind(enum.StrEnum):
+    """What the world reports of its own."""
+
+    HAZARD_STOP = "hazard_stop"
+    HAZARD_END = "hazard_end"
+    COLLISION = "collision"
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorldEvent:
+    """Something that happened to the car, at a frame."""
+
+    frame: int
+    kind: WorldEventKind
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+
+class World:
+    """A town in which a car drives among others.
+
+    Attributes:
+        town: the map.
+        car: the car.
+        planner: its local planner.
+        driver: what drives it.
+        actors: traffic, pedestrians and props.
+        weather: weather and light.
+        lights: whether the car's head lights are on.
+        faults: sensors that are faulty, and the frame at which each works again.
+        hazard: what the car is braking or standing for, or None.
+        frame: physics frames since the start.
+        frames: trajectory of the last call of `step` (n, 9), see `FRAME_COLUMNS`.
+        collisions: those of the car's own making.
+    """
+
+    def __init__(
+        self, town: Town, config: WorldConfig, *, seed: np.random.SeedSequence, departure: tuple[int, float],
+        network: TownNetwork | None = None,
+    ) -> None:  # fmt: skip
+        """Builds the world.
+
+        Args:
+            town: the map.
+            config: settings.
+            seed: source of the generators of traffic, pedestrians and localisation, one each.
+            departure: lane and distance along it [m] where the car stands.
+            network: the town's network, if there is one already: it is never changed.
+        """
+        traffic_seed, walk_seed, locate_seed = seed.spawn(3)
+        self.town, self.config = town, config
+        self.network = network or TownNetwork(town)
+        lane, station = departure
+        start = town.lanes[lane]
+        self.road = TownRoad(self.network, np_random=np.random.default_rng(traffic_seed))
+        self.car = Car(self.road, start.position(station), start.heading_at(station), start.height_at(station))
+        self.road.vehicles.append(self.car)
+        self.planner = LocalPlanner(town, lane, station)
+        self.driver = Driver(self.planner, length=self.car.LENGTH, cruise=config.cruise_speed)
+        self.junctions = JunctionControl(town)
+        self.weather = Weather()
+        self.actors = Actors(
+            self.road, self.junctions, self.car,
+            traffic_rng=np.random.default_rng(traffic_seed), walk_rng=np.random.default_rng(walk_seed),
+        )  # fmt: skip
+        self.actors.populate(vehicles=config.vehicles, pedestrians=config.pedestrians)
+        self.localizer = Localizer(
+            float(self.car.position[0]), float(self.car.position[1]), float(self.car.heading),
+            np.random.default_rng(locate_seed),
+        )  # fmt: skip
+        self.lights = False
+        self.faults: dict[Sensor, int] = {}
+        self.hazard: Hazard | None = None
+        self._hazard_since = 0
+        self._hazard_seen = 0
+        self._stopped_until = 0
+        self.frame = 0
+        self.frames: Array = np.zeros((0, len(FRAME_COLUMNS)))
+        self.collisions = 0
+        self._events: list[WorldEvent] = []
+
+    # --- time -------------------------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Simulated seconds since the start."""
+        return self.frame / FRAME_RATE
+
+    def step(self, frames: int) -> list[WorldEvent]:
+        """Lets the world run for a number of physics frames; returns what happened to the car."""
+        self._events = []
+        rows = np.empty((frames, len(FRAME_COLUMNS)))
+        before = (self.car.position.copy(), float(self.car.heading))
+        travelled = 0.0
+        self.planner.extend(float(self.car.speed))
+        for k in range(frames):
+            self._substep()
+            travelled += float(self.car.speed) / FRAME_RATE
+            control = self.car.control
+            rows[k] = (
+                self.frame, self.car.position[0], self.car.position[1], self.car.heading, self.car.speed,
+                control.throttle, control.steer, control.brake, self.planner.lane,
+            )  # fmt: skip
+        self.frames = rows
+        self._localize(travelled, float(self.car.heading) - before[1], frames / FRAME_RATE)
+        self.actors.tidy()
+        self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
+        return self._events
+
+    def _substep(self) -> None:
+        dt = 1.0 / FRAME_RATE
+        car = self.car
+        self.junctions.note(CAR, self.planner.lane, float(car.speed), self.time)
+        hazard = self._look_ahead()
+        friction = self.weather.friction
+        car.friction = friction
+        control = self.driver.control(
+            float(car.position[0]), float(car.position[1]), float(car.heading), float(car.speed), hazard, dt, friction
+        )
+        if self.frame < self._stopped_until:
+            control = type(control)(throttle=0.0, steer=control.steer, brake=1.0)
+        self._note_hazard(hazard, control.brake)
+        car.height = self.planner.height
+        car.drive(control, dt)
+        self.actors.act(dt)
+        speed_before = float(car.speed)
+        self.road.step(dt)
+        self.frame += 1
+        if car.crashed:
+            self._collide(speed_before)
+
+    def _localize(self, travelled: float, turned: float, seconds: float) -> None:
+        self.localizer.predict(travelled, turned, seconds)
+        if Sensor.GPS not in self.faults:
+            self.localizer.correct(float(self.car.position[0]), float(self.car.position[1]))
+
+    # --- perception -------------------------------------------------------------------------------------------------
+
+    @property
+    def sight(self) -> float:
+        """How far the car perceives bodies now [m]."""
+        if Sensor.VIEW in self.faults:
+            return 12.0  # bumper radar: enough to stop at walking pace, which a blind car is held to
+        sight = self.weather.sight(lights=self.lights)
+        return sight * BLUR if Sensor.BLUR in self.faults else sight
+
+    def perceived(self) -> list[Body]:
+        """Bodies that the car perceives, nearest first."""
+        return self.actors.bodies(self.car.position, self.sight)
+
+    def _look_ahead(self) -> Hazard | None:
+        """The nearest thing on the path that the car has to brake for."""
+        planner, car = self.planner, self.car
+        bodies = self.perceived()
+        found = bodies_ahead(
+            planner.path, planner.s, bodies, length=car.LENGTH, width=car.WIDTH, height=float(car.height)
+        )
+        for other in (self._junction_ahead(), self._gap_to_traffic(bodies)):
+            if other is not None and (found is None or other.gap < found.gap):
+                found = other
+        return found
+
+    def _junction_ahead(self) -> Hazard | None:
+        """The line before a junction that the car may not enter yet."""
+        path, planner, speed = self.planner.path, self.planner, float(self.car.speed)
+        reach = speed**2 / (2 * BRAKING) + 14.0
+        first, last = path.index_at(planner.s), path.index_at(planner.s + reach)
+        here = int(path.lanes[first])
+        for k in range(first + 1, last + 1):
+            lane = int(path.lanes[k])
+            if lane == here:
+                continue
+            if self.town.lanes[lane].in_junction and not self.town.lanes[here].in_junction:
+                line = float(path.s[k]) - planner.s - self.car.LENGTH / 2
+                if line < -self.car.LENGTH / 4:
+                    return None  # over the line already
+                after = next((n for n in planner.lanes_ahead[1:] if not self.town.lanes[n].in_junction), None)
+                room = after is None or room_at_start(self.road, self.network.lane_of(after), exclude=self.car)
+                if self.junctions.request(CAR, lane, self.time, room=room):
+                    return None
+                return Hazard(kind=ObjectClass.VEHICLES, gap=line + 2.0, key=-2)
+            here = lane
+        return None
+
+    def _gap_to_traffic(self, bodies: list[Body]) -> Hazard | None:
+        """Before a lane switch or U-turn: the place where it begins, while others are in its way."""
+        planner, path = self.planner, self.planner.path
+        action, _ = planner.manoeuvre
+        k = path.index_at(planner.s)
+        if path.manoeuvre[k] or not path.manoeuvre[k:].any():
+            return None
+        start = k + int(np.argmax(path.manoeuvre[k:]))
+        ahead = float(path.s[start]) - planner.s
+        if ahead > 15.0:
+            return None
+        lane = self.town.lanes[int(path.lanes[start])]
+        meeting, _ = lane.project(np.asarray(path.points[start]))
+        turning = action is PhysicalAction.U_TURN
+        for body in bodies:
+            if body.kind is not ObjectClass.VEHICLES or abs(body.height - float(self.car.height)) > 2.5:
+                continue
+            station, lateral = lane.project(np.array([body.x, body.y]))
+            if abs(lateral) > 2.0:
+                continue
+            closing = body.speed - (0.0 if turning else float(self.car.speed))
+            behind = 8.0 + max(closing, 0.0) * (5.0 if turning else 3.0)
+            if -behind < station - meeting < 9.0:
+                return Hazard(kind=ObjectClass.VEHICLES, gap=max(ahead, 0.0) + 2.0, key=body.key)
+        return None
+
+    def _note_hazard(self, hazard: Hazard | None, brake: float) -> None:
+        """Logs when the car begins to stop for something, and when it goes on."""
+        free = self.driver.allowed_speed(None)
+        speed = float(self.car.speed)
+        limiting = hazard is not None and hazard.safe_speed(self.weather.friction) < free - 0.5
+        if self.hazard is None:
+            if hazard is not None and limiting and not self.planner.held:
+                if (speed < 1.0 and hazard.speed < 1.0) or brake * 8.0 > HARD:
+                    self.hazard, self._hazard_since, self._hazard_seen = hazard, self.frame, self.frame
+                    self._log(
+                        WorldEventKind.HAZARD_STOP, reason=hazard.kind.label, distance=round(max(hazard.gap, 0.0), 2)
+                    )
+            return
+        if limiting and hazard is not None:
+            self.hazard, self._hazard_seen = hazard, self.frame
+        if self.frame - self._hazard_seen > FRAME_RATE // 2:
+            seconds = (self.frame - self._hazard_since) / FRAME_RATE
+            self._log(WorldEventKind.HAZARD_END, reason=self.hazard.kind.label, seconds=round(seconds, 2))
+            self.hazard = None
+
+    def _log(self, kind: WorldEventKind, **data: Any) -> None:
+        self._events.append(WorldEvent(frame=self.frame, kind=kind, data=data))
+
+    # --- collisions -------------------------------------------------------------------------------------------------
+
+    def _collide(self, speed: float) -> None:
+        """Books a collision: whose fault it was, and who is towed away."""
+        car = self.car
+        for kind, other in self.actors.take_crashed(car):
+            offset = np.asarray(other.position) - car.position
+            forward = float(offset @ np.array([math.cos(car.heading), math.sin(car.heading)]))
+            own = speed > 0.5 and forward > 0.0
+            self.collisions += own
+            self._log(WorldEventKind.COLLISION, other=kind.label, own_fault=own, speed=round(speed, 2))
+        car.crashed, car.impact, car.speed = False, None, 0.0
+        self._stopped_until = self.frame + round(self.config.collisions_stop * FRAME_RATE)
+
+    # --- faults -----------------------------------------------------------------------------------------------------
+
+    def set_fault(self, sensor: Sensor, on: bool) -> str | None:
+        """Switches a sensor fault on or off; returns the reason if nothing changes."""
+        if on == (sensor in self.faults):
+            return f"the fault of {sensor} is {'on' if on else 'off'} already"
+        if on:
+            self.faults[sensor] = self.frame + round(FAULT_SECONDS * FRAME_RATE)
+        else:
+            del self.faults[sensor]
+        return None

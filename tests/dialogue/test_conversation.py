@@ -1,0 +1,82 @@
+import pytest
+
+from dorothie_gym.dialogue import Conversation, Span
+from dorothie_gym.ontology import DialogueAct, DialogueMove, Role
+
+PARTICIPANT, CO_WIZARD = Role.PARTICIPANT, Role.CO_WIZARD
+
+
+def span(text: str, move: DialogueMove = DialogueMove.INSTRUCT) -> Span:
+    return Span(text, DialogueAct.of(move))
+
+
+def test_one_act_is_heard_when_its_words_are_over():
+    talk = Conversation()
+    assert talk.say(PARTICIPANT, span("turn left at the next"), 10.0) is None  # 5 words: 2 s
+    assert talk.speaking(PARTICIPANT, 10.5) == pytest.approx(1.5)
+    assert talk.deliver(11.5) == []
+    (heard,) = talk.deliver(12.0)
+    assert (heard.start, heard.end, heard.text) == (10.0, 12.0, "turn left at the next")
+    assert talk.deliver(12.5) == []
+    assert talk.speaking(PARTICIPANT, 12.0) == 0.0
+
+
+def test_one_word_in_each_of_two_decisions_is_one_utterance():
+    talk = Conversation()
+    talk.say(PARTICIPANT, span("yes", DialogueMove.REPLY_Y), 0.0)  # until 0.6 s
+    assert talk.deliver(0.5) == []
+    talk.say(PARTICIPANT, span("stop"), 0.5)
+    assert talk.deliver(1.0) == []
+    (heard,) = talk.deliver(1.5)
+    assert heard.end == pytest.approx(1.2)
+    assert [act.move for act in heard.acts] == [DialogueMove.REPLY_Y, DialogueMove.INSTRUCT]
+
+
+def test_a_pause_begins_a_new_utterance():
+    talk = Conversation()
+    talk.say(PARTICIPANT, span("yes"), 0.0)
+    assert len(talk.deliver(1.0)) == 1
+    talk.say(PARTICIPANT, span("stop"), 1.0)
+    assert talk.in_air(PARTICIPANT).start == 1.0
+
+
+def test_words_that_ended_but_were_not_delivered_are_gone_on_with_from_now():
+    talk = Conversation()
+    talk.say(PARTICIPANT, span("yes"), 0.0)
+    talk.say(PARTICIPANT, span("stop"), 2.0)
+    (heard,) = talk.deliver(2.6)
+    assert (heard.start, heard.end) == (0.0, pytest.approx(2.6))
+
+
+def test_speakers_overlap_and_are_delivered_by_their_start_participant_first():
+    talk = Conversation()
+    talk.say(CO_WIZARD, span("which way"), 0.0)
+    talk.say(PARTICIPANT, span("left now"), 0.0)
+    assert [heard.speaker for heard in talk.deliver(1.0)] == [PARTICIPANT, CO_WIZARD]
+    talk.say(CO_WIZARD, span("should I keep going straight on"), 1.0)
+    talk.say(PARTICIPANT, span("stop"), 1.5)
+    assert [heard.speaker for heard in talk.deliver(2.5)] == [PARTICIPANT]
+    assert [heard.speaker for heard in talk.deliver(3.5)] == [CO_WIZARD]
+
+
+def test_late_delivery_keeps_the_order_of_starts():
+    talk = Conversation()
+    talk.say(CO_WIZARD, span("okay"), 0.0)
+    talk.say(PARTICIPANT, span("stop"), 0.5)
+    assert [heard.speaker for heard in talk.deliver(5.0)] == [CO_WIZARD, PARTICIPANT]
+
+
+def test_too_many_acts_in_a_breath_are_refused_with_a_reason():
+    talk = Conversation(max_spans=2)
+    assert talk.say(PARTICIPANT, span("left"), 0.0) is None
+    assert talk.say(PARTICIPANT, span("left"), 0.5) is None
+    reason = talk.say(PARTICIPANT, span("left"), 1.0)
+    assert reason is not None and "participant" in reason and "2" in reason
+    assert len(talk.deliver(2.0)[0].spans) == 2
+    assert talk.say(PARTICIPANT, span("left"), 2.0) is None
+
+
+@pytest.mark.parametrize("arguments", [{"words_per_second": 0.0}, {"max_spans": 0}])
+def test_arguments_out_of_range_are_named(arguments):
+    with pytest.raises(ValueError, match=next(iter(arguments))):
+        Conversation(**arguments)

@@ -1,0 +1,123 @@
+import pytest
+
+from dorothie_gym.dialogue import EXPECTATIONS, ExchangeState, ExchangeTracker, Span, Utterance
+from dorothie_gym.ontology import DialogueAct, DialogueMove, Role
+
+P, C = Role.PARTICIPANT, Role.CO_WIZARD
+M = DialogueMove
+
+
+def said(speaker: Role, start: float, *moves: DialogueMove, seconds: float = 1.0) -> Utterance:
+    return Utterance(speaker, tuple(Span("words", DialogueAct.of(move)) for move in moves), start, start + seconds)
+
+
+def test_a_command_and_its_acknowledgement_are_one_exchange():
+    tracker = ExchangeTracker()
+    assert tracker.update(said(P, 0.0, M.INSTRUCT)) == (0,)
+    assert tracker.exchanges[0].state is ExchangeState.OPEN
+    assert tracker.update(said(C, 2.0, M.ACKNOWLEDGE)) == (0,)
+    (exchange,) = tracker.exchanges
+    assert (exchange.initiator, exchange.start, exchange.end) == (P, 0.0, 3.0)
+    assert exchange.state is ExchangeState.FULFILLED
+    assert exchange.acts == 2
+
+
+@pytest.mark.parametrize("question", EXPECTATIONS, ids=lambda move: move.label)
+def test_every_expected_answer_fulfils(question):
+    for answer in EXPECTATIONS[question]:
+        tracker = ExchangeTracker()
+        tracker.update(said(C, 0.0, question))
+        assert tracker.update(said(P, 1.5, answer)) == (0,)
+        assert tracker.exchanges[0].state is ExchangeState.FULFILLED
+
+
+def test_an_answer_and_a_command_in_one_utterance_close_and_open():
+    tracker = ExchangeTracker()
+    tracker.update(said(C, 0.0, M.QUERY_YN))
+    assert tracker.update(said(P, 2.0, M.REPLY_Y, M.INSTRUCT)) == (0, 1)
+    assert [exchange.state for exchange in tracker.exchanges] == [ExchangeState.FULFILLED, ExchangeState.OPEN]
+
+
+def test_a_reason_and_the_question_it_leads_to_share_an_exchange():
+    tracker = ExchangeTracker()
+    assert tracker.update(said(C, 0.0, M.EXPLAIN, M.QUERY_YN)) == (0, 0)
+    assert tracker.update(said(P, 2.0, M.REPLY_N)) == (0,)
+
+
+def test_an_explanation_behind_an_answer_belongs_to_it():
+    tracker = ExchangeTracker()
+    tracker.update(said(P, 0.0, M.INSTRUCT))
+    assert tracker.update(said(C, 2.0, M.ACKNOWLEDGE, M.EXPLAIN)) == (0, 0)
+    assert tracker.exchanges[0].state is ExchangeState.FULFILLED
+
+
+def test_two_overlapping_exchanges_both_get_closed():
+    tracker = ExchangeTracker()
+    assert tracker.update(said(P, 0.0, M.INSTRUCT)) == (0,)
+    assert tracker.update(said(C, 0.2, M.QUERY_W)) == (1,)
+    assert tracker.update(said(P, 2.0, M.REPLY_W)) == (1,)
+    assert tracker.update(said(C, 3.5, M.ACKNOWLEDGE)) == (0,)
+    assert tracker.open() == []
+
+
+def test_nobody_answers_themselves():
+    tracker = ExchangeTracker()
+    tracker.update(said(C, 0.0, M.QUERY_YN))
+    tracker.update(said(C, 2.0, M.REPLY_Y))
+    assert tracker.exchanges[0].state is ExchangeState.OPEN
+
+
+def test_a_misunderstanding_keeps_the_exchange_open_until_it_is_repaired():
+    tracker = ExchangeTracker()
+    tracker.update(said(P, 0.0, M.INSTRUCT))
+    assert tracker.update(said(C, 2.0, M.CONFUSE)) == (0,)
+    assert tracker.update(said(P, 4.0, M.CLARIFY)) == (0,)
+    assert tracker.exchanges[0].state is ExchangeState.OPEN
+    assert tracker.update(said(C, 6.0, M.CONFIRM)) == (0,)
+    assert tracker.exchanges[0].state is ExchangeState.FULFILLED
+
+
+def test_ten_seconds_of_silence_abandon_a_question():
+    tracker = ExchangeTracker()
+    tracker.update(said(C, 0.0, M.QUERY_W))  # until 1 s
+    tracker.tick(11.0)
+    assert tracker.exchanges[0].state is ExchangeState.OPEN
+    tracker.tick(11.5)
+    assert tracker.exchanges[0].state is ExchangeState.ABANDONED
+
+
+def test_a_statement_that_nobody_takes_up_owed_no_answer():
+    tracker = ExchangeTracker()
+    tracker.update(said(C, 0.0, M.EXPLAIN))
+    tracker.tick(20.0)
+    assert tracker.exchanges[0].state is ExchangeState.FULFILLED
+
+
+def test_an_answer_that_began_in_time_counts_although_it_ended_late():
+    tracker = ExchangeTracker()
+    tracker.update(said(C, 0.0, M.QUERY_W))
+    tracker.tick(12.0)
+    assert tracker.update(said(P, 10.5, M.REPLY_W, seconds=3.0)) == (0,)
+    assert tracker.exchanges[0].state is ExchangeState.FULFILLED
+
+
+def test_a_response_to_nothing_joins_the_last_exchange_or_stands_unprompted():
+    tracker = ExchangeTracker()
+    assert tracker.update(said(P, 0.0, M.ACKNOWLEDGE)) == (0,)
+    assert tracker.exchanges[0].unprompted
+    assert tracker.exchanges[0].state is ExchangeState.FULFILLED
+    assert tracker.update(said(C, 5.0, M.ACKNOWLEDGE)) == (0,)
+    assert tracker.update(said(C, 30.0, M.REPLY_Y)) == (1,)
+    assert tracker.exchanges[1].unprompted
+
+
+def test_irrelevant_talk_disturbs_no_exchange():
+    tracker = ExchangeTracker()
+    tracker.update(said(C, 0.0, M.QUERY_W))
+    assert tracker.update(said(P, 2.0, M.IRRELEVANT)) == (0,)
+    assert tracker.exchanges[0].state is ExchangeState.OPEN
+
+
+def test_patience_must_be_positive():
+    with pytest.raises(ValueError, match="patience"):
+        ExchangeTracker(0.0)
