@@ -74,7 +74,7 @@ class _Writer:
         body, close = _split_close(self._fill(template))
         manners = self._grammar.manners.get((self._voice, self._act.move))
         # A bare answer or a set phrase stands as it is: manners go with what has content.
-        if manners is not None and template.covers:
+        if manners is not None and template.covers and template.topic is None:
             body = self._mannered(body, manners)
         for slot in SPOKEN_SLOTS:
             if slot in self._values and slot not in template.covers:

@@ -275,10 +275,14 @@ def _directions(clause: Sequence[str], lists: _WordLists) -> list[Direction]:
     directions = [
         Direction(word)
         for place, word in enumerate(clause)
-        # "not right", "don't turn right"
-        if word in ("left", "right", "straight") and lists.denying.isdisjoint(clause[max(0, place - 2) : place])
+        if word in ("left", "right", "straight") and not _is_denied(clause[max(0, place - 3) : place], lists)
     ]
     return [Direction.BACK] if not directions and _BACK.search(" ".join(clause)) else directions
+
+
+def _is_denied(before: Sequence[str], lists: _WordLists) -> bool:
+    """Returns whether the words before a direction deny it: "not right", "don't take a right"; doubt is no denial."""
+    return "sure" not in before and not lists.denying.isdisjoint(before)
 
 
 def _clauses(words: Sequence[str]) -> list[list[str]]:
@@ -294,7 +298,7 @@ def _clauses(words: Sequence[str]) -> list[list[str]]:
 def _ordinal(words: Sequence[str], lists: _WordLists) -> int | None:
     if _AFTER_NEXT.search(" ".join(words)):
         return 2
-    for word, noun in zip(words, [*words[1:], ""], strict=True):
+    for word, noun in zip(words, words[1:], strict=False):
         number = read_ordinal(word)
         if number is not None and noun in lists.ordinal_nouns:
             return number

@@ -28,6 +28,7 @@ from dorothie_gym.spaces.observations import (
     heard_acts,
     observation_space,
 )
+from dorothie_gym.spaces.text import plain_text
 
 __all__ = [
     "NO_MOVE",
@@ -54,4 +55,5 @@ __all__ = [
     "heard_acts",
     "noop",
     "observation_space",
+    "plain_text",
 ]

@@ -96,7 +96,7 @@ class Physical:
 
 @dataclass(frozen=True, kw_only=True)
 class Mental:
-    """A belief update: junction ids of a plan, landmarks of a goal, a landmark's status, or a guess of its place."""
+    """A belief update: a plan (indices in `Town.junctions`), goals, a landmark's status, or a guess of its place."""
 
     action: MentalAction
     plan: tuple[int, ...] = ()

@@ -15,6 +15,9 @@ STORY_LENGTH = 2400
 METRES = 1024
 """Places on a lane are given in whole metres; no lane of a known town is longer than this [m]."""
 
+REACH = 1e6
+"""Bound of quantities that have no other: no coordinate [m], speed [m/s] or time [s] of a session comes near it."""
+
 PERCENT = 101
 """Steps of a quantity that the Ad-Wizard sets, as a share of its range."""
 

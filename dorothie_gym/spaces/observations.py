@@ -29,7 +29,14 @@ from dorothie_gym.ontology import (
     decode_slots,
 )
 from dorothie_gym.spaces.actions import NO_MOVE
-from dorothie_gym.spaces.limits import MESSAGE_LENGTH, STORY_LENGTH, TEXT_CHARACTERS, UTTERANCE_LENGTH, SpaceLimits
+from dorothie_gym.spaces.limits import (
+    MESSAGE_LENGTH,
+    REACH,
+    STORY_LENGTH,
+    TEXT_CHARACTERS,
+    UTTERANCE_LENGTH,
+    SpaceLimits,
+)
 
 Observation: TypeAlias = dict[str, Any]
 
@@ -80,7 +87,10 @@ class SubgoalColumn(enum.IntEnum):
 
 
 class ExitColumn(enum.IntEnum):
-    """Columns of `exits`, the turn options at the next junction of the present path, from right to left."""
+    """Columns of `exits`, the turn options at the next junction of the present path, from right to left.
+
+    `lane` is the lane after the junction, `street` its street (-1: none), `junction` an index in `Town.junctions`.
+    """
 
     PRESENT = 0
     ANGLE = 1
@@ -193,8 +203,8 @@ def observation_space(role: Role, limits: SpaceLimits, observe_acts: bool = True
     return spaces.Dict({**common, **own})
 
 
-def _box(*shape: int, low: float = -np.inf) -> spaces.Box:
-    return spaces.Box(low, np.inf, shape, dtype=np.float64)
+def _box(*shape: int, low: float = -REACH) -> spaces.Box:
+    return spaces.Box(low, REACH, shape, dtype=np.float64)
 
 
 def _text(length: int) -> spaces.Text:

@@ -144,7 +144,7 @@ class Actors:
         for vehicle in self.vehicles:
             vehicle.act()
         for pedestrian in self.pedestrians:
-            pedestrian.walk(dt, self._across(pedestrian))
+            pedestrian.walk(dt, self._across)
 
     def bodies(self, position: Array, sight: float) -> list[Body]:
         """Bodies within sight of a position, nearest first."""

@@ -11,10 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from dorothie_gym.world.town.model import Lane, Town
+from dorothie_gym.world.town.model import Array, Lane, Town
 
-CLEARANCE = 3.2
-"""Centre lines closer than this cannot be driven at the same time [m]: two car widths of 2 m less a shared margin."""
+CIRCLE_OFFSET = 1.7
+"""Three circles of radius 1.3 m, one in the middle and one this far to either side, cover a car of 5 m x 2 m [m]."""
+
+CLEARANCE = 3.1
+"""Circles of two vehicles that go straight, closer than this, touch or nearly so [m]."""
+
+TURNING_CLEARANCE = 3.9
+"""The same where one of them turns: stock steering cuts corners by up to 0.8 m [m]."""
+
+TURN = np.radians(20.0)
+"""A connector that changes direction by more than this is a turn [rad]."""
 
 HEIGHT = 2.5
 """Connectors further apart in height do not meet [m]."""
@@ -112,9 +121,16 @@ class JunctionControl:
 
 
 def _meet(one: Lane, other: Lane) -> bool:
-    points = [
-        np.array([lane.position(s) for s in np.linspace(0, lane.length, int(lane.length) + 2)]) for lane in (one, other)
-    ]
-    near = cdist(*points).min()
     level = abs(one.height_at(one.length / 2) - other.height_at(other.length / 2)) <= HEIGHT
-    return bool(near < CLEARANCE and level)
+    turning = any(abs(lane.headings[-1] - lane.headings[0]) > TURN for lane in (one, other))
+    clearance = TURNING_CLEARANCE if turning else CLEARANCE
+    return bool(level and cdist(_swept(one), _swept(other)).min() < clearance)
+
+
+def _swept(lane: Lane) -> Array:
+    """Centres of the circles that cover a vehicle, at every metre of its way along a lane (n, 2) [m]."""
+    stations = np.linspace(0.0, lane.length, int(lane.length) + 2)
+    headings = np.array([lane.heading_at(s) for s in stations])
+    middles = np.array([lane.position(s) for s in stations])
+    along = np.column_stack((np.cos(headings), np.sin(headings)))
+    return np.concatenate([middles + offset * along for offset in (-CIRCLE_OFFSET, 0.0, CIRCLE_OFFSET)])

@@ -49,23 +49,25 @@ class Localizer:
         covariance: Array = np.asarray(self._filter.P, dtype=np.float64)
         return covariance
 
-    def predict(self, distance: float, turn: float, dt: float) -> None:
+    def predict(self, ahead: float, right: float, turn: float, dt: float) -> None:
         """Moves the estimate on by odometry.
 
         Args:
-            distance: driven since the last call, as it truly was [m]; the wheel's error is added here.
-            turn: change of heading since then [rad]; the gyro's error is added here.
+            ahead: true displacement since the last call along the heading of then [m]; the wheels' error is added here.
+            right: and across it [m].
+            turn: true change of heading since then [rad]; the gyro's error is added here.
             dt: time since then [s].
         """
+        distance = math.hypot(ahead, right)
         moved = distance * self._scale
         turned = turn + YAW_RATE_SIGMA * dt * float(self._rng.standard_normal()) * (distance > 0.01)
         x, y, heading = self.pose
-        middle = heading + turned / 2
+        middle = heading + (math.atan2(right, ahead) if distance > 0.01 else 0.0)
         jacobian = np.array(
             [[1.0, 0.0, -moved * math.sin(middle)], [0.0, 1.0, moved * math.cos(middle)], [0.0, 0.0, 1.0]]
         )
         along = np.array([math.cos(middle), math.sin(middle), 0.0])
-        noise = np.outer(along, along) * (SPEED_SIGMA * moved) ** 2
+        noise = np.outer(along, along) * (SPEED_SIGMA * moved) ** 2 + np.diag([1.0, 1.0, 0.0]) * (0.01 * moved) ** 2
         noise[2, 2] = (YAW_RATE_SIGMA * dt) ** 2 * (distance > 0.01)
         self._filter.x = np.array([x + moved * math.cos(middle), y + moved * math.sin(middle), heading + turned])
         self._filter.P = jacobian @ self._filter.P @ jacobian.T + noise

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from highway_env.vehicle.objects import RoadObject
@@ -49,8 +50,8 @@ class Pedestrian(RoadObject):
         super().__init__(road, self._lane.position(station, self._lateral), self._heading(), WALKING_SPEED)
         self._place()
 
-    def walk(self, dt: float, across: float) -> None:
-        """Moves on by `dt` [s]; `across` is the way to the far side [m], used where the pedestrian wants to cross."""
+    def walk(self, dt: float, across: Callable[[Pedestrian], float]) -> None:
+        """Moves on by `dt` [s]; `across` tells the way to the far side [m] where the pedestrian wants to cross."""
         if self.crashed:
             self.speed = 0.0
             return
@@ -66,7 +67,7 @@ class Pedestrian(RoadObject):
                 self._direction = 1.0 if self._station <= 4.0 else -1.0
             if self._rng.random() < CROSSING_RATE * dt and self._is_clear():
                 near = abs(self._lateral - self._home) < 0.1
-                self._target = self._home - across if near else self._home
+                self._target = self._home - across(self) if near else self._home
         self._place()
 
     def _is_clear(self) -> bool:

@@ -8,6 +8,10 @@ from dorothie_gym.ontology import PropKind
 from dorothie_gym.world.network.road import TownRoad
 
 
+PROP_KINDS = tuple(PropKind)
+"""Kinds in the order of their numbers in observations and actions."""
+
+
 class Prop(Obstacle):
     """A prop on a lane: it stands across it, so that its width blocks the lane.
 

@@ -133,18 +133,16 @@ class World:
         self._events = []
         rows = np.empty((frames, len(FRAME_COLUMNS)))
         before = (self.car.position.copy(), float(self.car.heading))
-        travelled = 0.0
         self.planner.extend(float(self.car.speed))
         for k in range(frames):
             self._substep()
-            travelled += float(self.car.speed) / FRAME_RATE
             control = self.car.control
             rows[k] = (
                 self.frame, self.car.position[0], self.car.position[1], self.car.heading, self.car.speed,
                 control.throttle, control.steer, control.brake, self.planner.lane,
             )  # fmt: skip
         self.frames = rows
-        self._localize(travelled, float(self.car.heading) - before[1], frames / FRAME_RATE)
+        self._localize(*before, frames / FRAME_RATE)
         self.actors.tidy()
         self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
         return self._events
@@ -171,8 +169,11 @@ class World:
         if car.crashed:
             self._collide(speed_before)
 
-    def _localize(self, travelled: float, turned: float, seconds: float) -> None:
-        self.localizer.predict(travelled, turned, seconds)
+    def _localize(self, position: Array, heading: float, seconds: float) -> None:
+        moved = self.car.position - position
+        c, s = math.cos(heading), math.sin(heading)
+        ahead, right = float(moved @ (c, s)), float(moved @ (-s, c))
+        self.localizer.predict(ahead, right, float(self.car.heading) - heading, seconds)
         if Sensor.GPS not in self.faults:
             self.localizer.correct(float(self.car.position[0]), float(self.car.position[1]))
 
@@ -197,10 +198,8 @@ class World:
         found = bodies_ahead(
             planner.path, planner.s, bodies, length=car.LENGTH, width=car.WIDTH, height=float(car.height)
         )
-        for other in (self._junction_ahead(), self._gap_to_traffic(bodies)):
-            if other is not None and (found is None or other.gap < found.gap):
-                found = other
-        return found
+        hazards = [h for h in (found, self._junction_ahead(), self._gap_to_traffic(bodies)) if h is not None]
+        return min(hazards, key=Hazard.safe_speed, default=None)
 
     def _junction_ahead(self) -> Hazard | None:
         """The line before a junction that the car may not enter yet."""
@@ -214,7 +213,7 @@ class World:
                 continue
             if self.town.lanes[lane].in_junction and not self.town.lanes[here].in_junction:
                 line = float(path.s[k]) - planner.s - self.car.LENGTH / 2
-                if line < -self.car.LENGTH / 4:
+                if line < -self.car.LENGTH / 2:
                     return None  # over the line already
                 after = next((n for n in planner.lanes_ahead[1:] if not self.town.lanes[n].in_junction), None)
                 room = after is None or room_at_start(self.road, self.network.lane_of(after), exclude=self.car)

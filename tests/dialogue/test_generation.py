@@ -70,9 +70,9 @@ def test_wording_is_a_function_of_act_and_seed():
 def test_a_turn_says_its_direction(move, direction):
     for seed in range(20):
         for speaker in (Role.PARTICIPANT, Role.CO_WIZARD):
-            assert direction in words(
-                DialogueAct.of(move, ActionValue.J_TURN), speaker, seed, direction=direction
-            ).lower()
+            assert (
+                direction in words(DialogueAct.of(move, ActionValue.J_TURN), speaker, seed, direction=direction).lower()
+            )
 
 
 def test_particulars_are_said():
@@ -80,9 +80,7 @@ def test_particulars_are_said():
     turn = act(DialogueMove.INSTRUCT, ActionValue.J_TURN)
     speed = act(DialogueMove.EXPLAIN, ActionValue.SPEED_CHANGE)
     lights = act(DialogueMove.INSTRUCT, ActionValue.LIGHT_CHANGE)
-    change = act(
-        DialogueMove.INSTRUCT, LandmarkName.COCO, LandmarkName.IKEA, GoalStatus.ABANDONED, GoalStatus.ONGOING
-    )
+    change = act(DialogueMove.INSTRUCT, LandmarkName.COCO, LandmarkName.IKEA, GoalStatus.ABANDONED, GoalStatus.ONGOING)
     for seed in range(10):
         assert "second" in words(turn, seed=seed, direction="right", ordinal=2)
         assert "twenty-five" in words(speed, Role.CO_WIZARD, seed, faster=False, speed=25.0)

@@ -1,13 +1,130 @@
-import sys
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dorothie_gym.dialogue import guess_act, guess_spans, word_act
-from dorothie_gym.ontology import DialogueMove, Role, Slot, parse_act
+from dorothie_gym.dialogue import Direction, Wording, guess_act, guess_spans, word_act
+from dorothie_gym.ontology import SLOT_VALUES, DialogueAct, DialogueMove, LandmarkName, Role, Slot, parse_act
 
-sys.path.insert(0, str(Path(__file__).parent))
+SHARES = {Slot.ACTION: 0.4, Slot.LANDMARK: 0.4, Slot.STREET: 0.25, Slot.OBJECT: 0.12, Slot.STATUS: 0.15}
+
+
+def random_act(rng: np.random.Generator) -> DialogueAct:
+    """Any move; up to two values in any of the slots. Irrelevant talk carries none."""
+    move = DialogueMove(int(rng.integers(len(DialogueMove))))
+    values = []
+    for slot, share in SHARES.items():
+        if move is not DialogueMove.IRRELEVANT and rng.random() < share:
+            values += [SLOT_VALUES[slot][int(rng.integers(len(SLOT_VALUES[slot])))] for _ in range(rng.integers(1, 3))]
+    return DialogueAct.of(move, *values)
+
+
+def random_wording(rng: np.random.Generator) -> Wording:
+    return Wording(
+        direction=list(Direction)[int(rng.integers(4))] if rng.random() < 0.5 else None,
+        ordinal=int(rng.integers(1, 10)) if rng.random() < 0.2 else None,
+        faster=bool(rng.random() < 0.5) if rng.random() < 0.7 else None,
+        lights=bool(rng.random() < 0.5) if rng.random() < 0.7 else None,
+        speed=float(rng.integers(5, 90)) if rng.random() < 0.2 else None,
+        distance=float(rng.integers(5, 300)) if rng.random() < 0.1 else None,
+        here=bool(rng.random() < 0.1),
+        past=list(LandmarkName)[int(rng.integers(1, 11))] if rng.random() < 0.1 else None,
+    )
+
+
+@pytest.mark.parametrize("speaker", [Role.PARTICIPANT, Role.CO_WIZARD])
+def test_acts_are_recovered_from_generated_words(speaker):
+    rng = np.random.default_rng(11)
+    moves, values, recovered, surplus = Counter(), Counter(), Counter(), 0
+    count = 1500
+    for _ in range(count):
+        act = random_act(rng)
+        guess = guess_act(word_act(act, speaker, rng, random_wording(rng)))
+        moves[act.move is guess.move] += 1
+        for slot in (Slot.LANDMARK, Slot.STREET, Slot.ACTION):
+            values[slot] += len(act.values(slot))
+            recovered[slot] += sum(value in guess.slots for value in act.values(slot))
+        # `past` and `dropped` name landmarks that the act does not carry.
+        surplus += any(value not in act.slots for value in guess.slots if value.slot in (Slot.STREET, Slot.ACTION))
+    assert moves[True] / count >= 0.9
+    assert all(recovered[slot] / values[slot] >= 0.95 for slot in values), recovered
+    assert surplus / count < 0.05
+
+
+@pytest.mark.parametrize(
+    ("text", "move", "slots"),
+    [
+        ("Could you take me to the KFC first?", "Instruct", {"Landmark": ["KFC"]}),
+        ("left at the next one please", "Instruct", {"Action": ["JTurn"]}),
+        ("Which way here?", "QueryW", {"Action": ["Queried"]}),
+        ("Right.", "ReplyW", {"Action": ["JTurn"]}),
+        ("Should I keep going?", "QueryYN", {"Action": ["LaneFollow"]}),
+        ("hmm, not sure", "ReplyU", {}),
+        ("You mean the house on Beal, right?", "Check", {"Landmark": ["House"], "Street": ["Beal"]}),
+        ("That's it.", "Confirm", {}),
+        ("Did you get that?", "Align", {}),
+        ("I did.", "Acknowledge", {}),
+        ("Sorry, say again?", "Confuse", {}),
+        ("I said turn around.", "Clarify", {"Action": ["UTurn"]}),
+        ("It’s on Murfin, past the SevenEleven.", "Explain", {"Street": ["Murfin"], "Landmark": ["SevenEleven"]}),
+        ("a bit further", "Instruct", {"Action": ["LaneFollow"]}),
+        ("Shall I find another way?", "QueryYN", {}),
+        ("Taking Hubbard instead.", "Confirm", {"Street": ["Hubbard"]}),
+        ("Actually we can skip the gas station.", "Explain", {"Landmark": ["Shell"], "Status": ["Abandoned"]}),
+        ("Great, that's done.", "Explain", {"Status": ["Complete"]}),
+        ("Where to next?", "QueryW", {"Landmark": ["Queried"]}),
+        ("Do you see the person by the crossing?", "QueryYN", {"Object": ["Pedestrian"]}),
+        ("why did we stop", "QueryW", {"Action": ["Stop"]}),
+        ("Red light ahead.", "ReplyW", {"Object": ["TrafficLight"]}),
+        ("No no, that was the wrong way.", "Explain", {}),
+        ("Sorry, turning around.", "Acknowledge", {"Action": ["UTurn"]}),
+        ("what a nice day", "Irrelevant", {}),
+        ("TURN LEFT ON PLYMOUTH ROAD", "Instruct", {"Action": ["JTurn"], "Street": ["Plymouth"]}),
+        ("at the stop sign turn left", "Instruct", {"Action": ["JTurn"], "Object": ["TrafficSign"]}),
+        ("change to the left lane please", "Instruct", {"Action": ["LaneSwitch"]}),
+        ("asdf qwer", "Irrelevant", {}),
+        ("", "Irrelevant", {}),
+    ],
+)
+def test_free_english_is_understood(text, move, slots):
+    assert guess_act(text) == parse_act(move, slots)
+
+
+@pytest.mark.parametrize(
+    ("text", "after", "move"),
+    [
+        ("take a left", DialogueMove.QUERY_W, DialogueMove.REPLY_W),
+        ("okay", DialogueMove.QUERY_YN, DialogueMove.REPLY_Y),
+        ("yes", DialogueMove.CHECK, DialogueMove.CONFIRM),
+        ("okay", DialogueMove.INSTRUCT, DialogueMove.ACKNOWLEDGE),
+    ],
+)
+def test_the_move_before_tells_what_an_answer_is(text, after, move):
+    assert guess_act(text, after).move is move
+
+
+@pytest.mark.parametrize(
+    ("text", "moves"),
+    [
+        ("Yeah, then straight on to Fuller.", ["ReplyY", "Instruct"]),
+        ("no, stop", ["ReplyN", "Instruct"]),
+        ("I can hardly see, slow down.", ["Explain", "Instruct"]),
+        ("Not Ikea, Coco. Turning around.", ["Confirm", "Explain"]),
+        ("It's on Murfin, past the SevenEleven.", ["Explain"]),
+        ("no, don't turn left", ["ReplyN"]),
+        ("There's a barrier ahead. Shall I find another way?", ["Explain", "QueryYN"]),
+        ("  ", []),
+    ],
+)
+def test_one_breath_may_hold_several_acts(text, moves):
+    spans = guess_spans(text)
+    assert [span.act.move.label for span in spans] == moves
+    assert " ".join(span.text for span in spans) == text.strip()
+
+
+@given(st.text(max_size=160), st.none() | st.sampled_from(DialogueMove))
+def test_any_text_gets_acts(text, after):
+    assert isinstance(guess_act(text, after), DialogueAct)
+    assert all(span.text.strip() for span in guess_spans(text, after))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -27,6 +28,9 @@ REACTION = 0.4
 
 STANDSTILL_GAP = 2.5
 """Gap that is left to a body that stands [m]."""
+
+ROADBLOCK_GAP = 10.0
+"""Gap that is left to a prop [m]: room for a U-turn, which swings out 9 m ahead of the car's nose."""
 
 HARD_BRAKING = 4.0
 """Deceleration that the safe speed counts on [m/s^2]."""
@@ -70,15 +74,16 @@ class Hazard:
     def safe_speed(self, friction: float = 1.0) -> float:
         """Speed from which the car can still stop behind it (Gipps 1981, with the leader braking as hard) [m/s]."""
         braking = HARD_BRAKING * friction
-        room = max(self.gap - STANDSTILL_GAP, 0.0)
+        margin = ROADBLOCK_GAP if self.kind is ObjectClass.STATIC else STANDSTILL_GAP
+        room = max(self.gap - margin, 0.0)
         slack = braking * REACTION
-        return float(-slack + np.sqrt(slack**2 + self.speed**2 + 2 * braking * room))
+        return -slack + math.sqrt(slack**2 + self.speed**2 + 2 * braking * room)
 
 
 def bodies_ahead(
     path: Path, s: float, bodies: Sequence[Body], *, length: float, width: float, height: float
 ) -> Hazard | None:
-    """The nearest body on the path ahead, or soon to be there.
+    """The body on the path ahead, or soon to be there, that allows the least speed.
 
     Args:
         path: path of the car.
@@ -96,14 +101,14 @@ def bodies_ahead(
         return None
     stations, headings = path.s[first:last], path.headings[first:last]
     normals = np.column_stack((-np.sin(headings), np.cos(headings)))  # to the right
-    nearest: Hazard | None = None
+    worst: Hazard | None = None
     for body in bodies:
         if abs(body.height - height) > HEIGHT_MARGIN:
             continue
         hazard = _on_line(body, line, stations, headings, normals, s, length, width)
-        if hazard is not None and (nearest is None or hazard.gap < nearest.gap):
-            nearest = hazard
-    return nearest
+        if hazard is not None and (worst is None or hazard.safe_speed() < worst.safe_speed()):
+            worst = hazard
+    return worst
 
 
 def _on_line(

@@ -219,7 +219,21 @@ class LocalPlanner:
         self._lay([_Step(self.lane), _Step(target, change=True)], self.station, speed)
         return None
 
+    def may_turn_round(self, speed: float) -> bool:
+        """Whether a U-turn would be carried out at this speed [m/s]."""
+        return not isinstance(self._plan_u_turn(speed), str)
+
     def _turn_round(self, angle: int, speed: float) -> str | None:
+        plan = self._plan_u_turn(speed)
+        if isinstance(plan, str):
+            return plan
+        self._clear()
+        self._manoeuvre = PhysicalAction.U_TURN
+        self._lay_u_turn(*plan)
+        return None
+
+    def _plan_u_turn(self, speed: float) -> tuple[Oncoming, float] | str:
+        """Where a U-turn would lead and the station where it would begin, or why there can be none."""
         if self.in_manoeuvre or self._town.lanes[self.lane].in_junction:
             return "the car is in the middle of a manoeuvre"
         lane = self._town.lanes[self.lane]
@@ -237,10 +251,7 @@ class LocalPlanner:
             return "there is no oncoming lane beside this one"
         if begin > lane.length + 0.5:
             return "there is no room left to turn round"
-        self._clear()
-        self._manoeuvre = PhysicalAction.U_TURN
-        self._lay_u_turn(oncoming, min(begin, lane.length))
-        return None
+        return oncoming, min(begin, lane.length)
 
     def _turn(self, angle: int, speed: float) -> str | None:
         found = self._find_turn(angle, speed)

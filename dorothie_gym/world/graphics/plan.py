@@ -31,6 +31,7 @@ _CLEARANCE = 3.0  # [m] a lane this much higher than another passes over it
 _BRIDGE_REACH = 12.0  # [m] of road drawn as a bridge before and after the crossing
 _SIDEWALK = 2.2
 _KERB = 0.45
+_JOINT = 0.15
 _PLOT = 5.0
 
 
@@ -190,7 +191,9 @@ class Plan:
         lanes = self.town.lanes
         for margin, colour in ((_SIDEWALK, palette.SIDEWALK), (_KERB, palette.KERB), (0.0, palette.ROAD)):
             for lane in lanes:
-                yield Shape(ribbon(lane, margin), colour)
+                # Connectors a little wider, as for the fillings between them: no slivers of kerb remain inside.
+                wider = _JOINT if lane.in_junction and colour is palette.ROAD else 0.0
+                yield Shape(ribbon(lane, margin + wider), colour)
                 for s in (0.0, lane.length):  # rounded joints
                     yield Shape(disc(lane.position(s), lane.width_at(s) / 2.0 + margin), colour)
             if colour is palette.KERB:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import heapq
 import itertools
 import math
@@ -41,11 +42,11 @@ class Chain(NamedTuple):
 
 
 class LaneChains:
-    """The lanes around each lane; remembers those that depend on nothing but the town's links."""
+    """The lanes around each lane; remembers what it was asked last, for a vehicle keeps its route for a while."""
 
     def __init__(self, network: TownNetwork) -> None:
         self._network = network
-        self._around: dict[int, Chain] = {}
+        self._remembered = functools.lru_cache(maxsize=4096)(self._find)
 
     def around(self, index: LaneIndex, route: Sequence[tuple[str, str, int | None]] | None) -> Chain:
         """The lane itself, the lanes ahead along a route (or all, where it does not tell) and the lanes behind.
@@ -58,18 +59,16 @@ class LaneChains:
             Lanes that begin within `HORIZON` of the lane's end or end within it of its start; the lane itself first,
             then those ahead and then those behind, each from near to far.
         """
+        return self._remembered(index, tuple(route or ()))
+
+    def _find(self, index: LaneIndex, route: _Rest) -> Chain:
         row = self._network.row(index)
-        if not route and row in self._around:
-            return self._around[row]
         length = self._network.get_lane(index).length
         ahead = self._walk(index, route, self._onward, length)
-        behind = self._walk(index, None, self._back, 0.0)
+        behind = self._walk(index, (), self._back, 0.0)
         found = [(row, 0.0), *((r, s) for r, s in ahead), *((r, -s - self._length(r)) for r, s in behind)]
         rows, offsets = zip(*found, strict=True)
-        chain = Chain(np.array(rows, dtype=np.int64), np.array(offsets, dtype=np.float64))
-        if not route:
-            self._around[row] = chain
-        return chain
+        return Chain(np.array(rows, dtype=np.int64), np.array(offsets, dtype=np.float64))
 
     def _length(self, row: int) -> float:
         table = self._network.table
@@ -88,7 +87,7 @@ class LaneChains:
     def _walk(
         self,
         index: LaneIndex,
-        route: Sequence[tuple[str, str, int | None]] | None,
+        route: _Rest,
         step: Callable[[LaneIndex, _Rest], list[tuple[LaneIndex, _Rest]]],
         start: float,
     ) -> list[tuple[int, float]]:
@@ -102,7 +101,7 @@ class LaneChains:
             for following, remaining in step(lane, rest):
                 heapq.heappush(queue, (at, next(order), following, remaining))
 
-        push(start, index, tuple(route or ()))
+        push(start, index, route)
         while queue:
             at, _, lane, rest = heapq.heappop(queue)
             row = self._network.row(lane)

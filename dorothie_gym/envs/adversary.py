@@ -1,0 +1,226 @@
+"""Carries out the Ad-Wizard's exceptions, or tells why not: nothing may make the task impossible."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from dorothie_gym.ontology import ExceptionKind, GoalStatus
+from dorothie_gym.spaces import AdWizardAction
+from dorothie_gym.tasks import StoryboardError, TaskState
+from dorothie_gym.world.car.planner import BRAKING
+from dorothie_gym.world.props import Prop
+from dorothie_gym.world.town import Town
+from dorothie_gym.world.town.routing import router
+from dorothie_gym.world.world import World
+
+FROM_START = 30.0
+"""A prop stands at least this far behind the start of its lane [m], so that the car can turn round before it."""
+
+FROM_END = 8.0
+"""And this far before its end [m]."""
+
+FROM_SITE = 25.0
+"""And this far along the lane from any landmark's waypoint [m]: the car has to be able to stop there."""
+
+FROM_CAR = 25.0
+"""Nothing appears closer to the car than this [m], nor than it can stop, and turn round, before."""
+
+MOST = 60
+"""Vehicles, and pedestrians, that spawning fills a town up to."""
+
+Outcome: TypeAlias = str | dict[str, Any]
+"""A reason for a refusal, or what was done, for the log."""
+
+
+class Adversary:
+    """The Ad-Wizard's hands in the world and the task."""
+
+    def __init__(self, world: World, task: TaskState, max_props: int) -> None:
+        self._world, self._task, self._max_props = world, task, max_props
+        self._handlers: dict[ExceptionKind, Callable[[AdWizardAction], Outcome]] = {
+            ExceptionKind.WEATHER: self._weather,
+            ExceptionKind.SPAWN_VEHICLES: self._spawn,
+            ExceptionKind.SPAWN_PEDESTRIANS: self._spawn,
+            ExceptionKind.PLACE_PROP: self._place_prop,
+            ExceptionKind.MOVE_PROP: self._move_prop,
+            ExceptionKind.DELETE_PROP: self._delete_prop,
+            ExceptionKind.SENSOR_FAULT: self._fault,
+            ExceptionKind.TASK_TRIGGER: self._change_task,
+            ExceptionKind.TASK_DELETE: self._change_task,
+            ExceptionKind.TASK_CHANGE: self._change_task,
+            ExceptionKind.MESSAGE: self._message,
+        }
+
+    def carry_out(self, action: AdWizardAction) -> Outcome:
+        """Carries out an exception other than NONE."""
+        return self._handlers[action.exception](action)
+
+    # --- environment ------------------------------------------------------------------------------------------------
+
+    def _weather(self, action: AdWizardAction) -> Outcome:
+        weather = self._world.weather
+        before = weather.values[action.weather]
+        value = weather.set_share(action.weather, action.share)
+        if value == before:
+            return f"{action.weather} is {value:g} already"
+        return {"parameter": str(action.weather), "value": round(value, 3)}
+
+    def _spawn(self, action: AdWizardAction) -> Outcome:
+        world = self._world
+        if (reason := self._no_such_place(action)) is not None:
+            return reason
+        if action.count == 0:
+            return "nobody was to come: count is 0"
+        crowd = world.actors.vehicles if action.exception is ExceptionKind.SPAWN_VEHICLES else world.actors.pedestrians
+        if len(crowd) >= MOST:
+            return f"there are {MOST} of them in the town already"
+        middle = world.town.lanes[action.place.lane].position(action.place.metres)
+        half = max(float(action.extent), 5.0)
+        candidates = self._places_within(middle, half)
+        order = np.random.default_rng([world.frame, action.place.lane, action.place.metres]).permutation(
+            len(candidates)
+        )
+        done = 0
+        for k in order:
+            if done == action.count or len(crowd) >= MOST:
+                break
+            lane, station = candidates[int(k)]
+            if action.exception is ExceptionKind.SPAWN_VEHICLES:
+                done += world.actors.add_vehicle(lane, station, distance=max(FROM_CAR, self._stopping_distance()))
+            else:
+                done += world.actors.add_pedestrian(lane, station)
+        if done == 0:
+            return "there is no room for anybody in the rectangle"
+        corners = (float(middle[0] - half), float(middle[0] + half), float(middle[1] - half), float(middle[1] + half))
+        return {"asked": action.count, "count": done, **dict(zip(("x0", "x1", "y0", "y1"), corners, strict=True))}
+
+    def _places_within(self, middle: Any, half: float) -> list[tuple[int, float]]:
+        places = []
+        for lane in self._world.town.lanes:
+            if lane.in_junction or lane.length < 12.0:
+                continue
+            for station in np.arange(6.0, lane.length - 5.0, 7.0):
+                x, y = lane.position(float(station))
+                if abs(x - middle[0]) <= half and abs(y - middle[1]) <= half:
+                    places.append((lane.id, float(station)))
+        return places
+
+    def _place_prop(self, action: AdWizardAction) -> Outcome:
+        if len(self._world.actors.props) >= self._max_props:
+            return f"there are {self._max_props} props already"
+        if (reason := self._no_such_place(action) or self._unsafe(action, without=None)) is not None:
+            return reason
+        prop = self._world.actors.add_prop(action.prop, action.place.lane, float(action.place.metres))
+        return {"prop": str(prop.kind), "lane": prop.lane_id, "station": prop.station, **_xy(prop)}
+
+    def _move_prop(self, action: AdWizardAction) -> Outcome:
+        prop = self._prop(action.item)
+        if prop is None:
+            return f"there is no prop {action.item}"
+        if (reason := self._no_such_place(action) or self._unsafe(action, without=prop)) is not None:
+            return reason
+        row = self._world.actors.props.index(prop)
+        self._world.actors.remove_prop(prop)
+        moved = self._world.actors.add_prop(prop.kind, action.place.lane, float(action.place.metres))
+        props = self._world.actors.props
+        props.insert(row, props.pop())
+        return {
+            "item": action.item,
+            "prop": str(moved.kind),
+            "lane": moved.lane_id,
+            "station": moved.station,
+            **_xy(moved),
+        }
+
+    def _delete_prop(self, action: AdWizardAction) -> Outcome:
+        prop = self._prop(action.item)
+        if prop is None:
+            return f"there is no prop {action.item}"
+        self._world.actors.remove_prop(prop)
+        return {"item": action.item, "prop": str(prop.kind), **_xy(prop)}
+
+    def _fault(self, action: AdWizardAction) -> Outcome:
+        reason = self._world.set_fault(action.sensor, action.on)
+        return reason if reason is not None else {"sensor": str(action.sensor), "on": action.on}
+
+    # --- task -------------------------------------------------------------------------------------------------------
+
+    def _change_task(self, action: AdWizardAction) -> Outcome:
+        task = self._task
+        change = {
+            ExceptionKind.TASK_TRIGGER: task.trigger,
+            ExceptionKind.TASK_DELETE: task.delete,
+            ExceptionKind.TASK_CHANGE: task.change,
+        }[action.exception]
+        try:
+            change(action.item)
+        except StoryboardError as error:
+            return str(error)
+        landmark = task.storyboard.landmarks[task.landmark_of(action.item)]
+        status = GoalStatus.ABANDONED if action.exception is ExceptionKind.TASK_DELETE else task.status(action.item)
+        return {"subgoal": action.item, "landmark": landmark.name.label, "status": status.label}
+
+    def _message(self, action: AdWizardAction) -> Outcome:
+        return {} if action.message else "the message is empty"
+
+    # --- what must not be -------------------------------------------------------------------------------------------
+
+    def _prop(self, item: int) -> Prop | None:
+        props = self._world.actors.props
+        return props[item] if item < len(props) else None
+
+    def _no_such_place(self, action: AdWizardAction) -> str | None:
+        lanes = self._world.town.lanes
+        if action.place.lane >= len(lanes):
+            return f"the town has no lane {action.place.lane}; its lanes are 0..{len(lanes) - 1}"
+        length = lanes[action.place.lane].length
+        if action.place.metres > length:
+            return f"lane {action.place.lane} is only {length:.0f} m long"
+        return None
+
+    def _stopping_distance(self) -> float:
+        return float(self._world.car.speed) ** 2 / (2 * BRAKING)
+
+    def _unsafe(self, action: AdWizardAction, *, without: Prop | None) -> str | None:
+        """Why a prop must not stand at a place.
+
+        The checks are about every site of the town and not about those of the live subgoals only: otherwise a refusal
+        would tell where hidden landmarks are. Whatever is reachable at all stays reachable.
+        """
+        world, town = self._world, self._world.town
+        lane = town.lanes[action.place.lane]
+        station = float(action.place.metres)
+        if lane.in_junction:
+            return "a prop in a junction would leave no room to turn round"
+        if not FROM_START <= station <= lane.length - FROM_END:
+            return f"a prop stands at least {FROM_START:.0f} m into its lane and {FROM_END:.0f} m before its end"
+        place = lane.position(station)
+        if math.hypot(*(place - world.car.position)) < FROM_CAR + self._stopping_distance():
+            return "it would appear inside the car's stopping distance"
+        for site in town.sites:
+            if site.lane == lane.id and abs(site.station - station) < FROM_SITE:
+                return "it would stand where a landmark is reached"
+        others = [*world.actors.vehicles, *(p for p in world.actors.props if p is not without)]
+        if any(math.hypot(*(place - other.position)) < 6.0 for other in others):
+            return "there is something in that place already"
+        return self._cuts_off(town, (lane.id, station), without)
+
+    def _cuts_off(self, town: Town, place: tuple[int, float], without: Prop | None) -> str | None:
+        search = router(town)
+        start = (self._world.planner.lane, self._world.planner.station)
+        standing = [(p.lane_id, p.station) for p in self._world.actors.props if p is not without]
+        now = search.reachable(start, standing)
+        then = search.reachable(start, [*standing, place])
+        for site in town.sites:
+            cell = search.cell(site.lane, site.station)
+            if now[cell] and not then[cell]:
+                return "it would cut every way to a place where a landmark may be"
+        return None
+
+
+def _xy(prop: Prop) -> dict[str, float]:
+    return {"x": round(float(prop.position[0]), 3), "y": round(float(prop.position[1]), 3)}

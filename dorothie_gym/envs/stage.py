@@ -1,0 +1,363 @@
+"""The stage of a session: carries out what the roles decide, and keeps what they may know."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from dorothie_gym.dialogue import Conversation, ExchangeTracker, Span, Utterance, word_act
+from dorothie_gym.envs.adversary import Adversary
+from dorothie_gym.envs.beliefs import Beliefs
+from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.envs.scenario import Scenario
+from dorothie_gym.envs.views import Moment, Views
+from dorothie_gym.ontology import (
+    NAVIGATION_ACTIONS,
+    ExceptionKind,
+    LandmarkName,
+    MentalAction,
+    PhysicalAction,
+    Role,
+)
+from dorothie_gym.sessions import Event, EventType, SessionHeader
+from dorothie_gym.spaces import (
+    AdWizardAction,
+    CoWizardAction,
+    Mental,
+    Observation,
+    ParticipantAction,
+    Physical,
+    RoleAction,
+    SpaceLimits,
+    Speech,
+    plain_text,
+)
+from dorothie_gym.spaces.limits import UTTERANCE_LENGTH
+from dorothie_gym.tasks import TaskState
+from dorothie_gym.world.car.driver import GoalAhead
+from dorothie_gym.world.network.network import TownNetwork
+from dorothie_gym.world.town import Town
+from dorothie_gym.world.world import World, WorldEventKind
+
+ROLES = (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD)
+"""The agents, in the order in which they are listed."""
+
+ARRIVAL_DISTANCE = 2.0
+"""A landmark is reached when the car stands this close to its waypoint [m] (paper, appendix A.5)."""
+
+STANDING = 0.1
+"""Slower than this the car stands [m/s]."""
+
+_WORLD_EVENTS = {
+    WorldEventKind.HAZARD_STOP: EventType.HAZARD_STOP,
+    WorldEventKind.HAZARD_END: EventType.HAZARD_END,
+    WorldEventKind.COLLISION: EventType.COLLISION,
+}
+
+
+class Stage:
+    """A session in progress.
+
+    Attributes:
+        scenario: what it began with.
+        world: where it happens.
+        task: how far the storyboard has been played.
+        beliefs: what the Co-Wizard said it believes.
+        events: what happened in the last decision.
+        refused: reasons for the refusals of the last decision, by role.
+        said: all utterances that were heard so far.
+        trail: places of the car, one a decision.
+        counts: what the summary counts.
+    """
+
+    def __init__(
+        self, town: Town, network: TownNetwork, scenario: Scenario, config: EnvConfig, limits: SpaceLimits
+    ) -> None:
+        self.scenario, self.config, self.limits = scenario, config, limits
+        world_seed, word_seed = np.random.SeedSequence([scenario.seed, 1]).spawn(2)
+        self.world = World(town, config.world, seed=world_seed, departure=scenario.departure, network=network)
+        self.task = TaskState(scenario.storyboard)
+        self.beliefs = Beliefs(town)
+        self._adversary = Adversary(self.world, self.task, limits.props)
+        self._conversation = Conversation(config.words_per_second, limits.spans)
+        self._exchanges = ExchangeTracker()
+        self._words = np.random.default_rng(word_seed)
+        self._views = Views(self.world, scenario, self.task, self.beliefs, limits, config.observe_acts)
+        self._moment = self._new_moment([], "")
+        self._statuses = [self.task.status(i) for i in range(len(scenario.storyboard.subgoals))]
+        self.events: list[Event] = []
+        self.refused: dict[Role, list[str]] = {role: [] for role in ROLES}
+        self.said: list[Utterance] = []
+        self.messages: list[tuple[float, str]] = []
+        self.trail: list[tuple[float, float]] = [self._car_place()]
+        self.counts = {"utterances": 0, "acts": 0, "physical_actions": 0, "exceptions": 0, "refusals": 0}
+        self._outcome: dict[str, Any] | None = None
+
+    # --- a decision -------------------------------------------------------------------------------------------------
+
+    def play(self, actions: Mapping[Role, RoleAction]) -> dict[Role, dict[str, float]]:
+        """Carries out a decision of all roles and runs the physics until the next; returns each role's reward terms."""
+        self.events = []
+        self.refused = {role: [] for role in ROLES}
+        collisions, reached = self.world.collisions, self._reached()
+        message = self._play_ad_wizard(actions[Role.AD_WIZARD])
+        spoken = {role: self._speak(role, actions[role]) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
+        self._play_co_wizard(actions[Role.CO_WIZARD])
+        for event in self.world.step(self.config.frames):
+            self._log(_WORLD_EVENTS[event.kind], Role.AGENT, event.data, frame=event.frame)
+        self._note_arrivals()
+        self._moment = self._new_moment(self._conversation.deliver(self.world.time), message)
+        self.trail.append(self._car_place())
+        return self._rewards(self._reached() - reached, self.world.collisions - collisions, spoken)
+
+    def observe(self, role: Role) -> Observation:
+        """What a role observes now."""
+        return self._views.observe(role, self._moment)
+
+    def end(self, reason: str) -> None:
+        """Closes the session."""
+        self._log(EventType.END, Role.AGENT, {"success": self.success, "reason": reason})
+        self._outcome = {"reason": reason}
+
+    @property
+    def success(self) -> bool:
+        """Whether every live subgoal was reached, the destination last, without a collision of the car's own making."""
+        return self.task.done and self.task.success and self.world.collisions == 0
+
+    # --- what the roles do ------------------------------------------------------------------------------------------
+
+    def _play_ad_wizard(self, action: RoleAction) -> str:
+        assert isinstance(action, AdWizardAction)
+        if action.exception is ExceptionKind.NONE:
+            return ""
+        outcome = self._adversary.carry_out(action)
+        name = action.exception.name.lower()
+        if isinstance(outcome, str):
+            self._refuse(Role.AD_WIZARD, name, outcome)
+            return ""
+        if action.exception is not ExceptionKind.MESSAGE:
+            self.counts["exceptions"] += 1
+            self._log(EventType.EXCEPTION, Role.AD_WIZARD, {"kind": name, **outcome})
+        if action.exception.is_task:
+            self._note_statuses(name)
+        if action.message:
+            self.messages.append((self.world.time, action.message))
+            self._log(EventType.MESSAGE, Role.AD_WIZARD, {"text": action.message})
+        return action.message
+
+    def _speak(self, role: Role, action: RoleAction) -> bool:
+        assert isinstance(action, ParticipantAction | CoWizardAction)
+        speech = action.speech
+        if speech is None:
+            return False
+        text = speech.text.strip() or plain_text(self._word(role, speech), UTTERANCE_LENGTH)
+        reason = self._conversation.say(role, Span(text, speech.act), self.world.time)
+        if reason is not None:
+            self._refuse(role, "speech", reason)
+        return reason is None
+
+    def _word(self, role: Role, speech: Speech) -> str:
+        return word_act(speech.act, role, self._words)
+
+    def _play_co_wizard(self, action: RoleAction) -> None:
+        assert isinstance(action, CoWizardAction)
+        if action.mental is not None:
+            self._believe(action.mental)
+        if action.physical is not None:
+            self._drive(action.physical)
+
+    def _drive(self, physical: Physical) -> None:
+        world, action = self.world, physical.action
+        angle: int | None = None
+        up: bool | None = None
+        if action is PhysicalAction.SPEED_CHANGE:
+            up = physical.up
+            reason = world.driver.change_cruise(up)
+        elif action is PhysicalAction.LIGHT_CHANGE:
+            up = physical.up
+            reason = f"the lights are {'on' if up else 'off'} already" if world.lights == up else None
+            world.lights = up
+        else:
+            if action in (PhysicalAction.J_TURN, PhysicalAction.LANE_SWITCH):
+                angle = physical.angle
+            reason = world.planner.command(action, physical.angle, float(world.car.speed))
+        if reason is not None:
+            self._refuse(Role.CO_WIZARD, action.label, reason)
+            return
+        self.counts["physical_actions"] += 1
+        data = {"action": action.label, "angle": angle, "up": up}
+        self._log(EventType.PHYSICAL_ACTION, Role.CO_WIZARD, data, flagged=action in NAVIGATION_ACTIONS)
+
+    def _believe(self, mental: Mental) -> None:
+        town = self.world.town
+        data: dict[str, Any] = {"action": mental.action.label}
+        if mental.action is MentalAction.PLAN_UPDATE:
+            unknown = [k for k in mental.plan if k >= len(town.junctions)]
+            if unknown:
+                self._refuse(Role.CO_WIZARD, mental.action.label, f"the town has no junction number {unknown[0]}")
+                return
+            data["junctions"] = [town.junctions[k].id for k in mental.plan]
+        elif mental.action is MentalAction.GOAL_UPDATE:
+            self.beliefs.goals = mental.goals
+            data["landmarks"] = [name.label for name in mental.goals]
+        elif mental.action is MentalAction.STATUS_UPDATE:
+            data["landmark"], data["status"] = mental.landmark.label, mental.status.label
+        elif mental.action is MentalAction.KNOWLEDGE_UPDATE:
+            lane, metres = mental.place.lane, float(mental.place.metres)
+            if lane >= len(town.lanes) or metres > town.lanes[lane].length + 1.0:
+                self._refuse(Role.CO_WIZARD, mental.action.label, "the guessed place is not on a lane of the town")
+                return
+            self.beliefs.guess(mental.landmark, lane, metres)
+            x, y = town.lanes[lane].position(metres)
+            data.update(landmark=mental.landmark.label, x=round(float(x), 3), y=round(float(y), 3))
+        self.world.driver.set_goals(self.beliefs.goal_places(self._known_places()))
+        self._log(EventType.BELIEF_UPDATE, Role.CO_WIZARD, data)
+
+    def _known_places(self) -> dict[LandmarkName, list[GoalAhead]]:
+        places: dict[LandmarkName, list[GoalAhead]] = {}
+        for landmark in self.scenario.storyboard.landmarks:
+            if not landmark.hidden:
+                places.setdefault(landmark.name, []).append(GoalAhead(lane=landmark.lane, station=landmark.station))
+        return places
+
+    # --- what comes of it -------------------------------------------------------------------------------------------
+
+    def _note_arrivals(self) -> None:
+        if self.world.car.speed > STANDING:
+            return
+        x, y = self._car_place()
+        for landmark in self.scenario.storyboard.landmarks:
+            if math.hypot(landmark.waypoint[0] - x, landmark.waypoint[1] - y) <= ARRIVAL_DISTANCE:
+                for i in self.task.arrive(landmark.index):
+                    self._log_subgoal(i, "arrival")
+                self._note_statuses("arrival", log=False)
+
+    def _note_statuses(self, cause: str, *, log: bool = True) -> None:
+        for i in range(len(self._statuses)):
+            status = self.task.status(i)
+            if status is not self._statuses[i] and log:
+                self._log_subgoal(i, cause)
+            self._statuses[i] = status
+
+    def _log_subgoal(self, i: int, cause: str) -> None:
+        landmark = self.scenario.storyboard.landmarks[self.task.landmark_of(i)]
+        data = {"subgoal": i, "landmark": landmark.name.label, "status": self.task.status(i).label, "cause": cause}
+        self._log(EventType.SUBGOAL, Role.AGENT, data)
+
+    def _new_moment(self, utterances: list[Utterance], message: str) -> Moment:
+        heard: dict[Role, Utterance] = {}
+        for utterance in utterances:
+            exchanges = self._exchanges.update(utterance)
+            heard[utterance.speaker] = utterance
+            self.said.append(utterance)
+            self._log_utterance(utterance, exchanges)
+        now = self.world.time
+        self._exchanges.tick(now)
+        speaking = {role: self._conversation.speaking(role, now) for role in ROLES}
+        return Moment(heard=heard, message=message, speaking=speaking)
+
+    def _log_utterance(self, utterance: Utterance, exchanges: tuple[int, ...]) -> None:
+        number = self.counts["utterances"]
+        self.counts["utterances"] += 1
+        for span, exchange in zip(utterance.spans, exchanges, strict=True):
+            self.counts["acts"] += 1
+            data = {
+                "utterance": number,
+                "text": utterance.text,
+                "span": span.text,
+                "move": span.act.move.label,
+                "slots": {label: list(values) for label, values in span.act.slot_labels().items()},
+                "exchange": exchange,
+                "start": round(utterance.start, 3),
+                "end": round(utterance.end, 3),
+            }
+            self._log(EventType.DIALOGUE_MOVE, utterance.speaker, data, flagged=True)
+
+    def _rewards(self, reached: int, collisions: int, spoken: Mapping[Role, bool]) -> dict[Role, dict[str, float]]:
+        weights = self.config.rewards
+        shared = {
+            "subgoal": weights.subgoal * reached,
+            "success": weights.success * self.success,
+            "collision": weights.collision * collisions,
+            "time": weights.time / self.config.decision_frequency,
+        }
+        terms = {}
+        for role in ROLES:
+            sign = -1.0 if role is Role.AD_WIZARD else 1.0
+            terms[role] = {name: sign * value for name, value in shared.items()}
+            terms[role]["refusal"] = weights.refusal * len(self.refused[role])
+            if role is not Role.AD_WIZARD:
+                terms[role]["talk"] = weights.talk * spoken[role]
+        return terms
+
+    def _reached(self) -> int:
+        return sum(self.task.reached(i) for i in self.task.live)
+
+    def _refuse(self, role: Role, action: str, reason: str) -> None:
+        self.refused[role].append(f"{action}: {reason}")
+        self.counts["refusals"] += 1
+        self._log(EventType.REFUSAL, role, {"action": action, "reason": reason})
+
+    def _log(
+        self, kind: EventType, source: Role, data: Mapping[str, Any], *, flagged: bool = False, frame: int | None = None
+    ) -> None:
+        at = self.world.frame if frame is None else frame
+        self.events.append(Event(frame=at, type=kind, source=source, flagged=flagged, data=dict(data)))
+
+    def _car_place(self) -> tuple[float, float]:
+        return float(self.world.car.position[0]), float(self.world.car.position[1])
+
+    # --- what is kept -----------------------------------------------------------------------------------------------
+
+    def header(self) -> SessionHeader:
+        """What is known of the session before it begins."""
+        storyboard = self.scenario.storyboard
+        return SessionHeader(
+            town=self.world.town.name,
+            storyboard=storyboard.name,
+            seed=self.scenario.seed,
+            decision_frequency=self.config.decision_frequency,
+            street_names=[name.label for name in self.scenario.street_names],
+            landmarks=[
+                {
+                    "name": landmark.name.label,
+                    "lane": landmark.lane,
+                    "station": landmark.station,
+                    "x": landmark.position[0],
+                    "y": landmark.position[1],
+                    "street": landmark.street,
+                    "hidden": landmark.hidden,
+                }
+                for landmark in storyboard.landmarks
+            ],
+            subgoals=[
+                {
+                    "description": subgoal.description,
+                    "landmark": subgoal.landmark,
+                    "after": subgoal.after,
+                    "trigger": subgoal.trigger,
+                    "delete": subgoal.delete,
+                    "change": subgoal.change,
+                }
+                for subgoal in storyboard.subgoals
+            ],
+            story=storyboard.story,
+            departure=self.scenario.departure,
+            config=asdict(self.config),
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """How the session stands: success, subgoals, counts."""
+        return {
+            "success": self.success,
+            "arrived": self.task.done,
+            "subgoals": {"live": len(self.task.live), "reached": self._reached()},
+            "collisions": self.world.collisions,
+            "seconds": round(self.world.time, 3),
+            **self.counts,
+            **(self._outcome or {}),
+        }

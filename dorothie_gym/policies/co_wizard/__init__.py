@@ -1,0 +1,5 @@
+"""The scripted Co-Wizard: understands what it is told, plans on what it knows, asks when it does not, and drives."""
+
+from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard
+
+__all__ = ["ScriptedCoWizard"]

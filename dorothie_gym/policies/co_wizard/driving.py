@@ -1,0 +1,247 @@
+"""From beliefs to one physical action a decision."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from dorothie_gym.ontology import LandmarkName, PhysicalAction
+from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View, Wish
+from dorothie_gym.policies.journey import (
+    U_TURN_MARGIN,
+    Crossing,
+    direction_of,
+    find_exit,
+    lanes_ahead,
+    lanes_beside,
+    streets_named,
+)
+from dorothie_gym.spaces import Motion, Physical
+from dorothie_gym.world.town.model import Exit, LinkType, wrap_degrees
+from dorothie_gym.world.town.oncoming import oncoming_lanes
+from dorothie_gym.world.town.routing import Entry, Place
+
+BRAKING = 3.0
+"""Deceleration of Stop [m/s^2]."""
+
+DECISION = 0.5
+"""Time between decisions [s]."""
+
+TURN_LEAD = 85.0
+"""A turn is commanded when the junction is this near [m]."""
+
+PATIENCE = 2.0
+"""A command that has shown no effect is given again after this time [s]."""
+
+SAME_WAY = 25.0
+"""An exit of the own lane this close in angle is taken instead of that of a lane beside [degrees]."""
+
+U_TURN_SPEED_SQUARED = 12.0
+"""Square of the speed at which the car turns round [m^2/s^2]."""
+
+SWITCH_ROOM = 16.0
+"""Least room for a lane switch [m]."""
+
+
+def drive(mind: CoWizardMind, view: View) -> Physical | None:
+    """Chooses the physical action of this decision; None leaves the car to what it is doing."""
+    for consider in _CONCERNS:
+        action = consider(mind, view)
+        if action is not None:
+            return action
+    return None
+
+
+def _stand(mind: CoWizardMind, view: View) -> Physical | None:
+    if not mind.halted or view.motion is Motion.STOPPED or view.time - mind.stop_sent_at < PATIENCE:
+        return None
+    mind.stop_sent_at = view.time
+    return Physical(action=PhysicalAction.STOP)
+
+
+def _stop_at_place(mind: CoWizardMind, view: View) -> Physical | None:
+    """Stops at a place on the lane that is close ahead: the goal, or a few metres further."""
+    if mind.halted:
+        return None
+    target = mind.nudge or (mind.place if mind.exact else None)
+    if target is None:
+        return None
+    distance = distance_ahead(mind, view, target)
+    if mind.nudge is not None and (distance is None or distance < -2.0):
+        mind.nudge = None
+        return None
+    if distance is None or distance < -2.0:
+        return None
+    left = distance - view.speed**2 / (2 * BRAKING)
+    if left > view.speed * DECISION / 2 + 0.2:
+        return None
+    mind.halted, mind.nudge = True, None
+    mind.arrived = mind.goal is not None
+    mind.stop_sent_at = view.time
+    return Physical(action=PhysicalAction.STOP)
+
+
+def distance_ahead(mind: CoWizardMind, view: View, place: Place) -> float | None:
+    """How far a place is along the lanes that the car takes by default [m]; None if it is not on them within 80 m."""
+    ahead = -view.station
+    for lane in lanes_ahead(mind.town, view.lane, view.station, 80.0):
+        if lane == place[0]:
+            return ahead + place[1]
+        ahead += mind.town.lanes[lane].length
+    return None
+
+
+def place_ahead(mind: CoWizardMind, view: View, distance: float) -> Place:
+    """The place some way ahead by default; the end of the last lane if a junction comes before [m]."""
+    left = view.station + distance
+    lanes = lanes_ahead(mind.town, view.lane, view.station, distance)
+    for lane in lanes[:-1]:
+        if left <= mind.town.lanes[lane].length:
+            return lane, left
+        left -= mind.town.lanes[lane].length
+    return lanes[-1], min(left, mind.town.lanes[lanes[-1]].length)
+
+
+def _wish(mind: CoWizardMind, view: View) -> Physical | None:
+    if mind.wish is None:
+        return None
+    if mind.wish is Wish.U_TURN:
+        if view.manoeuvre is PhysicalAction.U_TURN:
+            mind.wish = None
+            return None
+        return turn_round(mind, view)
+    side = LinkType.LANE_CHANGE_LEFT if mind.wish is Wish.SWITCH_LEFT else LinkType.LANE_CHANGE_RIGHT
+    return _switch(mind, view, side)
+
+
+def turn_round(mind: CoWizardMind, view: View) -> Physical | None:
+    """Turns round as soon as it can be done, moving to the leftmost lane before."""
+    lane = mind.town.lanes[view.lane]
+    if lane.in_junction or view.manoeuvring or view.time - mind.commanded_at < PATIENCE:
+        return None
+    if mind.town.neighbour(view.lane, LinkType.LANE_CHANGE_LEFT) is not None:
+        return _switch(mind, view, LinkType.LANE_CHANGE_LEFT)
+    begin = view.station + max(0.0, view.speed**2 - U_TURN_SPEED_SQUARED) / (2 * BRAKING) + (view.speed > 0.5)
+    if oncoming_lanes(mind.town).at(view.lane, min(begin, lane.length)) is None:
+        return None
+    mind.commanded_at, mind.halted = view.time, False
+    return Physical(action=PhysicalAction.U_TURN)
+
+
+def _switch(mind: CoWizardMind, view: View, side: LinkType) -> Physical | None:
+    lane = mind.town.lanes[view.lane]
+    ready = not view.manoeuvring and view.time - mind.commanded_at >= PATIENCE and not lane.in_junction
+    possible = mind.town.neighbour(view.lane, side) is not None and lane.length - view.station > SWITCH_ROOM
+    if not ready or not possible:
+        return None
+    if mind.wish is not Wish.U_TURN:
+        mind.wish = None
+    mind.commanded_at, mind.halted = view.time, False
+    return Physical(action=PhysicalAction.LANE_SWITCH, angle=90 if side is LinkType.LANE_CHANGE_LEFT else -90)
+
+
+def _manoeuvre(mind: CoWizardMind, view: View) -> Physical | None:
+    """The lane change or U-turn that the own plan has next."""
+    if mind.journey is None or mind.halted or mind.directive is not None or view.manoeuvring:
+        return None
+    manoeuvre = mind.journey.next_manoeuvre(view.station)
+    if manoeuvre is None:
+        return None
+    entry, distance = manoeuvre
+    crossing = mind.journey.next_crossing(mind.town, view.station)
+    if crossing is not None and crossing.distance < distance:
+        return None
+    if entry is Entry.U_TURN:
+        reach = max(view.speed**2 - U_TURN_SPEED_SQUARED, 0.0) / (2 * BRAKING)
+        if mind.journey.turns_at_goal():
+            # a little beyond, unless the lane ends first
+            room = mind.town.lanes[view.lane].length - view.station - 2.0
+            return turn_round(mind, view) if distance <= reach - U_TURN_MARGIN or room <= reach else None
+        return turn_round(mind, view) if distance <= reach + 8.0 else None
+    if not _needs_switch(mind, view, crossing):
+        return None
+    return _switch(mind, view, LinkType.LANE_CHANGE_LEFT if entry is Entry.CHANGE_LEFT else LinkType.LANE_CHANGE_RIGHT)
+
+
+def _needs_switch(mind: CoWizardMind, view: View, crossing: Crossing | None) -> bool:
+    """Whether a lane change has to be commanded: a turn that no exit of the own lane offers brings its own along."""
+    assert mind.journey is not None
+    if crossing is None or mind.journey.changes_before(crossing) or view.choice is None:
+        return True
+    return any(abs(wrap_degrees(way.angle - crossing.exit.angle)) <= SAME_WAY for way in view.choice.exits)
+
+
+def wanted_exit(mind: CoWizardMind, view: View) -> Exit | None:
+    """The exit to take at the next junction with a choice: as asked for, else by the plan; None if neither tells."""
+    choice = view.choice
+    if choice is None:
+        return None
+    if mind.directive is not None:
+        directive = mind.directive
+        streets = streets_named(view.raw["street_names"], directive.street)
+        way = find_exit(mind.town, choice, directive.direction, streets)
+        if directive.skip > 0 or (way is None and directive.direction is None):
+            straight = [option for option in choice.exits if option.type is LinkType.STRAIGHT]
+            return straight[0] if straight else None
+        return way
+    if mind.journey is None or mind.wish is Wish.U_TURN:
+        return None
+    crossing = mind.journey.next_crossing(mind.town, view.station)
+    if crossing is None or mind.journey.changes_before(crossing):
+        return None
+    if crossing.lane == choice.lane or crossing.lane in lanes_beside(mind.town, choice.lane):
+        return crossing.exit
+    return None
+
+
+def _turn(mind: CoWizardMind, view: View) -> Physical | None:
+    if mind.halted or view.choice is None or mind.nudge is not None:
+        return None
+    way = wanted_exit(mind, view)
+    if way is None or (view.choice.distance > TURN_LEAD and view.motion is not Motion.WAITING):
+        return None
+    set_already = view.manoeuvre is PhysicalAction.J_TURN and abs(view.angle - way.angle) < 1.0
+    sent = (view.choice.lane, way.angle)
+    again = mind.turn_sent != sent or view.time - mind.turn_sent_at > PATIENCE
+    on_way = view.manoeuvre is PhysicalAction.J_TURN and mind.turn_sent == sent and view.motion is not Motion.WAITING
+    if (set_already and view.motion is not Motion.STOPPED) or not again or on_way or view.manoeuvring:
+        return None
+    mind.turn_sent, mind.turn_sent_at = sent, view.time
+    return Physical(action=PhysicalAction.J_TURN, angle=way.angle)
+
+
+def _go(mind: CoWizardMind, view: View) -> Physical | None:
+    if mind.halted or view.motion is not Motion.STOPPED:
+        return None
+    return Physical(action=PhysicalAction.START)
+
+
+def _comfort(mind: CoWizardMind, view: View) -> Physical | None:
+    if abs(view.cruise - mind.speed) > 2.6:
+        return Physical(action=PhysicalAction.SPEED_CHANGE, up=view.cruise < mind.speed)
+    if mind.lights is not None and mind.lights is not view.lights:
+        return Physical(action=PhysicalAction.LIGHT_CHANGE, up=mind.lights)
+    return None
+
+
+_CONCERNS: tuple[Callable[[CoWizardMind, View], Physical | None], ...] = (
+    _stop_at_place,
+    _stand,
+    _wish,
+    _manoeuvre,
+    _turn,
+    _go,
+    _comfort,
+)
+
+
+def creep(mind: CoWizardMind, view: View) -> None:
+    """Carries the guess of a place along that must be close, so that the car comes up to it slowly."""
+    if not mind.creeping or mind.place is None or mind.exact or mind.halted:
+        return
+    landmark = mind.goal or LandmarkName.UNKNOWN
+    distance = distance_ahead(mind, view, mind.place)
+    if distance is None or distance < 6.0:
+        mind.note_place(landmark, place_ahead(mind, view, 16.0))
+
+
+__all__ = ["creep", "direction_of", "distance_ahead", "drive", "place_ahead", "turn_round", "wanted_exit"]

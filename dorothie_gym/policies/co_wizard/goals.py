@@ -1,0 +1,174 @@
+"""What the Co-Wizard believes about places to go to: named, given up, guessed, reached."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from dorothie_gym.dialogue import Wording
+from dorothie_gym.ontology import DialogueMove, GoalStatus, LandmarkName, MentalAction, SlotValue, StreetName
+from dorothie_gym.policies.co_wizard.driving import place_ahead
+from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View
+from dorothie_gym.policies.journey import Journey
+from dorothie_gym.policies.scenery import SeenLandmark
+from dorothie_gym.policies.speech import remark
+from dorothie_gym.spaces import Mental
+from dorothie_gym.spaces import Place as MapPlace
+
+_COMMON = (LandmarkName.HOUSE, LandmarkName.PERSON)
+
+
+def known(view: View, name: LandmarkName, streets: Sequence[StreetName]) -> SeenLandmark | None:
+    """The landmark of that name on the map, on one of the streets if any is named; None if there is none."""
+    found = [mark for mark in view.landmarks if mark.name is name]
+    fitting = [mark for mark in found if mark.street in streets]
+    if fitting:
+        return fitting[0]
+    # a place that only one can be is that one even if its street was not understood
+    return found[0] if found and (not streets or name not in _COMMON) else None
+
+
+def aim(mind: CoWizardMind, view: View, mark: SeenLandmark) -> None:
+    """Makes a place on the map the goal and plans the way."""
+    mind.goal, mind.place, mind.exact = mark.name, mark.place, True
+    mind.directive, mind.wish, mind.nudge = None, None, None
+    mind.halted = mind.arrived = mind.creeping = False
+    mind.note(Mental(action=MentalAction.GOAL_UPDATE, goals=(mark.name,)))
+    mind.note_status(mark.name, GoalStatus.ONGOING)
+    plan_way(mind, view)
+
+
+def plan_way(mind: CoWizardMind, view: View) -> None:
+    """Plans a way to the goal, if its place is on the map."""
+    if mind.place is None or not mind.exact:
+        mind.journey = None
+        return
+    mind.journey = Journey.plan(mind.town, view.here, mind.place, mind.blocked)
+    note_plan(mind)
+
+
+def note_plan(mind: CoWizardMind) -> None:
+    """Notes the junctions of the plan if they are not those noted last."""
+    route = mind.journey.route if mind.journey is not None else None
+    junctions = route.junctions(mind.town) if route is not None else ()
+    indices = {junction.id: index for index, junction in enumerate(mind.town.junctions)}
+    plan = tuple(indices[junction] for junction in junctions if junction in indices)
+    if plan != mind.plan and plan:
+        mind.plan = plan
+        mind.note(Mental(action=MentalAction.PLAN_UPDATE, plan=plan))
+
+
+def hear_goal(
+    mind: CoWizardMind,
+    view: View,
+    name: LandmarkName,
+    streets: Sequence[StreetName],
+    rng: np.random.Generator,
+    dropped: LandmarkName | None = None,
+) -> None:
+    """Takes up a place that it is told to go to.
+
+    Args:
+        mind: of the Co-Wizard.
+        view: what it sees.
+        name: the place.
+        streets: streets named with it.
+        rng: for the words.
+        dropped: a place that is given up for it.
+    """
+    mark = known(view, name, streets)
+    if dropped is not None:
+        mind.note_status(dropped, GoalStatus.ABANDONED)
+    if mark is None:
+        _unknown(mind, view, name)
+        return
+    aim(mind, view, mark)
+    if dropped is not None:
+        wording = Wording(topic="changed", dropped=dropped)
+        mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, name, wording=wording))
+    elif not streets and rng.random() < mind.style.checks * (2.0 if name in _COMMON else 0.6):
+        mind.voice = mind.voice.plan(remark(DialogueMove.CHECK, name, mark.street))
+    else:
+        values: list[SlotValue] = [name]
+        if streets and rng.random() < mind.style.echoes:
+            values.append(mark.street)
+        move = DialogueMove.CONFIRM if rng.random() < 0.25 else DialogueMove.ACKNOWLEDGE
+        mind.voice = mind.voice.plan(remark(move, *values))
+
+
+def _unknown(mind: CoWizardMind, view: View, name: LandmarkName) -> None:
+    """The place is not on the map: says so, and goes where it is told to."""
+    again = mind.goal is name and not mind.exact
+    mind.goal, mind.place, mind.exact, mind.journey = name, None, False, None
+    mind.creeping, mind.arrived, mind.plan = False, False, ()
+    mind.note_status(name, GoalStatus.UNKNOWN)
+    if again:
+        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, name))
+    else:
+        mind.voice = mind.voice.plan(
+            remark(DialogueMove.EXPLAIN, name, GoalStatus.UNKNOWN, wording=Wording(topic="no_map"))
+        )
+
+
+def hear_stop_ahead(
+    mind: CoWizardMind, view: View, name: LandmarkName | None, distance: float, rng: np.random.Generator
+) -> None:
+    """It is told to stop some way ahead, perhaps by a place: comes up to it slowly."""
+    if name is not None:
+        mark = known(view, name, ())
+        if mark is not None and mark.name not in _COMMON:
+            if mind.place != mark.place:
+                aim(mind, view, mark)
+            mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, name))
+            return
+        mind.goal = name
+    mind.exact, mind.creeping, mind.halted, mind.arrived = False, True, False, False
+    mind.journey, mind.directive = None, None
+    # nearer than told: what is told is rounded, and a slow car can be stopped at the word
+    mind.note_place(mind.goal or LandmarkName.UNKNOWN, place_ahead(mind, view, max(distance - 12.0, 10.0)))
+    if rng.random() > mind.style.silent:
+        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+
+
+def hear_description(
+    mind: CoWizardMind, view: View, streets: Sequence[StreetName], landmarks: Sequence[LandmarkName],
+    rng: np.random.Generator,
+) -> None:  # fmt: skip
+    """It is told where a place is: notes a guess if a place close to it is on the map, and says that it has heard."""
+    near = next((mark for name in landmarks if (mark := known(view, name, ())) is not None), None)
+    if near is not None and mind.goal is not None and not mind.exact:
+        guess = Mental(
+            action=MentalAction.KNOWLEDGE_UPDATE, landmark=mind.goal, place=_map_place(near.lane, near.station)
+        )
+        mind.note(guess)
+    values: tuple[SlotValue, ...] = tuple(streets[:1]) if rng.random() < mind.style.echoes else ()
+    mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, *values))
+
+
+def _map_place(lane: int, station: float) -> MapPlace:
+    return MapPlace(lane=lane, metres=round(station))
+
+
+def give_up(mind: CoWizardMind, name: LandmarkName | None) -> None:
+    """A task is off; if it was the one under way, the car waits to be told what comes next."""
+    if name is not None:
+        mind.note_status(name, GoalStatus.ABANDONED)
+    if name is None or name is mind.goal:
+        leave_goal(mind)
+
+
+def complete(mind: CoWizardMind, name: LandmarkName | None) -> None:
+    """A task is done."""
+    done = name if name is not None else mind.goal
+    if done is not None:
+        mind.note_status(done, GoalStatus.COMPLETE)
+    leave_goal(mind)
+    mind.halted = True
+
+
+def leave_goal(mind: CoWizardMind) -> None:
+    """There is no goal any more."""
+    mind.goal, mind.place, mind.exact, mind.journey = None, None, False, None
+    mind.directive, mind.nudge, mind.wish = None, None, None
+    mind.creeping, mind.arrived, mind.plan = False, False, ()

@@ -1,0 +1,298 @@
+"""What the Co-Wizard makes of the human's words."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import numpy as np
+
+from dorothie_gym.dialogue import Direction, Heard, Wording
+from dorothie_gym.ontology import (
+    ActionValue,
+    DialogueAct,
+    DialogueMove,
+    GoalStatus,
+    LandmarkName,
+    ObjectClass,
+    Role,
+    Slot,
+    StreetName,
+)
+from dorothie_gym.policies.co_wizard.answers import answer_open, answer_yes_no
+from dorothie_gym.policies.co_wizard.driving import place_ahead
+from dorothie_gym.policies.co_wizard.goals import complete, give_up, hear_description, hear_goal, hear_stop_ahead
+from dorothie_gym.policies.co_wizard.mind import CoWizardMind, Directive, View, Wish
+from dorothie_gym.policies.co_wizard.obstacles import detour
+from dorothie_gym.policies.hearing import heard_utterance
+from dorothie_gym.policies.speech import remark
+
+NUDGE = 4.0
+"""How far "a bit further" is [m]."""
+
+WISH_TIME = 30.0
+"""A manoeuvre that finds no place for this long is given up [s]."""
+
+_STOPS = frozenset({ActionValue.STOP, ActionValue.LANE_FOLLOW})
+_A_BIT = re.compile(r"\b(bit|little)\b")
+_UNNAMED = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
+
+
+def listen(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
+    """Takes in what the human has said since the last decision: believes, prepares actions and answers."""
+    last = mind.voice.last
+    heard = heard_utterance(view.raw, Role.PARTICIPANT, last.act.move if last is not None else None)
+    if heard is None:
+        return
+    mind.heard_at = mind.idle_since = view.time
+    mind.voice = mind.voice.heard_other(view.time)
+    before = mind.voice.queue
+    for act in heard.acts:
+        react = _REACTIONS.get(act.move)
+        if react is not None:
+            react(mind, view, act, heard.words, rng)
+    # of several acknowledgements for one utterance the first will do
+    added = mind.voice.queue[len(before) :]
+    kept = tuple(
+        item for k, item in enumerate(added) if not k or item.act.move is not DialogueMove.ACKNOWLEDGE or item.act.slots
+    )
+    mind.voice = mind.voice.cleared().plan(*before, *kept)
+
+
+def _instruction(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+    landmarks = tuple(name for name in act.values(Slot.LANDMARK) if name not in _UNNAMED)
+    actions = tuple(value for value in act.values(Slot.ACTION) if value in _OBEYED)
+    streets = tuple(name for name in act.values(Slot.STREET) if isinstance(name, StreetName))
+    if not actions and landmarks:
+        _told_place(mind, view, act, words, rng)
+    elif words.distance is not None and not view.standing and _STOPS & set(actions):
+        name = landmarks[0] if landmarks and isinstance(landmarks[0], LandmarkName) else None
+        hear_stop_ahead(mind, view, name, float(words.distance), rng)
+    elif actions:
+        for action in actions:
+            _OBEYED[action](mind, view, act, words)
+        _acknowledge_action(mind, actions[0], words, rng)
+    elif streets:
+        _told_street(mind, view, streets[0])
+    elif mind.detour_at is not None:
+        detour(mind, view, rng)
+
+
+def _told_place(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+    landmarks = [name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName)]
+    statuses, streets = act.values(Slot.STATUS), act.values(Slot.STREET)
+    if GoalStatus.ABANDONED in statuses:
+        dropped = next((name for name in words.dropped if name in landmarks), landmarks[0])
+        others = [name for name in landmarks if name is not dropped]
+        if others:
+            hear_goal(mind, view, others[0], _streets(streets), rng, dropped=dropped)
+        else:
+            give_up(mind, dropped)
+            mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+    elif GoalStatus.PENDING in statuses:
+        mind.note_status(landmarks[0], GoalStatus.PENDING)
+        if mind.goal is not None and rng.random() < 0.5:
+            mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, mind.goal, wording=Wording(topic="order")))
+        else:
+            mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, landmarks[0]))
+    elif landmarks[0] is mind.goal and mind.exact and not mind.arrived and not streets:
+        mind.halted = False
+        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, landmarks[0]))
+    else:
+        hear_goal(mind, view, landmarks[0], _streets(streets), rng)
+
+
+def _streets(values: tuple[object, ...]) -> tuple[StreetName, ...]:
+    unnamed = (StreetName.UNKNOWN, StreetName.QUERIED)
+    return tuple(name for name in values if isinstance(name, StreetName) and name not in unnamed)
+
+
+def _told_street(mind: CoWizardMind, view: View, street: StreetName) -> None:
+    if mind.detour_at is not None:
+        mind.detour_at = None
+        mind.halted = False
+        mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, street, wording=Wording(topic="detour")))
+        return
+    mind.directive, mind.halted = Directive(direction=None, street=street, junction=view.junction), False
+    mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, street))
+
+
+def _acknowledge_action(mind: CoWizardMind, action: object, words: Heard, rng: np.random.Generator) -> None:
+    draw = rng.random()
+    assert isinstance(action, ActionValue)
+    if draw < mind.style.silent:
+        return
+    wording = Wording(
+        direction=words.direction,
+        faster=words.faster,
+        lights=words.lights,
+        speed=words.speed if action is ActionValue.SPEED_CHANGE else None,
+    )
+    if draw < mind.style.silent + mind.style.echoes * 0.6:
+        move = DialogueMove.CONFIRM if rng.random() < 0.3 else DialogueMove.ACKNOWLEDGE
+        mind.voice = mind.voice.plan(remark(move, action, wording=wording))
+    else:
+        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+
+
+# --- what actions mean ----------------------------------------------------------------------------------------------
+
+
+def _do_turn(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> None:
+    streets = _streets(act.values(Slot.STREET))
+    skip = max((words.ordinal or 1) - 1, 0)
+    mind.directive = Directive(
+        direction=words.direction,
+        street=streets[0] if streets else StreetName.UNKNOWN,
+        skip=skip,
+        junction=view.junction,
+    )
+    mind.wish, mind.halted, mind.nudge, mind.creeping, mind.arrived = None, False, None, False, False
+
+
+def _do_follow(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> None:
+    close = mind.halted or mind.creeping or view.standing
+    bit = words.further and _A_BIT.search(words.text.lower()) is not None
+    if close and (bit or words.distance is not None):
+        distance = float(words.distance) if words.distance is not None else NUDGE
+        mind.nudge, mind.halted = place_ahead(mind, view, distance), False
+        return
+    choice = view.choice
+    mind.halted, mind.arrived, mind.creeping, mind.wish = False, False, False, None
+    if choice is not None and (words.direction is Direction.STRAIGHT or choice.distance < 60.0):
+        mind.directive = Directive(direction=Direction.STRAIGHT, junction=choice.junction)
+
+
+def _do_u_turn(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> None:
+    mind.wish, mind.wish_until = Wish.U_TURN, view.time + WISH_TIME
+    mind.directive, mind.halted, mind.nudge, mind.creeping, mind.arrived = None, False, None, False, False
+    mind.detour_at = None
+
+
+def _do_switch(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> None:
+    right = words.direction is Direction.RIGHT
+    mind.wish, mind.wish_until = Wish.SWITCH_RIGHT if right else Wish.SWITCH_LEFT, view.time + WISH_TIME
+    mind.halted = False
+
+
+def _do_stop(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> None:
+    mind.halted, mind.nudge, mind.wish = True, None, None
+
+
+def _do_start(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> None:
+    mind.halted = mind.arrived = False
+
+
+def _do_speed(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> None:
+    if words.speed is not None:
+        mind.speed = words.speed
+    else:
+        mind.speed = round(view.cruise) + (10 if words.faster else -10)
+    mind.speed = min(max(5 * round(mind.speed / 5), 10), 60)
+
+
+def _do_lights(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> None:
+    mind.lights = words.lights is not False
+
+
+_OBEYED: dict[ActionValue, Callable[[CoWizardMind, View, DialogueAct, Heard], None]] = {
+    ActionValue.J_TURN: _do_turn,
+    ActionValue.LANE_FOLLOW: _do_follow,
+    ActionValue.U_TURN: _do_u_turn,
+    ActionValue.LANE_SWITCH: _do_switch,
+    ActionValue.STOP: _do_stop,
+    ActionValue.START: _do_start,
+    ActionValue.SPEED_CHANGE: _do_speed,
+    ActionValue.LIGHT_CHANGE: _do_lights,
+}
+
+
+# --- other moves ----------------------------------------------------------------------------------------------------
+
+
+def _explanation(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+    landmarks = [name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName)]
+    statuses = act.values(Slot.STATUS)
+    name = landmarks[0] if landmarks else None
+    if GoalStatus.COMPLETE in statuses:
+        complete(mind, name)
+        if rng.random() < 0.5:
+            mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+    elif GoalStatus.ABANDONED in statuses:
+        give_up(mind, name)
+        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+    elif act.values(Slot.STREET):
+        hear_description(mind, view, _streets(act.values(Slot.STREET)), landmarks, rng)
+    elif "wrong" in words.text.lower():
+        mind.journey = None if not mind.exact else mind.journey
+        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, wording=Wording(topic="sorry")))
+    elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.3:
+        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+
+
+def _reply(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+    """An answer to an open question, or an amplification: something to do, or where something is."""
+    late = act.move is DialogueMove.REPLY_W and view.choice is not None and mind.asked not in (-1, view.choice.lane)
+    if late and mind.exact and words.turns:
+        return  # the junction that was asked about lies behind, and the way is known by now
+    if act.values(Slot.ACTION):
+        _instruction(mind, view, act, words, rng)
+    elif words.turns:
+        _do_turn(mind, view, act, words)
+        _acknowledge_action(mind, ActionValue.J_TURN, words, rng)
+    elif act.values(Slot.STREET) or act.values(Slot.LANDMARK):
+        landmarks = [name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName)]
+        clarified = act.move is DialogueMove.CLARIFY and landmarks and mind.goal is not landmarks[0]
+        if clarified or (mind.goal is None and landmarks):
+            hear_goal(mind, view, landmarks[0], _streets(act.values(Slot.STREET)), rng)
+        else:
+            hear_description(mind, view, _streets(act.values(Slot.STREET)), landmarks, rng)
+    elif rng.random() < 0.5:
+        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+
+
+def _yes(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+    if mind.detour_at is not None:
+        detour(mind, view, rng)
+
+
+def _no(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+    mind.detour_at = None
+    if words.turns and not act.values(Slot.ACTION):
+        _do_turn(mind, view, act, words)
+
+
+def _alignment(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+    understood = mind.goal is not None or mind.directive is not None
+    if understood:
+        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, wording=Wording(topic="align")))
+    else:
+        mind.voice = mind.voice.plan(remark(DialogueMove.CONFUSE))
+
+
+def _check(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+    landmarks = act.values(Slot.LANDMARK)
+    right = not landmarks or mind.goal in landmarks
+    mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM if right else DialogueMove.REPLY_N))
+
+
+def _confusion(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+    last = mind.voice.last
+    if last is not None:
+        mind.voice = mind.voice.plan(remark(DialogueMove.CLARIFY, *last.act.slots, wording=last.wording))
+
+
+_REACTIONS: dict[DialogueMove, Callable[[CoWizardMind, View, DialogueAct, Heard, np.random.Generator], None]] = {
+    DialogueMove.INSTRUCT: _instruction,
+    DialogueMove.EXPLAIN: _explanation,
+    DialogueMove.REPLY_W: _reply,
+    DialogueMove.CLARIFY: _reply,
+    DialogueMove.REPLY_Y: _yes,
+    DialogueMove.CONFIRM: _yes,
+    DialogueMove.REPLY_N: _no,
+    DialogueMove.ALIGN: _alignment,
+    DialogueMove.CHECK: _check,
+    DialogueMove.CONFUSE: _confusion,
+    DialogueMove.QUERY_YN: answer_yes_no,
+    DialogueMove.QUERY_W: answer_open,
+}

@@ -1,0 +1,99 @@
+"""The scripted Co-Wizard, decision by decision."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from dorothie_gym.ontology import Role
+from dorothie_gym.policies.co_wizard.driving import creep, drive
+from dorothie_gym.policies.co_wizard.goals import note_plan
+from dorothie_gym.policies.co_wizard.listening import listen
+from dorothie_gym.policies.co_wizard.mind import CoWizardMind, Style, View
+from dorothie_gym.policies.co_wizard.obstacles import watch_road
+from dorothie_gym.policies.co_wizard.talking import speak_up, tell_action
+from dorothie_gym.policies.policy import Policy
+from dorothie_gym.spaces import ActionDict, CoWizardAction, Mental, SpaceLimits
+from dorothie_gym.world.town import Town
+
+ASTRAY = 2
+"""After so many decisions off the plan it is made anew."""
+
+
+class ScriptedCoWizard(Policy[CoWizardMind]):
+    """A car's mind that is told where to go: it believes, plans, drives, asks, confirms and explains.
+
+    It knows the map without hidden places. Places it knows it drives to by its own plan; to others it is guided by
+    words. What it believes it notes by mental actions.
+    """
+
+    def __init__(self, limits: SpaceLimits | None = None, style: Style | None = None) -> None:
+        """Prepares the policy.
+
+        Args:
+            limits: sizes of the spaces.
+            style: how it talks; drawn for each session where None.
+        """
+        super().__init__(Role.CO_WIZARD, limits)
+        self._style = style
+
+    def initial_state(self, seed: int, town: Town) -> CoWizardMind:
+        """A Co-Wizard that has not been told anything yet."""
+        style = Style.draw(np.random.default_rng((seed, 0))) if self._style is None else self._style
+        return CoWizardMind(seed=seed, town=town, style=style)
+
+    def step(self, observation: Mapping[str, Any], state: CoWizardMind) -> tuple[ActionDict, CoWizardMind]:
+        """Listens, looks, drives, and says something or nothing."""
+        mind = copy(state)
+        mind.count += 1
+        rng = np.random.default_rng((mind.seed, mind.count))
+        view = View.read(observation, mind.town)
+        _notice(mind, view)
+        listen(mind, view, rng)
+        watch_road(mind, view, rng)
+        creep(mind, view)
+        physical = drive(mind, view)
+        tell_action(mind, view, physical, rng)
+        speak_up(mind, view, rng)
+        speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng)
+        return CoWizardAction(speech=speech, physical=physical, mental=_next_note(mind)).encode(self.limits), mind
+
+
+def _notice(mind: CoWizardMind, view: View) -> None:
+    """Brings plan and directive up to where the car is."""
+    if not view.standing:
+        mind.standing_since = None
+    elif mind.standing_since is None:
+        mind.standing_since = view.time
+    _pass_junction(mind, view)
+    if mind.journey is None or view.manoeuvring:
+        return
+    mind.journey = mind.journey.followed(view.lane, view.station)
+    if mind.journey.astray >= ASTRAY:
+        mind.journey = mind.journey.replanned(mind.town, view.here, mind.blocked)
+        note_plan(mind)
+
+
+def _pass_junction(mind: CoWizardMind, view: View) -> None:
+    """Drops a directive when its junction has been passed, or counts down to it."""
+    directive = mind.directive
+    if directive is None or view.choice is None or view.manoeuvring:
+        return
+    if directive.junction == view.junction:
+        return
+    passed = directive.junction >= 0
+    if passed and directive.skip == 0:
+        mind.directive = None
+    else:
+        mind.directive = replace(directive, skip=max(directive.skip - passed, 0), junction=view.junction)
+
+
+def _next_note(mind: CoWizardMind) -> Mental | None:
+    if not mind.notes:
+        return None
+    first, mind.notes = mind.notes[0], mind.notes[1:]
+    return first

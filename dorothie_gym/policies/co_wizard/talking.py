@@ -1,0 +1,141 @@
+"""What the Co-Wizard says of its own accord: questions, reasons, arrivals."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dorothie_gym.dialogue import Direction, Wording
+from dorothie_gym.ontology import (
+    ActionValue,
+    DialogueMove,
+    LandmarkName,
+    ObjectClass,
+    PhysicalAction,
+    SlotValue,
+    StreetName,
+)
+from dorothie_gym.policies.co_wizard.driving import direction_of, wanted_exit
+from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View, Wish
+from dorothie_gym.policies.scenery import street_of
+from dorothie_gym.policies.speech import remark
+from dorothie_gym.spaces import Motion, Physical
+
+ASK_DISTANCE = 40.0
+"""A way is asked for when the junction is this near [m]."""
+
+ASK_AGAIN = 8.0
+"""A question without an answer is put again after this time [s]."""
+
+REASON = 3.0
+"""A hazard is explained when it holds the car for longer than this [s]."""
+
+FIRST_WORD = 5.0
+"""The human is left to speak first until this time [s]."""
+
+NEXT = 4.0
+"""Silence after which it asks what comes next [s]."""
+
+START = 7.0
+"""Silence at the beginning after which it asks where to go [s]."""
+
+
+def speak_up(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
+    """Plans at most one remark, if it has nothing to say yet."""
+    if not mind.voice.idle or view.speaking > 0.0:
+        return
+    for consider in (_give_up_wish, _ask_way, _say_arrived, _ask_goal, _explain_hazard):
+        consider(mind, view, rng)
+        if not mind.voice.idle:
+            return
+
+
+def _give_up_wish(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
+    if mind.wish is not None and view.time > mind.wish_until:
+        mind.wish = None
+        mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, wording=Wording(topic="refused")))
+
+
+def _ask_way(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
+    choice = view.choice
+    if choice is None or mind.halted or mind.creeping or mind.nudge is not None or view.time < FIRST_WORD:
+        return
+    if mind.wish is Wish.U_TURN or view.manoeuvring:
+        return
+    waiting = view.motion is Motion.WAITING
+    if not (waiting or choice.distance < ASK_DISTANCE) or wanted_exit(mind, view) is not None:
+        return
+    if mind.journey is not None and mind.journey.changes_before(None):
+        return
+    if view.manoeuvre is PhysicalAction.J_TURN and not waiting:
+        return
+    asked = mind.asked == choice.lane
+    if (asked and not waiting) or view.time - max(mind.asked_at, mind.heard_at) < ASK_AGAIN * asked:
+        return
+    mind.asked, mind.asked_at = choice.lane, view.time
+    options = [way for way in choice.exits if direction_of(way) is not Direction.STRAIGHT]
+    if options and rng.random() < 0.15:
+        way = options[int(rng.integers(len(options)))]
+        wording = Wording(direction=direction_of(way))
+        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_YN, ActionValue.J_TURN, wording=wording))
+    else:
+        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, ActionValue.QUERIED))
+
+
+def _say_arrived(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
+    if not (mind.arrived and mind.halted and view.standing) or mind.goal is None:
+        return
+    if mind.asked_at > mind.stop_sent_at:
+        return
+    mind.asked_at = view.time
+    if mind.exact and rng.random() < 0.6:
+        mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, mind.goal, wording=Wording(topic="arrived")))
+    elif not mind.exact:
+        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_YN))
+
+
+def _ask_goal(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
+    idle = mind.goal is None and mind.directive is None and mind.wish is None and mind.nudge is None
+    if not idle or mind.creeping:
+        mind.idle_since = view.time
+        return
+    if view.time - mind.idle_since < (NEXT if mind.halted else START):
+        return
+    if view.time - mind.asked_at < ASK_AGAIN or not (mind.halted or view.standing):
+        return
+    mind.asked_at = view.time
+    mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, LandmarkName.QUERIED))
+
+
+def _explain_hazard(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
+    if view.motion is not Motion.HAZARD or mind.standing_since is None or view.hazard is ObjectClass.UNLABELED:
+        return
+    if view.time - mind.standing_since < REASON or mind.hazard_told > mind.standing_since:
+        return
+    mind.hazard_told = view.time
+    if view.hazard is ObjectClass.TRAFFIC_LIGHT and rng.random() < 0.6:
+        return  # everybody sees a red light
+    values: tuple[SlotValue, ...] = (view.hazard,)
+    if rng.random() < 0.5:
+        values = (ActionValue.STOP, view.hazard)
+    mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, *values))
+
+
+def tell_action(mind: CoWizardMind, view: View, physical: Physical | None, rng: np.random.Generator) -> None:
+    """Says now and then what it does by its own plan."""
+    if physical is None or not mind.voice.idle or view.speaking > 0.0 or mind.directive is not None:
+        return
+    told = {PhysicalAction.J_TURN: ActionValue.J_TURN, PhysicalAction.U_TURN: ActionValue.U_TURN}
+    action = told.get(physical.action)
+    if action is None or mind.wish is not None or rng.random() > mind.style.tells:
+        return
+    values: list[SlotValue] = [action]
+    direction = None
+    if action is ActionValue.J_TURN:
+        way = wanted_exit(mind, view)
+        if way is None or direction_of(way) is Direction.STRAIGHT:
+            return
+        direction = direction_of(way)
+        street = street_of(view.raw, mind.town, way.lane)
+        if street is not StreetName.UNKNOWN and rng.random() < 0.6:
+            values.append(street)
+    mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, *values, wording=Wording(direction=direction)))

@@ -1,0 +1,236 @@
+"""A way to a place while it is being driven: how far it is, what comes next, and when it has been left."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from dorothie_gym.dialogue import Direction
+from dorothie_gym.ontology import StreetName
+from dorothie_gym.world.town import Town
+from dorothie_gym.world.town.model import Exit, LinkType, wrap_degrees
+from dorothie_gym.world.town.routing import Entry, Leg, Place, Route, router
+
+PASSED = 3.0
+"""A goal that lies further behind than this has been passed [m]."""
+
+LATE = 18.0
+"""A lane change or U-turn that is this overdue will not come any more [m]."""
+
+U_TURN_MARGIN = 12.0
+"""A U-turn that leads to a place right behind it is made so much later than planned: plans are made in cells [m]."""
+
+_CANONICAL = {Direction.LEFT: 90.0, Direction.RIGHT: -90.0, Direction.STRAIGHT: 0.0, Direction.BACK: 180.0}
+_DIRECTIONS = {
+    LinkType.LEFT: Direction.LEFT,
+    LinkType.RIGHT: Direction.RIGHT,
+    LinkType.STRAIGHT: Direction.STRAIGHT,
+    LinkType.U_TURN: Direction.BACK,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """The next junction where one has to choose: the lane that leads there, how far its end is [m], and the exits."""
+
+    lane: int
+    distance: float
+    exits: tuple[Exit, ...]
+
+    @property
+    def junction(self) -> int:
+        """Id of the junction."""
+        return max(way.junction_id for way in self.exits)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crossing:
+    """A junction of a journey: the lane it is entered from, the exit to take, and how far it is [m]."""
+
+    lane: int
+    exit: Exit
+    distance: float
+
+    @property
+    def direction(self) -> Direction:
+        """Which way the exit leads."""
+        return direction_of(self.exit)
+
+
+def direction_of(way: Exit) -> Direction:
+    """Which way an exit leads, as people say it."""
+    return _DIRECTIONS[way.type]
+
+
+def is_choice(town: Town, lane: int) -> bool:
+    """Whether a lane ends at a junction with more than one way on."""
+    exits = town.exits(lane)
+    return len(exits) > 1 and any(way.junction_id >= 0 for way in exits)
+
+
+def default_successor(town: Town, lane: int) -> int | None:
+    """The lane that a car goes on in without being asked; None at a junction with a choice and where the map ends."""
+    exits = town.exits(lane)
+    if not exits or is_choice(town, lane):
+        return None
+    return min(exits, key=lambda way: (abs(way.angle), way.connector)).connector
+
+
+def lanes_ahead(town: Town, lane: int, station: float, distance: float) -> tuple[int, ...]:
+    """The lane itself and those that follow by default, as far as `distance` [m]."""
+    found, ahead = [lane], town.lanes[lane].length - station
+    following = default_successor(town, lane)
+    while ahead < distance and following is not None and following not in found:
+        found.append(following)
+        ahead += town.lanes[following].length
+        following = default_successor(town, following)
+    return tuple(found)
+
+
+def next_choice(town: Town, lane: int, station: float) -> Choice | None:
+    """The next junction with a choice on the way that the car takes by default; None if there is none."""
+    seen, ahead = {lane}, town.lanes[lane].length - station
+    while not is_choice(town, lane):
+        following = default_successor(town, lane)
+        if following is None or following in seen:
+            return None
+        lane = following
+        seen.add(lane)
+        ahead += town.lanes[lane].length
+    return Choice(lane=lane, distance=max(ahead, 0.0), exits=town.exits(lane))
+
+
+def lanes_beside(town: Town, lane: int) -> tuple[int, ...]:
+    """Lanes of the same direction beside a lane, the nearest first."""
+    found: list[int] = []
+    for side in (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT):
+        beside = town.neighbour(lane, side)
+        while beside is not None and beside not in found and beside != lane:
+            found.append(beside)
+            beside = town.neighbour(beside, side)
+    return tuple(found)
+
+
+def find_exit(
+    town: Town, choice: Choice, direction: Direction | None, streets: frozenset[int] = frozenset()
+) -> Exit | None:
+    """The exit that is meant by a direction and perhaps a street; exits of lanes beside count where the own have none.
+
+    Args:
+        town: the map.
+        choice: the junction.
+        direction: which way; None if only a street was named.
+        streets: indices of the streets that bear the name; empty if none was named.
+    """
+    for lane in (choice.lane, *lanes_beside(town, choice.lane)):
+        exits = [way for way in town.exits(lane) if direction is None or direction_of(way) is direction]
+        onto = [way for way in exits if town.lanes[way.lane].street in streets]
+        if direction is None:
+            exits = []
+        if onto or exits:
+            canonical = _CANONICAL[direction] if direction is not None else 0.0
+            return min(onto or exits, key=lambda way: (abs(wrap_degrees(way.angle - canonical)), way.connector))
+    return None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Journey:
+    """A route to a goal and how far it has been driven.
+
+    Attributes:
+        goal: lane and station of the goal.
+        blocked: places that cannot be passed.
+        route: legs of the way; None if there is none.
+        leg: the leg that the car is on.
+        astray: for how many decisions the car has not been on the route.
+    """
+
+    goal: Place
+    blocked: tuple[Place, ...] = ()
+    route: Route | None = None
+    leg: int = 0
+    astray: int = 0
+
+    @classmethod
+    def plan(cls, town: Town, start: Place, goal: Place, blocked: tuple[Place, ...] = ()) -> Journey:
+        """Plans a way; where the blocked places leave none, one that ignores them."""
+        route = router(town).route(start, goal, blocked)
+        if route is None and blocked:
+            route = router(town).route(start, goal)
+        return cls(goal=goal, blocked=blocked, route=route)
+
+    def replanned(self, town: Town, start: Place, blocked: tuple[Place, ...] | None = None) -> Journey:
+        """A new way from `start` to the same goal."""
+        return Journey.plan(town, start, self.goal, self.blocked if blocked is None else blocked)
+
+    @property
+    def legs(self) -> tuple[Leg, ...]:
+        """What is left of the route, the present leg first."""
+        return self.route.legs[self.leg :] if self.route is not None else ()
+
+    def followed(self, lane: int, station: float) -> Journey:
+        """The same with the present leg brought up to where the car is; `astray` counts up if it is nowhere on it."""
+        for ahead, leg in enumerate(self.legs):
+            if leg.lane == lane and (ahead or not self._overdue(station)):
+                return replace(self, leg=self.leg + ahead, astray=0)
+        return replace(self, astray=self.astray + 1)
+
+    def _overdue(self, station: float) -> bool:
+        legs = self.legs
+        if len(legs) == 1:
+            return station > self.goal[1] + PASSED
+        return legs[1].entry is not Entry.FOLLOW and station > legs[0].end + LATE
+
+    def left(self, station: float) -> float:
+        """How far the goal is along the route [m]; negative when it has just been passed."""
+        legs = self.legs
+        if not legs:
+            return math.inf
+        if len(legs) == 1:
+            return self.goal[1] - station
+        return max(legs[0].end - station, 0.0) + sum(leg.end - leg.start for leg in legs[1:])
+
+    def next_crossing(self, town: Town, station: float) -> Crossing | None:
+        """The next junction with a choice on the route; None if the rest needs no choice."""
+        legs = self.legs
+        distance = 0.0
+        for k, leg in enumerate(legs[:-1]):
+            distance += max(leg.end - (station if k == 0 else leg.start), 0.0)
+            following = legs[k + 1]
+            if following.entry is Entry.FOLLOW and is_choice(town, leg.lane):
+                way = next((way for way in town.exits(leg.lane) if way.connector == following.lane), None)
+                if way is not None:
+                    return Crossing(lane=leg.lane, exit=way, distance=distance)
+        return None
+
+    def next_manoeuvre(self, station: float) -> tuple[Entry, float] | None:
+        """The first lane change or U-turn on the route before the next junction, and how far it is [m]."""
+        distance = 0.0
+        for k, leg in enumerate(self.legs):
+            if k and leg.entry is not Entry.FOLLOW:
+                return leg.entry, distance
+            distance += max(leg.end - (station if k == 0 else leg.start), 0.0)
+        return None
+
+    def turns_at_goal(self) -> bool:
+        """Whether the next U-turn comes out right before the goal."""
+        legs = self.legs
+        for k, leg in enumerate(legs):
+            if k and leg.entry is Entry.U_TURN:
+                return k == len(legs) - 1 and leg.end - leg.start < 2.0 * U_TURN_MARGIN
+        return False
+
+    def changes_before(self, crossing: Crossing | None) -> bool:
+        """Whether the route turns round before the given junction (or before the goal, where None)."""
+        for leg in self.legs[1:]:
+            if leg.entry is Entry.U_TURN:
+                return True
+            if crossing is not None and leg.lane == crossing.exit.connector:
+                return False
+        return False
+
+
+def streets_named(street_names: Iterable[int], name: StreetName) -> frozenset[int]:
+    """Indices of the streets that bear a name."""
+    return frozenset(k for k, value in enumerate(street_names) if int(value) == name.value)

@@ -1,0 +1,148 @@
+"""Which task comes next, and what is said about tasks: told, changed, given up, done."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from dorothie_gym.dialogue import Wording
+from dorothie_gym.ontology import DialogueMove, GoalStatus, SlotValue
+from dorothie_gym.policies.journey import Journey
+from dorothie_gym.policies.participant.mind import ParticipantMind, View
+from dorothie_gym.policies.scenery import SeenLandmark, SeenSubgoal
+from dorothie_gym.policies.speech import Remark, remark
+from dorothie_gym.world.town.routing import router
+
+UNANSWERED = 8.0
+"""After this time without a word from the car it is asked whether it has understood [s]."""
+
+
+def note_tasks(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+    """Compares the tasks with those seen last and says what is new."""
+    before, mind.subgoals = mind.subgoals, view.subgoals
+    for old, new in zip(before, view.subgoals, strict=False):
+        if new.reached and not old.reached:
+            _done(mind, view, new, rng)
+        elif new.open and not old.live:
+            _added(mind, view, new)
+        elif old.open and not new.live:
+            _dropped(mind, view, old)
+        elif new.open and new.landmark != old.landmark:
+            _changed(mind, view, old, new)
+
+
+def _done(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.random.Generator) -> None:
+    landmark = view.landmark(subgoal.landmark)
+    named = landmark is not None and rng.random() < 0.4
+    values: tuple[SlotValue, ...] = (landmark.name,) if landmark is not None and named else ()
+    mind.voice = mind.voice.cleared().plan(remark(DialogueMove.EXPLAIN, *values, GoalStatus.COMPLETE, urgent=True))
+    if subgoal.index == mind.target:
+        forget_target(mind)
+        if rng.random() > mind.style.hurries:
+            mind.voice = mind.voice.hold(view.time + 6.0)
+
+
+def _added(mind: ParticipantMind, view: View, subgoal: SeenSubgoal) -> None:
+    landmark = view.landmark(subgoal.landmark)
+    if landmark is None:
+        return
+    mind.voice = mind.voice.plan(
+        remark(DialogueMove.INSTRUCT, landmark.name, GoalStatus.PENDING, wording=Wording(topic="added"))
+    )
+
+
+def _dropped(mind: ParticipantMind, view: View, subgoal: SeenSubgoal) -> None:
+    landmark = view.landmark(subgoal.landmark)
+    if landmark is None:
+        return
+    if subgoal.index == mind.target:
+        forget_target(mind)
+        mind.voice = mind.voice.cleared()
+    mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, landmark.name, GoalStatus.ABANDONED))
+
+
+def _changed(mind: ParticipantMind, view: View, old: SeenSubgoal, new: SeenSubgoal) -> None:
+    former, landmark = view.landmark(old.landmark), view.landmark(new.landmark)
+    if new.index != mind.target or former is None or landmark is None:
+        return  # the car is told of it when its turn has come
+    told = mind.told
+    forget_target(mind)
+    mind.voice = mind.voice.cleared()
+    if told and former.name is not landmark.name:
+        _aim_at(mind, view, new, landmark)
+        mind.told, mind.told_at, mind.guiding = True, view.time, False
+        mind.voice = mind.voice.plan(
+            remark(
+                DialogueMove.INSTRUCT,
+                former.name,
+                landmark.name,
+                GoalStatus.ABANDONED,
+                GoalStatus.ONGOING,
+                wording=Wording(dropped=former.name),
+                urgent=True,
+            )
+        )
+
+
+def forget_target(mind: ParticipantMind) -> None:
+    """Leaves the present target."""
+    mind.target, mind.goal, mind.journey = None, None, None
+    mind.told, mind.guiding, mind.best = False, False, math.inf
+    mind.guided, mind.repeats = None, 0
+    mind.announced, mind.stop_text = False, ""
+    mind.stopped_at = mind.nudged_at = -math.inf
+
+
+def choose_target(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+    """Takes the nearest task that counts now, if there is none in hand."""
+    if mind.target is not None:
+        current = view.subgoals[mind.target]
+        if current.open and current.allowed:
+            return
+        forget_target(mind)
+    found: list[tuple[float, int, SeenSubgoal, SeenLandmark]] = []
+    for subgoal in view.subgoals:
+        landmark = view.landmark(subgoal.landmark)
+        if subgoal.open and subgoal.allowed and landmark is not None:
+            route = router(mind.town).route(view.place, landmark.place, mind.blocked)
+            found.append((route.length if route else math.inf, subgoal.index, subgoal, landmark))
+    if found:
+        _, _, subgoal, landmark = min(found, key=lambda row: row[:2])
+        _aim_at(mind, view, subgoal, landmark)
+        mind.guiding = bool(rng.random() < mind.style.guides)
+
+
+def _aim_at(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, landmark: SeenLandmark) -> None:
+    mind.target, mind.goal = subgoal.index, landmark
+    mind.journey = Journey.plan(mind.town, view.place, landmark.place, mind.blocked)
+
+
+def announcement(mind: ParticipantMind, view: View, rng: np.random.Generator) -> Remark:
+    """The target as an instruction, with its street where that helps."""
+    assert mind.goal is not None
+    values: list[SlotValue] = [mind.goal.name]
+    if not view.unique(mind.goal) or rng.random() < mind.style.names_street:
+        values.append(mind.goal.street)
+    more = sum(subgoal.open for subgoal in view.subgoals) > 2
+    topic = "first" if more and len(values) == 1 and rng.random() < 0.5 else None
+    return remark(DialogueMove.INSTRUCT, *values, wording=Wording(topic=topic))
+
+
+def tell_target(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+    """Tells the car of the target when its turn has come, and again if it does not answer."""
+    if mind.goal is None or not mind.voice.idle:
+        return
+    if not mind.told:
+        mind.told, mind.told_at = True, view.time
+        if not mind.guiding or rng.random() < mind.style.names_goal:
+            mind.voice = mind.voice.plan(announcement(mind, view, rng))
+        return
+    waiting = max(mind.told_at, mind.heard_at, mind.voice.last_end)
+    if view.standing and not mind.guiding and view.time - waiting > UNANSWERED and mind.repeats < 3:
+        mind.repeats += 1
+        mind.told_at = view.time
+        if mind.repeats == 1:
+            mind.voice = mind.voice.plan(remark(DialogueMove.ALIGN))
+        else:
+            mind.voice = mind.voice.plan(announcement(mind, view, rng))

@@ -1,0 +1,221 @@
+"""Telling the way: turns, turning round, lanes, and stopping at the very place."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from dorothie_gym.dialogue import Direction, Wording, speech_seconds, word_act
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, SlotValue, StreetName
+from dorothie_gym.policies.journey import Choice, Crossing, find_exit, next_choice
+from dorothie_gym.policies.participant.mind import ParticipantMind, View
+from dorothie_gym.policies.scenery import street_of
+from dorothie_gym.policies.speech import Remark, remark
+from dorothie_gym.world.town.routing import Entry
+
+TELL_DISTANCE = 110.0
+"""A turn is told when it is this near [m]."""
+
+TURN_ROUND_DISTANCE = 30.0
+"""Turning round is told when the place for it is this near [m]."""
+
+AGAIN = 9.0
+"""What has not been done is told again after this time [s]."""
+
+DECISION = 0.5
+"""Time between decisions [s]."""
+
+FASTEST = 11.0
+"""The car is not expected to get faster than this [m/s]."""
+
+BRAKING = 3.0
+"""Deceleration of the car's Stop [m/s^2]."""
+
+NEAR = 95.0
+"""A place is announced when it is this near [m]."""
+
+SLOW_SPEED = 5.0
+"""A car that is this slow need not be told to come up slowly [m/s]."""
+
+ROOM_TO_STOP = 28.0
+"""Turning round for a place on the other side is done this far beyond it, so that there is time to say stop [m]."""
+
+WITHIN = 1.9
+"""A car that stands this close to the place has arrived [m]."""
+
+
+def follow_journey(mind: ParticipantMind, view: View) -> None:
+    """Brings the way up to date, and plans anew where the car has left it."""
+    if mind.journey is None or view.turning:
+        return
+    before = mind.journey.left(view.station)
+    mind.journey = mind.journey.followed(view.lane, view.station)
+    passed = view.standing and mind.journey.left(view.station) < -WITHIN
+    if mind.journey.astray >= 3 or passed:
+        mind.journey = mind.journey.replanned(mind.town, view.place, mind.blocked)
+        mind.announced, mind.stop_text = False, ""
+        if mind.guiding and mind.journey.left(view.station) > before + 60.0 and math.isfinite(before):
+            mind.voice = mind.voice.cleared().plan(
+                remark(DialogueMove.EXPLAIN, wording=Wording(topic="wrong_way"), expires=view.time + 4.0)
+            )
+    mind.best = min(mind.best, mind.journey.left(view.station))
+
+
+def watch(mind: ParticipantMind, view: View) -> None:
+    """Takes over a car that goes far out of its way or does not get on by itself."""
+    if mind.guiding or mind.journey is None or not mind.told:
+        return
+    standing = 0.0 if mind.standing_since is None else view.time - mind.standing_since
+    lost = mind.journey.left(view.station) > mind.best + 350.0
+    if lost:
+        mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, wording=Wording(topic="wrong_way")))
+    if lost or (standing > 40.0 and view.time > mind.excused_until):
+        mind.guiding = True
+
+
+def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+    """Says what is to be done next, if it is time to."""
+    if mind.journey is None or not mind.told or not mind.voice.idle or view.speaking > 0.0 or view.turning:
+        return
+    if _approach(mind, view, rng) or not mind.guiding:
+        return
+    step = next_step(mind, view, DialogueMove.INSTRUCT, rng)
+    if step is None:
+        return
+    key, distance, words = step
+    near = distance < (_turning_distance(mind, view) if key[0] == "round" else TELL_DISTANCE)
+    waited = view.time - max(mind.guided_at, mind.heard_at)
+    stuck = view.standing and waited > AGAIN and view.time > mind.excused_until
+    if not near and stuck:
+        key, words = ("on", view.lane, 0), remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW)
+        near = True
+    overdue = stuck or (key[0] != "turn" and waited > AGAIN)
+    if near and (mind.guided != key or overdue):
+        note_told(mind, view, key)
+        mind.voice = mind.voice.plan(words)
+
+
+def _turning_distance(mind: ParticipantMind, view: View) -> float:
+    """How far ahead turning round is told: late enough not to come out beyond a place just behind."""
+    assert mind.journey is not None
+    if not mind.journey.turns_at_goal():
+        return TURN_ROUND_DISTANCE
+    manoeuvre = mind.journey.next_manoeuvre(view.station)
+    beyond = mind.town.lanes[view.lane].length - view.station - (manoeuvre[1] if manoeuvre else 0.0)
+    return 2.0 * view.speed - min(ROOM_TO_STOP, beyond - 15.0)
+
+
+def note_told(mind: ParticipantMind, view: View, key: tuple[str, int, int]) -> None:
+    """Remembers what the car has been told to do."""
+    mind.repeats = mind.repeats + 1 if mind.guided == key else 0
+    mind.guided, mind.guided_at = key, view.time
+
+
+def next_step(
+    mind: ParticipantMind, view: View, move: DialogueMove, rng: np.random.Generator
+) -> tuple[tuple[str, int, int], float, Remark] | None:
+    """What is to be done next: a key for it, how far ahead [m], and the words.
+
+    Args:
+        mind: of the participant.
+        view: what it sees.
+        move: an instruction, an answer to an open question, or a clarification.
+        rng: for the words.
+    """
+    journey = mind.journey
+    if journey is None:
+        return None
+    crossing = journey.next_crossing(mind.town, view.station)
+    manoeuvre = journey.next_manoeuvre(view.station)
+    if manoeuvre is not None and manoeuvre[0] is Entry.U_TURN:
+        if crossing is None or manoeuvre[1] < crossing.distance:
+            return ("round", 0, 0), manoeuvre[1], remark(move, ActionValue.U_TURN)
+    if crossing is not None:
+        key = ("turn", crossing.lane, crossing.exit.connector)
+        return key, crossing.distance, _turn(mind, view, move, crossing, rng)
+    if manoeuvre is not None:
+        left = manoeuvre[0] is Entry.CHANGE_LEFT
+        wording = Wording(direction=Direction.LEFT if left else Direction.RIGHT)
+        return ("lane", view.lane, int(left)), manoeuvre[1], remark(move, ActionValue.LANE_SWITCH, wording=wording)
+    return ("on", view.lane, 0), journey.left(view.station), remark(move, ActionValue.LANE_FOLLOW)
+
+
+def _turn(
+    mind: ParticipantMind, view: View, move: DialogueMove, crossing: Crossing, rng: np.random.Generator
+) -> Remark:
+    direction = crossing.direction
+    action = ActionValue.J_TURN
+    if direction is Direction.STRAIGHT and (move is not DialogueMove.INSTRUCT or rng.random() < 0.6):
+        action = ActionValue.LANE_FOLLOW
+    values: list[SlotValue] = [action]
+    street = street_of(view.raw, mind.town, crossing.exit.lane)
+    helps = street is not StreetName.UNKNOWN and direction is not Direction.STRAIGHT
+    if helps and (_ambiguous(mind, view, crossing) or rng.random() < mind.style.names_street * 0.6):
+        values.append(street)
+    first = crossing.distance < 60.0 or rng.random() < 0.5
+    ordinal = 1 if first and len(values) == 1 and action is ActionValue.J_TURN and rng.random() < 0.5 else None
+    return remark(move, *values, wording=Wording(direction=direction, ordinal=ordinal))
+
+
+def _ambiguous(mind: ParticipantMind, view: View, crossing: Crossing) -> bool:
+    """Whether the direction alone means another exit."""
+    choice = next_choice(mind.town, view.lane, view.station)
+    own = choice is not None and choice.lane == crossing.lane
+    asked = choice if own else Choice(lane=crossing.lane, distance=0.0, exits=mind.town.exits(crossing.lane))
+    assert asked is not None
+    meant = find_exit(mind.town, asked, crossing.direction)
+    return meant is not None and mind.town.lanes[meant.lane].road_id != mind.town.lanes[crossing.exit.lane].road_id
+
+
+def _approach(mind: ParticipantMind, view: View, rng: np.random.Generator) -> bool:
+    """Talks the car up to the place when nothing but the last stretch is left; tells whether that is so."""
+    journey = mind.journey
+    assert journey is not None
+    if journey.next_crossing(mind.town, view.station) is not None or journey.next_manoeuvre(view.station) is not None:
+        return False
+    left = journey.left(view.station)
+    if view.standing:
+        return _from_standing(mind, view, left)
+    if not mind.guiding:
+        return left < NEAR
+    if not mind.stop_text:
+        mind.stop_text = word_act(_STOP, Role.PARTICIPANT, rng, Wording(here=True))
+    if _time_to_stop(mind, view, left):
+        if view.time - mind.stopped_at > 3.0:
+            mind.stopped_at = view.time
+            mind.voice = mind.voice.plan(Remark(act=_STOP, text=mind.stop_text, urgent=True))
+        return True
+    if not mind.announced and left < NEAR and view.speed > SLOW_SPEED and mind.goal is not None:
+        mind.announced = True
+        wording = Wording(distance=max(left - view.speed * 2.5, 10.0))
+        mind.voice = mind.voice.plan(
+            remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, mind.goal.name, wording=wording, urgent=True)
+        )
+    return left < NEAR
+
+
+_STOP = DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.STOP)
+
+
+def _time_to_stop(mind: ParticipantMind, view: View, left: float) -> bool:
+    """Whether the words, begun now, stop the car closer to the place than if begun at the next decision."""
+    delay = math.ceil(speech_seconds(mind.stop_text) / DECISION - 1e-6) * DECISION
+    gain = min(max((view.speed - mind.speed_before) / DECISION, -2.0), 2.0)
+    then = min(max(view.speed + gain * delay, 0.0), max(FASTEST, view.speed))
+    travel = (view.speed + then) / 2 * delay + then**2 / (2 * BRAKING)
+    return left - travel <= view.speed * DECISION / 2
+
+
+def _from_standing(mind: ParticipantMind, view: View, left: float) -> bool:
+    if mind.standing_since is None or left > 45.0:
+        return False
+    waited = view.time - max(mind.standing_since, mind.nudged_at, mind.voice.last_end, mind.heard_at)
+    if waited > 6.0 if abs(left) <= WITHIN or not mind.guiding else waited > 1.6:
+        mind.nudged_at = view.time
+        distance = left if left > 9.0 else None
+        wording = Wording(distance=distance) if distance else Wording(topic="further")
+        mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording=wording))
+        if left > 30.0:
+            mind.announced = False
+    return True

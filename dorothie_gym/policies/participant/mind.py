@@ -1,0 +1,186 @@
+"""What the scripted participant remembers, and what it takes from an observation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from dorothie_gym.ontology import LandmarkName, Role
+from dorothie_gym.policies.journey import Journey
+from dorothie_gym.policies.scenery import (
+    SeenLandmark,
+    SeenObject,
+    SeenSubgoal,
+    read_landmarks,
+    read_objects,
+    read_subgoals,
+    scalar,
+)
+from dorothie_gym.policies.speech import Voice
+from dorothie_gym.world.town import Town
+from dorothie_gym.world.town.routing import Place
+
+STANDING = 0.3
+"""Below this speed the car stands [m/s]."""
+
+TURNED = 0.8
+"""Below this cosine of the angle between car and lane the car is in the middle of turning round."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Style:
+    """How a participant talks in a session.
+
+    Attributes:
+        guides: chance that a place which the car may know is guided to turn by turn all the same.
+        names_goal: chance that the place is named when guiding.
+        names_street: chance that a street is added to a place or a turn.
+        hurries: chance that the next task follows in the same breath as the report of the last.
+        patience: standing time after which it asks why [s].
+        chat: seconds between remarks beside the matter, on average [s].
+    """
+
+    guides: float
+    names_goal: float
+    names_street: float
+    hurries: float
+    patience: float
+    chat: float
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator) -> Style:
+        """A style by chance: two in five guide most of the way themselves."""
+        return cls(
+            guides=0.85 if rng.random() < 0.4 else 0.1,
+            names_goal=float(rng.uniform(0.4, 1.0)),
+            names_street=float(rng.uniform(0.1, 0.7)),
+            hurries=float(rng.uniform(0.2, 0.9)),
+            patience=float(rng.uniform(7.0, 14.0)),
+            chat=float(rng.uniform(60.0, 200.0)),
+        )
+
+
+@dataclass(kw_only=True)
+class ParticipantMind:
+    """Memory of the participant; a step works on a copy of it, and every field holds an immutable value.
+
+    Attributes:
+        seed: of all chance.
+        town: the map.
+        style: how it talks.
+        count: decisions taken.
+        voice: what it means to say.
+        subgoals: the tasks as seen last.
+        target: the subgoal it is about.
+        goal: landmark of that subgoal.
+        told: whether the car has been told of it.
+        told_at: when [s].
+        guiding: whether the way is told turn by turn.
+        journey: the way to the target.
+        best: least distance to the target so far [m].
+        guided: what was last told to do: a word for it and the lanes concerned.
+        guided_at: when [s].
+        repeats: how often that has been repeated.
+        announced: whether the car has been told that the place is near.
+        stop_text: words to stop the car with.
+        stopped_at: when they were said [s].
+        nudged_at: when the car was last told to go a bit further [s].
+        blocked: places that cannot be passed.
+        standing_since: since when the car has been standing [s].
+        heard_at: when the car last spoke [s].
+        excused_until: until when a standing car is not asked about [s].
+        asked_at: when it was last asked [s].
+        slowed: whether the car was told to slow down for the weather.
+        lights_at: when lights were last talked about [s].
+        chat_at: when to talk beside the matter next [s].
+        speed_before: speed at the decision before [m/s].
+    """
+
+    seed: int
+    town: Town
+    style: Style
+    count: int = 0
+    voice: Voice = field(default_factory=lambda: Voice(role=Role.PARTICIPANT))
+    subgoals: tuple[SeenSubgoal, ...] = ()
+    target: int | None = None
+    goal: SeenLandmark | None = None
+    told: bool = False
+    told_at: float = -math.inf
+    guiding: bool = False
+    journey: Journey | None = None
+    best: float = math.inf
+    guided: tuple[str, int, int] | None = None
+    guided_at: float = -math.inf
+    repeats: int = 0
+    announced: bool = False
+    stop_text: str = ""
+    stopped_at: float = -math.inf
+    nudged_at: float = -math.inf
+    blocked: tuple[Place, ...] = ()
+    standing_since: float | None = 0.0
+    heard_at: float = 0.0
+    excused_until: float = 0.0
+    asked_at: float = -math.inf
+    slowed: bool = False
+    lights_at: float = -math.inf
+    chat_at: float = math.inf
+    speed_before: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """An observation of the participant, read; `turning` tells that the car stands across its lane."""
+
+    raw: Mapping[str, Any]
+    time: float
+    speed: float
+    lane: int
+    station: float
+    speaking: float
+    landmarks: tuple[SeenLandmark, ...]
+    subgoals: tuple[SeenSubgoal, ...]
+    objects: tuple[SeenObject, ...]
+    turning: bool
+
+    @classmethod
+    def read(cls, observation: Mapping[str, Any], town: Town) -> View:
+        """Reads what every decision needs."""
+        lane, station = int(observation["lane"]), scalar(observation, "station")
+        across = float(observation["pose"][2]) - town.lanes[lane].heading_at(station)
+        return cls(
+            raw=observation,
+            time=scalar(observation, "time"),
+            speed=scalar(observation, "speed"),
+            lane=lane,
+            station=station,
+            speaking=scalar(observation, "speaking"),
+            landmarks=read_landmarks(observation, town),
+            subgoals=read_subgoals(observation),
+            objects=read_objects(observation),
+            turning=math.cos(across) < TURNED,
+        )
+
+    @property
+    def place(self) -> Place:
+        """Where the car is."""
+        return self.lane, self.station
+
+    @property
+    def standing(self) -> bool:
+        """Whether the car stands."""
+        return self.speed < STANDING
+
+    def landmark(self, row: int) -> SeenLandmark | None:
+        """The landmark of a row."""
+        return next((landmark for landmark in self.landmarks if landmark.row == row), None)
+
+    def unique(self, landmark: SeenLandmark) -> bool:
+        """Whether no other landmark bears the same name."""
+        return sum(other.name is landmark.name for other in self.landmarks) == 1 and landmark.name not in (
+            LandmarkName.HOUSE,
+            LandmarkName.PERSON,
+        )

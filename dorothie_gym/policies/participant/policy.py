@@ -1,0 +1,65 @@
+"""The scripted participant, decision by decision."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import copy
+from typing import Any
+
+import numpy as np
+
+from dorothie_gym.ontology import Role
+from dorothie_gym.policies.participant.goals import choose_target, note_tasks, tell_target
+from dorothie_gym.policies.participant.guidance import follow_journey, guide, watch
+from dorothie_gym.policies.participant.mind import ParticipantMind, Style, View
+from dorothie_gym.policies.participant.reactions import react
+from dorothie_gym.policies.participant.replies import listen
+from dorothie_gym.policies.policy import Policy
+from dorothie_gym.spaces import ActionDict, ParticipantAction, SpaceLimits
+from dorothie_gym.world.town import Town
+
+
+class ScriptedParticipant(Policy[ParticipantMind]):
+    """A human who wants the storyboard's tasks done and knows where everything is.
+
+    It names places or tells the way turn by turn (its style, drawn for each session), answers the car's questions,
+    corrects wrong turns, reports what is done, and takes up changes of the task.
+    """
+
+    def __init__(self, limits: SpaceLimits | None = None, style: Style | None = None) -> None:
+        """Prepares the policy.
+
+        Args:
+            limits: sizes of the spaces.
+            style: how it talks; drawn for each session where None.
+        """
+        super().__init__(Role.PARTICIPANT, limits)
+        self._style = style
+
+    def initial_state(self, seed: int, town: Town) -> ParticipantMind:
+        """A participant who has not said anything yet."""
+        rng = np.random.default_rng((seed, 0))
+        style = Style.draw(rng) if self._style is None else self._style
+        return ParticipantMind(seed=seed, town=town, style=style, chat_at=float(rng.uniform(25.0, style.chat + 25.0)))
+
+    def step(self, observation: Mapping[str, Any], state: ParticipantMind) -> tuple[ActionDict, ParticipantMind]:
+        """Listens, looks, and says something or nothing."""
+        mind = copy(state)
+        mind.count += 1
+        rng = np.random.default_rng((mind.seed, mind.count))
+        view = View.read(observation, mind.town)
+        if not view.standing:
+            mind.standing_since = None
+        elif mind.standing_since is None:
+            mind.standing_since = view.time
+        note_tasks(mind, view, rng)
+        choose_target(mind, view, rng)
+        follow_journey(mind, view)
+        listen(mind, view, rng)
+        tell_target(mind, view, rng)
+        watch(mind, view)
+        guide(mind, view, rng)
+        react(mind, view, rng)
+        speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng)
+        mind.speed_before = view.speed
+        return ParticipantAction(speech=speech).encode(self.limits), mind

@@ -1,0 +1,137 @@
+"""What the participant says about weather, obstacles and a car that stands, and what it says besides."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dorothie_gym.dialogue import Wording
+from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, WeatherParameter
+from dorothie_gym.policies.participant.mind import ParticipantMind, View
+from dorothie_gym.policies.scenery import place_on_lanes, weather
+from dorothie_gym.policies.speech import remark
+from dorothie_gym.world.town.routing import Place
+
+THICK_FOG = 35.0
+"""Fog density from which one cannot see far (percent)."""
+
+HEAVY_RAIN = 55.0
+"""Precipitation from which one should slow down (percent)."""
+
+SLOW, USUAL = 25.0, 40.0
+"""Speeds in bad weather and else [km/h]."""
+
+SIGHT = 80.0
+"""How far ahead an obstacle is noticed [m]."""
+
+
+def react(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+    """Talks about what is going on outside, if there is nothing else to say."""
+    note_blocked(mind, view)
+    if not mind.voice.idle or view.speaking > 0.0 or not mind.told:
+        return
+    _mind_weather(mind, view)
+    if mind.voice.idle:
+        _mind_light(mind, view, rng)
+    if mind.voice.idle:
+        _ask_why(mind, view)
+    if mind.voice.idle:
+        _chat(mind, view, rng)
+
+
+def note_blocked(mind: ParticipantMind, view: View, near: bool = False) -> None:
+    """Remembers an obstacle on the way and plans round it.
+
+    Args:
+        mind: of the participant.
+        view: what it sees.
+        near: whether the car has told of one: it is ahead even if it is not in sight.
+    """
+    if mind.journey is None:
+        return
+    lanes = [leg.lane for leg in mind.journey.legs[:6]]
+    found: Place | None = None
+    for thing in view.objects:
+        if thing.kind is ObjectClass.STATIC and thing.distance < SIGHT and found is None:
+            found = place_on_lanes(mind.town, lanes, thing.x, thing.y)
+            if found is not None and found[0] == view.lane and found[1] < view.station:
+                found = None
+    if found is None and near:
+        ahead = min(view.station + 12.0, mind.town.lanes[view.lane].length)
+        found = (view.lane, ahead)
+    if found is None or any(place[0] == found[0] and abs(place[1] - found[1]) < 10.0 for place in mind.blocked):
+        return
+    # the cell behind the obstacle as well: the car's own cell counts as free
+    mind.blocked = (*mind.blocked, found, (found[0], min(found[1] + 8.0, mind.town.lanes[found[0]].length)))
+    mind.journey = mind.journey.replanned(mind.town, view.place, mind.blocked)
+    mind.best = mind.journey.left(view.station)
+    mind.guided = None
+    if mind.guiding and not near:
+        mind.voice = mind.voice.cleared().plan(
+            remark(DialogueMove.EXPLAIN, ObjectClass.STATIC, wording=Wording(topic="blocked"), urgent=True)
+        )
+
+
+def _mind_weather(mind: ParticipantMind, view: View) -> None:
+    fog = weather(view.raw, WeatherParameter.FOG_DENSITY)
+    rain = weather(view.raw, WeatherParameter.PRECIPITATION)
+    if not mind.slowed and (fog > THICK_FOG or rain > HEAVY_RAIN):
+        mind.slowed = True
+        topic = "fog" if fog > THICK_FOG else "rain"
+        mind.voice = mind.voice.plan(
+            remark(DialogueMove.EXPLAIN, wording=Wording(topic=topic)),
+            remark(
+                DialogueMove.INSTRUCT,
+                ActionValue.SPEED_CHANGE,
+                wording=Wording(faster=False, speed=SLOW),
+                joined=True,
+            ),
+        )
+    elif mind.slowed and fog < THICK_FOG / 2 and rain < HEAVY_RAIN / 2:
+        mind.slowed = False
+        mind.voice = mind.voice.plan(
+            remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=Wording(faster=True, speed=USUAL))
+        )
+
+
+def _mind_light(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+    dark = weather(view.raw, WeatherParameter.SUN_ALTITUDE_ANGLE) < 0.0
+    if not dark or bool(view.raw["lights"]) or view.time - mind.lights_at < 25.0:
+        return
+    mind.lights_at = view.time
+    if rng.random() < 0.5:
+        mind.voice = mind.voice.plan(
+            remark(DialogueMove.QUERY_YN, ActionValue.LIGHT_CHANGE, wording=Wording(lights=True))
+        )
+        return
+    mind.voice = mind.voice.plan(
+        remark(DialogueMove.EXPLAIN, wording=Wording(topic="night")),
+        remark(DialogueMove.INSTRUCT, ActionValue.LIGHT_CHANGE, wording=Wording(lights=True), joined=True),
+    )
+
+
+def _ask_why(mind: ParticipantMind, view: View) -> None:
+    if mind.standing_since is None or mind.guiding or view.time < mind.excused_until:
+        return
+    near = mind.journey is not None and mind.journey.left(view.station) < 45.0
+    waited = view.time - max(mind.standing_since, mind.heard_at, mind.voice.last_end)
+    if waited > mind.style.patience and not near and view.time - mind.asked_at > 40.0:
+        mind.asked_at = view.time
+        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, ActionValue.STOP))
+
+
+def _chat(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+    if view.time < mind.chat_at or view.standing or mind.journey is None:
+        return
+    crossing = mind.journey.next_crossing(mind.town, view.station)
+    busy = mind.journey.left(view.station) < 130.0 or (
+        mind.guiding and crossing is not None and crossing.distance < 140.0
+    )
+    if busy:
+        return
+    mind.chat_at = view.time + float(rng.exponential(mind.style.chat)) + 20.0
+    topics = [remark(DialogueMove.IRRELEVANT)]
+    if not mind.guiding:
+        topics.append(remark(DialogueMove.QUERY_W, ActionValue.QUERIED))
+    if view.objects:
+        topics.append(remark(DialogueMove.QUERY_YN, view.objects[0].kind))
+    mind.voice = mind.voice.plan(topics[int(rng.integers(len(topics)))])

@@ -1,0 +1,154 @@
+"""Reads the tables of observations into small records."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dorothie_gym.ontology import GoalStatus, LandmarkName, ObjectClass, StreetName, WeatherParameter
+from dorothie_gym.spaces import LandmarkColumn, ObjectColumn, SubgoalColumn
+from dorothie_gym.world.town import Town
+
+PARAMETERS = tuple(WeatherParameter)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeenLandmark:
+    """A landmark on the map: its row, its name, where it stands [m] and the lane and station where one stops for it."""
+
+    row: int
+    name: LandmarkName
+    x: float
+    y: float
+    lane: int
+    station: float
+    street: StreetName
+
+    @property
+    def place(self) -> tuple[int, float]:
+        """Where one stops for it."""
+        return self.lane, self.station
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeenSubgoal:
+    """A task as it stands; `landmark` is a row of the landmarks."""
+
+    index: int
+    live: bool
+    landmark: int
+    status: GoalStatus
+    reached: bool
+    allowed: bool
+    can_trigger: bool = False
+    can_delete: bool = False
+    can_change: bool = False
+
+    @property
+    def open(self) -> bool:
+        """Whether it is still to be reached."""
+        return self.live and not self.reached
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeenObject:
+    """Something in sight: its class, place [m] and distance [m]."""
+
+    kind: ObjectClass
+    x: float
+    y: float
+    distance: float
+
+
+def street_of(observation: Mapping[str, Any], town: Town, lane: int) -> StreetName:
+    """Name of the street that a lane belongs to; UNKNOWN where it has none."""
+    street = town.lanes[lane].street
+    names = observation["street_names"]
+    return StreetName(int(names[street])) if 0 <= street < len(names) else StreetName.UNKNOWN
+
+
+def read_landmarks(observation: Mapping[str, Any], town: Town) -> tuple[SeenLandmark, ...]:
+    """The rows of `landmarks` in use."""
+    column = LandmarkColumn
+    return tuple(
+        SeenLandmark(
+            row=k,
+            name=LandmarkName(int(row[column.NAME])),
+            x=float(row[column.X]),
+            y=float(row[column.Y]),
+            lane=int(row[column.LANE]),
+            station=float(row[column.STATION]),
+            street=street_of(observation, town, int(row[column.LANE])),
+        )
+        for k, row in enumerate(observation["landmarks"])
+        if row[column.NAME] > 0
+    )
+
+
+def read_subgoals(observation: Mapping[str, Any]) -> tuple[SeenSubgoal, ...]:
+    """All rows of `subgoals`, those that are not in use as well: they are not live."""
+    column = SubgoalColumn
+    return tuple(
+        SeenSubgoal(
+            index=k,
+            live=bool(row[column.LIVE]),
+            landmark=int(row[column.LANDMARK]),
+            status=GoalStatus(int(row[column.STATUS])),
+            reached=bool(row[column.REACHED]),
+            allowed=bool(row[column.ALLOWED]),
+            can_trigger=bool(row[column.CAN_TRIGGER]),
+            can_delete=bool(row[column.CAN_DELETE]),
+            can_change=bool(row[column.CAN_CHANGE]),
+        )
+        for k, row in enumerate(observation["subgoals"])
+    )
+
+
+def read_objects(observation: Mapping[str, Any]) -> tuple[SeenObject, ...]:
+    """The rows of `objects` in use, nearest first."""
+    column = ObjectColumn
+    return tuple(
+        SeenObject(
+            kind=ObjectClass(int(row[column.KIND])),
+            x=float(row[column.X]),
+            y=float(row[column.Y]),
+            distance=float(row[column.DISTANCE]),
+        )
+        for row in observation["objects"]
+        if row[column.KIND] > 0
+    )
+
+
+def weather(observation: Mapping[str, Any], parameter: WeatherParameter) -> float:
+    """A parameter of the weather."""
+    return float(observation["weather"][PARAMETERS.index(parameter)])
+
+
+def scalar(observation: Mapping[str, Any], name: str) -> float:
+    """A field of one number."""
+    return float(np.asarray(observation[name]).reshape(-1)[0])
+
+
+def place_on_lanes(
+    town: Town, lanes: Sequence[int], x: float, y: float, width: float = 2.0
+) -> tuple[int, float] | None:
+    """The first of some lanes on which a point lies, and the distance along it; None if it lies on none.
+
+    Args:
+        town: the map.
+        lanes: lanes to look at, in order.
+        x: position [m].
+        y: position [m].
+        width: largest distance from the centre line [m].
+    """
+    point = np.array([x, y])
+    for lane in lanes:
+        station, lateral = town.lanes[lane].project(point)
+        end = town.lanes[lane].position(station)
+        if abs(lateral) <= width and math.hypot(end[0] - x, end[1] - y) <= width + 1.0:
+            return lane, station
+    return None
