@@ -1,3 +1,121 @@
-"""Environments in which a human, a driving wizard and an adversary talk while a car drives through a town."""
+"""Environments in which a human, a driving wizard and an adversary talk while a car drives through a town.
+
+Importing the package registers its environments with Gymnasium and PettingZoo; nothing slow to import is loaded until
+a name below is used or an environment is made.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+import pettingzoo
+
+if TYPE_CHECKING:
+    from dorothie_gym.envs.config import EnvConfig, RewardWeights
+    from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+    from dorothie_gym.envs.scenario import Scenario, draw_scenario
+    from dorothie_gym.evaluation.teacher_forced import NfDEnv, RfNEnv, UfNEnv
+    from dorothie_gym.ontology import Role
+    from dorothie_gym.policies import Policy, make_policy
+    from dorothie_gym.sessions import Session, load_sessions
+    from dorothie_gym.spaces import SpaceLimits, noop
+    from dorothie_gym.tasks import load_template, template_names
+    from dorothie_gym.world.config import WorldConfig
+    from dorothie_gym.world.town import Town, load_town
+    from dorothie_gym.world.town_env import TownEnv
+    from dorothie_gym.wrappers.flatten import FlattenAction, FlattenObservation, flatten
+    from dorothie_gym.wrappers.record_session import RecordSession
+    from dorothie_gym.wrappers.single_role import SingleRole
 
 __version__ = "0.1.0"
+
+_HOME = {
+    "DuoWizardEnv": "envs.duo_wizard_v0",
+    "EnvConfig": "envs.config",
+    "FlattenAction": "wrappers.flatten",
+    "FlattenObservation": "wrappers.flatten",
+    "NfDEnv": "evaluation.teacher_forced",
+    "Policy": "policies",
+    "RecordSession": "wrappers.record_session",
+    "RewardWeights": "envs.config",
+    "RfNEnv": "evaluation.teacher_forced",
+    "Role": "ontology",
+    "Scenario": "envs.scenario",
+    "Session": "sessions",
+    "SingleRole": "wrappers.single_role",
+    "SpaceLimits": "spaces",
+    "Town": "world.town",
+    "TownEnv": "world.town_env",
+    "UfNEnv": "evaluation.teacher_forced",
+    "WorldConfig": "world.config",
+    "draw_scenario": "envs.scenario",
+    "flatten": "wrappers.flatten",
+    "load_sessions": "sessions",
+    "load_template": "tasks",
+    "load_town": "world.town",
+    "make_policy": "policies",
+    "noop": "spaces",
+    "template_names": "tasks",
+}
+"""The module that each public name comes from, imported when the name is first used."""
+
+__all__ = [
+    "DuoWizardEnv",
+    "EnvConfig",
+    "FlattenAction",
+    "FlattenObservation",
+    "NfDEnv",
+    "Policy",
+    "RecordSession",
+    "RewardWeights",
+    "RfNEnv",
+    "Role",
+    "Scenario",
+    "Session",
+    "SingleRole",
+    "SpaceLimits",
+    "Town",
+    "TownEnv",
+    "UfNEnv",
+    "WorldConfig",
+    "__version__",
+    "draw_scenario",
+    "flatten",
+    "load_sessions",
+    "load_template",
+    "load_town",
+    "make_policy",
+    "noop",
+    "template_names",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
+def _register() -> None:
+    """Makes the environments known by their ids; the code behind an id is imported when one is made."""
+    duo_wizard = "dorothie_gym.envs.duo_wizard_v0"
+    pettingzoo.register("parallel", "dorothie_gym/DuoWizard-v0", f"{duo_wizard}:parallel_env")
+    pettingzoo.register("aec", "dorothie_gym/DuoWizard-v0", f"{duo_wizard}:env")
+    for view, role in (("Participant", "participant"), ("CoWizard", "co_wizard"), ("AdWizard", "ad_wizard")):
+        gymnasium.register(
+            f"dorothie_gym/{view}-v0", "dorothie_gym.wrappers.single_role:SingleRole", kwargs={"role": role}
+        )
+    for task in ("UfN", "RfN", "NfD"):
+        gymnasium.register(f"dorothie_gym/{task}-v0", f"dorothie_gym.evaluation.teacher_forced:{task}Env")
+    gymnasium.register("dorothie_gym/Town-v0", "dorothie_gym.world.town_env:TownEnv")
+
+
+_register()

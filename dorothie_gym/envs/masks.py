@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -53,7 +54,7 @@ class Masks:
 
     def mask(self, role: Role) -> dict[str, Any]:
         """The mask of a role's action space now."""
-        fields = dict(self._fixed[role])
+        fields = deepcopy(self._fixed[role])  # what an environment returned is its user's to change
         if role is Role.CO_WIZARD:
             fields["physical"], fields["angle"] = self._physical()
         elif role is Role.AD_WIZARD:

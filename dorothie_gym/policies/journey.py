@@ -21,6 +21,12 @@ LATE = 18.0
 U_TURN_MARGIN = 12.0
 """A U-turn that leads to a place right behind it is made so much later than planned: plans are made in cells [m]."""
 
+BRAKING = 3.0
+"""Deceleration of the car's Stop [m/s^2]."""
+
+LAG = 0.56
+"""Time that the brakes seem to take until they bite, measured at 3 to 11 m/s [s]."""
+
 _CANONICAL = {Direction.LEFT: 90.0, Direction.RIGHT: -90.0, Direction.STRAIGHT: 0.0, Direction.BACK: 180.0}
 _DIRECTIONS = {
     LinkType.LEFT: Direction.LEFT,
@@ -56,6 +62,11 @@ class Crossing:
     def direction(self) -> Direction:
         """Which way the exit leads."""
         return direction_of(self.exit)
+
+
+def stopping_distance(speed: float) -> float:
+    """How far the car goes on after Stop at a speed [m/s] [m]."""
+    return LAG * speed + speed**2 / (2 * BRAKING)
 
 
 def direction_of(way: Exit) -> Direction:

@@ -12,9 +12,9 @@ from dorothie_gym.world.car.hazards import Body
 from dorothie_gym.world.car.vehicle import Car
 from dorothie_gym.world.junctions import JunctionControl
 from dorothie_gym.world.network.road import TownRoad
-from dorothie_gym.world.pedestrians import Pedestrian
+from dorothie_gym.world.pedestrians import KERB, Pedestrian, rightmost
 from dorothie_gym.world.props import Prop
-from dorothie_gym.world.town.model import Array
+from dorothie_gym.world.town.model import Array, LinkType
 from dorothie_gym.world.town.oncoming import oncoming_lanes
 from dorothie_gym.world.traffic import CurveSpeeds, TrafficVehicle, free_places
 
@@ -86,8 +86,10 @@ class Actors:
 
     def add_pedestrian(self, lane: int, station: float) -> bool:
         """Puts a pedestrian beside a lane if nobody is there."""
+        lane = rightmost(self._town, lane)
         town_lane = self._town.lanes[lane]
-        place = town_lane.position(station, town_lane.width_at(station) / 2 + 1.6)
+        station = min(station, town_lane.length)
+        place = town_lane.position(station, town_lane.width_at(station) / 2 + KERB)
         if math.hypot(*(place - self._car.position)) < 8.0:
             return False
         if any(math.hypot(*(place - p.position)) < 1.0 for p in self.pedestrians):
@@ -141,7 +143,9 @@ class Actors:
 
     def act(self, dt: float) -> None:
         """Lets traffic decide and pedestrians walk for `dt` [s]; `road.step` then moves the traffic."""
+        crossing = self._car if getattr(self._car, "in_manoeuvre", False) else None
         for vehicle in self.vehicles:
+            vehicle.crossing = crossing
             vehicle.act()
         for pedestrian in self.pedestrians:
             pedestrian.walk(dt, self._across)
@@ -166,9 +170,16 @@ class Actors:
         """How far it is to the other side of the road [m]."""
         lane = self._town.lanes[pedestrian.lane_id]
         station, _ = lane.project(pedestrian.position)
-        oncoming = oncoming_lanes(self._town).at(lane.id, station)
-        width = lane.width_at(station)
-        return width + 3.2 + (oncoming.gap if oncoming is not None else 0.0)
+        leftmost, shift = lane, 0.0
+        while (beside := self._town.neighbour(leftmost.id, LinkType.LANE_CHANGE_LEFT)) is not None:
+            place = leftmost.position(station)
+            leftmost = self._town.lanes[beside]
+            station, lateral = leftmost.project(place)
+            shift += abs(lateral)
+        oncoming = oncoming_lanes(self._town).at(leftmost.id, station)
+        if oncoming is not None:
+            shift += oncoming.gap
+        return shift + lane.width_at(station) + 2 * KERB
 
     def _before_prop(self, vehicle: TrafficVehicle) -> bool:
         return any(

@@ -29,13 +29,26 @@ HEIGHT = 2.5
 """Connectors further apart in height do not meet [m]."""
 
 PATIENCE = 3.0
-"""Who holds a connector without entering it for this long loses it [s]."""
+"""Who holds a connector and stands before it for this long loses it [s]."""
+
+LAPSE = 1.0
+"""Who holds a connector without asking for it any more (it goes elsewhere) loses it after this long [s]."""
 
 
 @dataclass
 class _Claim:
+    """A connector that a vehicle holds or waits for.
+
+    Attributes:
+        connector: the lane.
+        since: when the vehicle began to wait, or to stand before it [s].
+        asked: when it asked last [s].
+        entered: whether it is on it.
+    """
+
     connector: int
     since: float
+    asked: float
     entered: bool = False
 
 
@@ -45,11 +58,11 @@ class JunctionControl:
     def __init__(self, town: Town) -> None:
         self._town = town
         self._crossing: dict[tuple[int, int], bool] = {}
-        self._held: dict[int, _Claim] = {}
+        self._held: dict[int, list[_Claim]] = {}
         self._waiting: dict[int, _Claim] = {}
 
     def request(self, key: int, connector: int, now: float, *, room: bool) -> bool:
-        """Asks to enter a connector.
+        """Asks to enter a connector; to be repeated until the vehicle is on it.
 
         Args:
             key: tells the vehicle apart.
@@ -58,49 +71,61 @@ class JunctionControl:
             room: whether there is room for the vehicle behind the junction.
 
         Returns:
-            Whether it may enter. The grant stays until `release`, or lapses if it is not used.
+            Whether it may enter. The grant stays until the vehicle has crossed, or lapses if it is not used.
         """
-        claim = self._held.get(key)
-        if claim is not None and claim.connector == connector:
-            return True
-        if claim is not None:
-            self.release(key)
+        held = self._held.get(key, [])
+        # a vehicle may still be crossing the last junction, but heads for one connector only
+        held[:] = [claim for claim in held if claim.entered or claim.connector == connector]
+        for claim in held:
+            if claim.connector == connector:
+                claim.asked = now
+                return True
         waiting = self._waiting.get(key)
         if waiting is None or waiting.connector != connector:
-            waiting = self._waiting[key] = _Claim(connector, now)
+            waiting = self._waiting[key] = _Claim(connector, now, now)
+        waiting.asked = now
         if not room:
             waiting.since = now  # whoever cannot leave the junction keeps nobody waiting
             return False
-        if any(self.crosses(connector, other.connector) for k, other in self._held.items() if k != key):
+        if any(
+            self.crosses(connector, claim.connector)
+            for other, claims in self._held.items()
+            if other != key
+            for claim in claims
+        ):
             return False
         if any(
-            other.since < waiting.since and self.crosses(connector, other.connector)
+            other.since < waiting.since and now - other.asked < LAPSE and self.crosses(connector, other.connector)
             for k, other in self._waiting.items()
             if k != key
         ):
             return False
         del self._waiting[key]
-        self._held[key] = _Claim(connector, now)
+        self._held.setdefault(key, []).append(_Claim(connector, now, now))
         return True
 
     def holds(self, key: int) -> int | None:
-        """Connector that a vehicle was granted."""
-        claim = self._held.get(key)
-        return None if claim is None else claim.connector
+        """Connector that a vehicle was granted last."""
+        held = self._held.get(key)
+        return held[-1].connector if held else None
 
     def note(self, key: int, lane: int, speed: float, now: float) -> None:
-        """Takes note of where a vehicle is: enters or leaves its connector, or stands before it for too long."""
-        claim = self._held.get(key)
-        if claim is None:
+        """Takes note of where a vehicle is: enters or leaves its connector, or does not use what it was granted."""
+        held = self._held.get(key)
+        if not held:
             return
-        if lane == claim.connector or self._town.lanes[lane].junction_id == self._junction(claim.connector):
+        junction = self._junction(lane)
+        held[:] = [claim for claim in held if self._stands(claim, junction, speed, now)]
+
+    def _stands(self, claim: _Claim, junction: int, speed: float, now: float) -> bool:
+        if junction == self._junction(claim.connector):
             claim.entered = True
-        elif claim.entered:
-            self.release(key)
-        elif speed > 0.3:
+            return True
+        if claim.entered:
+            return False
+        if speed > 0.3:
             claim.since = now
-        elif now - claim.since > PATIENCE:
-            self.release(key)
+        return now - claim.since <= PATIENCE and now - claim.asked <= LAPSE
 
     def release(self, key: int) -> None:
         """Gives back what a vehicle holds or waits for."""

@@ -9,6 +9,7 @@ import numpy as np
 from highway_env.vehicle.objects import RoadObject
 
 from dorothie_gym.world.network.road import TownRoad
+from dorothie_gym.world.town.model import LinkType, Town
 
 WALKING_SPEED = 1.3
 """[m/s], the usual design value for pedestrians (MUTCD takes 1.1)."""
@@ -19,11 +20,24 @@ KERB = 1.6
 CROSSING_RATE = 1 / 45
 """How often a pedestrian wants to cross [1/s]."""
 
+PERSONAL_SPACE = 0.7
+"""How close to a vehicle they step [m]."""
+
+PATIENCE = 2.0
+"""How long they wait for it to go on before they turn back [s]."""
+
 SAFE_TIME = 5.0
 """Time gap to vehicles that they want before stepping out [s]."""
 
 SAFE_DISTANCE = 14.0
 """And distance [m]."""
+
+
+def rightmost(town: Town, lane_id: int) -> int:
+    """The last of the lanes beside one another to the right: who walks beside it does not walk on another lane."""
+    while (beside := town.neighbour(lane_id, LinkType.LANE_CHANGE_RIGHT)) is not None:
+        lane_id = beside
+    return lane_id
 
 
 class Pedestrian(RoadObject):
@@ -37,6 +51,7 @@ class Pedestrian(RoadObject):
     LENGTH, WIDTH = 0.5, 0.5
 
     def __init__(self, road: TownRoad, lane_id: int, station: float, *, key: int, rng: np.random.Generator) -> None:
+        lane_id = rightmost(road.network.town, lane_id)
         self._lane = road.network.town.lanes[lane_id]
         self._rng = rng
         self.key = key
@@ -44,6 +59,8 @@ class Pedestrian(RoadObject):
         self._home = self._lane.width_at(station) / 2 + KERB
         self._lateral = self._home
         self._target = self._home
+        self._far = self._home
+        self._waited = 0.0
         self._direction = 1.0 if rng.random() < 0.5 else -1.0
         self.height = self._lane.height_at(station)
         self.lane_id = lane_id
@@ -56,6 +73,13 @@ class Pedestrian(RoadObject):
             self.speed = 0.0
             return
         crossing = abs(self._target - self._lateral) > 0.05
+        if self._would_touch_vehicle(dt):
+            self.speed = 0.0
+            self._waited += dt
+            if self._waited > PATIENCE:
+                self._turn_back(crossing)
+            return
+        self._waited = 0.0
         if crossing:
             step = math.copysign(
                 min(WALKING_SPEED * dt, abs(self._target - self._lateral)), self._target - self._lateral
@@ -67,8 +91,32 @@ class Pedestrian(RoadObject):
                 self._direction = 1.0 if self._station <= 4.0 else -1.0
             if self._rng.random() < CROSSING_RATE * dt and self._is_clear():
                 near = abs(self._lateral - self._home) < 0.1
-                self._target = self._home - across(self) if near else self._home
+                self._far = self._home - across(self) if near else self._lateral
+                self._target = self._far if near else self._home
         self._place()
+
+    def _would_touch_vehicle(self, dt: float) -> bool:
+        """Whether the next step leads up to a vehicle: nobody walks into the side of a car."""
+        step = WALKING_SPEED * max(dt, 0.2)
+        x = self.position[0] + step * math.cos(self.heading)
+        y = self.position[1] + step * math.sin(self.heading)
+        for vehicle in self.road.vehicles:
+            dx, dy = x - vehicle.position[0], y - vehicle.position[1]
+            if abs(dx) > 6.0 or abs(dy) > 6.0:
+                continue
+            c, s = math.cos(vehicle.heading), math.sin(vehicle.heading)
+            ahead, side = abs(dx * c + dy * s), abs(dy * c - dx * s)
+            if ahead < vehicle.LENGTH / 2 + PERSONAL_SPACE and side < vehicle.WIDTH / 2 + PERSONAL_SPACE:
+                return True
+        return False
+
+    def _turn_back(self, crossing: bool) -> None:
+        self._waited = 0.0
+        if crossing:
+            self._target = self._home if self._target != self._home else self._far
+        else:
+            self._direction = -self._direction
+        self.heading = self._heading()
 
     def _is_clear(self) -> bool:
         for vehicle in self.road.vehicles:

@@ -6,10 +6,12 @@ import math
 from typing import Any
 
 import numpy as np
+from highway_env.utils import not_zero
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
 from dorothie_gym.world.junctions import JunctionControl
+from dorothie_gym.world.network.ahead import LEVEL
 from dorothie_gym.world.network.network import LaneIndex
 from dorothie_gym.world.network.road import TownRoad
 from dorothie_gym.world.town.model import Lane, Town
@@ -28,6 +30,15 @@ STOP_BRAKING = 3.0
 
 ROOM_BEHIND = 9.0
 """Free lane that a vehicle wants behind a junction before it enters [m]."""
+
+SLOW = 4.0
+"""Slower than this a vehicle behind a junction may be in the way: a car that turns round does 3.5 [m/s]."""
+
+CROSSING_SIGHT = 40.0
+"""How far a vehicle is seen that switches lanes or turns round [m]."""
+
+CROSSING_MARGIN = 0.5
+"""Room that is left beside it [m]."""
 
 STUCK_SPEED = 0.3
 """Slower than this a vehicle counts as standing [m/s]."""
@@ -56,6 +67,7 @@ class TrafficVehicle(IDMVehicle):
     Attributes:
         key: tells it apart; keys of bodies in the world are unique.
         height: of the road under it [m].
+        crossing: a vehicle that is switching lanes or turning round, which may stand across several lanes.
         standing: how long it has been standing [s].
     """
 
@@ -79,6 +91,7 @@ class TrafficVehicle(IDMVehicle):
         self._desired = desired_speed
         self._front: Any | None = None
         self._front_gap = math.inf
+        self.crossing: Any | None = None
         self.standing = 0.0
         self.crash_age = 0.0
         super().__init__(
@@ -125,14 +138,52 @@ class TrafficVehicle(IDMVehicle):
             acceleration = min(acceleration, self.acceleration(self, self._front))
         self._front = None
         acceleration = min(acceleration, self._junction_acceleration(station))
-        steering = self.steering_control(self.target_lane_index)
+        if self.crossing is not None:
+            acceleration = min(acceleration, self._crossing_acceleration(self.crossing))
         Vehicle.act(
             self,
             {
-                "acceleration": float(np.clip(acceleration, -self.ACC_MAX, self.ACC_MAX)),
-                "steering": float(np.clip(steering, -self.MAX_STEERING_ANGLE, self.MAX_STEERING_ANGLE)),
+                "acceleration": min(max(acceleration, -self.ACC_MAX), self.ACC_MAX),
+                "steering": self.steering_control(self.target_lane_index),
             },
         )
+
+    def steering_control(self, target_lane_index: LaneIndex) -> float:
+        """Stock's steering angle towards a lane [rad], computed on plain numbers, which is several times faster."""
+        lane = self._network.get_lane(target_lane_index)
+        station, lateral = lane.local_coordinates(self.position)
+        ahead = lane.heading_at(station + self.speed * self.TAU_PURSUIT)
+        speed = not_zero(self.speed)
+        back = math.asin(min(max(-self.KP_LATERAL * lateral / speed, -1.0), 1.0))
+        wanted = ahead + min(max(back, -math.pi / 4), math.pi / 4)
+        error = (wanted - self.heading + math.pi) % (2 * math.pi) - math.pi
+        rate = self.LENGTH / 2 / speed * self.KP_HEADING * error
+        slip = math.asin(min(max(rate, -1.0), 1.0))
+        steering = math.atan(2 * math.tan(slip))
+        return float(min(max(steering, -self.MAX_STEERING_ANGLE), self.MAX_STEERING_ANGLE))
+
+    def acceleration(
+        self, ego_vehicle: Any, front_vehicle: Any | None = None, rear_vehicle: Any | None = None
+    ) -> float:
+        """Stock's acceleration by the Intelligent Driver Model [m/s^2], computed on plain numbers."""
+        if ego_vehicle is None or not isinstance(ego_vehicle, Vehicle):
+            return 0.0
+        target = getattr(ego_vehicle, "target_speed", 0.0)
+        if ego_vehicle.lane is not None and ego_vehicle.lane.speed_limit is not None:
+            target = min(max(target, 0.0), ego_vehicle.lane.speed_limit)
+        speed = float(ego_vehicle.speed)
+        acceleration = self.COMFORT_ACC_MAX * (1.0 - (max(speed, 0.0) / abs(not_zero(target))) ** self.DELTA)
+        if front_vehicle is not None:
+            gap = not_zero(ego_vehicle.lane_distance_to(front_vehicle))
+            acceleration -= self.COMFORT_ACC_MAX * (self.desired_gap(ego_vehicle, front_vehicle) / gap) ** 2
+        return float(acceleration)
+
+    def desired_gap(self, ego_vehicle: Any, front_vehicle: Any = None, projected: bool = True) -> float:
+        """Stock's distance that is wanted to a vehicle in front [m], computed on plain numbers."""
+        speed, other = float(ego_vehicle.speed), float(front_vehicle.speed)
+        closing = speed - (other * math.cos(front_vehicle.heading - ego_vehicle.heading) if projected else other)
+        braking = 2.0 * math.sqrt(-self.COMFORT_ACC_MAX * self.COMFORT_ACC_MIN)
+        return float(self.DISTANCE_WANTED + speed * self.TIME_WANTED + speed * closing / braking)
 
     def clip_actions(self) -> None:
         """As stock, but brakes stop a vehicle and do not reverse it."""
@@ -199,6 +250,24 @@ class TrafficVehicle(IDMVehicle):
             distance += lane.length
         return math.inf
 
+    def _crossing_acceleration(self, other: Any) -> float:
+        """Acceleration that stops the vehicle before one that is partly in its way [m/s^2]; inf where it is not."""
+        dx, dy = other.position - self.position
+        if dx * dx + dy * dy > CROSSING_SIGHT**2 or abs(other.height - self.height) > LEVEL:
+            return math.inf
+        gap, start = math.inf, 0.0
+        own = self._network.get_lane(self.target_lane_index).local_coordinates(self.position)[0]
+        for index in self.route[:3]:
+            lane = self._network.get_lane(index)
+            for corner in other.polygon()[:4]:
+                station, lateral = lane.local_coordinates(corner)
+                if abs(lateral) < self.WIDTH / 2 + CROSSING_MARGIN and 0.0 <= station <= lane.length:
+                    gap = min(gap, start + station - own)
+            start += lane.length
+        if gap < -self.LENGTH / 2:
+            return math.inf  # passed already
+        return math.inf if math.isinf(gap) else self._brake_to(gap - self.LENGTH / 2 - 1.0)
+
     def _brake_to(self, distance: float) -> float:
         if distance <= 0.3:
             return -self.ACC_MAX if self.speed > 0 else 0.0
@@ -219,7 +288,7 @@ def room_at_start(road: TownRoad, lane: Any, exclude: Any) -> bool:
     """Whether nothing slow stands on the first metres of a lane."""
     start = lane.position(0.0, 0.0)
     for other in [*road.vehicles, *road.objects]:
-        if other is exclude or other.speed > 2.5:
+        if other is exclude or other.speed > SLOW:
             continue
         dx, dy = other.position[0] - start[0], other.position[1] - start[1]
         if dx * dx + dy * dy > (ROOM_BEHIND + 6.0) ** 2:

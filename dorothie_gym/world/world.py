@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +14,7 @@ import numpy as np
 from dorothie_gym.ontology import ObjectClass, PhysicalAction, Sensor
 from dorothie_gym.world.actors import Actors
 from dorothie_gym.world.car.driver import Driver
-from dorothie_gym.world.car.hazards import Body, Hazard, bodies_ahead
+from dorothie_gym.world.car.hazards import HEIGHT_MARGIN, Body, Hazard, bodies_ahead
 from dorothie_gym.world.car.planner import BRAKING, LocalPlanner
 from dorothie_gym.world.car.vehicle import Car
 from dorothie_gym.world.config import FRAME_RATE, WorldConfig
@@ -34,8 +35,20 @@ FAULT_SECONDS = 30.0
 BLUR = 0.5
 """Share of the sight that is left when the view is blurred."""
 
+TURN_ROUND_SPEED = 4.0
+"""Whoever comes towards a car that turns round is taken to be at least this fast soon [m/s]."""
+
+UPSTREAM = 50.0
+"""How far before a lane's start vehicles that come towards it are looked for [m]."""
+
+EXTEND_EVERY = 15
+"""The path is lengthened this often [frames]."""
+
 HARD = 3.5
 """Braking harder than this for something ahead is a hazard stop [m/s^2]."""
+
+STANDING = 0.1
+"""Slower than this the car stands [m/s]."""
 
 FRAME_COLUMNS = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "brake", "lane")
 """Columns of `World.frames`; `lane` is the lane's id, heading in radians, speed in m/s."""
@@ -133,8 +146,9 @@ class World:
         self._events = []
         rows = np.empty((frames, len(FRAME_COLUMNS)))
         before = (self.car.position.copy(), float(self.car.heading))
-        self.planner.extend(float(self.car.speed))
         for k in range(frames):
+            if k % EXTEND_EVERY == 0:
+                self.planner.extend(float(self.car.speed))
             self._substep()
             control = self.car.control
             rows[k] = (
@@ -153,14 +167,14 @@ class World:
         self.junctions.note(CAR, self.planner.lane, float(car.speed), self.time)
         hazard = self._look_ahead()
         friction = self.weather.friction
-        car.friction = friction
+        car.friction, self.driver.sight = friction, self.sight
         control = self.driver.control(
             float(car.position[0]), float(car.position[1]), float(car.heading), float(car.speed), hazard, dt, friction
         )
         if self.frame < self._stopped_until:
             control = type(control)(throttle=0.0, steer=control.steer, brake=1.0)
         self._note_hazard(hazard, control.brake)
-        car.height = self.planner.height
+        car.height, car.in_manoeuvre = self.planner.height, self.planner.in_manoeuvre
         car.drive(control, dt)
         self.actors.act(dt)
         speed_before = float(car.speed)
@@ -196,7 +210,7 @@ class World:
         planner, car = self.planner, self.car
         bodies = self.perceived()
         found = bodies_ahead(
-            planner.path, planner.s, bodies, length=car.LENGTH, width=car.WIDTH, height=float(car.height)
+            planner.path, planner.s, bodies, length=car.LENGTH, width=car.WIDTH, speed=float(car.speed)
         )
         hazards = [h for h in (found, self._junction_ahead(), self._gap_to_traffic(bodies)) if h is not None]
         return min(hazards, key=Hazard.safe_speed, default=None)
@@ -204,6 +218,8 @@ class World:
     def _junction_ahead(self) -> Hazard | None:
         """The line before a junction that the car may not enter yet."""
         path, planner, speed = self.planner.path, self.planner, float(self.car.speed)
+        if planner.held and speed < STANDING:
+            return None  # asks for nothing that it does not use
         reach = speed**2 / (2 * BRAKING) + 14.0
         first, last = path.index_at(planner.s), path.index_at(planner.s + reach)
         here = int(path.lanes[first])
@@ -234,20 +250,47 @@ class World:
         ahead = float(path.s[start]) - planner.s
         if ahead > 15.0:
             return None
-        lane = self.town.lanes[int(path.lanes[start])]
-        meeting, _ = lane.project(np.asarray(path.points[start]))
+        target = int(path.lanes[start])
+        meeting, _ = self.town.lanes[target].project(np.asarray(path.points[start]))
         turning = action is PhysicalAction.U_TURN
         for body in bodies:
-            if body.kind is not ObjectClass.VEHICLES or abs(body.height - float(self.car.height)) > 2.5:
+            if body.kind is not ObjectClass.VEHICLES:
                 continue
-            station, lateral = lane.project(np.array([body.x, body.y]))
-            if abs(lateral) > 2.0:
+            station = self._place_towards(target, body)
+            if station is None:
                 continue
-            closing = body.speed - (0.0 if turning else float(self.car.speed))
-            behind = 8.0 + max(closing, 0.0) * (5.0 if turning else 3.0)
+            if turning:  # it takes the car's length of time to get round, in which who stands now may have come up
+                behind = 8.0 + 5.0 * max(body.speed, TURN_ROUND_SPEED)
+            else:
+                behind = 8.0 + 3.0 * max(body.speed - float(self.car.speed), 0.0)
             if -behind < station - meeting < 9.0:
                 return Hazard(kind=ObjectClass.VEHICLES, gap=max(ahead, 0.0) + 2.0, key=body.key)
         return None
+
+    def _place_towards(self, target: int, body: Body) -> float | None:
+        """Where a body is along a lane, negative where it comes towards its start, or None if it does not [m]."""
+        position = np.array([body.x, body.y])
+        for lane_id, offset in self._upstream(target):
+            lane = self.town.lanes[lane_id]
+            station, lateral = lane.project(position)
+            if abs(lateral) > 2.0 or abs(lane.height_at(station) - body.height) > HEIGHT_MARGIN:
+                continue
+            if math.cos(lane.heading_at(station) - body.heading) < 0.5:
+                continue
+            if not lane.in_junction or self.junctions.holds(body.key) == lane_id:
+                return station + offset
+        return None
+
+    @functools.lru_cache(maxsize=256)  # noqa: B019 - a world lives as long as its session
+    def _upstream(self, target: int) -> tuple[tuple[int, float], ...]:
+        """A lane, and those that lead to it within sight of a turning car, with where they begin [m]."""
+        found = [(target, 0.0)]
+        for lane, offset in found:
+            for before in self.town.predecessors(lane):
+                start = offset - self.town.lanes[before].length
+                if offset > -UPSTREAM and all(before != known for known, _ in found):
+                    found.append((before, start))
+        return tuple(found)
 
     def _note_hazard(self, hazard: Hazard | None, brake: float) -> None:
         """Logs when the car begins to stop for something, and when it goes on."""

@@ -7,21 +7,20 @@ from collections.abc import Callable
 from dorothie_gym.ontology import LandmarkName, PhysicalAction
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View, Wish
 from dorothie_gym.policies.journey import (
+    BRAKING,
     U_TURN_MARGIN,
     Crossing,
     direction_of,
     find_exit,
     lanes_ahead,
     lanes_beside,
+    stopping_distance,
     streets_named,
 )
 from dorothie_gym.spaces import Motion, Physical
 from dorothie_gym.world.town.model import Exit, LinkType, wrap_degrees
 from dorothie_gym.world.town.oncoming import oncoming_lanes
 from dorothie_gym.world.town.routing import Entry, Place
-
-BRAKING = 3.0
-"""Deceleration of Stop [m/s^2]."""
 
 DECISION = 0.5
 """Time between decisions [s]."""
@@ -71,7 +70,7 @@ def _stop_at_place(mind: CoWizardMind, view: View) -> Physical | None:
         return None
     if distance is None or distance < -2.0:
         return None
-    left = distance - view.speed**2 / (2 * BRAKING)
+    left = distance - stopping_distance(view.speed)
     if left > view.speed * DECISION / 2 + 0.2:
         return None
     mind.halted, mind.nudge = True, None

@@ -111,9 +111,7 @@ def _unknown(mind: CoWizardMind, view: View, name: LandmarkName) -> None:
         )
 
 
-def hear_stop_ahead(
-    mind: CoWizardMind, view: View, name: LandmarkName | None, distance: float, rng: np.random.Generator
-) -> None:
+def hear_stop_ahead(mind: CoWizardMind, view: View, name: LandmarkName | None, distance: float) -> None:
     """It is told to stop some way ahead, perhaps by a place: comes up to it slowly."""
     if name is not None:
         mark = known(view, name, ())
@@ -127,8 +125,6 @@ def hear_stop_ahead(
     mind.journey, mind.directive = None, None
     # nearer than told: what is told is rounded, and a slow car can be stopped at the word
     mind.note_place(mind.goal or LandmarkName.UNKNOWN, place_ahead(mind, view, max(distance - 12.0, 10.0)))
-    if rng.random() > mind.style.silent:
-        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
 
 
 def hear_description(

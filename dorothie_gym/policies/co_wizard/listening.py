@@ -67,7 +67,9 @@ def _instruction(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard,
         _told_place(mind, view, act, words, rng)
     elif words.distance is not None and not view.standing and _STOPS & set(actions):
         name = landmarks[0] if landmarks and isinstance(landmarks[0], LandmarkName) else None
-        hear_stop_ahead(mind, view, name, float(words.distance), rng)
+        hear_stop_ahead(mind, view, name, float(words.distance))
+        if mind.voice.idle and rng.random() > mind.style.silent:
+            mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
     elif actions:
         for action in actions:
             _OBEYED[action](mind, view, act, words)
@@ -184,6 +186,10 @@ def _do_start(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) ->
 
 
 def _do_speed(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> None:
+    if words.speed is None and words.faster is False and not mind.exact:
+        # nobody says why: the place that is not on the map must be near
+        hear_stop_ahead(mind, view, None, 20.0)
+        return
     if words.speed is not None:
         mind.speed = words.speed
     else:

@@ -64,8 +64,10 @@ def _ask_way(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
     waiting = view.motion is Motion.WAITING
     if not (waiting or choice.distance < ASK_DISTANCE) or wanted_exit(mind, view) is not None:
         return
-    if mind.journey is not None and mind.journey.changes_before(None):
-        return
+    if mind.journey is not None:
+        crossing = mind.journey.next_crossing(mind.town, view.station)
+        if crossing is None or mind.journey.changes_before(crossing):
+            return  # the goal, or the place to turn round, comes first
     if view.manoeuvre is PhysicalAction.J_TURN and not waiting:
         return
     asked = mind.asked == choice.lane

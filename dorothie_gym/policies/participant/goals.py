@@ -138,8 +138,9 @@ def tell_target(mind: ParticipantMind, view: View, rng: np.random.Generator) -> 
         if not mind.guiding or rng.random() < mind.style.names_goal:
             mind.voice = mind.voice.plan(announcement(mind, view, rng))
         return
-    waiting = max(mind.told_at, mind.heard_at, mind.voice.last_end)
-    if view.standing and not mind.guiding and view.time - waiting > UNANSWERED and mind.repeats < 3:
+    waiting = max(mind.told_at, mind.voice.last_end)
+    unheard = mind.heard_at < mind.told_at and view.time - waiting > UNANSWERED
+    if view.standing and not mind.guiding and unheard and mind.repeats < 3:
         mind.repeats += 1
         mind.told_at = view.time
         if mind.repeats == 1:

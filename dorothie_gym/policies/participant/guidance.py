@@ -8,7 +8,7 @@ import numpy as np
 
 from dorothie_gym.dialogue import Direction, Wording, speech_seconds, word_act
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, SlotValue, StreetName
-from dorothie_gym.policies.journey import Choice, Crossing, find_exit, next_choice
+from dorothie_gym.policies.journey import Choice, Crossing, find_exit, next_choice, stopping_distance
 from dorothie_gym.policies.participant.mind import ParticipantMind, View
 from dorothie_gym.policies.scenery import street_of
 from dorothie_gym.policies.speech import Remark, remark
@@ -23,14 +23,14 @@ TURN_ROUND_DISTANCE = 30.0
 AGAIN = 9.0
 """What has not been done is told again after this time [s]."""
 
+SWITCHING = 5.0
+"""The car is given this long for a lane change before the next one is told [s]."""
+
 DECISION = 0.5
 """Time between decisions [s]."""
 
 FASTEST = 11.0
 """The car is not expected to get faster than this [m/s]."""
-
-BRAKING = 3.0
-"""Deceleration of the car's Stop [m/s^2]."""
 
 NEAR = 95.0
 """A place is announced when it is this near [m]."""
@@ -52,6 +52,8 @@ def follow_journey(mind: ParticipantMind, view: View) -> None:
     before = mind.journey.left(view.station)
     mind.journey = mind.journey.followed(view.lane, view.station)
     passed = view.standing and mind.journey.left(view.station) < -WITHIN
+    if passed:
+        mind.guiding = True
     if mind.journey.astray >= 3 or passed:
         mind.journey = mind.journey.replanned(mind.town, view.place, mind.blocked)
         mind.announced, mind.stop_text = False, ""
@@ -88,9 +90,11 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     waited = view.time - max(mind.guided_at, mind.heard_at)
     stuck = view.standing and waited > AGAIN and view.time > mind.excused_until
     if not near and stuck:
-        key, words = ("on", view.lane, 0), remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW)
+        key, words = ("on", view.lane, 0), remark(DialogueMove.INSTRUCT, ActionValue.START)
         near = True
     overdue = stuck or (key[0] != "turn" and waited > AGAIN)
+    if key[0] == "lane" and view.time - mind.guided_at < SWITCHING:
+        return
     if near and (mind.guided != key or overdue):
         note_told(mind, view, key)
         mind.voice = mind.voice.plan(words)
@@ -182,16 +186,19 @@ def _approach(mind: ParticipantMind, view: View, rng: np.random.Generator) -> bo
     if not mind.stop_text:
         mind.stop_text = word_act(_STOP, Role.PARTICIPANT, rng, Wording(here=True))
     if _time_to_stop(mind, view, left):
-        if view.time - mind.stopped_at > 3.0:
+        if view.time - mind.stopped_at > 5.0 and left > 0.0:
             mind.stopped_at = view.time
             mind.voice = mind.voice.plan(Remark(act=_STOP, text=mind.stop_text, urgent=True))
         return True
     if not mind.announced and left < NEAR and view.speed > SLOW_SPEED and mind.goal is not None:
         mind.announced = True
-        wording = Wording(distance=max(left - view.speed * 2.5, 10.0))
-        mind.voice = mind.voice.plan(
-            remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, mind.goal.name, wording=wording, urgent=True)
-        )
+        if left > 3.5 * view.speed + 20.0:
+            wording = Wording(distance=max(left - view.speed * 3.0, 10.0))
+            words = remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, mind.goal.name, wording=wording, urgent=True)
+            mind.voice = mind.voice.plan(words)
+        elif left > 1.5 * view.speed + 5.0:
+            slower = remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=Wording(faster=False), urgent=True)
+            mind.voice = mind.voice.plan(slower)
     return left < NEAR
 
 
@@ -203,7 +210,7 @@ def _time_to_stop(mind: ParticipantMind, view: View, left: float) -> bool:
     delay = math.ceil(speech_seconds(mind.stop_text) / DECISION - 1e-6) * DECISION
     gain = min(max((view.speed - mind.speed_before) / DECISION, -2.0), 2.0)
     then = min(max(view.speed + gain * delay, 0.0), max(FASTEST, view.speed))
-    travel = (view.speed + then) / 2 * delay + then**2 / (2 * BRAKING)
+    travel = (view.speed + then) / 2 * delay + stopping_distance(then)
     return left - travel <= view.speed * DECISION / 2
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import copy
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,8 @@ class ScriptedParticipant(Policy[ParticipantMind]):
         mind.count += 1
         rng = np.random.default_rng((mind.seed, mind.count))
         view = View.read(observation, mind.town)
+        if view.turning and mind.standing_since is not None and view.time - mind.standing_since > 4.0:
+            view = replace(view, turning=False)  # it does not go on turning by itself
         if not view.standing:
             mind.standing_since = None
         elif mind.standing_since is None:

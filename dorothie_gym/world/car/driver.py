@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dorothie_gym.ontology import PhysicalAction
+from dorothie_gym.ontology import ObjectClass, PhysicalAction
 from dorothie_gym.world.car.control import Control, PathController
 from dorothie_gym.world.car.hazards import Hazard
 from dorothie_gym.world.car.path import Path
@@ -28,6 +28,12 @@ APPROACH_SPEED = 14.0 * KMH
 
 APPROACH_DISTANCE = 20.0
 """Where a goal begins to be near [m]."""
+
+PROP_DEPTH = 1.25
+"""Half the length of the longest prop: it is in sight when its middle is [m]."""
+
+WALKING_SPEED = 1.5
+"""Speed of a car that hardly sees anything [m/s]."""
 
 END_GAP = 0.8
 """Room left between the nose of a waiting car and the end of its lane [m]."""
@@ -78,12 +84,14 @@ class Driver:
     Attributes:
         cruise: desired speed [km/h].
         goals: places where the car is expected to stop; it comes up to them slowly.
+        sight: how far the car perceives bodies now [m]; it goes no faster than it can stop within.
     """
 
     def __init__(self, planner: LocalPlanner, *, length: float, cruise: float = 40.0) -> None:
         self.planner = planner
         self.cruise = cruise
         self.goals: Sequence[GoalAhead] = ()
+        self.sight = math.inf
         self._length = length
         self._controller = PathController(length)
         self._profile: SpeedProfile | None = None
@@ -109,7 +117,7 @@ class Driver:
         planner = self.planner
         self._prepare()
         assert self._profile is not None
-        speed = min(self.cruise * KMH, self._profile.at(planner.s + 0.1))
+        speed = min(self.cruise * KMH, self._profile.at(planner.s + 0.1), self._sight_speed(friction))
         for place in self._goals_on_path:
             left = place - planner.s
             if -1.0 <= left:
@@ -118,6 +126,13 @@ class Driver:
         if hazard is not None:
             speed = min(speed, hazard.safe_speed(friction))
         return speed
+
+    def _sight_speed(self, friction: float) -> float:
+        """Speed from which the car can stop behind a roadblock that comes in sight [m/s]."""
+        if math.isinf(self.sight):
+            return math.inf
+        unseen = Hazard(kind=ObjectClass.STATIC, gap=self.sight - self._length / 2 - PROP_DEPTH)
+        return max(unseen.safe_speed(friction), WALKING_SPEED)
 
     def control(self, x: float, y: float, heading: float, speed: float, hazard: Hazard | None, dt: float,
                 friction: float = 1.0) -> Control:  # fmt: skip

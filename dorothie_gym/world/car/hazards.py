@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dorothie_gym.ontology import ObjectClass
-from dorothie_gym.world.car.path import Path
+from dorothie_gym.world.car.path import SPACING, Path
+from dorothie_gym.world.town.model import Array
 
 LOOKAHEAD = 45.0
 """How far ahead the path is watched [m]."""
@@ -22,6 +23,9 @@ HEIGHT_MARGIN = 2.5
 
 PREDICTIONS = (0.0, 0.5, 1.0, 1.5)
 """Times at which moving bodies are looked for on the path [s]."""
+
+CROSSING = 0.35
+"""Sine of the angle to the path from which on a moving body counts as crossing it."""
 
 REACTION = 0.4
 """Time until brakes bite, kept in hand [s]."""
@@ -81,7 +85,7 @@ class Hazard:
 
 
 def bodies_ahead(
-    path: Path, s: float, bodies: Sequence[Body], *, length: float, width: float, height: float
+    path: Path, s: float, bodies: Sequence[Body], *, length: float, width: float, speed: float = 0.0
 ) -> Hazard | None:
     """The body on the path ahead, or soon to be there, that allows the least speed.
 
@@ -91,51 +95,60 @@ def bodies_ahead(
         bodies: all that is perceived.
         length: of the car [m].
         width: of the car [m].
-        height: of the road under the car [m].
+        speed: of the car [m/s]: the faster it is, the farther it looks.
     """
     if not bodies:
         return None
-    first, last = path.index_at(s), path.index_at(s + LOOKAHEAD) + 1
-    line = path.points[first:last]  # (m, 2)
-    if len(line) < 2:
+    ahead = _Ahead.of(path, s, max(LOOKAHEAD, speed * REACTION + speed**2 / (2 * HARD_BRAKING) + ROADBLOCK_GAP))
+    if len(ahead.stations) < 2:
         return None
-    stations, headings = path.s[first:last], path.headings[first:last]
-    normals = np.column_stack((-np.sin(headings), np.cos(headings)))  # to the right
     worst: Hazard | None = None
     for body in bodies:
-        if abs(body.height - height) > HEIGHT_MARGIN:
-            continue
-        hazard = _on_line(body, line, stations, headings, normals, s, length, width)
+        hazard = ahead.meet(body, length=length, width=width)
         if hazard is not None and (worst is None or hazard.safe_speed() < worst.safe_speed()):
             worst = hazard
     return worst
 
 
-def _on_line(
-    body: Body, line: np.ndarray, stations: np.ndarray, headings: np.ndarray, normals: np.ndarray,
-    s: float, length: float, width: float,
-) -> Hazard | None:  # fmt: skip
-    reach = LOOKAHEAD + 2.0 * abs(body.speed) + body.length
-    if abs(body.x - line[0, 0]) > reach or abs(body.y - line[0, 1]) > reach:
+@dataclass(frozen=True, eq=False)
+class _Ahead:
+    """The stretch of path that is watched: points (m, 2), their distance from the car's middle, heights, directions."""
+
+    points: Array
+    stations: Array
+    heights: Array
+    headings: Array
+    cosines: Array
+    sines: Array
+
+    @classmethod
+    def of(cls, path: Path, s: float, reach: float) -> _Ahead:
+        cut = slice(path.index_at(s), path.index_at(s + reach) + 1)
+        headings = path.headings[cut]
+        return cls(path.points[cut], path.s[cut] - s, path.heights[cut], headings, np.cos(headings), np.sin(headings))
+
+    def meet(self, body: Body, *, length: float, width: float) -> Hazard | None:
+        """The first place of the path where the car would touch a body, now or where it is heading."""
+        reach = float(self.stations[-1]) + 2.0 * abs(body.speed) + body.length + length
+        if abs(body.x - self.points[0, 0]) > reach or abs(body.y - self.points[0, 1]) > reach:
+            return None
+        turn = body.heading - self.headings
+        parallel, square = np.abs(np.cos(turn)), np.abs(np.sin(turn))
+        half_width = (body.width * parallel + body.length * square) / 2 + width / 2 + SIDE_MARGIN  # (m,)
+        half_length = (body.length * parallel + body.width * square) / 2  # (m,)
+        level = np.abs(self.heights - body.height) <= HEIGHT_MARGIN
+        for time in PREDICTIONS if body.speed > 0.2 else PREDICTIONS[:1]:
+            dx = body.x + time * body.speed * math.cos(body.heading) - self.points[:, 0]
+            dy = body.y + time * body.speed * math.sin(body.heading) - self.points[:, 1]
+            across = np.abs(dy * self.cosines - dx * self.sines)
+            along = dx * self.cosines + dy * self.sines
+            touching = (across <= half_width) & (np.abs(along) <= half_length + SPACING) & level
+            if time > 0.0:
+                touching &= square >= CROSSING  # who goes along the path is where it is now
+            if not touching.any():
+                continue
+            k = int(np.argmax(touching))
+            gap = float(self.stations[k] + along[k] - half_length[k]) - length / 2
+            speed = max(body.speed * math.cos(float(turn[k])), 0.0) if time == 0.0 else 0.0
+            return Hazard(kind=body.kind, gap=gap, speed=speed, key=body.key)
         return None
-    for time in PREDICTIONS if body.speed > 0.2 else PREDICTIONS[:1]:
-        x = body.x + time * body.speed * np.cos(body.heading)
-        y = body.y + time * body.speed * np.sin(body.heading)
-        dx, dy = x - line[:, 0], y - line[:, 1]
-        k = int(np.argmin(dx * dx + dy * dy))
-        turn = body.heading - headings[k]
-        if time > 0.0 and abs(np.sin(turn)) < 0.35:
-            return None  # goes along the path: where it is now is what counts
-        across = dx[k] * normals[k, 0] + dy[k] * normals[k, 1]
-        along = dx[k] * np.cos(headings[k]) + dy[k] * np.sin(headings[k])
-        half_width = (body.width * abs(np.cos(turn)) + body.length * abs(np.sin(turn))) / 2
-        half_length = (body.length * abs(np.cos(turn)) + body.width * abs(np.sin(turn))) / 2
-        ends = k == 0 or k == len(line) - 1
-        if abs(across) > width / 2 + half_width + SIDE_MARGIN or (ends and abs(along) > half_length + 1.0):
-            continue
-        gap = float(stations[k] - s) + (along if ends else 0.0) - length / 2 - half_length
-        if gap < -length / 2 - half_length:
-            continue  # behind the car's middle
-        speed = max(body.speed * float(np.cos(turn)), 0.0) if time == 0.0 else 0.0
-        return Hazard(kind=body.kind, gap=gap, speed=speed, key=body.key)
-    return None

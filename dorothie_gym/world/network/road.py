@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Sequence
@@ -124,10 +125,18 @@ class TownRoad(Road):
         if not index:
             return nobody
         others = [
-            t for t in itertools.chain(self.vehicles, self.objects) if t is not vehicle and not isinstance(t, Landmark)
+            t for t in itertools.chain(self.vehicles, self.objects) if t is not vehicle and not _is_landmark(type(t))
         ]
         if not others:
             return nobody
+        places = np.empty((len(others), 2))
+        heights, rows = np.empty(len(others)), np.empty(len(others), dtype=np.int64)
+        for k, other in enumerate(others):
+            x, y = other.position
+            height = getattr(other, "height", None)
+            places[k, 0], places[k, 1] = x, y
+            heights[k] = math.nan if height is None else height
+            rows[k] = getattr(other.lane, "row", -1)
         chain = self._chains.around(index, self._route(vehicle, index))
         table = self.network.table
         found = Neighbours(
@@ -138,9 +147,9 @@ class TownRoad(Road):
                 self._zones,
                 *chain,
                 np.asarray(vehicle.position, dtype=np.float64),
-                np.array([other.position for other in others], dtype=np.float64),
-                np.array([_own_height(other) for other in others]),
-                np.array([getattr(other.lane, "row", -1) for other in others], dtype=np.int64),
+                places,
+                heights,
+                rows,
             )
         )
         front = others[found.front] if found.front >= 0 else None
@@ -156,6 +165,7 @@ class TownRoad(Road):
         return [target] if target in self.network.successors(index) else None
 
 
-def _own_height(thing: Any) -> float:
-    height = getattr(thing, "height", None)
-    return math.nan if height is None else float(height)
+@functools.lru_cache(maxsize=64)
+def _is_landmark(kind: type) -> bool:
+    # asked for all pairs at every step: highway-env's classes are abstract base classes, whose checks are slow
+    return issubclass(kind, Landmark)

@@ -19,8 +19,11 @@ from dorothie_gym.world.town.oncoming import oncoming_lanes
 CELL = 10.0
 """Lanes are cut into cells of about this length for the search [m]."""
 
-CHANGE_LENGTH = 20.0
-"""Road that a lane change takes in a plan [m]."""
+CHANGE_LENGTH = 36.0
+"""Road that a lane change takes in a plan [m]: three seconds at 40 km/h, and the first metre."""
+
+SHORT_CHANGE = 16.0
+"""Road that it takes at least, at a walking pace [m]; every metre less than `CHANGE_LENGTH` counts double."""
 
 CHANGE_COST = 10.0
 """Metres of detour that a lane change is worth."""
@@ -132,10 +135,12 @@ class Router:
                 continue
             for k in range(self._counts[lane_id]):
                 start = (k + 0.5) * size
-                if start + CHANGE_LENGTH > lane.length:
+                length = min(CHANGE_LENGTH, lane.length - start)
+                if length < SHORT_CHANGE:
                     break
-                there, _ = town.lanes[target].project(lane.position(start + CHANGE_LENGTH))
-                edge(self.cell(lane_id, start), self.cell(target, there), CHANGE_COST, CHANGE_LENGTH, kind)
+                there, _ = town.lanes[target].project(lane.position(start + length))
+                extra = CHANGE_COST + 2.0 * (CHANGE_LENGTH - length)
+                edge(self.cell(lane_id, start), self.cell(target, there), extra, length, kind)
         table = oncoming_lanes(town)
         for k in range(self._counts[lane_id]):
             oncoming = table.at(lane_id, (k + 0.5) * size)

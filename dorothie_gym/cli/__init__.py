@@ -1,0 +1,5 @@
+"""The command line: `dorothie-gym run`, `towns`, `storyboards` and `evaluate`."""
+
+from dorothie_gym.cli.app import app, main
+
+__all__ = ["app", "main"]

@@ -1,0 +1,50 @@
+"""The application and its commands. What a command needs is imported when it runs, so that `--help` is quick."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Annotated
+
+import typer
+
+from dorothie_gym import __version__
+from dorothie_gym.cli.evaluate import evaluate
+from dorothie_gym.cli.listings import storyboards, towns
+from dorothie_gym.cli.run import run
+
+app = typer.Typer(
+    help="Talk between a passenger and a car that drives through a town, with an adversary in between.",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    pretty_exceptions_show_locals=False,
+)
+app.command()(run)
+app.command()(towns)
+app.command()(storyboards)
+app.command()(evaluate)
+
+
+def _tell_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"dorothie-gym {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Runs the command line."""
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # its greeting on standard output would spoil --json
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")  # a terminal without a letter shows "?" instead of failing
+    app(prog_name="dorothie-gym")

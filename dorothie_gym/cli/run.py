@@ -1,0 +1,197 @@
+"""`dorothie-gym run`: plays one session."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dorothie_gym.cli.output import (
+    INTERRUPTED,
+    check_file,
+    check_picture,
+    fail,
+    print_json,
+    stderr,
+    stdout,
+    told_plainly,
+)
+
+if TYPE_CHECKING:
+    from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+
+PICTURE = Path("dorothie.png")
+"""Picture that is written where none is asked for."""
+
+_POLICY = "scripted|silent|random"
+_VIDEO_SUFFIXES = (".mp4", ".gif", ".mkv", ".mov", ".webm")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Plan:
+    """What was asked for on the command line."""
+
+    town: str
+    storyboard: str | None
+    seed: int
+    out: Path | None
+    picture: Path | None
+    video: Path | None
+    players: tuple[str, str, str]
+    max_seconds: float | None
+
+
+def run(
+    town: Annotated[
+        str, typer.Option(metavar="NAME|FILE", help="A town's name, or a file (.xodr, .yaml).")
+    ] = "brookside",
+    storyboard: Annotated[
+        str | None, typer.Option(metavar="NAME|FILE", help="A storyboard's name, or a file (.json); else drawn.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Equal seeds play equal sessions.")] = 0,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Record the session into this folder, which must hold none yet.")
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(metavar="P.png", help=f"Draw how it ended; {PICTURE} unless --no-picture or --json is given."),
+    ] = None,
+    no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw no picture.")] = False,
+    video: Annotated[
+        Path | None, typer.Option(metavar="V.mp4", help="Film the session (needs dorothie-gym[video]).")
+    ] = None,
+    participant: Annotated[str, typer.Option(metavar=_POLICY, help="Who plays the participant.")] = "scripted",
+    co_wizard: Annotated[str, typer.Option(metavar=_POLICY, help="Who plays the Co-Wizard.")] = "scripted",
+    ad_wizard: Annotated[str, typer.Option(metavar=_POLICY, help="Who plays the Ad-Wizard.")] = "scripted",
+    max_seconds: Annotated[
+        float | None, typer.Option(min=1.0, max=86400.0, help="Cut the session off after so many simulated seconds.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
+) -> None:
+    """Play one session: three roles talk while the car drives. The seed is 0 unless you give another."""
+    if no_picture and picture is not None:
+        fail("--picture and --no-picture exclude each other; give one of them")
+    plan = _Plan(
+        town=town,
+        storyboard=storyboard,
+        seed=seed,
+        out=out,
+        picture=picture if picture or no_picture or as_json else PICTURE,
+        video=video,
+        players=(participant, co_wizard, ad_wizard),
+        max_seconds=max_seconds,
+    )
+    _check_outputs(plan)
+    with told_plainly():
+        facts = _play(plan, quiet=as_json)
+    if as_json:
+        print_json(facts)
+        return
+    from dorothie_gym.cli.live import summary
+
+    console = stdout()
+    console.print(summary(facts, _written(plan), console))
+
+
+def _check_outputs(plan: _Plan) -> None:
+    """Fails before anything takes time where something could not be written in the end."""
+    if plan.picture is not None:
+        check_picture(plan.picture)
+    if plan.video is None:
+        return
+    if plan.video.suffix.lower() not in _VIDEO_SUFFIXES:
+        fail(f"{plan.video}: no format of a film; give a name that ends in {', '.join(_VIDEO_SUFFIXES)}")
+    check_file(plan.video)
+    if find_spec("imageio") is None or find_spec("imageio_ffmpeg") is None:
+        fail("--video needs imageio, which is not installed; run: pip install 'dorothie-gym[video]'")
+
+
+def _play(plan: _Plan, *, quiet: bool) -> dict[str, Any]:
+    """Plays the session and returns what --json writes."""
+    from dorothie_gym.envs.config import EnvConfig
+    from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+    from dorothie_gym.ontology import AGENT_ROLES
+    from dorothie_gym.policies import make_policy
+    from dorothie_gym.rollout import play_session
+
+    config = EnvConfig() if plan.max_seconds is None else EnvConfig(max_seconds=plan.max_seconds)
+    env = DuoWizardEnv(plan.town, plan.storyboard, config=config)
+    try:
+        policies = {
+            role: make_policy(name, role, env.limits) for role, name in zip(AGENT_ROLES, plan.players, strict=True)
+        }
+    except ValueError as error:
+        fail(str(error))
+    begun = time.perf_counter()
+    with ExitStack() as stack:
+        watchers = _watchers(plan, stack, quiet=quiet)
+
+        def watch(env: DuoWizardEnv) -> None:
+            for watcher in watchers:
+                watcher(env)
+
+        try:
+            ending = play_session(env, policies, seed=plan.seed, folder=plan.out, on_step=watch)
+        except KeyboardInterrupt:
+            stack.close()
+            _tell_interruption(env, plan)
+    wall = time.perf_counter() - begun
+    if plan.picture is not None:
+        _draw(env, plan.picture)
+    return _facts(env, ending, wall, plan.out)
+
+
+def _watchers(plan: _Plan, stack: ExitStack, *, quiet: bool) -> list[Callable[[DuoWizardEnv], None]]:
+    """Who looks on: the show on the terminal, and the camera."""
+    watchers: list[Callable[[DuoWizardEnv], None]] = []
+    if plan.video is not None:
+        from dorothie_gym.cli.film import Film
+
+        watchers.append(stack.enter_context(Film(plan.video)))
+    if not quiet:
+        from dorothie_gym.cli.live import LiveShow
+
+        watchers.append(stack.enter_context(LiveShow(stdout())))
+    return watchers
+
+
+def _tell_interruption(env: DuoWizardEnv, plan: _Plan) -> None:
+    if plan.out is None:
+        kept = "nothing was recorded (--out DIR records)"
+    else:
+        kept = f"what happened until then is kept in {plan.out}"
+    stderr().print(
+        f"Interrupted after {env.stage.world.time:.1f} simulated seconds; {kept}.", markup=False, soft_wrap=True
+    )
+    raise typer.Exit(INTERRUPTED)
+
+
+def _draw(env: DuoWizardEnv, path: Path) -> None:
+    """The whole town at the end of the session, with the way that was driven and the talk."""
+    from dorothie_gym.envs.painter import scene_of
+    from dorothie_gym.envs.rendering import SceneRenderer
+
+    SceneRenderer().save(scene_of(env.stage), path, follow=False)
+
+
+def _facts(env: DuoWizardEnv, ending: dict[str, Any], wall: float, out: Path | None) -> dict[str, Any]:
+    return {
+        "town": env.town.name,
+        "storyboard": env.scenario.storyboard.name,
+        "seed": env.scenario.seed,
+        **{key: ending[key] for key in ("success", "subgoals", "arrived", "collisions", "seconds")},
+        "wall_seconds": round(wall, 3),
+        **{key: ending[key] for key in ("utterances", "acts", "physical_actions", "exceptions")},
+        "session": None if out is None else str(out),
+    }
+
+
+def _written(plan: _Plan) -> dict[str, str]:
+    files = {"session": plan.out, "picture": plan.picture, "video": plan.video}
+    return {name: str(path) for name, path in files.items() if path is not None}

@@ -1,0 +1,113 @@
+"""A few sessions that are played once and kept: what there is to read when nobody has given a folder of sessions."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from dorothie_gym import __version__
+from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.policies import make_policy
+from dorothie_gym.rollout.play import play_session
+from dorothie_gym.sessions import FORMAT_VERSION
+
+CACHE_VARIABLE = "DOROTHIE_GYM_CACHE"
+"""The environment variable that names the folder in which sessions are kept."""
+
+TOWN = "brookside"
+SEEDS = tuple(range(8))
+CONFIG = EnvConfig(max_seconds=240.0)
+"""Shorter than a session usually is, so that nobody waits long for the first of them."""
+
+_LOG = logging.getLogger(__name__)
+
+
+class CacheError(RuntimeError):
+    """The folder in which sessions are kept cannot be written; the message says what to set."""
+
+
+def cache_folder() -> Path:
+    """Returns the folder in which sessions are kept, which need not exist.
+
+    `DOROTHIE_GYM_CACHE`, else `dorothie_gym` in `XDG_CACHE_HOME`, else `~/.cache/dorothie_gym`.
+    """
+    if chosen := os.environ.get(CACHE_VARIABLE):
+        return Path(chosen).expanduser()
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path("~/.cache").expanduser()) / "dorothie_gym"
+
+
+def default_corpus(*, seeds: Sequence[int] = SEEDS, config: EnvConfig = CONFIG) -> Path:
+    """Returns a folder of sessions of the scripted roles; plays them the first time, with a progress bar on stderr.
+
+    They are kept in the user's cache under the version of the package and what they were played with, so that another
+    version plays its own. The folder appears when all sessions are played: nobody ever reads a part of it.
+
+    Args:
+        seeds: a session is played for each.
+        config: of the environment.
+
+    Raises:
+        CacheError: the cache cannot be written.
+    """
+    key = {"format": FORMAT_VERSION, "town": TOWN, "seeds": list(seeds), "config": asdict(config)}
+    digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:12]
+    folder = cache_folder() / f"corpus-{__version__}-{digest}"
+    if folder.is_dir():
+        return folder
+    with _told_what_to_set(folder.parent):
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        part = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", suffix=".part", dir=folder.parent))
+        try:
+            _play(part, seeds, config)
+            _publish(part, folder)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+    return folder
+
+
+def _play(folder: Path, seeds: Sequence[int], config: EnvConfig) -> None:
+    console = Console(stderr=True)
+    _LOG.info("playing %d sessions, which are kept in %s", len(seeds), folder.parent)
+    env = DuoWizardEnv(TOWN, config=config)
+    policies = {role: make_policy("scripted", role, env.limits) for role in AGENT_ROLES}
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as progress:
+        bar = progress.add_task("Playing a few sessions, once", total=len(seeds))
+        for seed in seeds:
+            play_session(env, policies, seed=seed, folder=folder / f"{TOWN}-{seed:03d}")
+            progress.advance(bar)
+
+
+def _publish(part: Path, folder: Path) -> None:
+    """Gives the finished folder its name, unless another process was faster with the same sessions."""
+    part.chmod(0o755)  # temporary folders are closed to everybody else
+    try:
+        part.rename(folder)
+    except OSError:
+        if not folder.is_dir():
+            raise
+
+
+@contextmanager
+def _told_what_to_set(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise CacheError(
+            f"{folder}: sessions cannot be kept here ({error.strerror or error}); "
+            f"set {CACHE_VARIABLE} to a folder that can be written, or give a folder of sessions"
+        ) from error

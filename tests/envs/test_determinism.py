@@ -1,0 +1,75 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from tests.envs.sessions_played import digest, play_at_random, play_by_script
+
+ROOT = Path(__file__).parents[2]
+
+CODE = """
+import sys
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.wrappers.record_session import RecordSession
+from tests.envs.sessions_played import digest, play_at_random, play_by_script
+
+env = RecordSession(DuoWizardEnv("brookside", max_cycles=60), sys.argv[1])
+for k, play in enumerate((play_at_random, play_by_script)):
+    for moment in play(env, seed=11 + k, decisions=60):
+        print(digest(moment))
+"""
+
+
+def play_in_a_process(folder: Path, hash_seed: str) -> list[str]:
+    variables = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONHASHSEED": hash_seed}
+    done = subprocess.run(
+        [sys.executable, "-c", CODE, str(folder)], env=variables, capture_output=True, text=True, check=True
+    )
+    return done.stdout.split()
+
+
+def test_two_processes_see_and_record_the_same(tmp_path: Path) -> None:
+    one = play_in_a_process(tmp_path / "one", "1")
+    other = play_in_a_process(tmp_path / "other", "2")
+    assert len(one) == 2 * 61
+    assert one == other
+    files = sorted(path.relative_to(tmp_path / "one") for path in (tmp_path / "one").rglob("*") if path.is_file())
+    assert len(files) >= 2 * 3
+    for file in files:
+        assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "other" / file).read_bytes(), str(file)
+
+
+@pytest.mark.parametrize("play", [play_at_random, play_by_script])
+def test_an_environment_that_was_used_before_plays_the_same(play: Any) -> None:
+    used = DuoWizardEnv()
+    list(play(used, seed=5, decisions=15))
+    fresh = [digest(moment) for moment in play(DuoWizardEnv(), seed=6, decisions=15)]
+    assert [digest(moment) for moment in play(used, seed=6, decisions=15)] == fresh
+
+
+def test_what_was_returned_is_left_alone() -> None:
+    env = DuoWizardEnv()
+    kept = list(play_at_random(env, seed=3, decisions=8))
+    seen = [digest(moment) for moment in play_at_random(DuoWizardEnv(), seed=3, decisions=8)]
+    assert [digest(moment) for moment in kept] == seen
+
+
+def test_resets_without_a_seed_go_on_from_the_last_seed() -> None:
+    env, other = DuoWizardEnv(), DuoWizardEnv()
+    for each in (env, other):
+        each.reset(seed=8)
+    first, second = (digest(env.reset()) for _ in range(2))
+    assert first != second
+    assert [digest(other.reset()) for _ in range(2)] == [first, second]
+
+
+def test_seeds_matter() -> None:
+    env = DuoWizardEnv()
+    assert not np.array_equal(env.reset(seed=1)[0]["ad_wizard"]["pose"], env.reset(seed=2)[0]["ad_wizard"]["pose"])

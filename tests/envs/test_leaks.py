@@ -1,0 +1,106 @@
+"""What a role must not know is not in what it observes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.ontology import Role
+from dorothie_gym.spaces import SubgoalColumn, noop
+from tests.envs.sessions_played import play_at_random, play_by_script, replay, with_hidden_landmarks_moved
+
+DECISIONS = 60
+
+
+@pytest.fixture(scope="module")
+def env() -> DuoWizardEnv:
+    return DuoWizardEnv()
+
+
+def check_that_hidden_places_do_not_show(env: DuoWizardEnv, play: Any, seed: int, decisions: int = DECISIONS) -> bool:
+    """Plays a session, and plays its actions again where hidden landmarks stand elsewhere.
+
+    Returns False if nothing is hidden in the session.
+    """
+    env.reset(seed=seed)
+    scenario = env.scenario
+    if not any(landmark.hidden for landmark in scenario.storyboard.landmarks):
+        return False
+    played = list(play(env, seed=seed, decisions=decisions))
+    moved = with_hidden_landmarks_moved(scenario, env, np.random.default_rng(seed))
+    again = replay(env, moved, [actions for _, _, actions in played if actions])
+    compared = 0
+    for (observations, infos, _), (others, other_infos) in zip(played, again, strict=False):
+        role = str(Role.CO_WIZARD)
+        for field, value in observations[role].items():
+            np.testing.assert_array_equal(others[role][field], value, err_msg=f"{field}, decision {compared}")
+        for field in ("action_mask", "refused"):
+            np.testing.assert_equal(other_infos[role][field], infos[role][field])
+        # the others do see it: the test would notice
+        assert not np.array_equal(others["participant"]["landmarks"], observations["participant"]["landmarks"])
+        compared += 1
+    assert compared > 1
+    return True
+
+
+@pytest.mark.parametrize("seed", [0, 2, 5])
+@pytest.mark.parametrize("play", [play_at_random, play_by_script])
+def test_places_of_hidden_landmarks_do_not_show(env: DuoWizardEnv, play: Any, seed: int) -> None:
+    assert check_that_hidden_places_do_not_show(env, play, seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("play", [play_at_random, play_by_script])
+def test_places_of_hidden_landmarks_do_not_show_in_many_sessions(env: DuoWizardEnv, play: Any) -> None:
+    told = sum(check_that_hidden_places_do_not_show(env, play, seed, decisions=200) for seed in range(100, 125))
+    assert told > 15
+
+
+def play_in_silence(env: DuoWizardEnv, seed: int, decisions: int = 4) -> list[dict[str, Any]]:
+    observations, _ = env.reset(seed=seed)
+    seen = [observations]
+    for _ in range(decisions):
+        observations, *_ = env.step({agent: noop(Role(agent), env.limits) for agent in env.agents})
+        seen.append(observations)
+    return seen
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_co_wizard_reads_nothing_of_the_story(env: DuoWizardEnv, seed: int) -> None:
+    for observations in play_in_silence(env, seed):
+        texts = {name: value for name, value in observations["co_wizard"].items() if isinstance(value, str)}
+        assert texts == {"participant_text": ""}
+        assert not {"story", "tasks", "subgoals", "message", "hidden"} & set(observations["co_wizard"])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_hidden_landmarks_are_not_on_the_co_wizards_map(env: DuoWizardEnv, seed: int) -> None:
+    for observations in play_in_silence(env, seed):
+        known = [landmark for landmark in env.scenario.storyboard.landmarks if not landmark.hidden]
+        table = observations["co_wizard"]["landmarks"]
+        assert [(row[1], row[2]) for row in table if row[0]] == [landmark.position for landmark in known]
+
+
+def test_participant_does_not_see_subgoals_that_are_not_triggered_yet(env: DuoWizardEnv) -> None:
+    checked = 0
+    for seed in range(12):
+        observations = play_in_silence(env, seed, decisions=1)[-1]
+        task, participant = env.stage.task, observations["participant"]
+        for i, subgoal in enumerate(env.scenario.storyboard.subgoals):
+            if i in task.live:
+                assert participant["subgoals"][i, SubgoalColumn.LIVE]
+                continue
+            checked += 1
+            assert not participant["subgoals"][i].any()
+            assert subgoal.description not in participant["tasks"]
+            assert observations["ad_wizard"]["subgoals"][i].any()
+    assert checked
+
+
+def test_participant_does_not_see_what_the_ad_wizard_may_do(env: DuoWizardEnv) -> None:
+    for seed in range(8):
+        table = play_in_silence(env, seed, decisions=1)[-1]["participant"]["subgoals"]
+        assert not table[:, SubgoalColumn.CAN_TRIGGER :].any()

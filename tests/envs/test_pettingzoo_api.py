@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pettingzoo.test import (
+    api_test,
+    max_cycles_test,
+    parallel_api_test,
+    parallel_seed_test,
+    render_test,
+    seed_test,
+)
+
+from dorothie_gym.envs import duo_wizard_v0
+from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.world.config import WorldConfig
+
+CYCLES = 60
+
+ADVICE = (
+    "Observation is not a NumPy array",
+    "Observation space for each agent probably should be gymnasium.spaces.box or gymnasium.spaces.discrete",
+    "Action space for each agent probably should be gymnasium.spaces.box or gymnasium.spaces.discrete",
+    "We recommend agents to be named in the format <descriptor>_<number>, like .player_0.",
+    "Agents have different observation space sizes",
+)
+"""What PettingZoo advises, and the design does not follow: plain spaces, numbered names, equal spaces."""
+
+pytestmark = [pytest.mark.filterwarnings(f"ignore:{text}$:UserWarning:pettingzoo.test.api_test") for text in ADVICE]
+
+
+@pytest.fixture(autouse=True)
+def no_screen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+
+
+def parallel(**arguments: Any) -> Any:
+    return duo_wizard_v0.parallel_env(**{"max_cycles": CYCLES, **arguments})
+
+
+def turns(**arguments: Any) -> Any:
+    return duo_wizard_v0.env(**{"max_cycles": CYCLES, **arguments})
+
+
+def test_parallel_api() -> None:
+    parallel_api_test(parallel(), num_cycles=CYCLES)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"config": EnvConfig(observe_acts=False)},
+        {"config": EnvConfig(decision_frequency=30.0, world=WorldConfig(vehicles=0, pedestrians=0))},
+        {"storyboard": "fetch_priya"},
+    ],
+    ids=["words only", "empty streets, 30 Hz", "one storyboard"],
+)
+def test_parallel_api_with_arguments(arguments: dict[str, Any]) -> None:
+    parallel_api_test(parallel(**arguments), num_cycles=20)
+
+
+def test_aec_api() -> None:
+    api_test(turns(), num_cycles=CYCLES)
+
+
+def test_same_seed_plays_the_same_in_turns() -> None:
+    seed_test(turns, num_cycles=CYCLES)
+
+
+def test_same_seed_plays_the_same_in_parallel() -> None:
+    parallel_seed_test(parallel, num_cycles=CYCLES)
+
+
+def test_max_cycles() -> None:
+    max_cycles_test(duo_wizard_v0)
+
+
+def test_rendering() -> None:
+    render_test(turns)

@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+import ast
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import pettingzoo
+import pytest
+
+import dorothie_gym
+
+SLOW = (
+    "torch", "stable_baselines3", "sb3_contrib", "transformers", "pygame", "matplotlib", "highway_env", "filterpy", "numba",
+    "scipy", "lxml", "rich", "typer",
+)  # fmt: skip
+
+
+def loaded_by(code: str) -> Any:
+    """What a fresh interpreter prints as JSON after running the code."""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)
+
+
+def test_import_loads_nothing_slow() -> None:
+    modules = loaded_by("import json, sys, dorothie_gym; print(json.dumps(sorted(sys.modules)))")
+    assert not {name.partition(".")[0] for name in modules} & set(SLOW)
+    assert [name for name in modules if name.startswith("dorothie_gym")] == ["dorothie_gym"]
+
+
+def test_import_costs_little_more_than_gymnasium_and_pettingzoo() -> None:
+    code = """
+        import json, sys, time
+        import gymnasium, pettingzoo
+        before, start = set(sys.modules), time.process_time()
+        import dorothie_gym
+        print(json.dumps([time.process_time() - start, len(set(sys.modules) - before)]))
+    """
+    seconds, modules = loaded_by("\n".join(line.strip() for line in code.splitlines()))
+    assert seconds < 0.1
+    assert modules < 5
+
+
+def test_names_are_found_when_used() -> None:
+    for name in dorothie_gym.__all__:
+        assert getattr(dorothie_gym, name) is not None
+    assert set(dorothie_gym.__all__) <= set(dir(dorothie_gym))
+    with pytest.raises(AttributeError, match="no attribute 'Nonsense'"):
+        _ = dorothie_gym.Nonsense
+
+
+def test_type_checkers_see_the_names_that_are_found() -> None:
+    tree = ast.parse(Path(str(dorothie_gym.__file__)).read_text(encoding="utf-8"))
+    block = next(node for node in tree.body if isinstance(node, ast.If))
+    seen = {
+        alias.name: str(node.module).removeprefix("dorothie_gym.")
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert seen == dorothie_gym._HOME
+    assert sorted([*seen, "__version__"]) == sorted(dorothie_gym.__all__)
+
+
+def test_environments_are_registered() -> None:
+    ids = {name for name in gym.registry if name.startswith("dorothie_gym/")}
+    names = ("Participant", "CoWizard", "AdWizard", "UfN", "RfN", "NfD", "Town")
+    assert ids == {f"dorothie_gym/{name}-v0" for name in names}
+    assert "dorothie_gym/DuoWizard-v0" in pettingzoo.parallel_registry
+    assert "dorothie_gym/DuoWizard-v0" in pettingzoo.aec_registry
+
+
+def test_pettingzoo_makes_both_forms() -> None:
+    parallel = pettingzoo.make("parallel", "dorothie_gym/DuoWizard-v0", town="brookside", max_cycles=3)
+    assert isinstance(parallel, dorothie_gym.DuoWizardEnv)
+    assert parallel.max_cycles == 3
+    turns = pettingzoo.make("aec", "dorothie_gym/DuoWizard-v0")
+    turns.reset(seed=1)
+    assert turns.agent_selection == "participant"
+
+
+def test_gymnasium_makes_a_role_without_importing_the_package_first() -> None:
+    env = gym.make("dorothie_gym:dorothie_gym/CoWizard-v0", town="brookside")
+    assert env.unwrapped.role is dorothie_gym.Role.CO_WIZARD  # type: ignore[attr-defined]

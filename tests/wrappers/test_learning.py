@@ -1,0 +1,39 @@
+"""The reinforcement learners that the wrappers are for do learn on them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import pytest
+
+import dorothie_gym
+
+QUIET = {"participant": "silent", "ad_wizard": "silent"}
+
+
+def driving() -> Any:
+    env = gym.make("dorothie_gym/CoWizard-v0", partners=QUIET, max_cycles=20)
+    return dorothie_gym.flatten(env, fields=("physical", "angle"))
+
+
+@pytest.mark.parametrize(("package", "name"), [("stable_baselines3", "PPO"), ("sb3_contrib", "MaskablePPO")])
+def test_a_learner_learns(package: str, name: str) -> None:
+    learner = getattr(pytest.importorskip(package, reason="needs the extra 'baselines'"), name)
+    model = learner("MultiInputPolicy", driving(), n_steps=32, batch_size=32, n_epochs=1, device="cpu", seed=0)
+    model.learn(64)
+    assert model.num_timesteps == 64
+    assert model.predict(model.env.reset())[0].shape == (1, 2)
+
+
+def test_a_masked_learner_does_only_what_is_possible() -> None:
+    contrib = pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
+    env = dorothie_gym.flatten(
+        gym.make("dorothie_gym/CoWizard-v0", partners=QUIET, max_cycles=20), fields=("physical",)
+    )
+    model = contrib.MaskablePPO("MultiInputPolicy", env, n_steps=8, batch_size=8, device="cpu", seed=0)
+    observation, _ = env.reset(seed=1)
+    for _ in range(15):
+        action, _ = model.predict(observation, action_masks=env.get_wrapper_attr("action_masks")())
+        assert env.get_wrapper_attr("action_masks")()[int(action[0])]
+        observation, *_ = env.step(action)
