@@ -14,8 +14,8 @@ import pytest
 import dorothie_gym
 
 SLOW = (
-    "torch", "stable_baselines3", "sb3_contrib", "transformers", "pygame", "matplotlib", "highway_env", "filterpy", "numba",
-    "scipy", "lxml", "rich", "typer",
+    "torch", "stable_baselines3", "sb3_contrib", "transformers", "pygame", "matplotlib", "highway_env", "filterpy",
+    "numba", "scipy", "lxml", "rich", "typer",
 )  # fmt: skip
 
 

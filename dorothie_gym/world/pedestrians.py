@@ -26,6 +26,9 @@ PERSONAL_SPACE = 0.7
 PATIENCE = 2.0
 """How long they wait for it to go on before they turn back [s]."""
 
+PATIENCE = 2.0
+"""How long they stand before a vehicle that does not move before they turn back [s]."""
+
 SAFE_TIME = 5.0
 """Time gap to vehicles that they want before stepping out [s]."""
 
@@ -94,6 +97,19 @@ class Pedestrian(RoadObject):
                 self._far = self._home - across(self) if near else self._lateral
                 self._target = self._far if near else self._home
         self._place()
+
+    def _wait(self, dt: float, crossing: bool) -> None:
+        """Stands before a vehicle; turns back when it does not go away, for its driver may be waiting, too."""
+        self.speed = 0.0
+        self._waited += dt
+        if self._waited < PATIENCE:
+            return
+        self._waited = 0.0
+        if crossing:
+            self._target, self._origin = self._origin, self._target
+        else:
+            self._direction = -self._direction
+        self.heading = self._heading()
 
     def _would_touch_vehicle(self, dt: float) -> bool:
         """Whether the next step leads up to a vehicle: nobody walks into the side of a car."""

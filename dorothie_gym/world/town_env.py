@@ -74,7 +74,7 @@ class TownEnv(AbstractEnv):
     def define_spaces(self) -> None:
         """Sets the spaces, with finite bounds: nothing in a town is beyond `FARTHEST`."""
         super().define_spaces()
-        space = self.observation_space
+        space: spaces.Space[Any] = self.observation_type.space()
         if isinstance(space, spaces.Box) and space.dtype != np.uint8:
             low, high = np.clip(space.low, -FARTHEST, FARTHEST), np.clip(space.high, -FARTHEST, FARTHEST)
             self.observation_space = spaces.Box(low, high, dtype=space.dtype)

@@ -115,7 +115,7 @@ class FlattenObservation(gym.Wrapper[dict[str, NDArray[Any]], Any, Any, Any], Re
         if self._masked:
             assert isinstance(env.action_space, spaces.MultiDiscrete)
             found["action_mask"] = spaces.MultiBinary(int(env.action_space.nvec.sum()))
-        self.observation_space = spaces.Dict(found)
+        self.observation_space: spaces.Space[Any] = spaces.Dict(found)
 
     def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[dict[str, NDArray[Any]], Info]:
         """Resets the environment."""

@@ -122,7 +122,7 @@ class SingleRole(gym.Env[Observation, ActionDict]):
             info["is_success"] = bool(self.duo.summary()["success"])
         return self._observations[self.role], rewards[self.role], terminated, truncated, info
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """Draws the aerial view, see `DuoWizardEnv.render`."""
         return self.duo.render()
 

@@ -20,9 +20,9 @@ from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.wrappers.record_session import RecordSession
 from tests.envs.sessions_played import digest, play_at_random, play_by_script
 
-env = RecordSession(DuoWizardEnv("brookside", max_cycles=60), sys.argv[1])
+env = RecordSession(DuoWizardEnv("brookside", max_cycles=40), sys.argv[1])
 for k, play in enumerate((play_at_random, play_by_script)):
-    for moment in play(env, seed=11 + k, decisions=60):
+    for moment in play(env, seed=11 + k, decisions=40):
         print(digest(moment))
 """
 
@@ -38,7 +38,7 @@ def play_in_a_process(folder: Path, hash_seed: str) -> list[str]:
 def test_two_processes_see_and_record_the_same(tmp_path: Path) -> None:
     one = play_in_a_process(tmp_path / "one", "1")
     other = play_in_a_process(tmp_path / "other", "2")
-    assert len(one) == 2 * 61
+    assert len(one) == 2 * 41
     assert one == other
     files = sorted(path.relative_to(tmp_path / "one") for path in (tmp_path / "one").rglob("*") if path.is_file())
     assert len(files) >= 2 * 3
@@ -49,9 +49,9 @@ def test_two_processes_see_and_record_the_same(tmp_path: Path) -> None:
 @pytest.mark.parametrize("play", [play_at_random, play_by_script])
 def test_an_environment_that_was_used_before_plays_the_same(play: Any) -> None:
     used = DuoWizardEnv()
-    list(play(used, seed=5, decisions=15))
-    fresh = [digest(moment) for moment in play(DuoWizardEnv(), seed=6, decisions=15)]
-    assert [digest(moment) for moment in play(used, seed=6, decisions=15)] == fresh
+    list(play(used, seed=5, decisions=12))
+    fresh = [digest(moment) for moment in play(DuoWizardEnv(), seed=6, decisions=12)]
+    assert [digest(moment) for moment in play(used, seed=6, decisions=12)] == fresh
 
 
 def test_what_was_returned_is_left_alone() -> None:

@@ -12,7 +12,7 @@ from dorothie_gym.ontology import Role
 from dorothie_gym.spaces import SubgoalColumn, noop
 from tests.envs.sessions_played import play_at_random, play_by_script, replay, with_hidden_landmarks_moved
 
-DECISIONS = 60
+DECISIONS = 40
 
 
 @pytest.fixture(scope="module")

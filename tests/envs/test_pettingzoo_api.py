@@ -1,20 +1,25 @@
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import pytest
-from pettingzoo.test import (
-    api_test,
-    max_cycles_test,
-    parallel_api_test,
-    parallel_seed_test,
-    render_test,
-    seed_test,
-)
 
 from dorothie_gym.envs import duo_wizard_v0
 from dorothie_gym.envs.config import EnvConfig
 from dorothie_gym.world.config import WorldConfig
+
+with warnings.catch_warnings():
+    # PettingZoo's tests import an environment of its own in a way that it has deprecated.
+    warnings.filterwarnings("ignore", "The old environment creation API", DeprecationWarning)
+    from pettingzoo.test import (
+        api_test,
+        max_cycles_test,
+        parallel_api_test,
+        parallel_seed_test,
+        render_test,
+        seed_test,
+    )
 
 CYCLES = 60
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import gymnasium as gym
@@ -10,6 +11,16 @@ import pytest
 import dorothie_gym
 
 QUIET = {"participant": "silent", "ad_wizard": "silent"}
+
+
+@pytest.fixture(autouse=True)
+def one_thread() -> Iterator[None]:
+    """Small networks on cores that are shared with other tests."""
+    torch = pytest.importorskip("torch", reason="needs the extra 'baselines'")
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
 
 
 def driving() -> Any:
