@@ -40,7 +40,9 @@ class Film:
 
         self.frames = 0
         self._renderer = SceneRenderer()
-        self._writer: Any = imageio.get_writer(path, fps=FRAMES_PER_SECOND, macro_block_size=16)
+        self._writer: Any = imageio.get_writer(
+            path, fps=FRAMES_PER_SECOND, macro_block_size=16, ffmpeg_params=["-preset", "veryfast"]
+        )
         self._last: Scene | None = None
 
     def __enter__(self) -> Self:

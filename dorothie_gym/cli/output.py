@@ -53,7 +53,7 @@ def told_plainly() -> Iterator[None]:
     except (TownError, StoryboardError, SessionError) as error:
         fail(str(error))
     except OSError as error:
-        fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
+        fail(f"{error.filename}: {error.strerror}; check the path" if error.filename else str(error))
 
 
 def check_picture(path: Path) -> None:

@@ -30,7 +30,7 @@ PICTURE = Path("dorothie.png")
 """Picture that is written where none is asked for."""
 
 _POLICY = "scripted|silent|random"
-_VIDEO_SUFFIXES = (".mp4", ".gif", ".mkv", ".mov", ".webm")
+_VIDEO_SUFFIXES = (".mp4", ".mkv", ".mov")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,7 +177,9 @@ def _draw(env: DuoWizardEnv, path: Path) -> None:
     from dorothie_gym.envs.painter import scene_of
     from dorothie_gym.envs.rendering import SceneRenderer
 
-    SceneRenderer().save(scene_of(env.stage), path, follow=False)
+    scenario = env.scenario
+    caption = f"{env.town.name}  ·  {scenario.storyboard.name}  ·  seed {scenario.seed}"
+    SceneRenderer().save(scene_of(env.stage, caption), path, follow=False)
 
 
 def _facts(env: DuoWizardEnv, ending: dict[str, Any], wall: float, out: Path | None) -> dict[str, Any]:

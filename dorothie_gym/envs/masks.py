@@ -64,14 +64,17 @@ class Masks:
     def _physical(self) -> tuple[Mask, Mask]:
         world, planner = self._world, self._world.planner
         lane = planner.lane
-        left = world.town.neighbour(lane, LinkType.LANE_CHANGE_LEFT) is not None
-        right = world.town.neighbour(lane, LinkType.LANE_CHANGE_RIGHT) is not None
-        exits, _ = planner.exits()
+        speed = float(world.car.speed)
+        left, right = planner.may_switch(LinkType.LANE_CHANGE_LEFT), planner.may_switch(LinkType.LANE_CHANGE_RIGHT)
+        committed = planner.is_committed(speed)
+        exits = () if committed else planner.exits()[0]
         busy = planner.in_manoeuvre or world.town.lanes[lane].in_junction
         legal = {
-            PhysicalAction.LANE_FOLLOW: not busy and (planner.held or planner.manoeuvre[0] is not None),
-            PhysicalAction.LANE_SWITCH: not busy and (left or right),
-            PhysicalAction.U_TURN: not busy and planner.may_turn_round(float(world.car.speed)),
+            PhysicalAction.LANE_FOLLOW: not busy
+            and not committed
+            and (planner.held or planner.manoeuvre[0] is not None),
+            PhysicalAction.LANE_SWITCH: left or right,
+            PhysicalAction.U_TURN: not busy and planner.may_turn_round(speed),
             PhysicalAction.J_TURN: bool(exits),
             PhysicalAction.STOP: not planner.held,
             PhysicalAction.START: planner.held,
@@ -85,7 +88,7 @@ class Masks:
         angle = np.zeros(360, dtype=np.int8)
         angle[180] = 1
         for way in exits:
-            angle[way.angle + 180] = 1
+            angle[way.angle + 180] = planner.held or way.angle != planner.turn_ahead
         for side, possible in ((90, left), (-90, right)):
             angle[side + 180] |= possible
         return physical, angle

@@ -232,6 +232,11 @@ class Journey:
                 return k == len(legs) - 1 and leg.end - leg.start < 2.0 * U_TURN_MARGIN
         return False
 
+    def leaves_default(self, town: Town, lane: int, station: float, crossing: Crossing) -> bool:
+        """Whether a lane has to be changed to come to a junction at all: by default the car goes on to another one."""
+        choice = next_choice(town, lane, station)
+        return choice is None or choice.junction != crossing.exit.junction_id
+
     def changes_before(self, crossing: Crossing | None) -> bool:
         """Whether the route turns round before the given junction (or before the goal, where None)."""
         for leg in self.legs[1:]:

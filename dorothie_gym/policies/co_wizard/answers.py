@@ -81,6 +81,8 @@ def _why_standing(mind: CoWizardMind, view: View) -> None:
     if view.hazard is not ObjectClass.UNLABELED:
         mind.hazard_told = view.time
         mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, view.hazard))
+    elif mind.arrived and mind.goal is not None:
+        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_YN, mind.goal))
     elif mind.goal is None and mind.directive is None:
         mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, LandmarkName.QUERIED))
     else:

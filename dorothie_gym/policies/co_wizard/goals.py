@@ -19,9 +19,9 @@ from dorothie_gym.spaces import Place as MapPlace
 _COMMON = (LandmarkName.HOUSE, LandmarkName.PERSON)
 
 
-def known(view: View, name: LandmarkName, streets: Sequence[StreetName]) -> SeenLandmark | None:
+def known(mind: CoWizardMind, view: View, name: LandmarkName, streets: Sequence[StreetName]) -> SeenLandmark | None:
     """The landmark of that name on the map, on one of the streets if any is named; None if there is none."""
-    found = [mark for mark in view.landmarks if mark.name is name]
+    found = [mark for mark in view.landmarks if mark.name is name and mark.place not in mind.not_there]
     fitting = [mark for mark in found if mark.street in streets]
     if fitting:
         return fitting[0]
@@ -77,7 +77,7 @@ def hear_goal(
         rng: for the words.
         dropped: a place that is given up for it.
     """
-    mark = known(view, name, streets)
+    mark = known(mind, view, name, streets)
     if dropped is not None:
         mind.note_status(dropped, GoalStatus.ABANDONED)
     if mark is None:
@@ -114,7 +114,7 @@ def _unknown(mind: CoWizardMind, view: View, name: LandmarkName) -> None:
 def hear_stop_ahead(mind: CoWizardMind, view: View, name: LandmarkName | None, distance: float) -> None:
     """It is told to stop some way ahead, perhaps by a place: comes up to it slowly."""
     if name is not None:
-        mark = known(view, name, ())
+        mark = known(mind, view, name, ())
         if mark is not None and mark.name not in _COMMON:
             if mind.place != mark.place:
                 aim(mind, view, mark)
@@ -132,7 +132,7 @@ def hear_description(
     rng: np.random.Generator,
 ) -> None:  # fmt: skip
     """It is told where a place is: notes a guess if a place close to it is on the map, and says that it has heard."""
-    near = next((mark for name in landmarks if (mark := known(view, name, ())) is not None), None)
+    near = next((mark for name in landmarks if (mark := known(mind, view, name, ())) is not None), None)
     if near is not None and mind.goal is not None and not mind.exact:
         guess = Mental(
             action=MentalAction.KNOWLEDGE_UPDATE, landmark=mind.goal, place=_map_place(near.lane, near.station)
@@ -159,8 +159,20 @@ def complete(mind: CoWizardMind, name: LandmarkName | None) -> None:
     done = name if name is not None else mind.goal
     if done is not None:
         mind.note_status(done, GoalStatus.COMPLETE)
+    if done in _COMMON and mind.place is not None and mind.exact:
+        mind.not_there = (*mind.not_there, mind.place)
     leave_goal(mind)
-    mind.halted = True
+    mind.halted, mind.speed = True, mind.usual
+    mind.voice = mind.voice.cleared()
+
+
+def doubt(mind: CoWizardMind) -> None:
+    """The place it took for the goal is not the one meant: it has to be guided."""
+    if mind.exact and mind.place is not None:
+        if mind.goal in _COMMON:
+            mind.not_there = (*mind.not_there, mind.place)
+        mind.place, mind.exact, mind.journey, mind.plan = None, False, None, ()
+    mind.arrived = False
 
 
 def leave_goal(mind: CoWizardMind) -> None:

@@ -21,7 +21,7 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies.co_wizard.answers import answer_open, answer_yes_no
 from dorothie_gym.policies.co_wizard.driving import place_ahead
-from dorothie_gym.policies.co_wizard.goals import complete, give_up, hear_description, hear_goal, hear_stop_ahead
+from dorothie_gym.policies.co_wizard.goals import complete, doubt, give_up, hear_description, hear_goal, hear_stop_ahead
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, Directive, View, Wish
 from dorothie_gym.policies.co_wizard.obstacles import detour
 from dorothie_gym.policies.hearing import heard_utterance
@@ -33,8 +33,14 @@ NUDGE = 4.0
 WISH_TIME = 30.0
 """A manoeuvre that finds no place for this long is given up [s]."""
 
+_MOVES = frozenset(
+    {ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH, ActionValue.START}
+)
 _STOPS = frozenset({ActionValue.STOP, ActionValue.LANE_FOLLOW})
 _A_BIT = re.compile(r"\b(bit|little)\b")
+OPEN_ROAD = 20
+"""A lower speed is for the moment only [km/h]."""
+
 _UNNAMED = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
 
 
@@ -71,6 +77,8 @@ def _instruction(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard,
         if mind.voice.idle and rng.random() > mind.style.silent:
             mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
     elif actions:
+        if mind.arrived and _MOVES & set(actions) and not _A_BIT.search(words.text.lower()):
+            doubt(mind)
         for action in actions:
             _OBEYED[action](mind, view, act, words)
         _acknowledge_action(mind, actions[0], words, rng)
@@ -195,6 +203,8 @@ def _do_speed(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) ->
     else:
         mind.speed = round(view.cruise) + (10 if words.faster else -10)
     mind.speed = min(max(5 * round(mind.speed / 5), 10), 60)
+    if mind.speed >= OPEN_ROAD:
+        mind.usual = mind.speed
 
 
 def _do_lights(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> None:
@@ -264,6 +274,8 @@ def _yes(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np
 
 def _no(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
     mind.detour_at = None
+    if mind.arrived:
+        doubt(mind)
     if words.turns and not act.values(Slot.ACTION):
         _do_turn(mind, view, act, words)
 

@@ -107,6 +107,8 @@ class CoWizardMind:
         nudge: place to go on to and stop at again.
         creeping: whether the place is close and its guess is carried along.
         speed: cruise speed aimed at [km/h].
+        usual: cruise speed on open road, as told last [km/h].
+        not_there: places of houses and people that were done with, or that were not the ones meant.
         lights: lights aimed at, None if nothing was said.
         notes: belief updates still to be made.
         statuses: what became of landmarks.
@@ -142,6 +144,8 @@ class CoWizardMind:
     nudge: Place | None = None
     creeping: bool = False
     speed: int = USUAL_SPEED
+    usual: int = USUAL_SPEED
+    not_there: tuple[Place, ...] = ()
     lights: bool | None = None
     notes: tuple[Mental, ...] = ()
     statuses: tuple[tuple[LandmarkName, GoalStatus], ...] = ()

@@ -35,6 +35,9 @@ FASTEST = 11.0
 NEAR = 95.0
 """A place is announced when it is this near [m]."""
 
+CAREFUL = 15.0
+"""Speed that the car is told to go at when it has missed a place before [km/h]."""
+
 SLOW_SPEED = 5.0
 """A car that is this slow need not be told to come up slowly [m/s]."""
 
@@ -55,9 +58,12 @@ def follow_journey(mind: ParticipantMind, view: View) -> None:
     if passed:
         mind.guiding = True
     if mind.journey.astray >= 3 or passed:
+        if mind.guiding and before < 15.0:
+            mind.misses, mind.eased = mind.misses + 1, False
         mind.journey = mind.journey.replanned(mind.town, view.place, mind.blocked)
         mind.announced, mind.stop_text = False, ""
-        if mind.guiding and mind.journey.left(view.station) > before + 60.0 and math.isfinite(before):
+        missed = mind.guiding and mind.guided is not None and mind.guided[0] == "turn"
+        if missed and mind.journey.left(view.station) > before + 60.0 and math.isfinite(before):
             mind.voice = mind.voice.cleared().plan(
                 remark(DialogueMove.EXPLAIN, wording=Wording(topic="wrong_way"), expires=view.time + 4.0)
             )
@@ -86,6 +92,11 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     if step is None:
         return
     key, distance, words = step
+    if mind.misses and not mind.eased and mind.journey.left(view.station) < NEAR and view.speed > SLOW_SPEED:
+        mind.eased = True
+        wording = Wording(faster=False, speed=CAREFUL)
+        mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=wording))
+        return
     near = distance < (_turning_distance(mind, view) if key[0] == "round" else TELL_DISTANCE)
     waited = view.time - max(mind.guided_at, mind.heard_at)
     stuck = view.standing and waited > AGAIN and view.time > mind.excused_until
@@ -135,7 +146,11 @@ def next_step(
     if manoeuvre is not None and manoeuvre[0] is Entry.U_TURN:
         if crossing is None or manoeuvre[1] < crossing.distance:
             return ("round", 0, 0), manoeuvre[1], remark(move, ActionValue.U_TURN)
-    if crossing is not None:
+    switch = manoeuvre is not None and (
+        crossing is None
+        or (manoeuvre[1] < crossing.distance and journey.leaves_default(mind.town, view.lane, view.station, crossing))
+    )
+    if crossing is not None and not switch:
         key = ("turn", crossing.lane, crossing.exit.connector)
         return key, crossing.distance, _turn(mind, view, move, crossing, rng)
     if manoeuvre is not None:

@@ -86,6 +86,8 @@ class ParticipantMind:
         guided_at: when [s].
         repeats: how often that has been repeated.
         announced: whether the car has been told that the place is near.
+        misses: how often the car has gone past the place.
+        eased: whether it has been told to go slowly because of that.
         stop_text: words to stop the car with.
         stopped_at: when they were said [s].
         nudged_at: when the car was last told to go a bit further [s].
@@ -117,6 +119,8 @@ class ParticipantMind:
     guided_at: float = -math.inf
     repeats: int = 0
     announced: bool = False
+    misses: int = 0
+    eased: bool = False
     stop_text: str = ""
     stopped_at: float = -math.inf
     nudged_at: float = -math.inf

@@ -27,6 +27,9 @@ from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.scenery import SeenLandmark
 from dorothie_gym.policies.speech import remark
 
+ELSEWHERE = 40.0
+"""A car that stands farther than this from the target has not come to it [m]."""
+
 JUST_TOLD = 5.0
 """A question that was put while the answer was being given needs no other one [s]."""
 
@@ -90,7 +93,9 @@ def _yes_or_no(mind: ParticipantMind, view: View, act: DialogueAct, rng: np.rand
         seen = any(thing.kind in objects for thing in view.objects)
         mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y if seen else DialogueMove.REPLY_N))
     elif landmarks and mind.goal is not None:
-        if mind.goal.name in landmarks:
+        if mind.goal.name in landmarks and _elsewhere(mind, view):
+            _not_here(mind, view)
+        elif mind.goal.name in landmarks:
             mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y))
         else:
             again = announcement(mind, view, rng)
@@ -144,6 +149,18 @@ def _describe(mind: ParticipantMind, view: View, move: DialogueMove) -> None:
     mind.voice = mind.voice.plan_first(remark(move, *values, wording=Wording(topic="where")))
 
 
+def _elsewhere(mind: ParticipantMind, view: View) -> bool:
+    """Whether the car stands, and not at the target."""
+    return view.standing and mind.journey is not None and mind.journey.left(view.station) > ELSEWHERE
+
+
+def _not_here(mind: ParticipantMind, view: View) -> None:
+    """The car takes another place for the target."""
+    assert mind.goal is not None
+    mind.guiding = True
+    mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_N, mind.goal.name))
+
+
 def _near(goal: SeenLandmark, view: View) -> SeenLandmark | None:
     """A well-known place close to the target."""
     found = [
@@ -159,6 +176,9 @@ def _explanation(mind: ParticipantMind, view: View, act: DialogueAct, rng: np.ra
     if GoalStatus.UNKNOWN in statuses and mind.goal is not None and mind.goal.name in landmarks:
         if not mind.guiding:
             _describe(mind, view, DialogueMove.EXPLAIN)
+        return
+    if mind.goal is not None and mind.goal.name in landmarks and not statuses and _elsewhere(mind, view):
+        _not_here(mind, view)
         return
     if act.values(Slot.OBJECT):
         mind.excused_until = view.time + 30.0

@@ -7,36 +7,14 @@ choice, and no turn was asked for, the path ends there and the car waits.
 from __future__ import annotations
 
 import math
-from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 
 from dorothie_gym.ontology import PhysicalAction
-from dorothie_gym.world.car.path import TURNING_RADIUS, Path, Piece, follow, switch, u_turn
-from dorothie_gym.world.town.model import Exit, LinkType, Town, wrap_degrees
+from dorothie_gym.world.car.lanes import HORIZON, LEAD, MIN_SWITCH, Lanes, Step
+from dorothie_gym.world.car.path import TURNING_RADIUS, Path, Piece, follow, u_turn
+from dorothie_gym.world.town.model import Exit, LinkType, Town
 from dorothie_gym.world.town.oncoming import Oncoming, oncoming_lanes
-
-HORIZON = 120.0
-"""Length of path kept ahead [m]."""
-
-SWITCH_TIME = 3.0
-"""A lane switch takes about this long [s]."""
-
-MIN_SWITCH = 14.0
-"""Shortest lane switch [m]."""
-
-SWITCH_COST = 20.0
-"""Degrees by which an exit of the own lane may fit worse than that of a lane beside it and still be taken."""
-
-SETTLE = 15.0
-"""A lane that was just entered is followed for this long before it is changed, where there is room [m]."""
-
-EXACT = 5.0
-"""An exit within this many degrees is the one that was meant."""
-
-LEAD = 1.0
-"""Room that a manoeuvre leaves to the car before it begins [m]."""
 
 LANDING = 6.0
 """Oncoming lane left after a U-turn, so that the car stands straight before it waits at the lane's end [m]."""
@@ -44,16 +22,14 @@ LANDING = 6.0
 U_TURN_SPEED = 3.5
 """Speed of a U-turn [m/s]."""
 
+HALF_LENGTH = 2.5
+"""Of the car [m]."""
+
+HARD_STOP = 5.0
+"""Deceleration with which the car still stops before a junction when its plan is changed [m/s^2]."""
+
 BRAKING = 3.0
 """Deceleration that plans count on [m/s^2]."""
-
-
-@dataclass(frozen=True)
-class _Step:
-    """A lane of the plan and how it is entered."""
-
-    lane: int
-    change: bool = False
 
 
 class LocalPlanner:
@@ -68,14 +44,16 @@ class LocalPlanner:
 
     def __init__(self, town: Town, lane: int, station: float) -> None:
         self._town = town
+        self._lanes = Lanes(town)
         self._oncoming = oncoming_lanes(town)
         self.held = False
-        self.offset = 0.0
-        self._pending: int | None = None  # angle of the turn asked for
         self._manoeuvre: PhysicalAction | None = None
         self._manoeuvre_angle = 0
         self._manoeuvre_end = 0.0
-        self._lay([_Step(lane)], station)
+        self._chosen = (-1, -1)  # connector and lane of the turn that is planned
+        pieces, self._open_end = self._lanes.lay([Step(lane)], station, 0.0)
+        self.path = Path(pieces or [follow(town.lanes[lane], town.lanes[lane].length - 0.5)])
+        self.s, self.offset = (0.0 if pieces else self.path.length), 0.0
 
     # --- where the car is -------------------------------------------------------------------------------------------
 
@@ -132,7 +110,7 @@ class LocalPlanner:
     def extend(self, speed: float) -> None:
         """Lengthens the path ahead where the way is clear; to be called once a decision, with the speed [m/s]."""
         if self.room < HORIZON and not self._open_end:
-            self._lay_from_here(self._steps_ahead(), speed)
+            self._lay_from_here(self._lanes.steps_along(self.lanes_ahead), speed)
 
     # --- turn options -----------------------------------------------------------------------------------------------
 
@@ -147,15 +125,11 @@ class LocalPlanner:
         for lane in self.lanes_ahead:
             if self._town.lanes[lane].in_junction:
                 continue
-            if self._is_choice(lane):
+            if self._lanes.is_choice(lane):
                 last = k + int(np.flatnonzero(lanes[k:] == lane)[-1])
                 left = self._town.lanes[lane].length - float(self.path.stations[last])
                 return self._town.exits(lane), float(self.path.s[last]) + left - self.s
         return (), 0.0
-
-    def _is_choice(self, lane: int) -> bool:
-        exits = self._town.exits(lane)
-        return len(exits) > 1 and any(way.junction_id >= 0 for way in exits)
 
     # --- actions ----------------------------------------------------------------------------------------------------
 
@@ -198,15 +172,30 @@ class LocalPlanner:
             return None if self.held else "the car is in the middle of a manoeuvre"
         if self._manoeuvre is None and not self.held:
             return "the car follows its lane already"
+        if self.is_committed(speed):
+            return "the car cannot stop before the junction any more"
         self._clear()
-        self._lay([_Step(self.lane)], self.station)
+        self._lay([Step(self.lane)], self.station)
         return None
 
     def _switch_lane(self, angle: int, speed: float) -> str | None:
         if angle == 0:
             return "a lane switch needs a side: a positive angle is left, a negative one right"
-        side = LinkType.LANE_CHANGE_LEFT if angle > 0 else LinkType.LANE_CHANGE_RIGHT
-        name = "left" if angle > 0 else "right"
+        target = self._plan_switch(LinkType.LANE_CHANGE_LEFT if angle > 0 else LinkType.LANE_CHANGE_RIGHT)
+        if isinstance(target, str):
+            return target
+        self._clear()
+        self._manoeuvre, self._manoeuvre_angle = PhysicalAction.LANE_SWITCH, 90 if angle > 0 else -90
+        self._lay([Step(self.lane), Step(target, change=True)], self.station, speed)
+        return None
+
+    def may_switch(self, side: LinkType) -> bool:
+        """Whether a lane switch would be carried out; `side` is one of the two lane-change types."""
+        return not isinstance(self._plan_switch(side), str)
+
+    def _plan_switch(self, side: LinkType) -> int | str:
+        """The lane to switch to, or why there can be no switch."""
+        name = "left" if side is LinkType.LANE_CHANGE_LEFT else "right"
         if self.in_manoeuvre or self._town.lanes[self.lane].in_junction:
             return "the car is in the middle of a manoeuvre"
         target = self._town.neighbour(self.lane, side)
@@ -214,10 +203,24 @@ class LocalPlanner:
             return f"there is no lane to the {name}"
         if self._town.lanes[self.lane].length - self.station < MIN_SWITCH + LEAD:
             return f"there is no room left to switch to the {name}"
-        self._clear()
-        self._manoeuvre, self._manoeuvre_angle = PhysicalAction.LANE_SWITCH, 90 if angle > 0 else -90
-        self._lay([_Step(self.lane), _Step(target, change=True)], self.station, speed)
-        return None
+        return target
+
+    @property
+    def turn_ahead(self) -> int | None:
+        """Angle of the turn that is planned and not yet begun [degrees], or None."""
+        ahead = self._manoeuvre is PhysicalAction.J_TURN and not self._town.lanes[self.lane].in_junction
+        return self._manoeuvre_angle if ahead else None
+
+    def is_committed(self, speed: float) -> bool:
+        """Whether the car cannot stop any more before the junction at which it is to turn, at this speed [m/s]."""
+        if self.turn_ahead is None:
+            return False
+        k = self.path.index_at(self.s)
+        turn = np.flatnonzero(self.path.lanes[k:] == self._chosen[0])
+        if not len(turn):
+            return False
+        room = float(self.path.s[k + int(turn[0])]) - self.s - HALF_LENGTH
+        return speed > 0.5 and speed**2 / (2 * HARD_STOP) > room
 
     def may_turn_round(self, speed: float) -> bool:
         """Whether a U-turn would be carried out at this speed [m/s]."""
@@ -254,13 +257,15 @@ class LocalPlanner:
         return oncoming, min(begin, lane.length)
 
     def _turn(self, angle: int, speed: float) -> str | None:
-        found = self._find_turn(angle, speed)
+        found = self._lanes.find_turn(self._lanes.through_junction(self.lane), self.station, angle)
         if found is None:
             return "there is no junction with a choice ahead"
         steps, way = found
         same = self._manoeuvre is PhysicalAction.J_TURN and self._chosen == (way.connector, way.lane)
         if same and not self.held:
             return "the car is about to take that turn already"
+        if self.is_committed(speed):
+            return "the car is too close to the junction to take another turn"
         self._clear()
         self._manoeuvre, self._manoeuvre_angle = PhysicalAction.J_TURN, way.angle
         self._chosen = (way.connector, way.lane)
@@ -270,134 +275,14 @@ class LocalPlanner:
     def _clear(self) -> None:
         self._manoeuvre, self._manoeuvre_angle, self._chosen = None, 0, (-1, -1)
 
-    _chosen: tuple[int, int] = (-1, -1)
-
-    def _find_turn(self, angle: int, speed: float) -> tuple[list[_Step], Exit] | None:
-        """Lanes to the exit that fits the angle best, changing lanes before the junction if that fits much better."""
-        first = self._current_steps()
-        own = first[-1].lane
-        if not self._is_choice(own):
-            # where the lane itself leads on as asked, it is kept to its end: a lane is changed further on, if at all
-            fits = [way for way in self._town.exits(own) if abs(wrap_degrees(way.angle - angle)) <= EXACT]
-            if fits:
-                first = [*first, _Step(fits[0].connector), *self._onward(fits[0])]
-        best: tuple[float, list[_Step], Exit] | None = None
-        # lanes that go on are looked at before lanes beside, so that a lane is changed as late as there is room for it
-        queue: deque[tuple[list[_Step], int]] = deque([(first, 0)])
-        seen = {first[-1].lane}
-        while queue:
-            steps, changes = queue.popleft()
-            lane = steps[-1].lane
-            if self._is_choice(lane):
-                for way in self._town.exits(lane):
-                    misfit = abs(wrap_degrees(way.angle - angle)) + SWITCH_COST * changes
-                    if best is None or misfit < best[0]:
-                        best = (misfit, [*steps, _Step(way.connector), *self._onward(way)], way)
-            else:
-                on = self._default_successor(lane)
-                if on is not None and on not in seen:
-                    seen.add(on)
-                    queue.appendleft(([*steps, _Step(on)], changes))
-            for side in (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT):
-                beside = self._town.neighbour(lane, side)
-                if beside is not None and beside not in seen and self._room_to_switch(steps) and changes < 3:
-                    seen.add(beside)
-                    queue.append(([*steps, _Step(beside, change=True)], changes + 1))
-        return None if best is None else (best[1], best[2])
-
-    def _onward(self, way: Exit) -> list[_Step]:
-        """Connectors and lane from the entered one to the exit's lane."""
-        steps, lane = [], way.connector
-        while lane != way.lane:
-            lane = self._town.successors(lane)[0].target
-            steps.append(_Step(lane))
-        return steps
-
-    def _room_to_switch(self, steps: list[_Step]) -> bool:
-        lane = self._town.lanes[steps[-1].lane]
-        changes = 1
-        for step in reversed(steps):
-            if not step.change:
-                break
-            changes += 1
-        first = steps[-changes] if changes <= len(steps) else steps[0]
-        start = self.station if first.lane == self.lane else 0.0
-        return lane.length - start >= changes * (MIN_SWITCH + LEAD) and not lane.in_junction
-
     # --- laying the path --------------------------------------------------------------------------------------------
 
-    def _current_steps(self) -> list[_Step]:
-        """The plan up to where the next choice may be changed: the present lane, or the rest of a manoeuvre."""
-        lane = self.lane
-        if not self._town.lanes[lane].in_junction:
-            return [_Step(lane)]
-        steps = [_Step(lane)]
-        while self._town.lanes[steps[-1].lane].in_junction:
-            on = self._default_successor(steps[-1].lane)
-            if on is None:
-                break
-            steps.append(_Step(on))
-        return steps
-
-    def _steps_ahead(self) -> list[_Step]:
-        steps = [_Step(lane) for lane in self.lanes_ahead]
-        for k in range(1, len(steps)):
-            beside = (
-                self._town.neighbour(steps[k - 1].lane, LinkType.LANE_CHANGE_LEFT),
-                self._town.neighbour(steps[k - 1].lane, LinkType.LANE_CHANGE_RIGHT),
-            )
-            if steps[k].lane in beside:
-                steps[k] = _Step(steps[k].lane, change=True)
-        return steps
-
-    def _default_successor(self, lane: int) -> int | None:
-        """The lane that follows without being asked: the only one, or outside junctions the straightest."""
-        exits = self._town.exits(lane)
-        if not exits or self._is_choice(lane):
-            return None
-        return min(exits, key=lambda way: (abs(way.angle), way.connector)).connector
-
-    def _grow(self, steps: list[_Step], ahead: float) -> bool:
-        """Adds the lanes that follow until there is path enough; tells whether the path has an open end."""
-        while ahead < HORIZON:
-            on = self._default_successor(steps[-1].lane)
-            if on is None:
-                return True
-            steps.append(_Step(on))
-            ahead += self._town.lanes[on].length
-        return False
-
-    def _lay(self, steps: list[_Step], station: float, speed: float = 0.0, head: list[Piece] | None = None) -> None:
+    def _lay(self, steps: list[Step], station: float, speed: float = 0.0, head: list[Piece] | None = None) -> None:
         """Lays the path anew: `steps[0]` from `station` on, behind the pieces of `head`."""
-        steps = list(steps)
-        pieces = list(head or [])
-        lengths = [self._town.lanes[step.lane].length for step in steps if not step.change]
-        self._open_end = self._grow(steps, sum(lengths) - station)
-        at = station
-        for k, step in enumerate(steps):
-            lane = self._town.lanes[step.lane]
-            following = steps[k + 1] if k + 1 < len(steps) else None
-            if following is None or not following.change:
-                if at < lane.length - 1e-3:
-                    pieces.append(follow(lane, at))
-                at = 0.0
-                continue
-            target = self._town.lanes[following.lane]
-            changes = 1
-            while k + 1 + changes < len(steps) and steps[k + 1 + changes].change:
-                changes += 1
-            room = max((lane.length - at) / changes - LEAD, 2.0)
-            distance = min(max(MIN_SWITCH, SWITCH_TIME * speed), room)
-            spare = (lane.length - at) - changes * (distance + LEAD)
-            lead = LEAD if k == 0 else min(max(spare, LEAD), SETTLE)
-            begin = min(at + lead, lane.length - distance)
-            if begin > at + 1e-3:
-                pieces.append(follow(lane, at, begin))
-            pieces.append(switch(lane, target, max(begin, at), distance))
-            at = float(pieces[-1].stations[-1])
-        self._set_path(pieces)
+        pieces, self._open_end = self._lanes.lay(steps, station, speed)
+        self._set_path([*(head or []), *pieces])
 
-    def _lay_from_here(self, steps: list[_Step], speed: float = 0.0) -> None:
+    def _lay_from_here(self, steps: list[Step], speed: float = 0.0) -> None:
         """Lays the path anew from the car's place, keeping the rest of a lane switch or U-turn under way."""
         head, station = self._under_way()
         self._lay(steps, station, speed, head)
@@ -427,7 +312,7 @@ class LocalPlanner:
             head.append(follow(lane, self.station, begin))
         head.append(u_turn(lane, target, begin, TURNING_RADIUS))
         landing = min(oncoming.station + 0.5, target.length)
-        self._lay([_Step(target.id)], landing, head=head)
+        self._lay([Step(target.id)], landing, head=head)
 
     def _set_path(self, pieces: list[Piece]) -> None:
         if not pieces:  # the very end of a lane: its last half metre
@@ -435,7 +320,7 @@ class LocalPlanner:
             pieces = [follow(lane, lane.length - 0.5)]
         x, y = self._car_position()
         self.path = Path(pieces)
-        self.s, self.offset = self.path.project(x, y, 0.0) if x is not None and y is not None else (0.0, 0.0)
+        self.s, self.offset = self.path.project(x, y, 0.0)
         off_line = np.flatnonzero(self.path.manoeuvre)
         if self._manoeuvre is PhysicalAction.J_TURN:
             entered = np.flatnonzero(self.path.lanes == self._chosen[1])
@@ -443,12 +328,7 @@ class LocalPlanner:
         elif self._manoeuvre is not None and len(off_line):
             self._manoeuvre_end = float(self.path.s[off_line[-1]])
 
-    path: Path | None = None  # type: ignore[assignment]
-    s: float = 0.0
-
-    def _car_position(self) -> tuple[float, float] | tuple[None, None]:
-        if self.path is None:
-            return None, None
+    def _car_position(self) -> tuple[float, float]:
         x, y = self.path.position_at(self.s)
         heading = self.path.heading_at(self.s)
         return x - self.offset * math.sin(heading), y + self.offset * math.cos(heading)

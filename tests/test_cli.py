@@ -1,0 +1,215 @@
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import Result
+from typer.testing import CliRunner
+
+import dorothie_gym
+from dorothie_gym.cli import app
+from dorothie_gym.sessions import Session
+from dorothie_gym.world.town import describe, load_town
+
+ROOT = Path(__file__).parents[1]
+RUN_KEYS = [
+    "town", "storyboard", "seed", "success", "subgoals", "arrived", "collisions", "seconds", "wall_seconds",
+    "utterances", "acts", "physical_actions", "exceptions", "session",
+]  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands may write into the current folder."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+
+
+def call(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def loaded(*arguments: object) -> Any:
+    result = call(*arguments)
+    assert result.exit_code == 0, result.output
+    assert result.stderr == ""
+    return json.loads(result.stdout)
+
+
+def process(*arguments: object, **variables: str) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), **variables}
+    command = [sys.executable, "-m", "dorothie_gym.cli", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, env=environment, timeout=120)
+
+
+class TestRun:
+    def test_json_has_exactly_the_promised_keys(self) -> None:
+        facts = loaded("run", "--seed", 3, "--max-seconds", 4, "--json")
+        assert list(facts) == RUN_KEYS
+        assert list(facts["subgoals"]) == ["live", "reached"]
+        assert facts["town"] == "brookside" and facts["seed"] == 3 and facts["seconds"] == 4.0
+        assert facts["session"] is None and facts["arrived"] is False
+        assert not any(Path().iterdir()), "nothing is written that was not asked for"
+
+    def test_standard_output_is_json_and_nothing_else(self, tmp_path: Path) -> None:
+        picture, session = tmp_path / "p.png", tmp_path / "s"
+        arguments = ("run", "--max-seconds", 2, "--json", "--picture", picture, "--out", session)
+        done = process(*arguments, PYGAME_HIDE_SUPPORT_PROMPT="")
+        assert done.returncode == 0 and done.stderr == ""
+        assert list(json.loads(done.stdout)) == RUN_KEYS
+        assert done.stdout.count("\n") == 1
+        assert picture.read_bytes().startswith(b"\x89PNG")
+        assert Session.load(session).complete
+
+    def test_talk_and_summary_are_shown_and_the_end_is_drawn(self) -> None:
+        result = call("run", "--seed", 3, "--max-seconds", 8)
+        assert result.exit_code == 0, result.output
+        assert Path("dorothie.png").read_bytes().startswith(b"\x89PNG")
+        for text in ("brookside", "seed 3", "Participant", "Instruct", "0 of its own making", "dorothie.png"):
+            assert text in result.stdout
+        assert max(map(len, result.stdout.splitlines())) <= 80
+
+    def test_no_picture_is_drawn_where_none_is_wanted(self) -> None:
+        assert call("run", "--max-seconds", 1, "--no-picture").exit_code == 0
+        assert not Path("dorothie.png").exists()
+
+    def test_the_picture_shows_the_whole_town(self) -> None:
+        pygame = pytest.importorskip("pygame")
+        loaded("run", "--max-seconds", 1, "--json", "--picture", "p.png")
+        assert pygame.image.load("p.png").get_size() == (1280, 800)
+
+    def test_a_session_is_recorded_where_it_is_told(self) -> None:
+        facts = loaded("run", "--seed", 3, "--max-seconds", 6, "--json", "--out", "deep/down")
+        session = Session.load(facts["session"])
+        assert facts["session"] == str(Path("deep/down"))
+        assert session.complete and session.header.seed == 3
+        assert len(session.utterances()) == facts["utterances"] > 0
+        assert len(session.all_moves) == facts["acts"]
+
+    def test_roles_can_be_silenced(self) -> None:
+        silent = ("--participant", "silent", "--co-wizard", "silent", "--ad-wizard", "silent")
+        facts = loaded("run", "--max-seconds", 5, "--json", *silent)
+        assert facts["utterances"] == facts["acts"] == facts["physical_actions"] == facts["exceptions"] == 0
+
+    def test_storyboards_and_towns_can_be_named(self) -> None:
+        facts = loaded("run", "--town", "brookside", "--storyboard", "poorly_cat", "--max-seconds", 1, "--json")
+        assert (facts["town"], facts["storyboard"]) == ("brookside", "poorly_cat")
+
+    def test_a_film_is_written_at_ten_frames_a_second(self) -> None:
+        imageio = pytest.importorskip("imageio.v2")
+        pytest.importorskip("imageio_ffmpeg")
+        loaded("run", "--seed", 3, "--max-seconds", 2, "--json", "--video", "v.mp4")
+        with imageio.get_reader("v.mp4") as reader:
+            assert reader.get_meta_data()["fps"] == 10.0
+            frames = [np.asarray(frame) for frame in reader]
+        assert len(frames) == 21  # the beginning, and five for each of four decisions
+        assert frames[0].shape == (800, 1280, 3)
+
+    def test_a_film_without_its_extra_says_what_to_install(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("dorothie_gym.cli.run.find_spec", lambda name: None)
+        result = call("run", "--video", "v.mp4")
+        assert result.exit_code == 2 and "pip install 'dorothie-gym[video]'" in result.stderr
+
+    def test_ctrl_c_keeps_the_session_and_exits_with_130(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+
+        step = DuoWizardEnv.step
+
+        def interrupted(self: DuoWizardEnv, actions: Any) -> Any:
+            if self.stage.world.time >= 3.0:
+                raise KeyboardInterrupt
+            return step(self, actions)
+
+        monkeypatch.setattr(DuoWizardEnv, "step", interrupted)
+        result = call("run", "--seed", 3, "--out", "cut", "--json")
+        assert result.exit_code == 130 and result.stdout == ""
+        assert "Interrupted after 3.0 simulated seconds; what happened until then is kept in cut" in result.stderr
+        session = Session.load("cut")
+        assert not session.complete and session.duration == pytest.approx(3.0)
+
+
+class TestTowns:
+    def test_json_of_one_is_its_description(self) -> None:
+        assert loaded("towns", "brookside", "--json") == describe(load_town("brookside"))
+
+    def test_json_of_all_is_a_list(self) -> None:
+        rows = loaded("towns", "--json")
+        assert describe(load_town("brookside")) in rows
+
+    def test_towns_are_listed(self) -> None:
+        result = call("towns")
+        assert result.exit_code == 0 and "brookside" in result.stdout
+
+    def test_a_town_is_described_and_drawn(self) -> None:
+        result = call("towns", "brookside", "--picture", "map.png")
+        assert result.exit_code == 0 and "Brook Road" in result.stdout and "map.png" in result.stdout
+        assert Path("map.png").read_bytes().startswith(b"\x89PNG")
+
+    @pytest.mark.parametrize("name", ["Town02", "Town05"])
+    def test_a_published_map_is_described(self, name: str) -> None:
+        path = ROOT.parent / "shared" / "maps" / f"{name}.xodr"
+        if not path.is_file():
+            pytest.skip(f"{path} is not there")
+        assert loaded("towns", path, "--json")["name"] == name
+
+
+@pytest.fixture(scope="module")
+def sessions(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sessions")
+    for seed in (3, 4):
+        loaded("run", "--seed", seed, "--max-seconds", 30, "--json", "--out", folder / f"s{seed}")
+    return folder
+
+
+class TestEvaluate:
+    @pytest.mark.parametrize("model", ["majority", "random"])
+    def test_json_has_the_metrics_of_all_tasks(self, sessions: Path, model: str) -> None:
+        table = loaded("evaluate", "--sessions", sessions, "--model", model, "--json")
+        assert table["tasks"] == ["ufn", "rfn", "nfd"] and table["model"] == model
+        assert table["sessions_train"] == table["sessions_test"] == 1
+        for key in ("ufn_move_accuracy", "rfn_slot_f1", "nfd_joint_accuracy", "nfd_joint_accuracy_paper"):
+            assert key in table
+
+    def test_the_table_names_sessions_and_counts_points(self, sessions: Path) -> None:
+        result = call("evaluate", "--sessions", sessions, "--tasks", "ufn,nfd")
+        assert result.exit_code == 0
+        assert "UfN" in result.stdout and "NfD" in result.stdout and "RfN" not in result.stdout
+        assert "points skipped" in result.stdout
+        assert "Trained on s3; tested on s4." in result.stdout
+
+    def test_without_sessions_a_few_are_played(self, monkeypatch: pytest.MonkeyPatch, sessions: Path) -> None:
+        monkeypatch.setattr("dorothie_gym.rollout.default_corpus", lambda: sessions)
+        assert loaded("evaluate", "--json")["sessions"] == str(sessions)
+
+    def test_a_cache_that_cannot_be_written_is_told(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        (tmp_path / "file").touch()
+        monkeypatch.setenv("DOROTHIE_GYM_CACHE", str(tmp_path / "file" / "below"))
+        result = call("evaluate")
+        assert result.exit_code == 2 and "set DOROTHIE_GYM_CACHE" in result.stderr
+
+
+def test_storyboards_are_listed() -> None:
+    names = [row["name"] for row in loaded("storyboards", "--json")]
+    result = call("storyboards")
+    assert len(names) >= 8 and all(name in result.stdout for name in names)
+
+
+def test_the_version_is_told() -> None:
+    assert call("--version").stdout == f"dorothie-gym {dorothie_gym.__version__}\n"
+
+
+def test_help_imports_nothing_slow() -> None:
+    code = (
+        "import sys; from typer.testing import CliRunner; from dorothie_gym.cli import app\n"
+        "assert CliRunner().invoke(app, ['run', '--help']).exit_code == 0\n"
+        "slow = {'scipy', 'numba', 'highway_env', 'pygame', 'matplotlib', 'filterpy', 'torch'} & set(sys.modules)\n"
+        "assert not slow, slow"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    subprocess.run([sys.executable, "-c", code], check=True, env=environment, timeout=60)

@@ -1,0 +1,27 @@
+"""What README.md shows runs as written."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+README = Path(__file__).parents[1] / "README.md"
+SNIPPETS = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), flags=re.DOTALL)
+
+
+@pytest.mark.parametrize("snippet", SNIPPETS, ids=[f"snippet_{k}" for k in range(len(SNIPPETS))])
+# PettingZoo's and stable-baselines3's imports reach for packages that are deprecating things.
+@pytest.mark.filterwarnings("ignore::DeprecationWarning:pettingzoo")
+def test_snippet_runs_as_written(snippet: str) -> None:
+    exec(compile(snippet, str(README), "exec"), {"__name__": "__main__"})
+
+
+def test_readme_shows_the_promised_snippets() -> None:
+    text = "\n".join(SNIPPETS)
+    for shown in ("gym.make", "pettingzoo.make", ".learn(", "NfD-v0"):
+        assert shown in text
+
+
+@pytest.mark.parametrize("link", re.findall(r"\]\(((?!http)[^)#]+)\)", README.read_text(encoding="utf-8")))
+def test_linked_file_exists(link: str) -> None:
+    assert (README.parent / link).exists(), f"README.md links to {link}"
