@@ -178,7 +178,7 @@ def _draw(env: DuoWizardEnv, path: Path) -> None:
     from dorothie_gym.envs.rendering import SceneRenderer
 
     scenario = env.scenario
-    caption = f"{env.town.name}  ·  {scenario.storyboard.name}  ·  seed {scenario.seed}"
+    caption = f"{env.town.name} · {scenario.storyboard.name} · seed {scenario.seed}"
     SceneRenderer().save(scene_of(env.stage, caption), path, follow=False)
 
 

@@ -15,11 +15,14 @@ from dorothie_gym.world.town.routing import Entry, Leg, Place, Route, router
 PASSED = 3.0
 """A goal that lies further behind than this has been passed [m]."""
 
+SWITCH_ROOM = 16.0
+"""Least room for a lane switch [m]."""
+
 LATE = 18.0
 """A lane change or U-turn that is this overdue will not come any more [m]."""
 
-U_TURN_MARGIN = 12.0
-"""A U-turn that leads to a place right behind it is made so much later than planned: plans are made in cells [m]."""
+NEAR_GOAL = 30.0
+"""A goal this close behind a U-turn is easily missed: plans are made in cells [m]."""
 
 BRAKING = 3.0
 """Deceleration of the car's Stop [m/s^2]."""
@@ -180,18 +183,21 @@ class Journey:
         """What is left of the route, the present leg first."""
         return self.route.legs[self.leg :] if self.route is not None else ()
 
-    def followed(self, lane: int, station: float) -> Journey:
+    def followed(self, town: Town, lane: int, station: float) -> Journey:
         """The same with the present leg brought up to where the car is; `astray` counts up if it is nowhere on it."""
         for ahead, leg in enumerate(self.legs):
-            if leg.lane == lane and (ahead or not self._overdue(station)):
+            if leg.lane == lane and (ahead or not self._overdue(town, station)):
                 return replace(self, leg=self.leg + ahead, astray=0)
         return replace(self, astray=self.astray + 1)
 
-    def _overdue(self, station: float) -> bool:
+    def _overdue(self, town: Town, station: float) -> bool:
         legs = self.legs
         if len(legs) == 1:
             return station > self.goal[1] + PASSED
-        return legs[1].entry is not Entry.FOLLOW and station > legs[0].end + LATE
+        if legs[1].entry is Entry.FOLLOW:
+            return False
+        no_room = legs[1].entry is not Entry.U_TURN and town.lanes[legs[0].lane].length - station < SWITCH_ROOM
+        return no_room or station > legs[0].end + LATE
 
     def left(self, station: float) -> float:
         """How far the goal is along the route [m]; negative when it has just been passed."""
@@ -224,13 +230,25 @@ class Journey:
             distance += max(leg.end - (station if k == 0 else leg.start), 0.0)
         return None
 
-    def turns_at_goal(self) -> bool:
-        """Whether the next U-turn comes out right before the goal."""
-        legs = self.legs
-        for k, leg in enumerate(legs):
-            if k and leg.entry is Entry.U_TURN:
-                return k == len(legs) - 1 and leg.end - leg.start < 2.0 * U_TURN_MARGIN
-        return False
+    def turning_room(self, town: Town, lane: int) -> float | None:
+        """How far beyond its planned place the next U-turn can be made, and should be if the goal lies right behind it.
+
+        Args:
+            town: the map.
+            lane: that the car is on.
+
+        Returns:
+            0 if the U-turn may as well be made now; else the room on its lane [m]; None before the car is on it.
+        """
+        for k, leg in enumerate(self.legs[1:], start=1):
+            if leg.entry is not Entry.U_TURN:
+                continue
+            before = self.legs[k - 1]
+            if before.lane != lane:
+                return None
+            at_goal = k == len(self.legs) - 1 and leg.end - leg.start < NEAR_GOAL
+            return max(town.lanes[lane].length - before.end, 0.0) if at_goal else 0.0
+        return None
 
     def leaves_default(self, town: Town, lane: int, station: float, crossing: Crossing) -> bool:
         """Whether a lane has to be changed to come to a junction at all: by default the car goes on to another one."""

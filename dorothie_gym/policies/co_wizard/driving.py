@@ -8,7 +8,7 @@ from dorothie_gym.ontology import LandmarkName, PhysicalAction
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View, Wish
 from dorothie_gym.policies.journey import (
     BRAKING,
-    U_TURN_MARGIN,
+    SWITCH_ROOM,
     Crossing,
     direction_of,
     find_exit,
@@ -37,8 +37,8 @@ SAME_WAY = 25.0
 U_TURN_SPEED_SQUARED = 12.0
 """Square of the speed at which the car turns round [m^2/s^2]."""
 
-SWITCH_ROOM = 16.0
-"""Least room for a lane switch [m]."""
+U_TURN_MARGIN = 14.0
+"""So far beyond a place on the other side the car turns round for it [m]."""
 
 
 def drive(mind: CoWizardMind, view: View) -> Physical | None:
@@ -151,11 +151,11 @@ def _manoeuvre(mind: CoWizardMind, view: View) -> Physical | None:
         return None
     if entry is Entry.U_TURN:
         reach = max(view.speed**2 - U_TURN_SPEED_SQUARED, 0.0) / (2 * BRAKING)
-        if mind.journey.turns_at_goal():
-            # a little beyond, unless the lane ends first
-            room = mind.town.lanes[view.lane].length - view.station - 2.0
-            return turn_round(mind, view) if distance <= reach - U_TURN_MARGIN or room <= reach else None
-        return turn_round(mind, view) if distance <= reach + 8.0 else None
+        room = mind.journey.turning_room(mind.town, view.lane)
+        if room is None:
+            return None
+        beyond = min(U_TURN_MARGIN, room - 6.0) if room > 0.0 else -8.0
+        return turn_round(mind, view) if distance <= reach - beyond else None
     if not _needs_switch(mind, view, crossing):
         return None
     return _switch(mind, view, LinkType.LANE_CHANGE_LEFT if entry is Entry.CHANGE_LEFT else LinkType.LANE_CHANGE_RIGHT)

@@ -72,7 +72,7 @@ def _notice(mind: CoWizardMind, view: View) -> None:
     _pass_junction(mind, view)
     if mind.journey is None or view.manoeuvring:
         return
-    mind.journey = mind.journey.followed(view.lane, view.station)
+    mind.journey = mind.journey.followed(mind.town, view.lane, view.station)
     if mind.journey.astray >= ASTRAY:
         mind.journey = mind.journey.replanned(mind.town, view.here, mind.blocked)
         note_plan(mind)

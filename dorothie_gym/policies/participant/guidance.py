@@ -53,7 +53,7 @@ def follow_journey(mind: ParticipantMind, view: View) -> None:
     if mind.journey is None or view.turning:
         return
     before = mind.journey.left(view.station)
-    mind.journey = mind.journey.followed(view.lane, view.station)
+    mind.journey = mind.journey.followed(mind.town, view.lane, view.station)
     passed = view.standing and mind.journey.left(view.station) < -WITHIN
     if passed:
         mind.guiding = True
@@ -114,11 +114,10 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
 def _turning_distance(mind: ParticipantMind, view: View) -> float:
     """How far ahead turning round is told: late enough not to come out beyond a place just behind."""
     assert mind.journey is not None
-    if not mind.journey.turns_at_goal():
-        return TURN_ROUND_DISTANCE
-    manoeuvre = mind.journey.next_manoeuvre(view.station)
-    beyond = mind.town.lanes[view.lane].length - view.station - (manoeuvre[1] if manoeuvre else 0.0)
-    return 2.0 * view.speed - min(ROOM_TO_STOP, beyond - 15.0)
+    room = mind.journey.turning_room(mind.town, view.lane)
+    if room is None:
+        return 1.5 * view.speed
+    return 2.0 * view.speed - min(ROOM_TO_STOP, room - 12.0) if room > 0.0 else TURN_ROUND_DISTANCE
 
 
 def note_told(mind: ParticipantMind, view: View, key: tuple[str, int, int]) -> None:
