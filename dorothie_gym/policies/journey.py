@@ -250,10 +250,14 @@ class Journey:
             return max(town.lanes[lane].length - before.end, 0.0) if at_goal else 0.0
         return None
 
-    def leaves_default(self, town: Town, lane: int, station: float, crossing: Crossing) -> bool:
-        """Whether a lane has to be changed to come to a junction at all: by default the car goes on to another one."""
+    def needs_switch(self, town: Town, lane: int, station: float, crossing: Crossing) -> bool:
+        """Whether a lane change before a junction has to be made on its own, not on the way into the turn.
+
+        By default the car would go on to another junction, or run into what blocks its lane.
+        """
         choice = next_choice(town, lane, station)
-        return choice is None or choice.junction != crossing.exit.junction_id
+        obstructed = any(place[0] == lane and place[1] > station for place in self.blocked)
+        return obstructed or choice is None or choice.junction != crossing.exit.junction_id
 
     def changes_before(self, crossing: Crossing | None) -> bool:
         """Whether the route turns round before the given junction (or before the goal, where None)."""

@@ -7,21 +7,11 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy
+from dorothie_gym.policies.seeds import policy_seed
 from dorothie_gym.sessions import SessionWriter
-
-_POLICIES = 2
-"""Which branch of a session's seed the policies draw from; the world draws from another."""
-
-
-def policy_seed(seed: int, role: Role) -> int:
-    """Returns the seed of a role's policy in the session of a seed: 32 bits, other ones for each role."""
-    branch = np.random.SeedSequence([seed, _POLICIES, AGENT_ROLES.index(role)])
-    return int(branch.generate_state(1)[0])
 
 
 def play_session(

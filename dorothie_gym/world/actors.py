@@ -24,8 +24,14 @@ TOW_CRASHED = 3.0
 TOW_BLOCKED = 15.0
 """A vehicle that stands before a prop gives up after this long [s]."""
 
+TOW_FACING = 6.0
+"""A vehicle that stands before a car that stands in the middle of a U-turn gives way to it after this long [s]."""
+
 TOW_STUCK = 60.0
 """Any vehicle that stands for this long is towed away, so that no knot lasts for ever [s]."""
+
+STANDING = 0.1
+"""Slower than this the car stands [m/s]."""
 
 CLEAR_OF_CAR = 25.0
 """Nobody appears closer to the car than this [m]."""
@@ -115,6 +121,7 @@ class Actors:
         """Tows crashed and stuck vehicles away and brings others in; to be called once a decision."""
         for vehicle in list(self.vehicles):
             blocked = vehicle.standing > TOW_BLOCKED and self._before_prop(vehicle)
+            blocked |= vehicle.standing > TOW_FACING and self._faces_turning_car(vehicle)
             if vehicle.crash_age > TOW_CRASHED or vehicle.standing > TOW_STUCK or blocked:
                 self._remove(vehicle)
                 self._replace()
@@ -143,7 +150,7 @@ class Actors:
 
     def act(self, dt: float) -> None:
         """Lets traffic decide and pedestrians walk for `dt` [s]; `road.step` then moves the traffic."""
-        crossing = self._car if getattr(self._car, "in_manoeuvre", False) else None
+        crossing = self._car if getattr(self._car, "sweep", None) else None
         for vehicle in self.vehicles:
             vehicle.crossing = crossing
             vehicle.act()
@@ -186,6 +193,10 @@ class Actors:
             math.hypot(*(prop.position - vehicle.position)) < 40.0 and vehicle.front_distance_to(prop) > 0.0
             for prop in self.props
         )
+
+    def _faces_turning_car(self, vehicle: TrafficVehicle) -> bool:
+        car = self._car
+        return bool(getattr(car, "sweep", None)) and car.speed < STANDING and _near(vehicle, car, 6.0)
 
     def _is_clear(self, place: Array, distance: float) -> bool:
         if math.hypot(*(place - self._car.position)) < distance:

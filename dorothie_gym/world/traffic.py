@@ -35,7 +35,7 @@ SLOW = 4.0
 """Slower than this a vehicle behind a junction may be in the way: a car that turns round does 3.5 [m/s]."""
 
 CROSSING_SIGHT = 40.0
-"""How far a vehicle is seen that switches lanes or turns round [m]."""
+"""How far a car is seen that turns round [m]."""
 
 CROSSING_MARGIN = 0.5
 """Room that is left beside it [m]."""
@@ -67,7 +67,7 @@ class TrafficVehicle(IDMVehicle):
     Attributes:
         key: tells it apart; keys of bodies in the world are unique.
         height: of the road under it [m].
-        crossing: a vehicle that is switching lanes or turning round, which may stand across several lanes.
+        crossing: the car while it turns round, across lanes where others do not expect it.
         standing: how long it has been standing [s].
     """
 
@@ -251,7 +251,7 @@ class TrafficVehicle(IDMVehicle):
         return math.inf
 
     def _crossing_acceleration(self, other: Any) -> float:
-        """Acceleration that stops the vehicle before one that is partly in its way [m/s^2]; inf where it is not."""
+        """Acceleration that stops the vehicle before the way of one that turns round [m/s^2]; inf where it is clear."""
         dx, dy = other.position - self.position
         if dx * dx + dy * dy > CROSSING_SIGHT**2 or abs(other.height - self.height) > LEVEL:
             return math.inf
@@ -259,14 +259,14 @@ class TrafficVehicle(IDMVehicle):
         own = self._network.get_lane(self.target_lane_index).local_coordinates(self.position)[0]
         for index in self.route[:3]:
             lane = self._network.get_lane(index)
-            for corner in other.polygon()[:4]:
-                station, lateral = lane.local_coordinates(corner)
-                if abs(lateral) < self.WIDTH / 2 + CROSSING_MARGIN and 0.0 <= station <= lane.length:
+            for place in other.sweep:
+                station, lateral = lane.local_coordinates(place)
+                if abs(lateral) < (self.WIDTH + other.WIDTH) / 2 + CROSSING_MARGIN and 0.0 <= station <= lane.length:
                     gap = min(gap, start + station - own)
             start += lane.length
-        if gap < -self.LENGTH / 2:
-            return math.inf  # passed already
-        return math.inf if math.isinf(gap) else self._brake_to(gap - self.LENGTH / 2 - 1.0)
+        gap -= self.LENGTH / 2 + other.LENGTH / 2
+        # whoever is in its way already had better go on
+        return self._brake_to(gap) if -1.0 < gap < math.inf else math.inf
 
     def _brake_to(self, distance: float) -> float:
         if distance <= 0.3:

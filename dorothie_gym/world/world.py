@@ -174,7 +174,7 @@ class World:
         if self.frame < self._stopped_until:
             control = type(control)(throttle=0.0, steer=control.steer, brake=1.0)
         self._note_hazard(hazard, control.brake)
-        car.height, car.in_manoeuvre = self.planner.height, self.planner.in_manoeuvre
+        car.height, car.sweep = self.planner.height, self.planner.sweep()
         car.drive(control, dt)
         self.actors.act(dt)
         speed_before = float(car.speed)
@@ -209,6 +209,11 @@ class World:
         """The nearest thing on the path that the car has to brake for."""
         planner, car = self.planner, self.car
         bodies = self.perceived()
+        block = bodies_ahead(
+            planner.path, planner.s, [body for body in bodies if body.kind is ObjectClass.STATIC],
+            length=car.LENGTH, width=car.WIDTH,
+        )  # fmt: skip
+        planner.roadblock = block.gap + car.LENGTH / 2 if block is not None else math.inf
         found = bodies_ahead(
             planner.path, planner.s, bodies, length=car.LENGTH, width=car.WIDTH, speed=float(car.speed)
         )

@@ -15,6 +15,7 @@ from dorothie_gym.envs.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
+from dorothie_gym.policies.seeds import policy_seed
 from dorothie_gym.spaces import ActionDict, Observation, noop
 from dorothie_gym.tasks import StoryboardTemplate
 from dorothie_gym.world.town import Town
@@ -99,7 +100,7 @@ class SingleRole(gym.Env[Observation, ActionDict]):
         session = seed if seed is not None else int(self.np_random.integers(2**31))
         self._observations, infos = self.duo.reset(seed=session, options=options)
         self._states = {
-            role: policy.initial_state(partner_seed(self.duo.scenario.seed, role), self.duo.town)
+            role: policy.initial_state(policy_seed(self.duo.scenario.seed, role), self.duo.town)
             for role, policy in self.partners.items()
         }
         return self._observations[self.role], infos[self.role]
@@ -144,9 +145,3 @@ class SingleRole(gym.Env[Observation, ActionDict]):
             if cast[role].limits != self.duo.limits:
                 raise ValueError(f"the policy of {role} has other SpaceLimits than the town's: {self.duo.limits}")
         return cast
-
-
-def partner_seed(seed: int, role: Role) -> int:
-    """Seed of the policy that plays a role in the session of a seed, the same as where all three are policies."""
-    branch = np.random.SeedSequence([seed, 2, AGENT_ROLES.index(role)])
-    return int(branch.generate_state(1)[0])

@@ -166,7 +166,7 @@ def _needs_switch(mind: CoWizardMind, view: View, crossing: Crossing | None) -> 
     assert mind.journey is not None
     if crossing is None or mind.journey.changes_before(crossing) or view.choice is None:
         return True
-    if mind.journey.leaves_default(mind.town, view.lane, view.station, crossing):
+    if mind.journey.needs_switch(mind.town, view.lane, view.station, crossing):
         return True
     return any(abs(wrap_degrees(way.angle - crossing.exit.angle)) <= SAME_WAY for way in view.choice.exits)
 

@@ -15,9 +15,6 @@ from dorothie_gym.policies.scenery import SeenObject, place_on_lanes, street_of
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.spaces import Motion
 
-STOP_DISTANCE = 38.0
-"""The car is stopped when an obstacle is this near: there is room left to turn round or change lanes [m]."""
-
 SIGHT = 70.0
 """An obstacle is noticed when it is this near [m]."""
 
@@ -55,8 +52,7 @@ def watch_road(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None
     else:
         mind.asked_at = view.time
         mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, ActionValue.QUERIED, joined=True))
-    if thing.distance < STOP_DISTANCE or mind.detour_at is not None:
-        mind.halted = mind.detour_at is not None
+    mind.halted = True
 
 
 def _on_path(view: View) -> SeenObject | None:

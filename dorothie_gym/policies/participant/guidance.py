@@ -17,7 +17,7 @@ from dorothie_gym.world.town.routing import Entry
 TELL_DISTANCE = 110.0
 """A turn is told when it is this near [m]."""
 
-TURN_ROUND_DISTANCE = 30.0
+TURN_ROUND_DISTANCE = 45.0
 """Turning round is told when the place for it is this near [m]."""
 
 AGAIN = 9.0
@@ -86,16 +86,15 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     """Says what is to be done next, if it is time to."""
     if mind.journey is None or not mind.told or not mind.voice.idle or view.speaking > 0.0 or view.turning:
         return
+    if mind.journey.astray:
+        return
     if _approach(mind, view, rng) or not mind.guiding:
         return
     step = next_step(mind, view, DialogueMove.INSTRUCT, rng)
     if step is None:
         return
     key, distance, words = step
-    if mind.misses and not mind.eased and mind.journey.left(view.station) < NEAR and view.speed > SLOW_SPEED:
-        mind.eased = True
-        wording = Wording(faster=False, speed=CAREFUL)
-        mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=wording))
+    if _ease(mind, view):
         return
     near = distance < (_turning_distance(mind, view) if key[0] == "round" else TELL_DISTANCE)
     waited = view.time - max(mind.guided_at, mind.heard_at)
@@ -109,6 +108,23 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     if near and (mind.guided != key or overdue):
         note_told(mind, view, key)
         mind.voice = mind.voice.plan(words)
+
+
+def _ease(mind: ParticipantMind, view: View) -> bool:
+    """Has the car slow down for a place that is easily missed: one missed before, or one right behind a junction."""
+    assert mind.journey is not None
+    left = mind.journey.left(view.station)
+    if mind.eased or left > NEAR or view.speed < SLOW_SPEED:
+        return False
+    crossing = mind.journey.next_crossing(mind.town, view.station)
+    behind_junction = crossing is not None and crossing.distance < 50.0 and left - crossing.distance < 40.0
+    told = mind.guided is not None and mind.guided[0] == "turn"
+    if not mind.misses and not (behind_junction and told):
+        return False
+    mind.eased = True
+    wording = Wording(faster=False, speed=CAREFUL)
+    mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=wording))
+    return True
 
 
 def _turning_distance(mind: ParticipantMind, view: View) -> float:
@@ -147,7 +163,7 @@ def next_step(
             return ("round", 0, 0), manoeuvre[1], remark(move, ActionValue.U_TURN)
     switch = manoeuvre is not None and (
         crossing is None
-        or (manoeuvre[1] < crossing.distance and journey.leaves_default(mind.town, view.lane, view.station, crossing))
+        or (manoeuvre[1] < crossing.distance and journey.needs_switch(mind.town, view.lane, view.station, crossing))
     )
     if crossing is not None and not switch:
         key = ("turn", crossing.lane, crossing.exit.connector)

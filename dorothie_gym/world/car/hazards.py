@@ -33,8 +33,11 @@ REACTION = 0.4
 STANDSTILL_GAP = 2.5
 """Gap that is left to a body that stands [m]."""
 
-ROADBLOCK_GAP = 10.0
-"""Gap that is left to a prop [m]: room for a U-turn, which swings out 9 m ahead of the car's nose."""
+ROADBLOCK_GAP = 12.5
+"""Gap that the car aims to leave to a prop [m]: room for a U-turn (`U_TURN_REACH`), and 2 m by which it may overshoot."""
+
+TIGHT_GAP = 1.0
+"""Gap that is left to what stands, while the car turns or switches lanes [m]."""
 
 HARD_BRAKING = 4.0
 """Deceleration that the safe speed counts on [m/s^2]."""
@@ -68,17 +71,24 @@ class Body:
 
 @dataclass(frozen=True, kw_only=True)
 class Hazard:
-    """Something ahead on the path: its gap to the car's nose [m] and its speed along the path [m/s]."""
+    """Something ahead on the path: its gap to the car's nose [m] and its speed along the path [m/s].
+
+    `tight` tells that the car is in the middle of a manoeuvre, in which it goes up to things more closely.
+    """
 
     kind: ObjectClass
     gap: float
     speed: float = 0.0
     key: int = -1
+    tight: bool = False
 
     def safe_speed(self, friction: float = 1.0) -> float:
         """Speed from which the car can still stop behind it (Gipps 1981, with the leader braking as hard) [m/s]."""
         braking = HARD_BRAKING * friction
-        margin = ROADBLOCK_GAP if self.kind is ObjectClass.STATIC else STANDSTILL_GAP
+        if self.tight and self.speed < 0.5:
+            margin = TIGHT_GAP
+        else:
+            margin = ROADBLOCK_GAP if self.kind is ObjectClass.STATIC else STANDSTILL_GAP
         room = max(self.gap - margin, 0.0)
         slack = braking * REACTION
         return -slack + math.sqrt(slack**2 + self.speed**2 + 2 * braking * room)
@@ -99,12 +109,13 @@ def bodies_ahead(
     """
     if not bodies:
         return None
+    tight = bool(path.manoeuvre[path.index_at(s)])
     ahead = _Ahead.of(path, s, max(LOOKAHEAD, speed * REACTION + speed**2 / (2 * HARD_BRAKING) + ROADBLOCK_GAP))
     if len(ahead.stations) < 2:
         return None
     worst: Hazard | None = None
     for body in bodies:
-        hazard = ahead.meet(body, length=length, width=width)
+        hazard = ahead.meet(body, length=length, width=width, tight=tight)
         if hazard is not None and (worst is None or hazard.safe_speed() < worst.safe_speed()):
             worst = hazard
     return worst
@@ -127,7 +138,7 @@ class _Ahead:
         headings = path.headings[cut]
         return cls(path.points[cut], path.s[cut] - s, path.heights[cut], headings, np.cos(headings), np.sin(headings))
 
-    def meet(self, body: Body, *, length: float, width: float) -> Hazard | None:
+    def meet(self, body: Body, *, length: float, width: float, tight: bool) -> Hazard | None:
         """The first place of the path where the car would touch a body, now or where it is heading."""
         reach = float(self.stations[-1]) + 2.0 * abs(body.speed) + body.length + length
         if abs(body.x - self.points[0, 0]) > reach or abs(body.y - self.points[0, 1]) > reach:
@@ -150,5 +161,5 @@ class _Ahead:
             k = int(np.argmax(touching))
             gap = float(self.stations[k] + along[k] - half_length[k]) - length / 2
             speed = max(body.speed * math.cos(float(turn[k])), 0.0) if time == 0.0 else 0.0
-            return Hazard(kind=body.kind, gap=gap, speed=speed, key=body.key)
+            return Hazard(kind=body.kind, gap=gap, speed=speed, key=body.key, tight=tight)
         return None

@@ -18,6 +18,11 @@ TURNING_RADIUS = 4.5
 """Radius of a U-turn [m]: a little over the 3.8 m of highway-env's bicycle at full lock (60 degrees, 5 m long)."""
 
 
+U_TURN_REACH = 12.5
+"""How far ahead of its middle a car comes in a U-turn [m]: 11 m for the middle of it where lanes are 3.5 m apart (the
+farthest), 1 m of width, and what is kept beside it."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Piece:
     """A stretch of path that belongs to one lane.

@@ -12,9 +12,12 @@ import numpy as np
 
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.world.car.lanes import HORIZON, LEAD, MIN_SWITCH, Lanes, Step
-from dorothie_gym.world.car.path import TURNING_RADIUS, Path, Piece, follow, u_turn
+from dorothie_gym.world.car.path import TURNING_RADIUS, U_TURN_REACH, Path, Piece, follow, u_turn
 from dorothie_gym.world.town.model import Exit, LinkType, Town
 from dorothie_gym.world.town.oncoming import Oncoming, oncoming_lanes
+
+SWEEP_STEP = 4
+"""Of the points of a U-turn, which are half a metre apart, others are told every so many."""
 
 LANDING = 6.0
 """Oncoming lane left after a U-turn, so that the car stands straight before it waits at the lane's end [m]."""
@@ -40,6 +43,7 @@ class LocalPlanner:
         s: how far along the path the car is [m].
         offset: its distance from the path, positive right [m].
         held: whether the car stands by the action Stop.
+        roadblock: how far ahead of the car's middle a roadblock is seen [m], or inf.
     """
 
     def __init__(self, town: Town, lane: int, station: float) -> None:
@@ -47,6 +51,7 @@ class LocalPlanner:
         self._lanes = Lanes(town)
         self._oncoming = oncoming_lanes(town)
         self.held = False
+        self.roadblock = math.inf
         self._manoeuvre: PhysicalAction | None = None
         self._manoeuvre_angle = 0
         self._manoeuvre_end = 0.0
@@ -100,6 +105,14 @@ class LocalPlanner:
     def in_manoeuvre(self) -> bool:
         """Whether the car is off the centre lines: switching or turning round."""
         return bool(self.path.manoeuvre[self.path.index_at(self.s)])
+
+    def sweep(self) -> list[tuple[float, float]]:
+        """Places (x, y) that a car that is turning round has still to pass, every 2 m or so; else none."""
+        if self._manoeuvre is not PhysicalAction.U_TURN or not self.in_manoeuvre:
+            return []
+        k = self.path.index_at(self.s)
+        rest = self.path.points[k:][self.path.manoeuvre[k:]][::SWEEP_STEP]
+        return [(float(x), float(y)) for x, y in rest]
 
     def advance(self, x: float, y: float) -> None:
         """Takes note of where the car is now [m]."""
@@ -252,6 +265,8 @@ class LocalPlanner:
             if self._town.neighbour(self.lane, LinkType.LANE_CHANGE_LEFT) is not None:
                 return "a U-turn begins on the leftmost lane"
             return "there is no oncoming lane beside this one"
+        if speed > 0.5 and begin - self.station + U_TURN_REACH > self.roadblock:
+            return "the car is too fast to turn round before the roadblock"
         if begin > lane.length + 0.5:
             return "there is no room left to turn round"
         return oncoming, min(begin, lane.length)

@@ -16,7 +16,7 @@ class Car(Vehicle):
         control: what the actuators were told last.
         height: of the road under it [m].
         friction: share of the dry road's grip.
-        in_manoeuvre: whether it is off the centre lines, where others may not find it on their lane.
+        sweep: places [m] that it has still to pass while it turns round, across lanes where others do not expect it.
     """
 
     MAX_SPEED = 40.0
@@ -26,7 +26,7 @@ class Car(Vehicle):
         super().__init__(road, position, heading, 0.0)
         self.control = Control(throttle=0.0, steer=0.0, brake=0.0)
         self.friction = 1.0
-        self.in_manoeuvre = False
+        self.sweep: list[tuple[float, float]] = []
 
     def drive(self, control: Control, dt: float) -> None:
         """Sets the controls for the next substep of `dt` seconds; brakes stop the car, they do not reverse it."""
