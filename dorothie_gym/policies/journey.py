@@ -21,11 +21,14 @@ SWITCH_ROOM = 16.0
 LATE = 18.0
 """A lane change or U-turn that is this overdue will not come any more [m]."""
 
-NEAR_GOAL = 30.0
-"""A goal this close behind a U-turn is easily missed: plans are made in cells [m]."""
+TIGHT = 40.0
+"""A goal or lane change this close behind a U-turn is easily missed: plans are made in cells [m]."""
 
 BRAKING = 3.0
 """Deceleration of the car's Stop [m/s^2]."""
+
+U_TURN_SPEED_SQUARED = 12.0
+"""Square of the speed at which the car turns round [m^2/s^2]."""
 
 LAG = 0.56
 """Time that the brakes seem to take until they bite, measured at 3 to 11 m/s [s]."""
@@ -231,7 +234,9 @@ class Journey:
         return None
 
     def turning_room(self, town: Town, lane: int) -> float | None:
-        """How far beyond its planned place the next U-turn can be made, and should be if the goal lies right behind it.
+        """How far beyond its planned place the next U-turn can be made, and should be if something follows right behind.
+
+        A U-turn that is made later comes out further from the goal, or from the lane change that follows it.
 
         Args:
             town: the map.
@@ -246,8 +251,9 @@ class Journey:
             before = self.legs[k - 1]
             if before.lane != lane:
                 return None
-            at_goal = k == len(self.legs) - 1 and leg.end - leg.start < NEAR_GOAL
-            return max(town.lanes[lane].length - before.end, 0.0) if at_goal else 0.0
+            followed = k == len(self.legs) - 1 or self.legs[k + 1].entry is not Entry.FOLLOW
+            tight = followed and leg.end - leg.start < TIGHT
+            return max(town.lanes[lane].length - before.end, 0.0) if tight else 0.0
         return None
 
     def needs_switch(self, town: Town, lane: int, station: float, crossing: Crossing) -> bool:

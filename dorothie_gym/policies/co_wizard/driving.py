@@ -9,6 +9,7 @@ from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View, Wish
 from dorothie_gym.policies.journey import (
     BRAKING,
     SWITCH_ROOM,
+    U_TURN_SPEED_SQUARED,
     Crossing,
     direction_of,
     find_exit,
@@ -33,9 +34,6 @@ PATIENCE = 2.0
 
 SAME_WAY = 25.0
 """An exit of the own lane this close in angle is taken instead of that of a lane beside [degrees]."""
-
-U_TURN_SPEED_SQUARED = 12.0
-"""Square of the speed at which the car turns round [m^2/s^2]."""
 
 U_TURN_MARGIN = 14.0
 """So far beyond a place on the other side the car turns round for it [m]."""
@@ -154,7 +152,7 @@ def _manoeuvre(mind: CoWizardMind, view: View) -> Physical | None:
         room = mind.journey.turning_room(mind.town, view.lane)
         if room is None:
             return None
-        beyond = min(U_TURN_MARGIN, room - 6.0) if room > 0.0 else -8.0
+        beyond = min(U_TURN_MARGIN, room - 6.0) if room > 0.0 else -2.0
         return turn_round(mind, view) if distance <= reach - beyond else None
     if not _needs_switch(mind, view, crossing):
         return None

@@ -8,7 +8,15 @@ import numpy as np
 
 from dorothie_gym.dialogue import Direction, Wording, speech_seconds, word_act
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, SlotValue, StreetName
-from dorothie_gym.policies.journey import Choice, Crossing, find_exit, next_choice, stopping_distance
+from dorothie_gym.policies.journey import (
+    BRAKING,
+    U_TURN_SPEED_SQUARED,
+    Choice,
+    Crossing,
+    find_exit,
+    next_choice,
+    stopping_distance,
+)
 from dorothie_gym.policies.participant.mind import ParticipantMind, View
 from dorothie_gym.policies.scenery import street_of
 from dorothie_gym.policies.speech import Remark, remark
@@ -16,9 +24,6 @@ from dorothie_gym.world.town.routing import Entry
 
 TELL_DISTANCE = 110.0
 """A turn is told when it is this near [m]."""
-
-TURN_ROUND_DISTANCE = 45.0
-"""Turning round is told when the place for it is this near [m]."""
 
 AGAIN = 9.0
 """What has not been done is told again after this time [s]."""
@@ -128,12 +133,14 @@ def _ease(mind: ParticipantMind, view: View) -> bool:
 
 
 def _turning_distance(mind: ParticipantMind, view: View) -> float:
-    """How far ahead turning round is told: late enough not to come out beyond a place just behind."""
+    """How far ahead turning round is told, so that the car turns where it is planned or a little later."""
     assert mind.journey is not None
     room = mind.journey.turning_room(mind.town, view.lane)
     if room is None:
         return 1.5 * view.speed
-    return 2.0 * view.speed - min(ROOM_TO_STOP, room - 12.0) if room > 0.0 else TURN_ROUND_DISTANCE
+    # what the car drives while it is being told, and while it slows down
+    on_the_way = 1.5 * view.speed + max(view.speed**2 - U_TURN_SPEED_SQUARED, 0.0) / (2 * BRAKING) + 2.0
+    return on_the_way - (min(ROOM_TO_STOP, room - 12.0) if room > 0.0 else 0.0)
 
 
 def note_told(mind: ParticipantMind, view: View, key: tuple[str, int, int]) -> None:

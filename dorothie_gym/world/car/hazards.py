@@ -33,8 +33,8 @@ REACTION = 0.4
 STANDSTILL_GAP = 2.5
 """Gap that is left to a body that stands [m]."""
 
-ROADBLOCK_GAP = 12.5
-"""Gap that the car aims to leave to a prop [m]: room for a U-turn (`U_TURN_REACH`), and 2 m by which it may overshoot."""
+ROADBLOCK_GAP = 14.0
+"""Gap that the car aims to leave to a prop [m]: room for a U-turn, and 2 m by which it comes closer."""
 
 TIGHT_GAP = 1.0
 """Gap that is left to what stands, while the car turns or switches lanes [m]."""

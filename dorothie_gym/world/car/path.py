@@ -18,9 +18,9 @@ TURNING_RADIUS = 4.5
 """Radius of a U-turn [m]: a little over the 3.8 m of highway-env's bicycle at full lock (60 degrees, 5 m long)."""
 
 
-U_TURN_REACH = 12.5
-"""How far ahead of its middle a car comes in a U-turn [m]: 11 m for the middle of it where lanes are 3.5 m apart (the
-farthest), 1 m of width, and what is kept beside it."""
+U_TURN_REACH = 14.0
+"""Room ahead of its middle that a car needs for a U-turn [m]: 11 m for its middle where lanes are 3.5 m apart, 1 m for
+its side, and what is kept free beside it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
