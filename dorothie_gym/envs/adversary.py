@@ -14,7 +14,7 @@ from dorothie_gym.tasks import StoryboardError, TaskState
 from dorothie_gym.world.car.planner import BRAKING
 from dorothie_gym.world.props import Prop
 from dorothie_gym.world.town import Town
-from dorothie_gym.world.town.routing import router
+from dorothie_gym.world.town.routing import CELL, router
 from dorothie_gym.world.world import World
 
 FROM_START = 30.0
@@ -28,6 +28,9 @@ FROM_SITE = 25.0
 
 FROM_CAR = 25.0
 """Nothing appears closer to the car than this [m], nor than it can stop, and turn round, before."""
+
+STANDS_BEFORE = 17.0
+"""The middle of a car that stops for a prop stands about this far before the prop's [m]."""
 
 MOST = 60
 """Vehicles, and pedestrians, that spawning fills a town up to."""
@@ -204,7 +207,7 @@ class Adversary:
         for site in town.sites:
             if site.lane == lane.id and abs(site.station - station) < FROM_SITE:
                 return "it would stand where a landmark is reached"
-        others = [*world.actors.vehicles, *(p for p in world.actors.props if p is not without)]
+        others: list[Any] = [*world.actors.vehicles, *(p for p in world.actors.props if p is not without)]
         if any(math.hypot(*(place - other.position)) < 6.0 for other in others):
             return "there is something in that place already"
         return self._cuts_off(town, (lane.id, station), without)
@@ -215,9 +218,13 @@ class Adversary:
         standing = [(p.lane_id, p.station) for p in self._world.actors.props if p is not without]
         now = search.reachable(start, standing)
         then = search.reachable(start, [*standing, place])
+        # and from where the car would stand before it, should it come there: it must not be trapped
+        lane, station = place
+        gap = [(lane, station - back) for back in np.arange(0.0, STANDS_BEFORE, CELL / 2)]
+        trapped = search.reachable((lane, station - STANDS_BEFORE), [*standing, *gap])
         for site in town.sites:
             cell = search.cell(site.lane, site.station)
-            if now[cell] and not then[cell]:
+            if now[cell] and not (then[cell] and trapped[cell]):
                 return "it would cut every way to a place where a landmark may be"
         return None
 

@@ -69,7 +69,7 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
     - v0: first version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+    metadata: ClassVar[dict[str, Any]] = {
         "name": "duo_wizard_v0",
         "render_modes": ["human", "rgb_array"],
         "render_fps": 2,

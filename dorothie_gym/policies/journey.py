@@ -21,6 +21,9 @@ SWITCH_ROOM = 16.0
 LATE = 18.0
 """A lane change or U-turn that is this overdue will not come any more [m]."""
 
+ROOM_BEFORE_OBSTACLE = 12.0
+"""Room that turning round takes before an obstacle [m]."""
+
 TIGHT = 40.0
 """A goal or lane change this close behind a U-turn is easily missed: plans are made in cells [m]."""
 
@@ -234,7 +237,7 @@ class Journey:
         return None
 
     def turning_room(self, town: Town, lane: int) -> float | None:
-        """How far beyond its planned place the next U-turn can be made, and should be if something follows right behind.
+        """How far beyond its planned place the next U-turn can be made, and should be if something is close behind.
 
         A U-turn that is made later comes out further from the goal, or from the lane change that follows it.
 
@@ -253,7 +256,9 @@ class Journey:
                 return None
             followed = k == len(self.legs) - 1 or self.legs[k + 1].entry is not Entry.FOLLOW
             tight = followed and leg.end - leg.start < TIGHT
-            return max(town.lanes[lane].length - before.end, 0.0) if tight else 0.0
+            ends = [place[1] - ROOM_BEFORE_OBSTACLE for place in self.blocked if place[0] == lane]
+            end = min([*ends, town.lanes[lane].length])
+            return max(end - before.end, 0.0) if tight else 0.0
         return None
 
     def needs_switch(self, town: Town, lane: int, station: float, crossing: Crossing) -> bool:

@@ -12,7 +12,7 @@ from dorothie_gym.world.car.hazards import Body
 from dorothie_gym.world.car.vehicle import Car
 from dorothie_gym.world.junctions import JunctionControl
 from dorothie_gym.world.network.road import TownRoad
-from dorothie_gym.world.pedestrians import KERB, Pedestrian, rightmost
+from dorothie_gym.world.pedestrians import KERB, Pedestrian, rightmost, walkway
 from dorothie_gym.world.props import Prop
 from dorothie_gym.world.town.model import Array, LinkType
 from dorothie_gym.world.town.oncoming import oncoming_lanes
@@ -73,7 +73,9 @@ class Actors:
             if len(self.vehicles) == vehicles:
                 break
             self.add_vehicle(lane, station, distance=CLEAR_OF_CAR)
-        for lane, station in free_places(self._town, self._walk_rng, pedestrians):
+        for lane, station in free_places(self._town, self._walk_rng, 12 * pedestrians):
+            if len(self.pedestrians) == pedestrians:
+                break
             self.add_pedestrian(lane, station)
 
     def add_vehicle(self, lane: int, station: float, *, distance: float) -> bool:
@@ -100,7 +102,10 @@ class Actors:
             return False
         if any(math.hypot(*(place - p.position)) < 1.0 for p in self.pedestrians):
             return False
-        pedestrian = Pedestrian(self._road, lane, station, key=self._new_key(), rng=self._walk_rng)
+        stretch = walkway(self._road.network, lane, station)
+        if stretch is None:
+            return False
+        pedestrian = Pedestrian(self._road, lane, station, stretch=stretch, key=self._new_key(), rng=self._walk_rng)
         self._road.objects.append(pedestrian)
         self.pedestrians.append(pedestrian)
         return True
@@ -186,7 +191,7 @@ class Actors:
         oncoming = oncoming_lanes(self._town).at(leftmost.id, station)
         if oncoming is not None:
             shift += oncoming.gap
-        return shift + lane.width_at(station) + 2 * KERB
+        return float(shift + lane.width_at(station) + 2 * KERB)
 
     def _before_prop(self, vehicle: TrafficVehicle) -> bool:
         return any(
@@ -201,7 +206,7 @@ class Actors:
     def _is_clear(self, place: Array, distance: float) -> bool:
         if math.hypot(*(place - self._car.position)) < distance:
             return False
-        others = [*self.vehicles, *self.props]
+        others: list[Any] = [*self.vehicles, *self.props]
         return all(math.hypot(*(place - other.position)) >= CLEAR_OF_OTHERS for other in others)
 
     def _remove(self, vehicle: TrafficVehicle) -> None:
@@ -220,7 +225,7 @@ class Actors:
 
 
 def _near(thing: Any, car: Car, reach: float) -> bool:
-    return math.hypot(*(thing.position - car.position)) < reach + thing.diagonal / 2
+    return bool(math.hypot(*(thing.position - car.position)) < reach + thing.diagonal / 2)
 
 
 def _body(kind: ObjectClass, key: int, thing: Any) -> Body:

@@ -60,6 +60,30 @@ class JunctionControl:
         self._crossing: dict[tuple[int, int], bool] = {}
         self._held: dict[int, list[_Claim]] = {}
         self._waiting: dict[int, _Claim] = {}
+        self._closed: dict[int, tuple[int, float]] = {}  # junction: who closed it, and when it asked last
+
+    def close(self, key: int, junction: int, now: float) -> bool:
+        """Asks for a whole junction, to turn round in its mouth; to be repeated as long as it is needed.
+
+        Args:
+            key: tells the vehicle apart.
+            junction: id of the junction.
+            now: simulated time [s].
+
+        Returns:
+            Whether it is empty; then nobody else is let in while this is repeated.
+        """
+        self._closed[junction] = (key, now)
+        return not any(
+            self._junction(claim.connector) == junction
+            for other, claims in self._held.items()
+            if other != key
+            for claim in claims
+        )
+
+    def _is_closed_to(self, key: int, junction: int, now: float) -> bool:
+        closed = self._closed.get(junction)
+        return closed is not None and closed[0] != key and now - closed[1] < LAPSE
 
     def request(self, key: int, connector: int, now: float, *, room: bool) -> bool:
         """Asks to enter a connector; to be repeated until the vehicle is on it.
@@ -86,6 +110,8 @@ class JunctionControl:
         waiting.asked = now
         if not room:
             waiting.since = now  # whoever cannot leave the junction keeps nobody waiting
+            return False
+        if self._is_closed_to(key, self._junction(connector), now):
             return False
         if any(
             self.crosses(connector, claim.connector)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from highway_env.vehicle.objects import RoadObject
 
+from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.network.road import TownRoad
 from dorothie_gym.world.town.model import LinkType, Town
 
@@ -16,6 +17,15 @@ WALKING_SPEED = 1.3
 
 KERB = 1.6
 """Distance from the lane's edge at which they walk [m]."""
+
+FROM_ENDS = 4.0
+"""How far from the ends of a lane they turn back [m]."""
+
+WALK_STEP = 2.0
+"""Step in which a walkway is looked for [m]."""
+
+SHORTEST_WALK = 8.0
+"""Shortest walkway [m]."""
 
 CROSSING_RATE = 1 / 45
 """How often a pedestrian wants to cross [1/s]."""
@@ -36,6 +46,27 @@ SAFE_DISTANCE = 14.0
 """And distance [m]."""
 
 
+def walkway(network: TownNetwork, lane_id: int, station: float) -> tuple[float, float] | None:
+    """The stretch beside a lane around a place on which one walks on no other lane [m], or None if there is none."""
+    lane = network.town.lanes[lane_id]
+
+    def is_free(at: float) -> bool:
+        place = lane.position(at, lane.width_at(at) / 2 + KERB)
+        closest = network.get_lane(network.get_closest_lane_index(place, height=lane.height_at(at)))
+        along, lateral = closest.local_coordinates(place)
+        return bool(abs(lateral) > closest.width_at(along) / 2 + KERB / 2)
+
+    low, high = FROM_ENDS, lane.length - FROM_ENDS
+    if not low <= station <= high or not is_free(station):
+        return None
+    first = last = station
+    while first - WALK_STEP >= low and is_free(first - WALK_STEP):
+        first -= WALK_STEP
+    while last + WALK_STEP <= high and is_free(last + WALK_STEP):
+        last += WALK_STEP
+    return (first, last) if last - first >= SHORTEST_WALK else None
+
+
 def rightmost(town: Town, lane_id: int) -> int:
     """The last of the lanes beside one another to the right: who walks beside it does not walk on another lane."""
     while (beside := town.neighbour(lane_id, LinkType.LANE_CHANGE_RIGHT)) is not None:
@@ -53,8 +84,21 @@ class Pedestrian(RoadObject):
 
     LENGTH, WIDTH = 0.5, 0.5
 
-    def __init__(self, road: TownRoad, lane_id: int, station: float, *, key: int, rng: np.random.Generator) -> None:
-        lane_id = rightmost(road.network.town, lane_id)
+    def __init__(
+        self, road: TownRoad, lane_id: int, station: float, *,
+        stretch: tuple[float, float], key: int, rng: np.random.Generator,
+    ) -> None:  # fmt: skip
+        """Puts a pedestrian beside a lane.
+
+        Args:
+            road: of the town.
+            lane_id: the lane, the rightmost one.
+            station: distance along it [m].
+            stretch: between which stations it walks [m].
+            key: of its own.
+            rng: of its decisions.
+        """
+        self._stretch = stretch
         self._lane = road.network.town.lanes[lane_id]
         self._rng = rng
         self.key = key
@@ -90,26 +134,13 @@ class Pedestrian(RoadObject):
             self._lateral += step
         else:
             self._station += self._direction * WALKING_SPEED * dt
-            if not 4.0 < self._station < self._lane.length - 4.0:
-                self._direction = 1.0 if self._station <= 4.0 else -1.0
+            if not self._stretch[0] < self._station < self._stretch[1]:
+                self._direction = 1.0 if self._station <= self._stretch[0] else -1.0
             if self._rng.random() < CROSSING_RATE * dt and self._is_clear():
                 near = abs(self._lateral - self._home) < 0.1
                 self._far = self._home - across(self) if near else self._lateral
                 self._target = self._far if near else self._home
         self._place()
-
-    def _wait(self, dt: float, crossing: bool) -> None:
-        """Stands before a vehicle; turns back when it does not go away, for its driver may be waiting, too."""
-        self.speed = 0.0
-        self._waited += dt
-        if self._waited < PATIENCE:
-            return
-        self._waited = 0.0
-        if crossing:
-            self._target, self._origin = self._origin, self._target
-        else:
-            self._direction = -self._direction
-        self.heading = self._heading()
 
     def _would_touch_vehicle(self, dt: float) -> bool:
         """Whether the next step leads up to a vehicle: nobody walks into the side of a car."""
@@ -142,7 +173,7 @@ class Pedestrian(RoadObject):
         return True
 
     def _heading(self) -> float:
-        along = self._lane.heading_at(self._station)
+        along: float = self._lane.heading_at(self._station)
         if abs(self._target - self._lateral) > 0.05:
             return along + math.copysign(math.pi / 2, self._target - self._lateral)
         return along if self._direction > 0 else along + math.pi

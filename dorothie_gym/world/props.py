@@ -7,7 +7,6 @@ from highway_env.vehicle.objects import Obstacle
 from dorothie_gym.ontology import PropKind
 from dorothie_gym.world.network.road import TownRoad
 
-
 PROP_KINDS = tuple(PropKind)
 """Kinds in the order of their numbers in observations and actions."""
 

@@ -71,6 +71,10 @@ class TrafficVehicle(IDMVehicle):
         standing: how long it has been standing [s].
     """
 
+    # set by stock's initialisers, which carry no types
+    speed: float
+    target_lane_index: LaneIndex
+
     def __init__(
         self,
         road: TownRoad,

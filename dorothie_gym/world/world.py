@@ -15,6 +15,7 @@ from dorothie_gym.ontology import ObjectClass, PhysicalAction, Sensor
 from dorothie_gym.world.actors import Actors
 from dorothie_gym.world.car.driver import Driver
 from dorothie_gym.world.car.hazards import HEIGHT_MARGIN, Body, Hazard, bodies_ahead
+from dorothie_gym.world.car.path import U_TURN_REACH
 from dorothie_gym.world.car.planner import BRAKING, LocalPlanner
 from dorothie_gym.world.car.vehicle import Car
 from dorothie_gym.world.config import FRAME_RATE, WorldConfig
@@ -40,6 +41,9 @@ TURN_ROUND_SPEED = 4.0
 
 UPSTREAM = 50.0
 """How far before a lane's start vehicles that come towards it are looked for [m]."""
+
+BEGUN = 1.0
+"""A manoeuvre from a stand has begun after this way [m]."""
 
 EXTEND_EVERY = 15
 """The path is lengthened this often [frames]."""
@@ -249,7 +253,12 @@ class World:
         planner, path = self.planner, self.planner.path
         action, _ = planner.manoeuvre
         k = path.index_at(planner.s)
-        if path.manoeuvre[k] or not path.manoeuvre[k:].any():
+        turning = action is PhysicalAction.U_TURN
+        if path.manoeuvre[k] and (planner.s > BEGUN or float(self.car.speed) > STANDING):
+            if turning:
+                self._close_junction(path.points[k])
+            return None
+        if not path.manoeuvre[k:].any():
             return None
         start = k + int(np.argmax(path.manoeuvre[k:]))
         ahead = float(path.s[start]) - planner.s
@@ -257,7 +266,6 @@ class World:
             return None
         target = int(path.lanes[start])
         meeting, _ = self.town.lanes[target].project(np.asarray(path.points[start]))
-        turning = action is PhysicalAction.U_TURN
         for body in bodies:
             if body.kind is not ObjectClass.VEHICLES:
                 continue
@@ -270,7 +278,29 @@ class World:
                 behind = 8.0 + 3.0 * max(body.speed - float(self.car.speed), 0.0)
             if -behind < station - meeting < 9.0:
                 return Hazard(kind=ObjectClass.VEHICLES, gap=max(ahead, 0.0) + 2.0, key=body.key)
+        # asked for last: those who wait before the junction have to go first
+        if turning and not self._close_junction(path.points[start]):
+            return Hazard(kind=ObjectClass.VEHICLES, gap=max(ahead, 0.0) + 2.0, key=-2)
         return None
+
+    def _close_junction(self, start: Array) -> bool:
+        """Keeps others out of junctions into which a U-turn reaches that begins at a place [m]; tells if it is free."""
+        free = True
+        for junction, (x, y), radius in self._mouths:
+            if math.hypot(x - start[0], y - start[1]) < radius + U_TURN_REACH:
+                free &= self.junctions.close(CAR, junction, self.time)
+        return free
+
+    @functools.cached_property
+    def _mouths(self) -> list[tuple[int, tuple[float, float], float]]:
+        """Junctions: id, a middle [m], and the radius in which their connectors lie [m]."""
+        found = []
+        for junction in self.town.junctions:
+            points = np.concatenate([self.town.lanes[lane].points[:, :2] for lane in junction.connectors])
+            middle = (points.min(axis=0) + points.max(axis=0)) / 2
+            radius = float(np.hypot(*(points - middle).T).max())
+            found.append((junction.id, (float(middle[0]), float(middle[1])), radius))
+        return found
 
     def _place_towards(self, target: int, body: Body) -> float | None:
         """Where a body is along a lane, negative where it comes towards its start, or None if it does not [m]."""

@@ -16,8 +16,9 @@ from dorothie_gym.ontology import (
     SlotValue,
     StreetName,
 )
-from dorothie_gym.policies.co_wizard.driving import direction_of, wanted_exit
+from dorothie_gym.policies.co_wizard.driving import wanted_exit
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View
+from dorothie_gym.policies.journey import direction_of
 from dorothie_gym.policies.scenery import street_of
 from dorothie_gym.policies.speech import remark
 

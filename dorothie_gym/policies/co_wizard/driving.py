@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from dorothie_gym.ontology import LandmarkName, PhysicalAction
+from dorothie_gym.ontology import LandmarkName, ObjectClass, PhysicalAction
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View, Wish
 from dorothie_gym.policies.journey import (
     BRAKING,
     SWITCH_ROOM,
     U_TURN_SPEED_SQUARED,
     Crossing,
-    direction_of,
     find_exit,
     lanes_ahead,
     lanes_beside,
@@ -153,7 +152,8 @@ def _manoeuvre(mind: CoWizardMind, view: View) -> Physical | None:
         if room is None:
             return None
         beyond = min(U_TURN_MARGIN, room - 6.0) if room > 0.0 else -2.0
-        return turn_round(mind, view) if distance <= reach - beyond else None
+        held_up = view.standing and view.motion is Motion.HAZARD and view.hazard is ObjectClass.STATIC
+        return turn_round(mind, view) if distance <= reach - beyond or held_up else None
     if not _needs_switch(mind, view, crossing):
         return None
     return _switch(mind, view, LinkType.LANE_CHANGE_LEFT if entry is Entry.CHANGE_LEFT else LinkType.LANE_CHANGE_RIGHT)
@@ -241,6 +241,3 @@ def creep(mind: CoWizardMind, view: View) -> None:
     distance = distance_ahead(mind, view, mind.place)
     if distance is None or distance < 6.0:
         mind.note_place(landmark, place_ahead(mind, view, 16.0))
-
-
-__all__ = ["creep", "direction_of", "distance_ahead", "drive", "place_ahead", "turn_round", "wanted_exit"]

@@ -43,6 +43,9 @@ NEAR = 95.0
 CAREFUL = 15.0
 """Speed that the car is told to go at when it has missed a place before [km/h]."""
 
+SLOW_WITHIN = 20.0
+"""A car that has been told of the place is slow from here on [m]."""
+
 SLOW_SPEED = 5.0
 """A car that is this slow need not be told to come up slowly [m/s]."""
 
@@ -103,6 +106,9 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
         return
     near = distance < (_turning_distance(mind, view) if key[0] == "round" else TELL_DISTANCE)
     waited = view.time - max(mind.guided_at, mind.heard_at)
+    on_its_lane = key[0] == "round" and mind.journey.turning_room(mind.town, view.lane) is not None
+    if on_its_lane and mind.standing_since is not None and view.time - mind.standing_since > 4.0:
+        near = True
     stuck = view.standing and waited > AGAIN and view.time > mind.excused_until
     if not near and stuck:
         key, words = ("on", view.lane, 0), remark(DialogueMove.INSTRUCT, ActionValue.START)
@@ -228,14 +234,13 @@ def _approach(mind: ParticipantMind, view: View, rng: np.random.Generator) -> bo
             mind.voice = mind.voice.plan(Remark(act=_STOP, text=mind.stop_text, urgent=True))
         return True
     if not mind.announced and left < NEAR and view.speed > SLOW_SPEED and mind.goal is not None:
-        mind.announced = True
         if left > 3.5 * view.speed + 20.0:
             wording = Wording(distance=max(left - view.speed * 3.0, 10.0))
             words = remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, mind.goal.name, wording=wording, urgent=True)
-            mind.voice = mind.voice.plan(words)
+            mind.announced, mind.voice = True, mind.voice.plan(words)
         elif left > 1.5 * view.speed + 5.0:
             slower = remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=Wording(faster=False), urgent=True)
-            mind.voice = mind.voice.plan(slower)
+            mind.announced, mind.voice = True, mind.voice.plan(slower)
     return left < NEAR
 
 
@@ -244,6 +249,8 @@ _STOP = DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.STOP)
 
 def _time_to_stop(mind: ParticipantMind, view: View, left: float) -> bool:
     """Whether the words, begun now, stop the car closer to the place than if begun at the next decision."""
+    if mind.announced and left > SLOW_WITHIN:
+        return False  # it is about to slow down
     delay = math.ceil(speech_seconds(mind.stop_text) / DECISION - 1e-6) * DECISION
     gain = min(max((view.speed - mind.speed_before) / DECISION, -2.0), 2.0)
     then = min(max(view.speed + gain * delay, 0.0), max(FASTEST, view.speed))

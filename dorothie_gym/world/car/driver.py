@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dorothie_gym.ontology import ObjectClass, PhysicalAction
-from dorothie_gym.world.car.control import Control, PathController
+from dorothie_gym.world.car.control import MAX_BRAKING, Control, PathController
 from dorothie_gym.world.car.hazards import Hazard
 from dorothie_gym.world.car.path import Path
 from dorothie_gym.world.car.planner import BRAKING, U_TURN_SPEED, LocalPlanner
@@ -156,7 +156,12 @@ class Driver:
             target = min(target, self._hold_speed)
         else:
             self._hold_speed = None
-        return self._controller.step(planner.path, planner.s, planner.offset, heading, speed, target, dt)
+        control = self._controller.step(planner.path, planner.s, planner.offset, heading, speed, target, dt)
+        needed = hazard.braking(speed) if hazard is not None else 0.0
+        if needed > PROFILE_BRAKING:
+            # the speed controller lags behind: before a hazard the brake is applied that stops the car in time
+            control = replace(control, throttle=0.0, brake=max(control.brake, min(needed / MAX_BRAKING, 1.0)))
+        return control
 
     def _prepare(self) -> None:
         path = self.planner.path

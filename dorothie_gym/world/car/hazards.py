@@ -33,8 +33,8 @@ REACTION = 0.4
 STANDSTILL_GAP = 2.5
 """Gap that is left to a body that stands [m]."""
 
-ROADBLOCK_GAP = 14.0
-"""Gap that the car aims to leave to a prop [m]: room for a U-turn, and 2 m by which it comes closer."""
+ROADBLOCK_GAP = 12.5
+"""Gap that is left to a prop [m]: room for a U-turn (`path.U_TURN_REACH` from the car's middle)."""
 
 TIGHT_GAP = 1.0
 """Gap that is left to what stands, while the car turns or switches lanes [m]."""
@@ -85,13 +85,21 @@ class Hazard:
     def safe_speed(self, friction: float = 1.0) -> float:
         """Speed from which the car can still stop behind it (Gipps 1981, with the leader braking as hard) [m/s]."""
         braking = HARD_BRAKING * friction
+        slack = braking * REACTION
+        return -slack + math.sqrt(slack**2 + self.speed**2 + 2 * braking * self._room)
+
+    def braking(self, speed: float) -> float:
+        """Deceleration that stops the car behind it from a speed [m/s], or slows it to the same speed [m/s^2]."""
+        return max(speed**2 - self.speed**2, 0.0) / (2 * max(self._room, 0.05))
+
+    @property
+    def _room(self) -> float:
+        """Way that is left to the place where the car is to stop [m]."""
         if self.tight and self.speed < 0.5:
             margin = TIGHT_GAP
         else:
             margin = ROADBLOCK_GAP if self.kind is ObjectClass.STATIC else STANDSTILL_GAP
-        room = max(self.gap - margin, 0.0)
-        slack = braking * REACTION
-        return -slack + math.sqrt(slack**2 + self.speed**2 + 2 * braking * room)
+        return max(self.gap - margin, 0.0)
 
 
 def bodies_ahead(

@@ -167,7 +167,7 @@ class Path:
     @property
     def length(self) -> float:
         """Length of the path [m]."""
-        return self._s[-1]
+        return float(self._s[-1])
 
     def index_at(self, s: float) -> int:
         """Number of the point at or before a distance along the path."""
@@ -219,7 +219,7 @@ class Path:
         k = min(self.index_at(s), len(self._s) - 2)
         t = (s - self._s[k]) / (self._s[k + 1] - self._s[k])
         t = min(max(t, 0.0), 1.0)
-        return values[k] + t * (values[k + 1] - values[k])
+        return float(values[k] + t * (values[k + 1] - values[k]))
 
 
 def _sample(lane: Lane, stations: Array) -> Array:

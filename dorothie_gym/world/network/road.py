@@ -125,7 +125,9 @@ class TownRoad(Road):
         if not index:
             return nobody
         others = [
-            t for t in itertools.chain(self.vehicles, self.objects) if t is not vehicle and not _is_landmark(type(t))
+            t
+            for t in itertools.chain(self.vehicles, self.objects)
+            if t is not vehicle and not _is_landmark(t.__class__)
         ]
         if not others:
             return nobody

@@ -118,7 +118,7 @@ class Router:
         self._edge_kind = {(r, c): kind for r, c, kind in zip(rows, columns, kinds, strict=True)}
         self._edge_length = {(r, c): length for r, c, length in zip(rows, columns, lengths, strict=True)}
         size_of = int(self._first[-1])
-        self._graph = csr_matrix((costs, (rows, columns)), shape=(size_of, size_of))
+        self._graph: csr_matrix[np.float64] = csr_matrix((costs, (rows, columns)), shape=(size_of, size_of))
 
     def _add_side_edges(self, lane_id: int, edge: object) -> None:
         assert callable(edge)
@@ -172,17 +172,19 @@ class Router:
             return Route(legs=(Leg(start[0], Entry.FOLLOW, start[1], goal[1]),), length=max(goal[1] - start[1], 0.0))
         if source == target:
             return self._round_trip(graph, start, goal)
-        cost, previous = dijkstra(graph, indices=source, return_predecessors=True)
+        cost, previous = dijkstra(graph, indices=np.array(source), return_predecessors=True)
         if not math.isfinite(cost[target]):
             return None
         return self._compress(_trace(previous, source, target), start, goal)
 
-    def _round_trip(self, graph: csr_matrix, start: Place, goal: Place) -> Route | None:
+    def _round_trip(self, graph: csr_matrix[np.float64], start: Place, goal: Place) -> Route | None:
         cell = self.cell(*start)
-        cost, previous = dijkstra(graph, indices=cell, return_predecessors=True)
-        column = self._graph.getcol(cell).tocoo().row
+        cost, previous = dijkstra(graph, indices=np.array(cell), return_predecessors=True)
+        column = self._graph.tocsc()[:, [cell]].tocoo()
         ends = [
-            (float(cost[k]), int(k)) for k in column if math.isfinite(cost[k]) and (int(k), cell) in self._edge_kind
+            (float(cost[k] + last), int(k))
+            for k, last in zip(column.row, column.data, strict=True)
+            if math.isfinite(cost[k]) and (int(k), cell) in self._edge_kind
         ]
         if not ends:
             return None
@@ -201,10 +203,11 @@ class Router:
     def distances_to(self, goal: Place, blocked: Sequence[Place] = ()) -> NDArray[np.float64]:
         """Cost of the way from every cell to a goal [m of driving and its worth in detour]; inf where there is none."""
         target = self.cell(*goal)
-        result: NDArray[np.float64] = dijkstra(self._without(self.cells_of(blocked) - {target}).T, indices=target)
+        graph = self._without(self.cells_of(blocked) - {target})
+        result: NDArray[np.float64] = dijkstra(graph.T, indices=np.array(target))
         return result
 
-    def _without(self, cells: set[int]) -> csr_matrix:
+    def _without(self, cells: set[int]) -> csr_matrix[np.float64]:
         if not cells:
             return self._graph
         keep = np.ones(self._graph.shape[0])

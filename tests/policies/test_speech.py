@@ -1,0 +1,45 @@
+import numpy as np
+
+from dorothie_gym.ontology import DialogueMove, LandmarkName, Role
+from dorothie_gym.policies.speech import ANSWER_TIME, Voice, remark
+
+RNG = np.random.default_rng(0)
+
+
+def voice() -> Voice:
+    return Voice(role=Role.PARTICIPANT)
+
+
+def test_a_question_is_followed_by_silence_for_an_answer():
+    speaker = voice().plan(remark(DialogueMove.QUERY_W), remark(DialogueMove.EXPLAIN))
+    first, speaker = speaker.speak(0.0, 0.0, RNG)
+    assert first is not None and first.act.move is DialogueMove.QUERY_W
+    silent, speaker = speaker.speak(speaker.last_end + 0.1, 0.0, RNG)
+    assert silent is None
+    spoken, _ = speaker.speak(speaker.last_end + ANSWER_TIME + 0.1, 0.0, RNG)
+    assert spoken is not None
+
+
+def test_an_answer_of_the_other_ends_the_silence():
+    _, speaker = voice().plan(remark(DialogueMove.QUERY_W), remark(DialogueMove.EXPLAIN)).speak(0.0, 0.0, RNG)
+    spoken, _ = speaker.heard_other(2.0).speak(2.0, 0.0, RNG)
+    assert spoken is not None
+
+
+def test_joined_remarks_go_on_in_the_same_breath():
+    two = voice().plan(remark(DialogueMove.REPLY_N), remark(DialogueMove.INSTRUCT, LandmarkName.KFC, joined=True))
+    _, speaker = two.speak(0.0, 0.0, RNG)
+    spoken, _ = speaker.speak(0.5, 0.4, RNG)
+    assert spoken is not None and "KFC" in spoken.text
+
+
+def test_nobody_interrupts_himself():
+    _, speaker = voice().plan(remark(DialogueMove.EXPLAIN), remark(DialogueMove.EXPLAIN)).speak(0.0, 0.0, RNG)
+    spoken, _ = speaker.speak(0.5, 1.0, RNG)
+    assert spoken is None
+
+
+def test_what_has_expired_is_dropped_with_what_goes_on_from_it():
+    late = voice().plan(remark(DialogueMove.EXPLAIN, expires=1.0), remark(DialogueMove.INSTRUCT, joined=True))
+    spoken, speaker = late.speak(2.0, 0.0, RNG)
+    assert spoken is None and speaker.idle

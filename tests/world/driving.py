@@ -1,0 +1,101 @@
+"""Cars on their own, and worlds without others, to test driving with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from dorothie_gym.ontology import PropKind
+from dorothie_gym.world.car.driver import Driver
+from dorothie_gym.world.car.planner import LocalPlanner
+from dorothie_gym.world.car.vehicle import Car
+from dorothie_gym.world.config import FRAME_RATE, WorldConfig
+from dorothie_gym.world.network.network import TownNetwork
+from dorothie_gym.world.network.road import TownRoad
+from dorothie_gym.world.town import Town, load_town
+from dorothie_gym.world.world import World, WorldEvent
+
+MAPS = Path(__file__).resolve().parents[2] / "../shared/maps"
+DT = 1.0 / FRAME_RATE
+ALONE = WorldConfig(vehicles=0, pedestrians=0)
+
+
+@lru_cache(maxsize=4)
+def network(name: str) -> TownNetwork:
+    """A town by its name, or by that of a map that is there on some machines only."""
+    if not name.startswith("Town"):
+        return TownNetwork(load_town(name))
+    file = MAPS / f"{name}.xodr"
+    if not file.exists():
+        pytest.skip(f"the map {name}.xodr is not on this machine")
+    return TownNetwork(load_town(file))
+
+
+class Trip(NamedTuple):
+    """A car, what drives it, and how far it came off its path at most [m]."""
+
+    car: Car
+    driver: Driver
+    worst: float
+    arrived: bool
+
+    @property
+    def planner(self) -> LocalPlanner:
+        return self.driver.planner
+
+
+def on_lane(town: TownNetwork, lane: int, station: float) -> tuple[Car, Driver]:
+    place = town.town.lanes[lane]
+    car = Car(TownRoad(town), place.position(station), place.heading_at(station), place.height_at(station))
+    return car, Driver(LocalPlanner(town.town, lane, station), length=car.LENGTH)
+
+
+def drive(car: Car, driver: Driver, until: Callable[[], bool], seconds: float = 60.0) -> Trip:
+    """Drives without anybody else until something holds, looked at every frame."""
+    worst = 0.0
+    for frame in range(round(seconds * FRAME_RATE)):
+        if frame % 15 == 0:
+            driver.planner.extend(float(car.speed))
+        x, y = (float(v) for v in car.position)
+        control = driver.control(x, y, float(car.heading), float(car.speed), None, DT)
+        car.height = driver.planner.height
+        car.drive(control, DT)
+        car.step(DT)
+        driver.planner.advance(*(float(v) for v in car.position))
+        worst = max(worst, abs(driver.planner.offset))
+        if until():
+            return Trip(car, driver, worst, True)
+    return Trip(car, driver, worst, False)
+
+
+def off_centre(town: Town, lane: int, car: Car) -> float:
+    """Distance of a car from the centre line of a lane [m]."""
+    return abs(town.lanes[lane].project(np.asarray(car.position))[1])
+
+
+def world_at(name: str, lane: int, station: float, config: WorldConfig = ALONE, seed: int = 1) -> World:
+    roads = network(name)
+    return World(roads.town, config, seed=np.random.SeedSequence(seed), departure=(lane, station), network=roads)
+
+
+def run(world: World, seconds: float, until: Callable[[], bool] = lambda: False) -> list[WorldEvent]:
+    """Lets a world run by decisions of half a second; returns its events."""
+    events: list[WorldEvent] = []
+    for _ in range(round(2 * seconds)):
+        events += world.step(15)
+        if until():
+            break
+    return events
+
+
+def long_lane(town: Town, least: float = 110.0) -> int:
+    """A lane of some length outside junctions."""
+    return next(lane.id for lane in town.lanes if not lane.in_junction and lane.length > least)
+
+
+PROPS = tuple(PropKind)
