@@ -33,6 +33,9 @@ REASON = 3.0
 FIRST_WORD = 5.0
 """The human is left to speak first until this time [s]."""
 
+TOLD_AGAIN = 20.0
+"""A hazard is not explained again within this time, even if the car has inched on [s]."""
+
 NEXT = 4.0
 """Silence after which it asks what comes next [s]."""
 
@@ -112,7 +115,7 @@ def _ask_goal(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
 def _explain_hazard(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
     if view.motion is not Motion.HAZARD or mind.standing_since is None or view.hazard is ObjectClass.UNLABELED:
         return
-    if view.time - mind.standing_since < REASON or mind.hazard_told > mind.standing_since:
+    if view.time - mind.standing_since < REASON or view.time - mind.hazard_told < TOLD_AGAIN:
         return
     mind.hazard_told = view.time
     if view.hazard is ObjectClass.TRAFFIC_LIGHT and rng.random() < 0.6:

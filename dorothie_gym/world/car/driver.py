@@ -23,6 +23,9 @@ LATERAL_ACCELERATION = 2.2
 PROFILE_BRAKING = 2.0
 """Deceleration towards a curve or the end of the path [m/s^2]."""
 
+SURE_BRAKING = 1.8
+"""From this on, braking that is needed is applied whatever the speed controller says [m/s^2]."""
+
 APPROACH_SPEED = 14.0 * KMH
 """Speed near a goal, under the design's 15 km/h [m/s]."""
 
@@ -76,6 +79,12 @@ class SpeedProfile:
         else:
             near = math.inf
         return min(near, self._speeds[self._path.index_at(s)])
+
+    def braking(self, s: float, speed: float) -> float:
+        """Deceleration that stops the car at the end of the path from a speed [m/s]; 0 where it goes on [m/s^2]."""
+        if self._stop_at is None:
+            return 0.0
+        return speed**2 / (2 * max(self._stop_at - s, 0.05))
 
 
 class Driver:
@@ -157,9 +166,10 @@ class Driver:
         else:
             self._hold_speed = None
         control = self._controller.step(planner.path, planner.s, planner.offset, heading, speed, target, dt)
-        needed = hazard.braking(speed) if hazard is not None else 0.0
-        if needed > PROFILE_BRAKING:
-            # the speed controller lags behind: before a hazard the brake is applied that stops the car in time
+        assert self._profile is not None
+        needed = max(self._profile.braking(planner.s, speed), hazard.braking(speed) if hazard is not None else 0.0)
+        if needed > SURE_BRAKING:
+            # the speed controller lags behind: before a hazard or line the brake is applied that stops the car in time
             control = replace(control, throttle=0.0, brake=max(control.brake, min(needed / MAX_BRAKING, 1.0)))
         return control
 

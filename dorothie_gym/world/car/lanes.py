@@ -30,7 +30,7 @@ EXACT = 5.0
 LEAD = 1.0
 """Room that a manoeuvre leaves to the car before it begins [m]."""
 
-WAITING_ROOM = 3.5
+WAITING_ROOM = 4.5
 """A lane switch ends this far before the end of a lane at which the car may have to wait [m]."""
 
 MOST_CHANGES = 3

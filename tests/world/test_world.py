@@ -1,0 +1,204 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from dorothie_gym.ontology import ObjectClass, PhysicalAction, PropKind, Sensor, WeatherParameter
+from dorothie_gym.world.config import WorldConfig
+from dorothie_gym.world.pedestrians import Pedestrian
+from dorothie_gym.world.town import LinkType
+from dorothie_gym.world.world import World, WorldEventKind
+from tests.world.driving import PROPS, long_lane, network, run, world_at
+
+
+def stops_before_a_prop(world: World, station: float, kind: PropKind) -> list[WorldEventKind]:
+    world.actors.add_prop(kind, world.planner.lane, station)
+    events = run(world, 60.0, lambda: world.car.speed < 0.05 and world.time > 3.0)
+    assert world.collisions == 0
+    return [event.kind for event in events]
+
+
+@pytest.mark.parametrize("trouble", ["none", "fog", "blind"])
+@pytest.mark.parametrize("kind", PROPS)
+def test_car_stops_behind_roadblock_and_can_turn_round(kind: PropKind, trouble: str) -> None:
+    town = network("brookside").town
+    world = world_at("brookside", long_lane(town), 2.0)
+    if trouble == "fog":
+        for parameter in (WeatherParameter.FOG_DENSITY, WeatherParameter.WETNESS):
+            world.weather.set_share(parameter, 1.0)
+    if trouble == "blind":
+        world.set_fault(Sensor.VIEW, True)
+    lane = world.planner.lane
+    stops_before_a_prop(world, 60.0, kind)
+    assert 9.0 < 60.0 - kind.length / 2 - world.planner.station - world.car.LENGTH / 2 < 14.0
+    assert world.planner.command(PhysicalAction.U_TURN, 0, 0.0) is None
+    run(world, 30.0, lambda: world.planner.manoeuvre[0] is None)
+    assert world.planner.manoeuvre[0] is None
+    assert world.planner.lane != lane
+    assert world.collisions == 0
+
+
+def test_car_switches_lanes_round_a_roadblock() -> None:
+    town = network("Town05").town
+    lane = next(
+        lane.id
+        for lane in town.lanes
+        if lane.length > 110.0 and not lane.in_junction and town.neighbour(lane.id, LinkType.LANE_CHANGE_LEFT)
+    )
+    world = world_at("Town05", lane, 2.0)
+    stops_before_a_prop(world, 70.0, PropKind.STREET_BARRIER)
+    assert world.planner.command(PhysicalAction.LANE_SWITCH, 90, 0.0) is None
+    run(world, 30.0, lambda: world.planner.manoeuvre[0] is None)
+    assert world.planner.lane == town.neighbour(lane, LinkType.LANE_CHANGE_LEFT)
+    assert world.collisions == 0
+
+
+def test_hazard_stop_and_its_end_are_each_told_once_with_their_reason() -> None:
+    town = network("brookside").town
+    world = world_at("brookside", long_lane(town), 2.0)
+    prop = world.actors.add_prop(PropKind.DUMPSTER, world.planner.lane, 60.0)
+    events = run(world, 20.0)
+    assert [event.kind for event in events] == [WorldEventKind.HAZARD_STOP]
+    assert events[0].data["reason"] == ObjectClass.STATIC.label
+    assert type(events[0].data["distance"]) is float
+    world.actors.remove_prop(prop)
+    events = run(world, 5.0)
+    assert [event.kind for event in events] == [WorldEventKind.HAZARD_END]
+    assert events[0].data["reason"] == ObjectClass.STATIC.label
+    assert events[0].data["seconds"] > 5.0
+
+
+def test_car_stops_behind_a_standing_vehicle() -> None:
+    town = network("brookside").town
+    world = world_at("brookside", long_lane(town), 2.0)
+    assert world.actors.add_vehicle(world.planner.lane, 70.0, distance=10.0)
+    vehicle = world.actors.vehicles[0]
+    vehicle.act = lambda: vehicle.action.update(acceleration=0.0, steering=0.0)  # type: ignore[method-assign]
+    run(world, 14.0)
+    assert world.car.speed < 0.05
+    assert world.collisions == 0
+    assert 1.5 < math.hypot(*(vehicle.position - world.car.position)) - 5.0 < 5.0
+
+
+def test_car_stops_for_a_crossing_pedestrian() -> None:
+    town = network("brookside").town
+    world = world_at("brookside", long_lane(town), 2.0)
+    assert world.actors.add_pedestrian(world.planner.lane, 45.0)
+    walker = world.actors.pedestrians[0]
+    walker._stretch = (44.0, 46.0)
+    slowest, events = 40.0, []
+    for _ in range(40):
+        events += world.step(15)
+        if walker._far == walker._home and world.planner.station > 26.0:
+            walker._target = walker._far = -6.0  # steps out 19 m before the car
+        if walker._far != walker._home:
+            slowest = min(slowest, float(world.car.speed))
+    assert slowest < 3.0
+    assert world.collisions == 0
+    assert not any(event.kind is WorldEventKind.COLLISION for event in events)
+
+
+def test_pedestrians_walk_on_no_lane() -> None:
+    for name in ("brookside", "Town05"):
+        roads = network(name)
+        site = roads.town.sites[0]
+        world = world_at(name, site.lane, site.station, WorldConfig(vehicles=0, pedestrians=12))
+        assert len(world.actors.pedestrians) == 12
+        for _ in range(60):
+            world.step(15)
+            for walker in world.actors.pedestrians:
+                if abs(walker._lateral - walker._home) > 0.1:
+                    continue  # crossing
+                lane = roads.get_lane(roads.get_closest_lane_index(walker.position, height=walker.height))
+                station, lateral = lane.local_coordinates(walker.position)
+                assert abs(lateral) > lane.width_at(station) / 2
+
+
+def test_pedestrian_does_not_walk_into_a_car() -> None:
+    town = network("brookside").town
+    world = world_at("brookside", long_lane(town), 2.0)
+    world.planner.command(PhysicalAction.STOP, 0, 0.0)
+    lane = town.lanes[world.planner.lane]
+    walker = Pedestrian(
+        world.road, lane.id, 20.0, stretch=(4.0, 60.0), key=99, rng=np.random.default_rng(0)
+    )
+    world.road.objects.append(walker)
+    world.actors.pedestrians.append(walker)
+    walker._target = walker._far = -6.0
+    walker._station = 3.0
+    run(world, 20.0)
+    assert not world.car.crashed
+    assert not walker.crashed
+
+
+@pytest.mark.parametrize("frames", [1, 15, 300])
+def test_path_never_runs_out_however_seldom_decisions_are(frames: int) -> None:
+    town = network("Town05").town
+    site = town.sites[0]
+    world = world_at("Town05", site.lane, site.station, WorldConfig(vehicles=0, pedestrians=0, cruise_speed=90.0))
+    for _ in range(900 // frames):
+        world.step(frames)
+        assert world.planner.room > 0.0
+        assert abs(world.planner.offset) < 0.6
+
+
+def test_blind_car_goes_at_walking_pace_and_the_fault_ends_by_itself() -> None:
+    town = network("brookside").town
+    world = world_at("brookside", long_lane(town), 2.0)
+    assert world.set_fault(Sensor.VIEW, True) is None
+    assert world.set_fault(Sensor.VIEW, True) == "the fault of view is on already"
+    run(world, 5.0)
+    assert world.car.speed < 2.0
+    run(world, 24.5)
+    assert Sensor.VIEW in world.faults
+    run(world, 1.0)
+    assert not world.faults
+
+
+def test_same_seed_same_world_another_seed_another() -> None:
+    site = network("brookside").town.sites[3]
+    config = WorldConfig(vehicles=6, pedestrians=4)
+    frames = []
+    for seed in (5, 5, 6):
+        world = world_at("brookside", site.lane, site.station, config, seed)
+        run(world, 20.0)
+        frames.append(np.array([*[v.position for v in world.actors.vehicles], *world.frames[:, 1:3]]))
+    np.testing.assert_array_equal(frames[0], frames[1])
+    assert frames[0].shape != frames[2].shape or not np.array_equal(frames[0], frames[2])
+
+
+def drive_at_random(name: str, seed: int, seconds: float) -> World:
+    """Turns, U-turns and lane switches at random among ten vehicles and four pedestrians."""
+    town = network(name).town
+    rng = np.random.default_rng(seed)
+    site = town.sites[int(rng.integers(len(town.sites)))]
+    world = world_at(name, site.lane, site.station, WorldConfig(), seed)
+    planner = world.planner
+    for _ in range(round(2 * seconds)):
+        speed = float(world.car.speed)
+        exits, distance = planner.exits()
+        if exits and planner.manoeuvre[0] is None and distance < 60.0:
+            planner.command(PhysicalAction.J_TURN, exits[int(rng.integers(len(exits)))].angle, speed)
+        elif rng.random() < 0.03:
+            planner.command(PhysicalAction.U_TURN, 0, speed)
+        elif rng.random() < 0.03:
+            planner.command(PhysicalAction.LANE_SWITCH, 90 if rng.random() < 0.5 else -90, speed)
+        world.step(15)
+        assert np.isfinite(world.frames).all()
+        assert all(np.isfinite(vehicle.position).all() for vehicle in world.actors.vehicles)
+    return world
+
+
+@pytest.mark.parametrize("name", ["brookside", "Town02", "Town05"])
+def test_random_driving_gives_no_collision_of_the_cars_own_making(name: str) -> None:
+    assert drive_at_random(name, 1, 60.0).collisions == 0
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("name", ["brookside", "Town02", "Town05"])
+def test_long_random_driving_gives_no_collision_of_the_cars_own_making(name: str, seed: int) -> None:
+    assert drive_at_random(name, seed, 300.0).collisions == 0
