@@ -215,18 +215,24 @@ class Adversary:
     def _cuts_off(self, town: Town, place: tuple[int, float], without: Prop | None) -> str | None:
         search = router(town)
         start = (self._world.planner.lane, self._world.planner.station)
-        standing = [(p.lane_id, p.station) for p in self._world.actors.props if p is not without]
+        others = [p for p in self._world.actors.props if p is not without]
+        standing = [spot for p in others for spot in _closed_by((p.lane_id, p.station))]
+        closed = [*standing, *_closed_by(place)]
         now = search.reachable(start, standing)
-        then = search.reachable(start, [*standing, place])
+        then = search.reachable(start, closed)
         # and from where the car would stand before it, should it come there: it must not be trapped
-        lane, station = place
-        gap = [(lane, station - back) for back in np.arange(0.0, STANDS_BEFORE, CELL / 2)]
-        trapped = search.reachable((lane, station - STANDS_BEFORE), [*standing, *gap])
+        trapped = search.reachable((place[0], place[1] - STANDS_BEFORE), closed)
         for site in town.sites:
             cell = search.cell(site.lane, site.station)
             if now[cell] and not (then[cell] and trapped[cell]):
                 return "it would cut every way to a place where a landmark may be"
         return None
+
+
+def _closed_by(place: tuple[int, float]) -> list[tuple[int, float]]:
+    """Places that no car can stand in because of a prop: the prop's own and those right before it."""
+    lane, station = place
+    return [(lane, station - float(back)) for back in np.arange(0.0, STANDS_BEFORE, CELL / 2)]
 
 
 def _xy(prop: Prop) -> dict[str, float]:

@@ -6,6 +6,7 @@ holds a connector that crosses its own, nobody asked for one before, and there i
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,8 +110,9 @@ class JunctionControl:
             waiting = self._waiting[key] = _Claim(connector, now, now)
         waiting.asked = now
         if not room:
-            waiting.since = now  # whoever cannot leave the junction keeps nobody waiting
+            waiting.since = math.inf  # whoever cannot leave the junction keeps nobody waiting
             return False
+        waiting.since = min(waiting.since, now)
         if self._is_closed_to(key, self._junction(connector), now):
             return False
         if any(

@@ -21,6 +21,9 @@ KERB = 1.6
 FROM_ENDS = 4.0
 """How far from the ends of a lane they turn back [m]."""
 
+FROM_JUNCTION = 12.0
+"""How far from the ends of a lane they cross, so that they do not walk into a junction [m]."""
+
 WALK_STEP = 2.0
 """Step in which a walkway is looked for [m]."""
 
@@ -136,7 +139,8 @@ class Pedestrian(RoadObject):
             self._station += self._direction * WALKING_SPEED * dt
             if not self._stretch[0] < self._station < self._stretch[1]:
                 self._direction = 1.0 if self._station <= self._stretch[0] else -1.0
-            if self._rng.random() < CROSSING_RATE * dt and self._is_clear():
+            midway = FROM_JUNCTION < self._station < self._lane.length - FROM_JUNCTION
+            if self._rng.random() < CROSSING_RATE * dt and midway and self._is_clear():
                 near = abs(self._lateral - self._home) < 0.1
                 self._far = self._home - across(self) if near else self._lateral
                 self._target = self._far if near else self._home

@@ -16,7 +16,7 @@ from dorothie_gym.world.actors import Actors
 from dorothie_gym.world.car.driver import Driver
 from dorothie_gym.world.car.hazards import HEIGHT_MARGIN, Body, Hazard, bodies_ahead
 from dorothie_gym.world.car.path import U_TURN_REACH
-from dorothie_gym.world.car.planner import BRAKING, LocalPlanner
+from dorothie_gym.world.car.planner import BEGUN, BRAKING, LocalPlanner
 from dorothie_gym.world.car.vehicle import Car
 from dorothie_gym.world.config import FRAME_RATE, WorldConfig
 from dorothie_gym.world.junctions import JunctionControl
@@ -41,9 +41,6 @@ TURN_ROUND_SPEED = 4.0
 
 UPSTREAM = 50.0
 """How far before a lane's start vehicles that come towards it are looked for [m]."""
-
-BEGUN = 1.0
-"""A manoeuvre from a stand has begun after this way [m]."""
 
 EXTEND_EVERY = 15
 """The path is lengthened this often [frames]."""

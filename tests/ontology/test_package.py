@@ -12,7 +12,7 @@ def test_every_exported_name_exists() -> None:
 
 def test_import_pulls_in_the_standard_library_only() -> None:
     code = (
-        "import sys; before = set(sys.modules); import dorothie_gym.ontology\n"
+        "import dorothie_gym, sys; before = set(sys.modules); import dorothie_gym.ontology\n"
         "roots = {name.split('.')[0] for name in set(sys.modules) - before}\n"
         "print(sorted(roots - set(sys.stdlib_module_names) - {'dorothie_gym'}))"
     )

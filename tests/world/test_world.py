@@ -121,9 +121,7 @@ def test_pedestrian_does_not_walk_into_a_car() -> None:
     world = world_at("brookside", long_lane(town), 2.0)
     world.planner.command(PhysicalAction.STOP, 0, 0.0)
     lane = town.lanes[world.planner.lane]
-    walker = Pedestrian(
-        world.road, lane.id, 20.0, stretch=(4.0, 60.0), key=99, rng=np.random.default_rng(0)
-    )
+    walker = Pedestrian(world.road, lane.id, 20.0, stretch=(4.0, 60.0), key=99, rng=np.random.default_rng(0))
     world.road.objects.append(walker)
     world.actors.pedestrians.append(walker)
     walker._target = walker._far = -6.0

@@ -16,6 +16,9 @@ from dorothie_gym.world.car.path import TURNING_RADIUS, U_TURN_REACH, Path, Piec
 from dorothie_gym.world.town.model import Exit, LinkType, Town
 from dorothie_gym.world.town.oncoming import Oncoming, oncoming_lanes
 
+BEGUN = 1.0
+"""A manoeuvre from a stand has begun after this way [m]."""
+
 SWEEP_STEP = 4
 """Of the points of a U-turn, which are half a metre apart, others are told every so many."""
 
@@ -108,9 +111,9 @@ class LocalPlanner:
 
     def sweep(self) -> list[tuple[float, float]]:
         """Places (x, y) that a car that is turning round has still to pass, every 2 m or so; else none."""
-        if self._manoeuvre is not PhysicalAction.U_TURN or not self.in_manoeuvre:
-            return []
         k = self.path.index_at(self.s)
+        if self._manoeuvre is not PhysicalAction.U_TURN or not self.path.manoeuvre[k] or self.s < BEGUN:
+            return []  # also while it waits for a gap: others go first
         rest = self.path.points[k:][self.path.manoeuvre[k:]][::SWEEP_STEP]
         return [(float(x), float(y)) for x, y in rest]
 
@@ -221,8 +224,11 @@ class LocalPlanner:
     @property
     def turn_ahead(self) -> int | None:
         """Angle of the turn that is planned and not yet begun [degrees], or None."""
-        ahead = self._manoeuvre is PhysicalAction.J_TURN and not self._town.lanes[self.lane].in_junction
-        return self._manoeuvre_angle if ahead else None
+        if self._manoeuvre is not PhysicalAction.J_TURN:
+            return None
+        lane, connector = self._town.lanes[self.lane], self._town.lanes[self._chosen[0]]
+        begun = lane.in_junction and lane.junction_id == connector.junction_id
+        return None if begun else self._manoeuvre_angle
 
     def is_committed(self, speed: float) -> bool:
         """Whether the car cannot stop any more before the junction at which it is to turn, at this speed [m/s]."""

@@ -1,0 +1,75 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.world.car.hazards import Body, Hazard, bodies_ahead
+from dorothie_gym.world.car.path import Path, follow
+from dorothie_gym.world.town import Lane
+from tests.world.network.towns import lane
+
+ROAD: Lane = lane(0, [(0.0, 0.0), (100.0, 0.0)])
+
+
+def body(x: float, y: float = 0.0, *, kind: ObjectClass = ObjectClass.VEHICLES, **fields: float) -> Body:
+    values = {"heading": 0.0, "length": 5.0, "width": 2.0, "speed": 0.0, "height": 0.0} | fields
+    return Body(key=1, kind=kind, x=x, y=y, **values)
+
+
+def ahead(*bodies: Body, road: Lane = ROAD, speed: float = 0.0) -> Hazard | None:
+    return bodies_ahead(Path([follow(road)]), 10.0, bodies, length=5.0, width=2.0, speed=speed)
+
+
+def test_gap_is_from_nose_to_tail() -> None:
+    hazard = ahead(body(30.0))
+    assert hazard is not None
+    assert hazard.gap == pytest.approx(15.0, abs=0.1)
+    assert hazard.safe_speed() > 0.0
+
+
+@pytest.mark.parametrize("place", [(-5.0, 0.0), (30.0, 3.5), (30.0, -3.5), (90.0, 0.0)])
+def test_what_is_behind_beside_or_far_away_is_no_hazard(place: tuple[float, float]) -> None:
+    assert ahead(body(*place)) is None
+
+
+def test_prop_beside_the_path_is_no_hazard() -> None:
+    assert ahead(body(30.0, 2.0, kind=ObjectClass.STATIC, length=0.4, width=0.4)) is None
+    assert ahead(body(30.0, 1.2, kind=ObjectClass.STATIC, length=0.4, width=0.4)) is not None
+
+
+def test_things_on_a_bridge_are_no_hazard() -> None:
+    assert ahead(body(30.0, height=5.0)) is None
+
+
+def test_things_up_a_slope_are_a_hazard() -> None:
+    slope = lane(0, [(0.0, 0.0, 0.0), (100.0, 0.0, 12.0)])
+    assert ahead(body(40.0, height=4.8), road=slope) is not None
+    assert ahead(body(40.0, height=0.0), road=slope) is None
+
+
+def test_faster_car_looks_farther() -> None:
+    assert ahead(body(90.0)) is None
+    assert ahead(body(90.0), speed=25.0) is not None
+
+
+def test_who_is_about_to_cross_is_a_hazard() -> None:
+    walker = body(30.0, 3.0, kind=ObjectClass.PEDESTRIAN, heading=-math.pi / 2, speed=1.4, length=0.5, width=0.5)
+    leaving = body(30.0, 3.0, kind=ObjectClass.PEDESTRIAN, heading=math.pi / 2, speed=1.4, length=0.5, width=0.5)
+    assert ahead(walker) is not None
+    assert ahead(leaving) is None
+
+
+def test_the_most_pressing_of_several_counts() -> None:
+    hazard = ahead(body(40.0), body(25.0, speed=8.0), body(35.0, kind=ObjectClass.STATIC, length=0.6))
+    assert hazard is not None
+    assert hazard.kind is ObjectClass.STATIC
+
+
+def test_safe_speed_falls_with_gap_and_grip() -> None:
+    speeds = [Hazard(kind=ObjectClass.VEHICLES, gap=gap).safe_speed() for gap in (2.0, 5.0, 10.0, 40.0)]
+    assert speeds[0] == 0.0
+    assert speeds == sorted(speeds)
+    assert Hazard(kind=ObjectClass.VEHICLES, gap=20.0).safe_speed(0.7) < speeds[-1]
+    assert Hazard(kind=ObjectClass.VEHICLES, gap=20.0).braking(8.0) == pytest.approx(64 / 35)
