@@ -32,7 +32,7 @@ FROM_CAR = 25.0
 STANDS_BEFORE = 17.0
 """The middle of a car that stops for a prop stands about this far before the prop's [m]."""
 
-MOST = 60
+MOST = 30
 """Vehicles, and pedestrians, that spawning fills a town up to."""
 
 Outcome: TypeAlias = str | dict[str, Any]

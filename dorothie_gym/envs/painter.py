@@ -35,7 +35,7 @@ def scene_of(stage: Stage, caption: str = "") -> Scene:
         x, y = prop.position
         others.append(Actor(kind="prop", x=x, y=y, heading=prop.heading, length=prop.LENGTH, width=prop.WIDTH))
     lines = [
-        Line(time=u.start, speaker=u.speaker, text=u.text, acts=" ".join(str(act) for act in u.acts))
+        Line(time=u.start, speaker=u.speaker, text=u.text, acts=" ".join(str(act).removesuffix("()") for act in u.acts))
         for u in stage.said
     ]
     lines += [Line(time=time, speaker=Role.AD_WIZARD, text=text) for time, text in stage.messages]

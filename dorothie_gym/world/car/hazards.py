@@ -18,6 +18,10 @@ LOOKAHEAD = 45.0
 SIDE_MARGIN = 0.35
 """Room kept beside the car [m]."""
 
+MANOEUVRE_MARGIN = 0.75
+"""The same in a lane switch or U-turn [m]: where the curvature of a U-turn changes sign the car leaves its line by up
+to 0.67 m, because the bicycle's course cannot turn at once."""
+
 HEIGHT_MARGIN = 2.5
 """Things further above or below are on another road [m]."""
 
@@ -153,7 +157,8 @@ class _Ahead:
             return None
         turn = body.heading - self.headings
         parallel, square = np.abs(np.cos(turn)), np.abs(np.sin(turn))
-        half_width = (body.width * parallel + body.length * square) / 2 + width / 2 + SIDE_MARGIN  # (m,)
+        margin = MANOEUVRE_MARGIN if tight else SIDE_MARGIN
+        half_width = (body.width * parallel + body.length * square) / 2 + width / 2 + margin  # (m,)
         half_length = (body.length * parallel + body.width * square) / 2  # (m,)
         level = np.abs(self.heights - body.height) <= HEIGHT_MARGIN
         for time in PREDICTIONS if body.speed > 0.2 else PREDICTIONS[:1]:
