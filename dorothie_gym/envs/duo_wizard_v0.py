@@ -243,7 +243,7 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
 
     @property
     def last_frames(self) -> NDArray[np.float64]:
-        """Trajectory of the last decision (n, 9), see `dorothie_gym.world.world.FRAME_COLUMNS`."""
+        """Trajectory of the last decision (n, 9), see `dorothie_gym.world.config.FRAME_COLUMNS`."""
         return self.stage.world.frames
 
     def session_header(self) -> SessionHeader:

@@ -9,10 +9,10 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from dorothie_gym.ontology import ExceptionKind, PhysicalAction, Role
+from dorothie_gym.ontology import SPEED_STEP, ExceptionKind, PhysicalAction, Role
 from dorothie_gym.spaces import SpaceLimits, action_space
 from dorothie_gym.tasks import TaskState
-from dorothie_gym.world.car.driver import CRUISE_STEP, MAX_CRUISE, MIN_CRUISE
+from dorothie_gym.world.car.driver import MAX_CRUISE, MIN_CRUISE
 from dorothie_gym.world.town import LinkType
 from dorothie_gym.world.world import World
 
@@ -78,8 +78,8 @@ class Masks:
             PhysicalAction.J_TURN: bool(exits),
             PhysicalAction.STOP: not planner.held,
             PhysicalAction.START: planner.held,
-            PhysicalAction.SPEED_CHANGE: MIN_CRUISE + CRUISE_STEP <= world.driver.cruise
-            or world.driver.cruise <= MAX_CRUISE - CRUISE_STEP,
+            PhysicalAction.SPEED_CHANGE: MIN_CRUISE + SPEED_STEP <= world.driver.cruise
+            or world.driver.cruise <= MAX_CRUISE - SPEED_STEP,
             PhysicalAction.LIGHT_CHANGE: True,
         }
         physical = np.ones(len(PhysicalAction) + 1, dtype=np.int8)

@@ -16,6 +16,7 @@ from dorothie_gym.envs.config import EnvConfig
 from dorothie_gym.envs.scenario import Scenario
 from dorothie_gym.envs.views import Moment, Views
 from dorothie_gym.ontology import (
+    ARRIVAL_DISTANCE,
     NAVIGATION_ACTIONS,
     ExceptionKind,
     LandmarkName,
@@ -45,9 +46,6 @@ from dorothie_gym.world.world import World, WorldEventKind
 
 ROLES = (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD)
 """The agents, in the order in which they are listed."""
-
-ARRIVAL_DISTANCE = 2.0
-"""A landmark is reached when the car stands this close to its waypoint [m] (paper, appendix A.5)."""
 
 STANDING = 0.1
 """Slower than this the car stands [m/s]."""

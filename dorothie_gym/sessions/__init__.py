@@ -2,7 +2,7 @@
 
 from dorothie_gym.sessions.corpus import load_readable, load_sessions, session_folders, split_by_name
 from dorothie_gym.sessions.errors import SessionError
-from dorothie_gym.sessions.events import FRAME_RATE, Event, EventType
+from dorothie_gym.sessions.events import Event, EventType
 from dorothie_gym.sessions.header import FORMAT_VERSION, LandmarkRow, SessionHeader, SubgoalRow
 from dorothie_gym.sessions.points import (
     CarState,
@@ -22,6 +22,7 @@ from dorothie_gym.sessions.records import ActionRecord, MoveRecord, UtteranceRec
 from dorothie_gym.sessions.session import Session
 from dorothie_gym.sessions.trajectory import TRAJECTORY_COLUMNS, TRAJECTORY_DTYPE, Trajectory, trajectory_of
 from dorothie_gym.sessions.writer import SessionWriter
+from dorothie_gym.world.config import FRAME_RATE
 
 __all__ = [
     "ActionRecord",

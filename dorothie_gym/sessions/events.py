@@ -8,9 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dorothie_gym.ontology import Role
-
-FRAME_RATE = 30
-"""Frames a second of physics and of a recording (paper, appendix B.2)."""
+from dorothie_gym.world.config import FRAME_RATE
 
 
 class EventType(enum.StrEnum):
@@ -20,7 +18,8 @@ class EventType(enum.StrEnum):
     """One act: utterance (number), text (of the whole utterance), span (this act's words), move, slots
     ({slot label: [value labels]}), exchange (number), start and end [s]."""
     PHYSICAL_ACTION = "PhysicalAction"
-    """Of the Co-Wizard, that changed something: action (label), angle (degrees, positive left, or null), up (or null)."""
+    """Of the Co-Wizard, that changed something: action (label), angle (degrees, positive left, or null), up (or
+    null)."""
     BELIEF_UPDATE = "BeliefUpdate"
     """Mental action: action (label) and its arguments (junctions, landmarks, landmark, status, x, y)."""
     EXCEPTION = "Exception"

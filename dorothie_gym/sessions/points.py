@@ -17,10 +17,10 @@ from typing import TypeAlias
 import numpy as np
 
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, U_TURN_ANGLE, ArgumentKind, DialogueAct, PhysicalAction, Role
-from dorothie_gym.sessions.events import FRAME_RATE
 from dorothie_gym.sessions.header import LandmarkRow
 from dorothie_gym.sessions.records import ActionRecord, MoveRecord
 from dorothie_gym.sessions.session import Session
+from dorothie_gym.world.config import FRAME_RATE
 
 
 class Task(enum.StrEnum):

@@ -14,7 +14,7 @@ from dorothie_gym.ontology import Role
 from dorothie_gym.sessions.encoding import from_line
 from dorothie_gym.sessions.errors import SessionError
 from dorothie_gym.sessions.event_lines import decode_event
-from dorothie_gym.sessions.events import FRAME_RATE, Event, EventType
+from dorothie_gym.sessions.events import Event, EventType
 from dorothie_gym.sessions.fields import Fields
 from dorothie_gym.sessions.header import SessionHeader
 from dorothie_gym.sessions.layout import EVENTS_FILE, HEADER_FILE, SUMMARY_FILE, TRAJECTORY_FILE
@@ -27,6 +27,7 @@ from dorothie_gym.sessions.records import (
     utterance_records,
 )
 from dorothie_gym.sessions.trajectory import TRAJECTORY_DTYPE, TRAJECTORY_HEADER, Trajectory, decode_rows
+from dorothie_gym.world.config import FRAME_RATE
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.sessions.errors import SessionError
+from dorothie_gym.world.config import FRAME_COLUMNS
 
 Trajectory: TypeAlias = NDArray[np.void]
 """Structured array (n,) of `TRAJECTORY_DTYPE`, in order of frames."""
 
-TRAJECTORY_COLUMNS: Final = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "brake", "lane")
+TRAJECTORY_COLUMNS: Final = FRAME_COLUMNS
 """Frame (30 Hz), place [m], heading [rad, clockwise], speed [m/s], controls in [0, 1], [-1, 1], [0, 1], lane id."""
 
 TRAJECTORY_DTYPE: Final = np.dtype(

@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 FRAME_RATE = 30
-"""Physics substeps a second (paper, appendix B.2)."""
+"""Physics substeps, and frames of a recording, a second (paper, appendix B.2)."""
+
+FRAME_COLUMNS = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "brake", "lane")
+"""What is kept of the car at each frame: metres, radians, m/s, normalised controls; `lane` is the lane's id."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,7 +18,7 @@ from dorothie_gym.world.car.hazards import HEIGHT_MARGIN, Body, Hazard, bodies_a
 from dorothie_gym.world.car.path import U_TURN_REACH
 from dorothie_gym.world.car.planner import BEGUN, BRAKING, LocalPlanner
 from dorothie_gym.world.car.vehicle import Car
-from dorothie_gym.world.config import FRAME_RATE, WorldConfig
+from dorothie_gym.world.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
 from dorothie_gym.world.junctions import JunctionControl
 from dorothie_gym.world.localizer import Localizer
 from dorothie_gym.world.network.network import TownNetwork
@@ -50,9 +50,6 @@ HARD = 3.5
 
 STANDING = 0.1
 """Slower than this the car stands [m/s]."""
-
-FRAME_COLUMNS = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "brake", "lane")
-"""Columns of `World.frames`; `lane` is the lane's id, heading in radians, speed in m/s."""
 
 
 class WorldEventKind(enum.StrEnum):

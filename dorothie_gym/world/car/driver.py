@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dorothie_gym.ontology import ObjectClass, PhysicalAction
+from dorothie_gym.ontology import SPEED_STEP, ObjectClass, PhysicalAction
 from dorothie_gym.world.car.control import MAX_BRAKING, Control, PathController
 from dorothie_gym.world.car.hazards import Hazard
 from dorothie_gym.world.car.path import Path
@@ -41,8 +41,8 @@ WALKING_SPEED = 1.5
 END_GAP = 0.8
 """Room left between the nose of a waiting car and the end of its lane [m]."""
 
-MIN_CRUISE, MAX_CRUISE, CRUISE_STEP = 5.0, 90.0, 5.0
-"""Cruise speed: range and step of SpeedChange (paper, table 3) [km/h]."""
+MIN_CRUISE, MAX_CRUISE = 5.0, 90.0
+"""Range of the cruise speed [km/h]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,7 +110,7 @@ class Driver:
 
     def change_cruise(self, up: bool) -> str | None:
         """Changes the cruise speed by 5 km/h; returns the reason if that cannot be."""
-        wanted = self.cruise + (CRUISE_STEP if up else -CRUISE_STEP)
+        wanted = self.cruise + (SPEED_STEP if up else -SPEED_STEP)
         if not MIN_CRUISE <= wanted <= MAX_CRUISE:
             return f"the cruise speed stays within {MIN_CRUISE:.0f} and {MAX_CRUISE:.0f} km/h"
         self.cruise = wanted
