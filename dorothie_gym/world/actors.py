@@ -12,9 +12,9 @@ from dorothie_gym.world.car.hazards import Body
 from dorothie_gym.world.car.vehicle import Car
 from dorothie_gym.world.junctions import JunctionControl
 from dorothie_gym.world.network.road import TownRoad
-from dorothie_gym.world.pedestrians import KERB, Pedestrian, rightmost, walkway
+from dorothie_gym.world.pedestrians import KERB, Pedestrian, leftmost, rightmost, walkway
 from dorothie_gym.world.props import Prop
-from dorothie_gym.world.town.model import Array, LinkType
+from dorothie_gym.world.town.model import Array
 from dorothie_gym.world.town.oncoming import oncoming_lanes
 from dorothie_gym.world.traffic import CurveSpeeds, TrafficVehicle, free_places
 
@@ -179,19 +179,19 @@ class Actors:
         return [_body(kind, key, thing) for _, key, kind, thing in found]
 
     def _across(self, pedestrian: Pedestrian) -> float:
-        """How far it is to the other side of the road [m]."""
-        lane = self._town.lanes[pedestrian.lane_id]
+        """How far it is to the other side of the road, over all its lanes [m]."""
+        town = self._town
+        lane = town.lanes[pedestrian.lane_id]
         station, _ = lane.project(pedestrian.position)
-        leftmost, shift = lane, 0.0
-        while (beside := self._town.neighbour(leftmost.id, LinkType.LANE_CHANGE_LEFT)) is not None:
-            place = leftmost.position(station)
-            leftmost = self._town.lanes[beside]
-            station, lateral = leftmost.project(place)
-            shift += abs(lateral)
-        oncoming = oncoming_lanes(self._town).at(leftmost.id, station)
+        place = lane.position(station)
+        far = town.lanes[leftmost(town, lane.id)]
+        oncoming = oncoming_lanes(town).at(far.id, far.project(place)[0])
+        side = -1.0  # the far kerb is to the left of the last lane of this direction, to the right of an oncoming one
         if oncoming is not None:
-            shift += oncoming.gap
-        return float(shift + lane.width_at(station) + 2 * KERB)
+            far, side = town.lanes[rightmost(town, oncoming.lane)], 1.0
+        there, _ = far.project(place)
+        kerb = far.position(there, side * (far.width_at(there) / 2 + KERB))
+        return float(lane.width_at(station) / 2 + KERB + math.hypot(*(kerb - place)))
 
     def _before_prop(self, vehicle: TrafficVehicle) -> bool:
         return any(

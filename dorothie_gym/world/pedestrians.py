@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from highway_env.vehicle.objects import RoadObject
@@ -73,6 +74,13 @@ def walkway(network: TownNetwork, lane_id: int, station: float) -> tuple[float, 
 def rightmost(town: Town, lane_id: int) -> int:
     """The last of the lanes beside one another to the right: who walks beside it does not walk on another lane."""
     while (beside := town.neighbour(lane_id, LinkType.LANE_CHANGE_RIGHT)) is not None:
+        lane_id = beside
+    return lane_id
+
+
+def leftmost(town: Town, lane_id: int) -> int:
+    """The lane of the same direction that is farthest to the left."""
+    while (beside := town.neighbour(lane_id, LinkType.LANE_CHANGE_LEFT)) is not None:
         lane_id = beside
     return lane_id
 
@@ -147,18 +155,16 @@ class Pedestrian(RoadObject):
         self._place()
 
     def _would_touch_vehicle(self, dt: float) -> bool:
-        """Whether the next step leads up to a vehicle: nobody walks into the side of a car."""
+        """Whether the next step leads closer to a vehicle that is close: nobody walks into the side of a car."""
         step = WALKING_SPEED * max(dt, 0.2)
-        x = self.position[0] + step * math.cos(self.heading)
-        y = self.position[1] + step * math.sin(self.heading)
+        now = (float(self.position[0]), float(self.position[1]))
+        then = (now[0] + step * math.cos(self.heading), now[1] + step * math.sin(self.heading))
         for vehicle in self.road.vehicles:
-            dx, dy = x - vehicle.position[0], y - vehicle.position[1]
-            if abs(dx) > 6.0 or abs(dy) > 6.0:
+            if abs(now[0] - vehicle.position[0]) > 6.0 or abs(now[1] - vehicle.position[1]) > 6.0:
                 continue
-            c, s = math.cos(vehicle.heading), math.sin(vehicle.heading)
-            ahead, side = abs(dx * c + dy * s), abs(dy * c - dx * s)
-            if ahead < vehicle.LENGTH / 2 + PERSONAL_SPACE and side < vehicle.WIDTH / 2 + PERSONAL_SPACE:
-                return True
+            room = _room_beside(vehicle, *then)
+            if room < PERSONAL_SPACE and room < _room_beside(vehicle, *now):
+                return True  # who is close already may step away
         return False
 
     def _turn_back(self, crossing: bool) -> None:
@@ -187,3 +193,10 @@ class Pedestrian(RoadObject):
         self.heading = self._heading()
         self.speed = WALKING_SPEED
         self.height = self._lane.height_at(self._station)
+
+
+def _room_beside(vehicle: Any, x: float, y: float) -> float:
+    """How far outside of a vehicle's outline a place is, along its length or its width [m]; negative inside."""
+    dx, dy = x - vehicle.position[0], y - vehicle.position[1]
+    c, s = math.cos(vehicle.heading), math.sin(vehicle.heading)
+    return float(max(abs(dx * c + dy * s) - vehicle.LENGTH / 2, abs(dy * c - dx * s) - vehicle.WIDTH / 2))

@@ -131,6 +131,34 @@ def test_pedestrian_does_not_walk_into_a_car() -> None:
     assert not walker.crashed
 
 
+@pytest.mark.parametrize("name", ["brookside", "Town05"])
+def test_who_crosses_a_road_comes_to_its_far_kerb(name: str) -> None:
+    roads = network(name)
+    site = roads.town.sites[0]
+    world = world_at(name, site.lane, site.station, WorldConfig(vehicles=0, pedestrians=40))
+    for walker in world.actors.pedestrians:
+        walker._lateral = walker._target = walker._home - world.actors._across(walker)
+        walker._place()
+        lane = roads.get_lane(roads.get_closest_lane_index(walker.position, height=walker.height))
+        station, lateral = lane.local_coordinates(walker.position)
+        assert abs(lateral) > lane.width_at(station) / 2, f"{walker.position} is on lane {lane.town_lane.id}"
+
+
+def test_pedestrian_who_stands_close_to_a_car_steps_away_from_it() -> None:
+    town = network("brookside").town
+    world = world_at("brookside", long_lane(town), 12.0)
+    world.planner.command(PhysicalAction.STOP, 0, 0.0)
+    lane = town.lanes[world.planner.lane]
+    walker = Pedestrian(world.road, lane.id, 15.0, stretch=(4.0, 60.0), key=99, rng=np.random.default_rng(0))
+    world.road.objects.append(walker)
+    world.actors.pedestrians.append(walker)
+    walker._station, walker._lateral, walker._target = 15.1, 0.0, walker._home  # 0.35 m before the car's nose
+    walker._place()
+    run(world, 8.0)
+    assert abs(walker._lateral - walker._home) < 0.1
+    assert not walker.crashed
+
+
 @pytest.mark.parametrize("frames", [1, 15, 300])
 def test_path_never_runs_out_however_seldom_decisions_are(frames: int) -> None:
     town = network("Town05").town
