@@ -7,6 +7,8 @@ from typing import Any, ClassVar
 import numpy as np
 from gymnasium import spaces
 from highway_env.envs.common.abstract import AbstractEnv
+from highway_env.envs.common.graphics import EnvViewer
+from numpy.typing import NDArray
 
 from dorothie_gym.world.actors import Actors
 from dorothie_gym.world.junctions import JunctionControl
@@ -111,6 +113,15 @@ class TownEnv(AbstractEnv):
             "progress": float(vehicle.on_road * np.clip(along / self.config["reward_speed"], 0.0, 1.0)),
             "collision": float(self.config["collision_reward"] * vehicle.crashed),
         }
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Draws as highway-env does, also under SDL's dummy video driver, where its viewer would show black."""
+        if self.viewer is None and self.render_mode is not None:
+            viewer = EnvViewer(self)
+            viewer.enabled = True
+            self.viewer: EnvViewer | None = viewer
+        picture: NDArray[np.uint8] | None = super().render()
+        return picture
 
     def _is_terminated(self) -> bool:
         return bool(self.vehicle.crashed)
