@@ -2,6 +2,7 @@
 
 from dorothie_gym.world.town.catalogue import load_town, town_names
 from dorothie_gym.world.town.describe import describe
+from dorothie_gym.world.town.lights import LightColour, LightPhase, LightProgramme
 from dorothie_gym.world.town.model import (
     NO_JUNCTION,
     NO_STREET,
@@ -11,6 +12,7 @@ from dorothie_gym.world.town.model import (
     Lane,
     LaneLink,
     LinkType,
+    Sidewalk,
     Signal,
     SignalKind,
     Site,
@@ -27,7 +29,11 @@ __all__ = [
     "Junction",
     "Lane",
     "LaneLink",
+    "LightColour",
+    "LightPhase",
+    "LightProgramme",
     "LinkType",
+    "Sidewalk",
     "Signal",
     "SignalKind",
     "Site",

@@ -15,6 +15,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.world.town.lights import LightColour, LightProgramme
+
 Array: TypeAlias = NDArray[np.float64]
 
 NO_JUNCTION = -1
@@ -173,7 +175,7 @@ class Junction:
     """Where roads meet.
 
     Attributes:
-        id: the map's own number; plans (`PlanUpdate`) refer to it.
+        id: the map's own number, unique in the town; plans (`PlanUpdate`) refer to it.
         position: centre (x, y) [m].
         connectors: lanes that cross it.
     """
@@ -243,6 +245,23 @@ class Crosswalk:
     outline: Array
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sidewalk:
+    """A pavement beside a street.
+
+    Attributes:
+        id: index in `Town.sidewalks`.
+        points: its middle line (n, 3) [m].
+        width: [m].
+        street: index of its street, or -1.
+    """
+
+    id: int
+    points: Array
+    width: float
+    street: int = NO_STREET
+
+
 class TownError(ValueError):
     """A map cannot be read: names the file, the element and the reason."""
 
@@ -263,7 +282,8 @@ class Town:
         name: short name.
         lanes: all driving lanes; `lanes[i].id == i`.
         links: lane links, those that go on before lane changes, each once.
-        junctions, streets, sites, signals, crosswalks: what else the map has.
+        junctions, streets, sites, signals, crosswalks, sidewalks: what else the map has.
+        programmes: of the traffic lights, one for each junction that has lights.
     """
 
     def __init__(
@@ -277,6 +297,8 @@ class Town:
         sites: Sequence[Site] = (),
         signals: Sequence[Signal] = (),
         crosswalks: Sequence[Crosswalk] = (),
+        sidewalks: Sequence[Sidewalk] = (),
+        programmes: Sequence[LightProgramme] = (),
     ) -> None:
         self.name = name
         self.lanes = tuple(lanes)
@@ -286,6 +308,8 @@ class Town:
         self.sites = tuple(sites)
         self.signals = tuple(signals)
         self.crosswalks = tuple(crosswalks)
+        self.sidewalks = tuple(sidewalks)
+        self.programmes = tuple(programmes)
 
     @property
     def kilometres(self) -> float:
@@ -318,6 +342,22 @@ class Town:
     def neighbour(self, lane: int, side: LinkType) -> int | None:
         """Lane beside this one that a lane change leads to; `side` is one of the two lane-change types."""
         return next((link.target for link in self._links_from[lane] if link.type is side), None)
+
+    @cached_property
+    def _lights(self) -> dict[int, tuple[LightProgramme, int]]:
+        """By lane: the programme and the signal that rule its end."""
+        programme_of = {signal: programme for programme in self.programmes for signal in programme.signals}
+        return {
+            lane: (programme_of[signal.id], signal.id)
+            for signal in self.signals
+            if signal.id in programme_of
+            for lane in signal.lanes
+        }
+
+    def light(self, lane: int, time: float) -> LightColour | None:
+        """What the traffic light at the end of a lane shows at a simulated time [s]; None where there is no light."""
+        found = self._lights.get(lane)
+        return None if found is None else found[0].colour(found[1], time)
 
     @cached_property
     def _exits(self) -> tuple[tuple[Exit, ...], ...]:
