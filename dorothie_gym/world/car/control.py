@@ -10,6 +10,9 @@ from dorothie_gym.world.car.path import Path
 MAX_STEERING = math.pi / 3
 """Front wheel angle at full lock [rad], highway-env's."""
 
+MAX_SLIP = math.atan(math.tan(MAX_STEERING) / 2)
+"""Slip angle at full lock [rad]."""
+
 MAX_ACCELERATION = 3.0
 """Acceleration at full throttle [m/s^2]."""
 
@@ -76,20 +79,15 @@ class PIDController:
 class PathController:
     """Steers along a path and keeps a target speed.
 
-    Lateral: the bicycle's slip angle beta turns the car at v sin(beta) / (L / 2) (highway-env's kinematics). The path's
-    curvature gives beta in advance; a PID on the distance from the path gives the course to come back on.
-    Longitudinal: a PID on speed.
+    Lateral: highway-env's bicycle moves along its heading plus the slip angle, and the slip angle follows the wheel at
+    once. So its course can be laid along the path in every substep, also where the path's curvature jumps; a PID on the
+    distance from the path adds the angle to come back at. Longitudinal: a PID on speed.
     """
 
     LATERAL = PIDGains(proportional=1.2, integral=0.1, derivative=0.1, integral_limit=0.5)
     LONGITUDINAL = PIDGains(proportional=1.6, integral=0.15, integral_limit=0.8)
-    COURSE_GAIN = 4.0
-    """Rate at which the course error is steered away [1/s]."""
-    PREVIEW = 0.08
-    """Time ahead at which the path's direction is read [s]: two substeps of delay and the course loop's lag."""
 
-    def __init__(self, wheelbase: float) -> None:
-        self._half = wheelbase / 2
+    def __init__(self) -> None:
         self._lateral = PIDController(self.LATERAL)
         self._longitudinal = PIDController(self.LONGITUDINAL)
 
@@ -112,16 +110,10 @@ class PathController:
             target_speed: [m/s].
             dt: substep [s].
         """
-        moving = max(speed, 1.0)
-        ahead = s + speed * self.PREVIEW
-        feed_forward = math.asin(min(max(path.curvature_at(ahead) * self._half, -0.8), 0.8))
         back = self._lateral.step(-offset, dt) if speed > 0.3 else 0.0
-        wanted = path.heading_at(ahead) + math.atan2(back * 1.4, moving)
-        course = heading + feed_forward
-        error = (wanted - course + math.pi) % (2 * math.pi) - math.pi
-        sine = math.sin(feed_forward) + self.COURSE_GAIN * error * self._half / moving
-        slip = math.asin(min(max(sine, -0.8), 0.8))
-        steering = math.atan(2 * math.tan(slip))
+        wanted = path.heading_at(s + speed * dt / 2) + math.atan2(back * 1.4, max(speed, 1.0))
+        slip = (wanted - heading + math.pi) % (2 * math.pi) - math.pi
+        steering = math.atan(2 * math.tan(min(max(slip, -MAX_SLIP), MAX_SLIP)))
         pull = self._longitudinal.step(target_speed - speed, dt)
         if target_speed <= 0.0:
             self._longitudinal.reset()

@@ -102,7 +102,7 @@ class Driver:
         self.goals: Sequence[GoalAhead] = ()
         self.sight = math.inf
         self._length = length
-        self._controller = PathController(length)
+        self._controller = PathController()
         self._profile: SpeedProfile | None = None
         self._profiled: Path | None = None
         self._goals_on_path: list[float] = []

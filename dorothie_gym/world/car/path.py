@@ -162,7 +162,7 @@ class Path:
         self.curvatures = np.gradient(self.headings, self.s)
         self._s = self.s.tolist()
         self._x, self._y = self.points[:, 0].tolist(), self.points[:, 1].tolist()
-        self._headings, self._curvatures = self.headings.tolist(), self.curvatures.tolist()
+        self._headings = self.headings.tolist()
 
     @property
     def length(self) -> float:
@@ -206,10 +206,6 @@ class Path:
     def heading_at(self, s: float) -> float:
         """Direction of the path [rad]."""
         return self._interpolate(self._headings, s)
-
-    def curvature_at(self, s: float) -> float:
-        """Curvature of the path [1/m], positive to the right."""
-        return self._interpolate(self._curvatures, s)
 
     def position_at(self, s: float) -> tuple[float, float]:
         """Point of the path [m]."""
