@@ -11,6 +11,7 @@ import typer
 from dorothie_gym import __version__
 from dorothie_gym.cli.evaluate import evaluate
 from dorothie_gym.cli.listings import storyboards, towns
+from dorothie_gym.cli.optional import PictureCommand
 from dorothie_gym.cli.run import run
 
 app = typer.Typer(
@@ -21,7 +22,7 @@ app = typer.Typer(
     pretty_exceptions_show_locals=False,
 )
 app.command()(run)
-app.command()(towns)
+app.command(cls=PictureCommand)(towns)
 app.command()(storyboards)
 app.command()(evaluate)
 

@@ -5,45 +5,76 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.table import Table
 
+from dorothie_gym.cli.optional import OWN_NAME
 from dorothie_gym.cli.output import check_picture, fail, print_json, stdout, told_plainly
+
+if TYPE_CHECKING:
+    from dorothie_gym.world.town.check import Fault
+
+FAULTY = 1
+"""Exit code for a town that has faults."""
 
 
 def towns(
     town: Annotated[
         str | None, typer.Argument(help="A town's name, or a file (.xodr, .yaml); without it, all are listed.")
     ] = None,
-    picture: Annotated[Path | None, typer.Option(help="Draw the town's map into this PNG file.")] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Report what a driver would stumble over; exit with 1 if there is anything.")
+    ] = False,
+    picture: Annotated[
+        Path | None,
+        typer.Option(help="Draw the town's map into this PNG file; without a file, into one named after the town."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Write JSON, and nothing else.")] = False,
 ) -> None:
-    """List the towns that are shipped, or describe one: lanes, links, components, streets, signals."""
+    """List the towns that are shipped, or describe, check or draw one."""
+    if town is None:
+        _list_towns(check, picture, as_json)
+        return
+    if picture == Path(OWN_NAME):
+        picture = Path(f"{Path(town).stem}.png")
     if picture is not None:
-        if town is None:
-            fail("--picture draws one town; name it: dorothie-gym towns NAME --picture PICTURE.png")
         check_picture(picture)
     with told_plainly():
-        from dorothie_gym.world.town import describe, load_town, town_names
+        from dorothie_gym.world.town import describe, load_town
+        from dorothie_gym.world.town.check import check_town
 
-        if town is None:
-            rows = [describe(load_town(name)) for name in town_names()]
-            print_json(rows) if as_json else _show_towns(rows)
-            return
         loaded = load_town(town)
         facts = describe(loaded)
+        faults = check_town(loaded) if check else ()
         if picture is not None:
             from dorothie_gym.world.graphics import town_picture
 
             town_picture(loaded, picture)
     if as_json:
-        print_json(facts)
-        return
-    _show_town(facts)
+        print_json({"town": loaded.name, "faults": [_fault_row(fault) for fault in faults]} if check else facts)
+    else:
+        _show_faults(facts, faults) if check else _show_town(facts)
+        if picture is not None:
+            stdout().print(f"Map: {picture}", markup=False, soft_wrap=True)
+    if faults:
+        raise typer.Exit(FAULTY)
+
+
+def _list_towns(check: bool, picture: Path | None, as_json: bool) -> None:
+    """All towns that are shipped, with the fold that they belong to."""
+    if check:
+        fail("--check looks at one town; name it: dorothie-gym towns --check NAME (or a file, .xodr or .yaml)")
     if picture is not None:
-        stdout().print(f"Map: {picture}", markup=False, soft_wrap=True)
+        fail("--picture draws one town; name it: dorothie-gym towns NAME --picture")
+    with told_plainly():
+        from dorothie_gym.world.town import describe, load_town, town_names
+        from dorothie_gym.world.town.catalogue import SEEN_TOWNS, UNSEEN_TOWNS
+
+        folds = {**dict.fromkeys(SEEN_TOWNS, "seen"), **dict.fromkeys(UNSEEN_TOWNS, "unseen")}
+        rows = [{**describe(load_town(name)), "fold": folds.get(name)} for name in town_names()]
+    print_json(rows) if as_json else _show_towns(rows)
 
 
 def storyboards(
@@ -69,11 +100,13 @@ def storyboards(
 def _show_towns(rows: Sequence[Mapping[str, Any]]) -> None:
     table = Table(box=None, pad_edge=False)
     table.add_column("Town", style="bold")
+    table.add_column("Fold")
     for title in ("Lanes", "km", "Junctions", "Streets", "Signals", "Crosswalks", "Sites"):
         table.add_column(title, justify="right")
     for row in rows:
         table.add_row(
             row["name"],
+            row["fold"] or "-",
             str(row["lanes"]),
             f"{row['kilometres']:.1f}",
             str(row["junctions"]),
@@ -104,6 +137,42 @@ def _show_town(facts: Mapping[str, Any]) -> None:
     console = stdout()
     console.print(str(facts["name"]), style="bold", markup=False)
     console.print(table)
+
+
+def _show_faults(facts: Mapping[str, Any], faults: Sequence[Fault]) -> None:
+    """One line a fault: its kind, where it is, and what is wrong; or what was found to be in order."""
+    console = stdout()
+    for fault in faults:
+        x, y = fault.position
+        console.print(f"{_words(fault.kind):<12}", style="red", markup=False, end="")
+        console.print(f" at ({x:.1f}, {y:.1f}): ", style="dim", markup=False, end="")
+        console.print(fault.message, markup=False, soft_wrap=True)
+    if faults:
+        counts = Counter(_words(fault.kind) for fault in faults)
+        summary = ", ".join(f"{count} {kind}" for kind, count in counts.items())
+        console.print(f"{facts['name']}: {_count(len(faults), 'fault')} ({summary})", style="bold", markup=False)
+    else:
+        numbers = f"{_count(facts['lanes'], 'lane')}, {_count(facts['links'], 'link')}"
+        more = f"{_count(facts['junctions'], 'junction')}, {facts['kilometres']:.1f} km"
+        console.print(f"{facts['name']}: no faults: {numbers}, {more}", markup=False)
+
+
+def _fault_row(fault: Fault) -> dict[str, Any]:
+    x, y = fault.position
+    return {
+        "kind": str(fault.kind),
+        "lanes": list(fault.lanes),
+        "position": [round(x, 2), round(y, 2)],
+        "message": fault.message,
+    }
+
+
+def _words(kind: str) -> str:
+    return kind.replace("_", " ")
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _sizes(sizes: Sequence[int]) -> str:

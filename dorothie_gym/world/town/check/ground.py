@@ -1,0 +1,163 @@
+"""The paved ground of a junction, as far as its lanes tell.
+
+Towns have no kerbs as such. In the mouths of the lanes that lead into a junction the road is as wide as the lanes.
+Between the mouths all within their convex hull is paved, and what a curve needs that bulges out of it between the
+straights of its two ends; but not the corners: where a turn from kerb to kerb has one on its inner side, the kerb is
+rounded between the edges of the two mouths by the largest arc that fits. Of a loop, which turns by more than a half
+circle, the mouths tell nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from dorothie_gym.world.town.model import Array, Junction, Town
+
+CORNER_TURNS = np.radians([20.0, 160.0])
+"""Turns between these have a corner on their inner side [rad]."""
+
+FURTHEST_CORNER = 3.0
+"""The straights of a connector's ends meet no further away than this many times the distance between the ends."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Pose:
+    """An end of a lane: its place and direction (2,), and its width [m]."""
+
+    place: Array
+    along: Array
+    width: float
+
+    @property
+    def right(self) -> Array:
+        """Direction to the right (2,)."""
+        return np.array([-self.along[1], self.along[0]])
+
+    @property
+    def edges(self) -> Array:
+        """Left and right edge of the lane (2, 2) [m]."""
+        aside = 0.5 * self.width * self.right
+        return np.array([self.place - aside, self.place + aside])
+
+
+class Corner:
+    """The rounded kerb on the inner side of a right turn."""
+
+    def __init__(self, start: Pose, end: Pose, corner: Array, turn: float) -> None:
+        """Round off a corner.
+
+        Args:
+            start: where the turn begins.
+            end: where it ends.
+            corner: where the right edges of the two would meet (2,) [m].
+            turn: change of direction [rad], positive.
+        """
+        self._start, self._end = start, end
+        self._kerbs = start.edges[1], end.edges[1]
+        tangent = min(float(np.hypot(*(corner - kerb))) for kerb in self._kerbs)
+        self._radius = tangent / np.tan(0.5 * turn)
+        self._middle = corner - tangent * start.along + self._radius * start.right
+
+    def depth(self, places: Array) -> Array:
+        """How far places (n, 2) lie behind the kerb, 0 before it (n,) [m]."""
+        (kerb, kerb_behind), start, end = self._kerbs, self._start, self._end
+        from_middle = places - self._middle
+        straight = np.minimum((places - kerb) @ start.right, (places - kerb_behind) @ end.right)
+        rounded = (from_middle @ start.along > 0.0) & (from_middle @ end.along < 0.0)
+        depth = np.where(rounded, np.minimum(straight, self._radius - np.hypot(*from_middle.T)), straight)
+        # The kerb ends where the mouths are: what lies behind them is another street.
+        between = ((places - kerb) @ start.along > 0.0) & ((places - kerb_behind) @ end.along < 0.0)
+        result: Array = np.where(between, np.maximum(depth, 0.0), 0.0)
+        return result
+
+
+def mouths(town: Town, junction: Junction) -> Array:
+    """Edges (n, 2) of all lanes where they meet a junction, and of connectors that meet none there [m]."""
+    edges = [np.empty((0, 2))]
+    for number in junction.connectors:
+        before, after = town.predecessors(number), tuple(link.target for link in town.successors(number))
+        for lanes, own_end, its_end in ((before, 0, -1), (after, -1, 0)):
+            outside = [(k, its_end) for k in lanes if town.lanes[k].junction_id != junction.id]
+            edges += [end_of(town, lane, end).edges for lane, end in outside]
+            if not lanes:
+                edges.append(end_of(town, number, own_end).edges)
+    return np.concatenate(edges)
+
+
+def end_of(town: Town, lane: int, point: int) -> Pose:
+    """First (point 0) or last (point -1) end of a lane."""
+    row = town.lanes[lane]
+    heading = row.headings[point]
+    along = np.array([np.cos(heading), np.sin(heading)])
+    return Pose(place=row.points[point, :2], along=along, width=float(row.widths[point]))
+
+
+def corners(town: Town, connectors: Iterable[int], kerb_lanes: frozenset[int], edges: Array) -> list[Corner]:
+    """Corners beside the right turns from kerb to kerb; none where a third street comes in between.
+
+    Args:
+        town: the town.
+        connectors: of the junction.
+        kerb_lanes: lanes beside the kerb on their right.
+        edges: the junction's mouths (n, 2) [m].
+    """
+    found = []
+    for number in connectors:
+        before, after = town.predecessors(number), [link.target for link in town.successors(number)]
+        if not (before and after and kerb_lanes.issuperset(before) and kerb_lanes.issuperset(after)):
+            continue
+        start, end = end_of(town, before[0], -1), end_of(town, after[0], 0)
+        turn = float(np.arctan2(start.along @ -end.right, start.along @ end.along))
+        shifted = [Pose(place=pose.edges[1], along=pose.along, width=0.0) for pose in (start, end)]
+        meeting = _meeting(*shifted)
+        if meeting is None or not CORNER_TURNS[0] <= turn <= CORNER_TURNS[1]:
+            continue
+        corner = Corner(start, end, meeting, turn)
+        if float(np.max(corner.depth(edges))) < 0.5:
+            found.append(corner)
+    return found
+
+
+def outside(edges: Array, start: Pose, end: Pose, room: float, places: Array) -> Array:
+    """How far places (n, 2) lie off the ground between the mouths, 0 on it (n,) [m].
+
+    Args:
+        edges: the junction's mouths (m, 2) [m].
+        start: where the connector in question begins.
+        end: where it ends.
+        room: space to either side that a car on it needs [m].
+        places: to look at.
+    """
+    corner = _meeting(start, end)
+    if corner is not None:
+        bends = corner, corner
+    else:  # an S or a U: each end goes straight on for half of the way at most
+        reach = room + 0.5 * float(np.hypot(*(end.place - start.place)))
+        bends = start.place + reach * start.along, end.place - reach * end.along
+    aside = [
+        bend + sign * room * pose.right for bend, pose in zip(bends, (start, end), strict=True) for sign in (-1, 1)
+    ]
+    edges = np.concatenate((edges, np.array(aside)))
+    try:
+        hull = ConvexHull(edges)
+    except QhullError:  # all in a line, or fewer than three: there is no ground to leave
+        return np.zeros(len(places))
+    distance: Array = np.maximum(np.max(places @ hull.equations[:, :2].T + hull.equations[:, 2], axis=1), 0.0)
+    return distance
+
+
+def _meeting(start: Pose, end: Pose) -> Array | None:
+    """Where the straight on from the start meets the one that comes to the end; None if not between them."""
+    (d, e), gap = (start.along, end.along), end.place - start.place
+    cross = float(d[0] * e[1] - d[1] * e[0])
+    if abs(cross) < 1e-6:
+        return None
+    ahead, behind = (gap[0] * e[1] - gap[1] * e[0]) / cross, (d[0] * gap[1] - d[1] * gap[0]) / cross
+    if min(ahead, behind) < 0.0 or max(ahead, behind) > FURTHEST_CORNER * float(np.hypot(*gap)):
+        return None
+    meeting: Array = start.place + ahead * d
+    return meeting

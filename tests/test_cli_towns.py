@@ -1,0 +1,137 @@
+"""`dorothie-gym towns`: the list with its folds, and `--check`."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import Result
+from typer.testing import CliRunner
+
+from dorothie_gym.cli import app
+from dorothie_gym.world.town import describe, load_town, town_names
+
+KERB_TO_KERB = """
+<OpenDRIVE><header revMajor="1" revMinor="4"/>
+{roads}
+</OpenDRIVE>
+"""
+ROAD = """
+<road name="" length="100" id="{number}" junction="-1">
+  <link><predecessor elementType="road" elementId="{other}" contactPoint="end"/>
+    <successor elementType="road" elementId="{other}" contactPoint="start"/></link>
+  <planView>{half}</planView>
+  <lanes><laneSection s="0"><center><lane id="0" type="none" level="false"/></center><right>
+    <lane id="-1" type="driving" level="false"><link><predecessor id="-1"/><successor id="-1"/></link>
+      <width sOffset="0" a="{width}" b="0" c="0" d="0"/></lane>
+  </right></laneSection></lanes>
+</road>
+"""
+ARC = (
+    '<geometry s="0" x="0" y="{y}" hdg="{heading}" length="100">'
+    '<arc curvature="0.031415926535897934"/></geometry>'  # a half circle of 100 m
+)
+RADIUS = 100.0 / 3.141592653589793
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+
+
+def call(*arguments: object) -> Result:
+    return CliRunner().invoke(app, ["towns", *(str(argument) for argument in arguments)])
+
+
+def ring(name: str = "ring.xodr", *, width: float = 3.5) -> Path:
+    """An OpenDRIVE file with one lane around a circle, in two halves."""
+    halves = (ARC.format(y=-RADIUS, heading=0.0), ARC.format(y=RADIUS, heading=3.141592653589793))
+    roads = [ROAD.format(number=k, other=3 - k, half=half, width=width) for k, half in zip((1, 2), halves, strict=True)]
+    path = Path(name)
+    path.write_text(KERB_TO_KERB.format(roads="".join(roads)), encoding="utf-8")
+    return path
+
+
+def loaded(result: Result) -> Any:
+    assert result.stderr == "" and result.stdout.count("\n") == 1
+    return json.loads(result.stdout)
+
+
+class TestList:
+    def test_every_town_is_in_its_fold(self) -> None:
+        result = call("--json")
+        rows = {row["name"]: row for row in loaded(result)}
+        assert set(rows) == set(town_names()) and rows["brookside"]["fold"] == "unseen"
+        assert all(row["fold"] == "seen" for name, row in rows.items() if name != "brookside")
+        assert describe(load_town("brookside")) == {k: v for k, v in rows["brookside"].items() if k != "fold"}
+
+    def test_the_table_shows_the_folds(self) -> None:
+        lines = call().stdout.splitlines()
+        assert any(re.match(r"brookside +unseen +\d", line) for line in lines)
+        assert max(map(len, lines)) <= 80
+
+
+class TestCheck:
+    @pytest.mark.parametrize("arguments", [("--check", "brookside"), ("brookside", "--check")])
+    def test_a_sound_town(self, arguments: tuple[str, ...]) -> None:
+        result = call(*arguments)
+        assert result.exit_code == 0 and result.stderr == ""
+        facts = describe(load_town("brookside"))
+        assert result.stdout.startswith(f"brookside: no faults: {facts['lanes']} lanes, {facts['links']} links, ")
+        assert result.stdout.count("\n") == 1
+
+    def test_a_sound_town_as_json(self) -> None:
+        result = call("--check", "brookside", "--json")
+        assert result.exit_code == 0 and loaded(result) == {"town": "brookside", "faults": []}
+
+    def test_an_imported_map_is_checked_like_our_own(self) -> None:
+        result = call("--check", ring())
+        assert result.exit_code == 0 and result.stdout.startswith("ring: no faults: 2 lanes, 2 links, 0 junctions")
+
+    def test_one_line_for_each_fault_and_exit_code_1(self) -> None:
+        result = call("--check", ring("path.xodr", width=1.5))
+        assert result.exit_code == 1 and result.stderr == ""
+        first, second, summary = result.stdout.splitlines()
+        assert re.fullmatch(r"narrow +at \(-?\d+\.\d, -?\d+\.\d\): lane 0 is 1\.50 m wide, the car 2\.0 m", first)
+        assert "lane 1 is 1.50 m wide" in second
+        assert summary == "path: 2 faults (2 narrow)"
+
+    def test_faults_as_json(self) -> None:
+        result = call("--check", ring("path.xodr", width=1.5), "--json")
+        assert result.exit_code == 1
+        value = loaded(result)
+        assert list(value) == ["town", "faults"] and value["town"] == "path" and len(value["faults"]) == 2
+        fault = value["faults"][0]
+        assert list(fault) == ["kind", "lanes", "position", "message"]
+        assert fault["kind"] == "narrow" and fault["lanes"] == [0] and len(fault["position"]) == 2
+
+    def test_the_map_is_drawn_too_where_it_is_wanted(self) -> None:
+        result = call("--check", ring("path.xodr", width=1.5), "--picture", "map.png")
+        assert result.exit_code == 1 and result.stdout.endswith("Map: map.png\n")
+        assert Path("map.png").read_bytes().startswith(b"\x89PNG")
+
+    @pytest.mark.parametrize("more", [[], ["--json"]])
+    def test_a_file_that_cannot_be_read(self, more: list[str]) -> None:
+        Path("broken.yaml").write_text("junctions: [", encoding="utf-8")
+        for path in ("missing.xodr", "broken.yaml", "nowhere"):
+            result = call("--check", path, *more)
+            assert result.exit_code == 2 and result.stdout == "" and path in result.stderr
+
+    def test_without_a_name_it_says_what_to_name(self) -> None:
+        result = call("--check")
+        assert result.exit_code == 2 and result.stdout == ""
+        assert "name it: dorothie-gym towns --check NAME" in result.stderr
+
+
+def test_picture_without_a_file_is_named_after_the_town(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for line in (["towns", "brookside", "--picture"], ["towns", "--picture", "brookside"]):
+        result = CliRunner().invoke(app, line)
+        assert result.exit_code == 0, result.output
+        assert "Map: brookside.png" in result.output
+        assert (tmp_path / "brookside.png").stat().st_size > 10_000
+        (tmp_path / "brookside.png").unlink()
