@@ -7,6 +7,13 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 from dorothie_gym.world.town.model import Town, TownError
+from dorothie_gym.world.town.store import through_cache
+
+SEEN_TOWNS: tuple[str, ...] = ("midtown", "millbrook", "northgate")
+"""Towns that sessions to train on are driven in (the paper's folds: CARLA's Town01, Town03 and Town05)."""
+
+UNSEEN_TOWNS: tuple[str, ...] = ("brookside",)
+"""Towns that sessions of the unseen fold are driven in (the paper's: CARLA's Town02)."""
 
 _SUFFIXES = (".xodr", ".yaml", ".yml")
 _FOLDER = files("dorothie_gym.world.town") / "data"
@@ -22,7 +29,8 @@ def town_names() -> tuple[str, ...]:
 def load_town(name_or_path: str | Path) -> Town:
     """The town of that name, or the one in that file (`.xodr` for OpenDRIVE, `.yaml` for the town language).
 
-    A town that was read before is given again as long as its file has not changed; towns are not to be modified.
+    A town that was read before is given again as long as its file has not changed, also in later runs: it is kept in
+    the user's cache folder (see `dorothie_gym.world.town.store`). Towns are not to be modified.
 
     Raises:
         TownError: there is no such town or file, or the file is at fault.
@@ -51,7 +59,11 @@ def _load(path: Path) -> Town:
 
 @lru_cache(maxsize=16)
 def _read(path: Path, modified: int, size: int) -> Town:
-    """Reads a file; when it was modified and its size are there for the cache to tell versions apart."""
+    """Reads a file once a run; when it was modified and its size are there to tell versions apart."""
+    return through_cache(path, _compile)
+
+
+def _compile(path: Path) -> Town:
     # Each reader is imported when it is needed: lxml and scipy are slow to start.
     if path.suffix.lower() == ".xodr":
         from dorothie_gym.world.town.opendrive import read_opendrive

@@ -3,9 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dorothie_gym.world.town.check import FaultKind, check_town
 from dorothie_gym.world.town.model import LaneLink, LinkType, SignalKind, Town
 from dorothie_gym.world.town.opendrive import read_opendrive
-from dorothie_gym.world.town.opendrive.compile import turn_type
 
 from .opendrive_text import geometry, lane, linked, opendrive, road, section
 
@@ -86,13 +86,14 @@ def test_roads_that_go_on_one_to_one_stay_two_lanes(tmp_path: Path) -> None:
     assert town.links == (LaneLink(0, 1, LinkType.STRAIGHT),)
 
 
-def test_a_road_of_no_length_is_left_out_and_linked_across(tmp_path: Path) -> None:
+@pytest.mark.parametrize("length", [1e-5, 0.0])
+def test_a_road_of_no_length_is_left_out_and_linked_across(tmp_path: Path, length: float) -> None:
     ends = _next("predecessor", 1, "end") + _next("successor", 3, "start")
     both = section(0.0, lane(-1, more=linked(-1, -1)))
     town = _town(
         tmp_path,
         road(1, link=_next("successor", 2, "start"), sections=section(0.0, lane(-1, more=linked(after=-1)))),
-        road(2, length=1e-5, plan=geometry("<line/>", 1e-5, x=100.0), link=ends, sections=both),
+        road(2, length=length, plan=geometry('<arc curvature="0.1"/>', length, x=100.0), link=ends, sections=both),
         road(3, plan=geometry("<line/>", 100.0, x=100.0), sections=section(0.0, lane(-1))),
     )
     assert [lane.road_id for lane in town.lanes] == [1, 3]
@@ -101,10 +102,17 @@ def test_a_road_of_no_length_is_left_out_and_linked_across(tmp_path: Path) -> No
 
 def test_a_small_gap_between_linked_lanes_is_closed(tmp_path: Path) -> None:
     first = road(1, link=_next("successor", 2, "start"), sections=section(0.0, lane(-1, more=linked(after=-1))))
-    second = road(2, plan=geometry("<line/>", 100.0, x=100.1, y=0.08))
+    second = road(2, plan=geometry("<line/>", 100.0, x=100.02, y=0.03))
     town = _town(tmp_path, first, second)
     assert town.lanes[0].points[-1] == pytest.approx(town.lanes[1].points[0])
-    assert town.lanes[0].points[-1] == pytest.approx([100.05, 2.0 - 0.04, 0.0])
+    assert town.lanes[0].points[-1] == pytest.approx([100.01, 2.0 - 0.015, 0.0])
+
+
+def test_a_gap_that_is_no_slip_of_rounding_is_left_and_told(tmp_path: Path) -> None:
+    first = road(1, link=_next("successor", 2, "start"), sections=section(0.0, lane(-1, more=linked(after=-1))))
+    town = _town(tmp_path, first, road(2, plan=geometry("<line/>", 100.0, x=100.1, y=0.08)))
+    assert town.lanes[1].points[0] == pytest.approx([100.1, 2.0 - 0.08, 0.0])
+    assert FaultKind.GAP in {fault.kind for fault in check_town(town)}
 
 
 def _two_lanes(mark: str) -> str:
@@ -150,22 +158,6 @@ def test_a_lane_has_its_own_limit_before_the_road_s(tmp_path: Path) -> None:
     kind = '<type s="0" type="town"><speed max="36" unit="km/h"/></type>'
     own = section(0.0, lane(-1, more='<speed sOffset="0" max="5" unit="m/s"/>'))
     assert _town(tmp_path, road(more=kind, sections=own)).lanes[0].speed_limit == 5.0
-
-
-@pytest.mark.parametrize(
-    ("angle", "kind"),
-    [
-        (0.0, LinkType.STRAIGHT),
-        (-34.0, LinkType.STRAIGHT),
-        (90.0, LinkType.LEFT),
-        (-90.0, LinkType.RIGHT),
-        (149.0, LinkType.LEFT),
-        (-151.0, LinkType.U_TURN),
-        (180.0, LinkType.U_TURN),
-    ],
-)
-def test_turns_are_typed_by_their_angle(angle: float, kind: LinkType) -> None:
-    assert turn_type(angle) is kind
 
 
 def _junction() -> tuple[str, ...]:

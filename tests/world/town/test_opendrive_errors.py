@@ -5,7 +5,7 @@ import pytest
 from dorothie_gym.world.town.model import TownError
 from dorothie_gym.world.town.opendrive import read_opendrive
 
-from .opendrive_text import geometry, lane, linked, opendrive, road, section, shared_map
+from .opendrive_text import geometry, lane, opendrive, road, section, shared_map
 
 
 def _error(tmp_path: Path, text: str) -> TownError:
@@ -102,13 +102,6 @@ def test_a_road_that_leads_to_no_junction_is_named(tmp_path: Path) -> None:
     assert "junction 7" in error.reason
 
 
-def test_a_lane_that_leads_to_no_lane_is_named(tmp_path: Path) -> None:
-    sections = section(0.0, lane(-1, more=linked(after=-3))) + section(50.0, lane(-1))
-    error = _error(tmp_path, opendrive(road(12, sections=sections)))
-    assert error.element == "road 12 / laneSection 0 / lane -1"
-    assert "lane -3" in error.reason
-
-
 def test_a_junction_that_refers_to_no_road_is_named(tmp_path: Path) -> None:
     junction = (
         '<junction id="5"><connection id="0" incomingRoad="12" connectingRoad="44" contactPoint="start"/></junction>'
@@ -165,3 +158,35 @@ def test_a_map_cannot_draw_in_other_files(tmp_path: Path) -> None:
     secret.write_text("hidden words")
     text = f'<!DOCTYPE OpenDRIVE [<!ENTITY x SYSTEM "{secret.as_uri()}">]><OpenDRIVE>&x;</OpenDRIVE>'
     assert "hidden words" not in str(_error(tmp_path, text))
+
+
+def _small(text: str, tmp_path: Path, encoding: str = "utf-8") -> int:
+    path = tmp_path / "small.xodr"
+    path.write_bytes(text.encode(encoding))
+    return len(read_opendrive(path).lanes)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "iso-8859-1"])
+def test_a_map_may_be_encoded_in_any_way_that_it_says(tmp_path: Path, encoding: str) -> None:
+    declared = encoding.removesuffix("-sig")
+    text = opendrive(road(1)).replace('version="1.0"', f'version="1.0" encoding="{declared}"')
+    assert _small(text.replace('name=""', 'name="Königsstraße"'), tmp_path, encoding) == 1
+
+
+def test_a_map_may_have_a_namespace_and_what_no_reader_knows(tmp_path: Path) -> None:
+    header = '<header revMajor="1" revMinor="6"><geoReference><![CDATA[+proj=tmerc <&>]]></geoReference></header>'
+    extras = '<userData code="x"><vectorScene program="RoadRunner"/></userData><!-- note --><?tool of another?>'
+    text = opendrive(header, extras, road(1, more=extras, plan=geometry(extras + "<line/>", 100.0)), extras)
+    named = text.replace("<OpenDRIVE>", '<OpenDRIVE xmlns="http://code.asam.net/simulation/standard/opendrive_schema">')
+    assert _small(text, tmp_path) == _small(named, tmp_path) == 1
+
+
+def test_a_namespace_does_not_change_how_a_fault_is_told(tmp_path: Path) -> None:
+    text = opendrive(road(3, plan=" ")).replace("<OpenDRIVE>", '<OpenDRIVE xmlns="http://example.org/o">')
+    assert _error(tmp_path, text).element.startswith("road 3")
+
+
+def test_the_road_of_no_junction_may_say_so_or_not(tmp_path: Path) -> None:
+    assert _small(opendrive(road(1)), tmp_path) == 1
+    assert _small(opendrive(road(1).replace('junction="-1"', "")), tmp_path) == 1
+    assert _small(opendrive(road(1).replace('junction="-1"', 'junction=""')), tmp_path) == 1

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from dorothie_gym.world.town.model import Array, TownError
-from dorothie_gym.world.town.opendrive.records import OpenDriveRecords, RoadRecord
-from dorothie_gym.world.town.opendrive.topology import SHORTEST_LANE, Piece, Topology, runs_forward
+from dorothie_gym.world.town.opendrive.records import SIDEWALK, OpenDriveRecords, RoadRecord
+from dorothie_gym.world.town.opendrive.topology import SHORTEST_LANE, Topology, runs_forward
 
 # Distance between the samples taken from the file [m]: the chord of a 5 m radius is then 1.6 mm off its arc.
 _DENSE_STEP = 0.25
@@ -20,28 +21,64 @@ _LONGEST_STEP, _LONGEST_CURVE_STEP, _SHORTEST_STEP = 20.0, 2.0, 0.25
 _CHORD_ERROR = 0.005
 # Curvature below which a lane counts as straight [1/m]: 20 m of it bend by 5 mm.
 _STRAIGHT = 1e-4
-# Ends of linked lanes further apart than this [m] are no slip of rounding: they are left as the file has them.
-_LARGEST_STITCH = 1.0
+# Ends of linked lanes further apart than this [m] are no slip of rounding: they are left as the file has them, and
+# `check` tells of them. CARLA's maps need 2 mm.
+_LARGEST_STITCH = 0.05
 # A lane's own centre line may not jump further than this from one sample to the next [m].
 _LARGEST_JUMP = 10.0
-# Length over which a lane gives way to its moved end [m].
+# Length over which a lane gives way to its moved end [m], for each metre that it moves, and at least for one.
 _STITCH_LENGTH = 10.0
+# A lane narrower than this [m] and than this share of its greatest width (or of what it meets) is opening or closing.
+_OPEN_WIDTH, _OPEN_SHARE = 1.75, 0.5
 
 
 @dataclass(frozen=True)
-class _RoadSamples:
-    """Samples along one road: reference line (n,) each, heading [rad], and what belongs to which section."""
+class RoadSamples:
+    """Samples along one road, in the file's frame.
+
+    Attributes:
+        x, y, z: reference line (n,) each [m].
+        heading: its direction (n,) [rad].
+        tilt: roll angle of the road (n,) [rad], its left side up where it is positive.
+        spans: which samples belong to which lane section.
+        centres: for each section, by lane number: lateral place of the lane's middle and its width (m,) [m], of driving
+            lanes and sidewalks.
+    """
 
     x: Array
     y: Array
     z: Array
     heading: Array
+    tilt: Array
     spans: tuple[slice, ...]
-    centres: tuple[dict[int, tuple[Array, Array]], ...]  # per section: lane -> (lateral place, width), (m,) [m]
+    centres: tuple[dict[int, tuple[Array, Array]], ...]
+
+    def line(self, pieces: Iterable[tuple[int, int]]) -> Array:
+        """Middle of lanes, given as (section, lane) one after another along the road: x, y, z, width in OUR frame."""
+        rows = []
+        for section, lane in pieces:
+            here = self.spans[section]
+            lateral, width = self.centres[section][lane]
+            across = lateral * np.cos(self.tilt[here])
+            x = self.x[here] - across * np.sin(self.heading[here])
+            y = self.y[here] + across * np.cos(self.heading[here])
+            z = self.z[here] + lateral * np.sin(self.tilt[here])
+            rows.append(np.column_stack((x, -y, z, np.maximum(width, 0.0))))  # y south from here on
+        return np.concatenate(rows)
 
 
-def sample_centrelines(records: OpenDriveRecords, topology: Topology) -> list[Array]:
+def sample_centrelines(
+    records: OpenDriveRecords, topology: Topology, samples: Mapping[int, RoadSamples]
+) -> list[Array]:
     """Centre lines of all lanes in our frame and in driving direction, ends of linked lanes joined.
+
+    A lane that opens beside others, or ends there, and is linked to none at that end, begins where it is half as wide
+    as it becomes: nobody could drive in the wedge before.
+
+    Args:
+        records: the file.
+        topology: its lanes.
+        samples: its roads, by their ids.
 
     Returns:
         One array (n, 4) a lane: x, y, z and width [m].
@@ -49,20 +86,34 @@ def sample_centrelines(records: OpenDriveRecords, topology: Topology) -> list[Ar
     Raises:
         TownError: a lane's centre line has no length, or leaves a gap that no rounding explains.
     """
-    samples: dict[int, _RoadSamples] = {}
+    entered, left = ({link[k] for link in topology.links} for k in (1, 0))
     lines = []
-    for chain in topology.chains:
+    for k, chain in enumerate(topology.chains):
         road = records.roads[chain[0].road]
-        if road.id not in samples:
-            samples[road.id] = _sample_road(road)
-        dense = _dense_line(road, samples[road.id], chain)
+        forward = runs_forward(road, chain[0].lane)
+        dense = samples[road.id].line((p.section, p.lane) for p in (chain if forward else chain[::-1]))
+        dense = dense if forward else dense[::-1]
+        if k not in entered or k not in left:
+            dense = _without_wedges(dense, k not in entered, k not in left)
         fault = _fault(dense)
         if fault:
             element = f"road {road.id} / laneSection {chain[0].section} / lane {chain[0].lane}"
             raise TownError(records.source, element, fault)
-        lines.append(_thin(dense))
+        lines.append(thin(dense))
     _stitch(lines, topology.links)
     return lines
+
+
+def _is_open(widths: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    return widths >= min(_OPEN_WIDTH, _OPEN_SHARE * float(widths.max()))
+
+
+def _without_wedges(line: Array, at_start: bool, at_end: bool) -> Array:
+    """A centre line (n, 4) without the samples at its ends where the lane is still opening or already closing."""
+    wide = np.flatnonzero(_is_open(line[:, 3]))
+    first, last = wide[0] if at_start else 0, wide[-1] if at_end else len(line) - 1
+    kept = line[first : last + 1]
+    return kept if np.hypot(*np.ptp(kept[:, :2], axis=0)) >= SHORTEST_LANE else line
 
 
 def _fault(dense: Array) -> str:
@@ -73,7 +124,8 @@ def _fault(dense: Array) -> str:
     return f"its centre line jumps by {jump:.1f} m; check geometry, offsets and widths" if jump > _LARGEST_JUMP else ""
 
 
-def _sample_road(road: RoadRecord) -> _RoadSamples:
+def sample_road(road: RoadRecord) -> RoadSamples:
+    """Samples a road every few decimetres, section by section."""
     pieces, picks, spans = [], [], []
     total = 0
     for section in road.sections:
@@ -92,40 +144,32 @@ def _sample_road(road: RoadRecord) -> _RoadSamples:
         _lateral_places(road, k, s[span] - road.sections[k].start, pick[span] - road.sections[k].start, offset[span])
         for k, span in enumerate(spans)
     )
-    return _RoadSamples(x, y, road.elevation.at(s, pick), heading, tuple(spans), centres)
+    elevation, tilt = road.elevation.at(s, pick), road.superelevation.at(s, pick)
+    return RoadSamples(x=x, y=y, z=elevation, heading=heading, tilt=tilt, spans=tuple(spans), centres=centres)
 
 
 def _lateral_places(
     road: RoadRecord, section: int, ds: Array, pick: Array, offset: Array
 ) -> dict[int, tuple[Array, Array]]:
-    """Centre and width of each driving lane of a section: the lanes are laid side by side from the middle outwards."""
+    """Centre and width of lanes of a section, which are laid side by side from the middle outwards.
+
+    A lane given by its border ends there whatever lies between (OpenDRIVE 1.7, section 11.6.2).
+    """
     lanes = road.sections[section].lanes
     places = {}
     for side in (1, -1):
         edge = offset
         for number in sorted((n for n in lanes if n * side > 0), key=abs):
-            width = lanes[number].width.at(ds, pick)
-            if lanes[number].type == "driving":
+            lane = lanes[number]
+            width = lane.width.at(ds, pick) if lane.border is None else side * (lane.border.at(ds, pick) - edge)
+            if lane.drives or lane.type in SIDEWALK:
                 places[number] = (edge + 0.5 * side * width, width)
             edge = edge + side * width
     return places
 
 
-def _dense_line(road: RoadRecord, samples: _RoadSamples, chain: tuple[Piece, ...]) -> Array:
-    forward = runs_forward(road, chain[0].lane)
-    pieces = chain if forward else chain[::-1]
-    index = np.concatenate([np.arange(span.start, span.stop) for span in (samples.spans[p.section] for p in pieces)])
-    lateral = np.concatenate([samples.centres[p.section][p.lane][0] for p in pieces])
-    width = np.concatenate([samples.centres[p.section][p.lane][1] for p in pieces])
-    heading = samples.heading[index]
-    x = samples.x[index] - lateral * np.sin(heading)
-    y = samples.y[index] + lateral * np.cos(heading)
-    line = np.column_stack((x, -y, samples.z[index], np.maximum(width, 0.0)))  # y south from here on
-    return line if forward else line[::-1]
-
-
-def _thin(line: Array) -> Array:
-    """The same line with as few points as its curvature, its width and its height allow."""
+def thin(line: Array) -> Array:
+    """The same line (n, 4) with as few points as its curvature, its width and its height allow."""
     step = np.hypot(*np.diff(line[:, :2], axis=0).T)
     line = line[np.concatenate(([True], step > 1e-6))]
     station = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))))
@@ -163,15 +207,25 @@ def _stitch(lines: list[Array], links: tuple[tuple[int, int], ...]) -> None:
     for end in range(2 * len(lines)):
         members.setdefault(find(end), []).append(end)
     for ends in members.values():
-        places = np.array([lines[e // 2][-1 if e % 2 else 0, :3] for e in ends])
-        shift = places.mean(axis=0) - places
-        if len(ends) > 1 and 1e-9 < np.max(np.abs(shift)) and np.ptp(places, axis=0).max() <= _LARGEST_STITCH:
-            for end, move in zip(ends, shift, strict=True):
-                _move_end(lines[end // 2], bool(end % 2), move)
+        if len(ends) > 1:
+            _join(lines, ends)
+
+
+def _join(lines: list[Array], ends: list[int]) -> None:
+    """Moves ends of lanes to the middle of those that are open; one that is only opening there comes out of them."""
+    places = np.array([lines[e // 2][-1 if e % 2 else 0] for e in ends])  # (n, 4)
+    open_ = _is_open(places[:, 3])
+    target = places[open_, :3].mean(axis=0)
+    shift = target - places[:, :3]
+    if np.ptp(places[open_, :3], axis=0).max() > _LARGEST_STITCH or np.max(np.abs(shift)) <= 1e-9:
+        return
+    for end, move, width in zip(ends, shift, places[:, 3], strict=True):
+        if np.hypot(*move[:2]) <= max(_LARGEST_STITCH, places[:, 3].max() - width):
+            _move_end(lines[end // 2], bool(end % 2), move)
 
 
 def _move_end(line: Array, at_end: bool, move: Array) -> None:
     station = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))))
     away = station[-1] - station if at_end else station
-    fade = 0.5 + 0.5 * np.cos(np.pi * np.minimum(away / min(_STITCH_LENGTH, station[-1]), 1.0))
-    line[:, :3] += fade[:, None] * move
+    reach = min(_STITCH_LENGTH * max(1.0, float(np.hypot(*move[:2]))), station[-1])
+    line[:, :3] += (0.5 + 0.5 * np.cos(np.pi * np.minimum(away / reach, 1.0)))[:, None] * move

@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 
 from dorothie_gym.world.town.derive import lay_sites, name_streets
-from dorothie_gym.world.town.model import Array, Junction, Lane, LaneLink, LinkType, Town, wrap_degrees
-from dorothie_gym.world.town.opendrive.centrelines import sample_centrelines
+from dorothie_gym.world.town.model import Array, Junction, Lane, LaneLink, LinkType, Town
+from dorothie_gym.world.town.opendrive.centrelines import sample_centrelines, sample_road
 from dorothie_gym.world.town.opendrive.furniture import place_crosswalks, place_signals
 from dorothie_gym.world.town.opendrive.parse import parse_opendrive
 from dorothie_gym.world.town.opendrive.records import OpenDriveRecords, RoadRecord
+from dorothie_gym.world.town.opendrive.sidewalks import lay_sidewalks
 from dorothie_gym.world.town.opendrive.topology import Piece, Topology, build_topology
+from dorothie_gym.world.town.opendrive.turns import successor_links
+from dorothie_gym.world.town.programmes import derive_programmes
 
 # Limit of a road that names none, in built-up areas [m/s] (50 km/h).
 DEFAULT_SPEED_LIMIT = 50.0 / 3.6
-
-# Changes of heading that separate the types of turn [degrees].
-STRAIGHT_BELOW, U_TURN_ABOVE = 35.0, 150.0
 
 # Lanes have to run side by side for this long before one can change between them [m].
 SHORTEST_LANE_CHANGE = 5.0
@@ -29,7 +29,7 @@ def read_opendrive(path: str | Path) -> Town:
     """Reads an OpenDRIVE file (1.4, as CARLA's towns) into a town named like the file.
 
     The file's y points north and ours south: everything is mirrored once. A lane is a chain of lane sections of one
-    road that go on one to one; lanes of other types than "driving" are left out.
+    road that go on one to one; lanes of other types than "driving" (and the types of ramps) are left out.
 
     Args:
         path: file to read.
@@ -42,28 +42,23 @@ def read_opendrive(path: str | Path) -> Town:
     """
     records = parse_opendrive(path)
     topology = build_topology(records)
-    lanes = _lanes(records, topology, sample_centrelines(records, topology))
-    links = _successor_links(lanes, topology) + _lane_change_links(records, topology, lanes)
+    samples = {road.id: sample_road(road) for road in records.roads.values()}
+    lanes = _lanes(records, topology, sample_centrelines(records, topology, samples))
+    links = successor_links(lanes, topology) + _lane_change_links(records, topology, lanes)
     lanes, streets = name_streets(lanes, links)
+    junctions, signals = _junctions(lanes), place_signals(records, topology, lanes)
     return Town(
         name=Path(path).stem,
         lanes=lanes,
         links=links,
-        junctions=_junctions(lanes),
+        junctions=junctions,
         streets=streets,
         sites=lay_sites(lanes, links),
-        signals=place_signals(records, topology, lanes),
+        signals=signals,
         crosswalks=place_crosswalks(records),
+        sidewalks=lay_sidewalks(records, samples, lanes),
+        programmes=derive_programmes(lanes, links, junctions, signals),
     )
-
-
-def turn_type(angle: float) -> LinkType:
-    """Type of a turn by its angle [degrees], positive left."""
-    if abs(angle) > U_TURN_ABOVE:
-        return LinkType.U_TURN
-    if abs(angle) < STRAIGHT_BELOW:
-        return LinkType.STRAIGHT
-    return LinkType.LEFT if angle > 0 else LinkType.RIGHT
 
 
 def _lanes(records: OpenDriveRecords, topology: Topology, lines: list[Array]) -> tuple[Lane, ...]:
@@ -102,17 +97,6 @@ def _own_limit(road: RoadRecord, chain: tuple[Piece, ...]) -> float | None:
         until = [*(s for s, _ in road.speeds[1:]), np.inf]
         limits = [v for (s, v), e in zip(road.speeds, until, strict=False) if s < end and e > start]
     return min(limits, default=None)
-
-
-def _successor_links(lanes: tuple[Lane, ...], topology: Topology) -> tuple[LaneLink, ...]:
-    def kind(source: int, target: int) -> LinkType:
-        connector = lanes[target]
-        if lanes[source].in_junction or not connector.in_junction:
-            return LinkType.STRAIGHT
-        turned = np.degrees(connector.headings[-1] - connector.headings[0])
-        return turn_type(-float(turned) if abs(turned) < 180.0 else wrap_degrees(-float(turned)))
-
-    return tuple(LaneLink(source, target, kind(source, target)) for source, target in topology.links)
 
 
 def _lane_change_links(records: OpenDriveRecords, topology: Topology, lanes: tuple[Lane, ...]) -> tuple[LaneLink, ...]:

@@ -2,67 +2,131 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterator
 
 import numpy as np
 
 from dorothie_gym.world.town.model import Crosswalk, Lane, Signal, SignalKind
 from dorothie_gym.world.town.opendrive.records import CrosswalkRecord, OpenDriveRecords, RoadRecord, SignalRecord
-from dorothie_gym.world.town.opendrive.topology import Topology, runs_forward
+from dorothie_gym.world.town.opendrive.topology import Piece, Topology, runs_forward
 
 # Types of signal that CARLA's maps use: lights as in OpenDRIVE 1.4, annex, signs by their numbers in German law.
 SIGNAL_TYPES = {
     "1000001": SignalKind.TRAFFIC_LIGHT,
+    "1000002": SignalKind.OTHER,  # a light for those on foot
     "206": SignalKind.STOP,
     "205": SignalKind.YIELD,
     "274": SignalKind.SPEED,
 }
 
+# Kinds that have to be heeded at the end of a lane.
+_CONTROLS = (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP, SignalKind.YIELD)
+
+# A light or sign this far before a junction, or less, is meant for it, though a lane may end in between [m].
+_FARTHEST = 50.0
+
+# One that stands nearer to the start of its lane than to its end, and further than this from its end, is the far one of
+# two at a junction that lies behind it [m].
+_NEAR_THE_END = 30.0
+
 
 def place_signals(records: OpenDriveRecords, topology: Topology, lanes: tuple[Lane, ...]) -> tuple[Signal, ...]:
     """Signals of a file, one for each `signal` element, in order of their ids.
 
-    `Signal.lanes` are the lanes at whose end (or, outside junctions, on which) a driver has to heed it: where the file
-    names connectors of a junction, these are the lanes that lead into them.
+    `Signal.lanes` are the lanes at whose end a driver has to heed it (speed limits: on which they hold): those that
+    lead into the junction that it stands before, and where the file names connectors, those that lead into them.
     """
-    chain_at = _lanes_by_section(topology)
-    entered_from: defaultdict[int, list[int]] = defaultdict(list)
-    for source, target in topology.links:
-        entered_from[target].append(source)
+    ways = _Ways(topology, lanes)
     ruled: defaultdict[int, dict[int, None]] = defaultdict(dict)
-    owners: dict[int, tuple[RoadRecord, SignalRecord]] = {}
-    for road in records.roads.values():
-        for record in road.signals:
-            if not record.reference:
-                owners[record.id] = (road, record)
-            for lane in _ruled_lanes(road, record, chain_at):
-                approach = entered_from[lane] if lanes[lane].in_junction else [lane]
-                ruled[record.id].update(dict.fromkeys(approach))
+    placed = [(road, record) for road in records.roads.values() for record in road.signals]
+    owners = {record.id: (road, record) for road, record in placed if not record.reference}
+    for road, record in placed:
+        if record.id in owners:  # a reference may have lost its signal
+            controls = _kind(owners[record.id][1]) in _CONTROLS
+            for lane in ways.ruled(road, record, controls):
+                ruled[record.id].update(dict.fromkeys(ways.approaches(lane, controls)))
     return tuple(_signal(number, *owners[number], tuple(sorted(ruled[number])), lanes) for number in sorted(owners))
 
 
-def _lanes_by_section(topology: Topology) -> dict[tuple[int, int], dict[int, int]]:
-    """Lane index by (road, section) and lane number."""
-    table: defaultdict[tuple[int, int], dict[int, int]] = defaultdict(dict)
-    for k, chain in enumerate(topology.chains):
-        for piece in chain:
-            table[piece.road, piece.section][piece.lane] = k
-    return table
+def _kind(record: SignalRecord) -> SignalKind:
+    return SIGNAL_TYPES.get(record.type, SignalKind.TRAFFIC_LIGHT if record.dynamic else SignalKind.OTHER)
 
 
-def _ruled_lanes(
-    road: RoadRecord, record: SignalRecord, chain_at: dict[tuple[int, int], dict[int, int]]
-) -> Iterable[int]:
-    """Lanes of this road that a signal rules: those that it names, else those of its direction."""
-    starts = [section.start for section in road.sections]
-    section = max(0, int(np.searchsorted(starts, record.s, side="right")) - 1)
-    for number, lane in chain_at.get((road.id, section), {}).items():
-        if record.lanes:
-            if any(min(span) <= number <= max(span) for span in record.lanes):
+class _Ways:
+    """Finds the lanes that a signal is meant for."""
+
+    def __init__(self, topology: Topology, lanes: tuple[Lane, ...]) -> None:
+        self._lanes = lanes
+        self._at: defaultdict[int, list[tuple[Piece, int]]] = defaultdict(list)  # by road
+        for k, chain in enumerate(topology.chains):
+            for piece in chain:
+                self._at[piece.road].append((piece, k))
+        self._before: defaultdict[int, list[int]] = defaultdict(list)
+        self._after: defaultdict[int, list[int]] = defaultdict(list)
+        for source, target in topology.links:
+            self._before[target].append(source)
+            self._after[source].append(target)
+
+    def ruled(self, road: RoadRecord, record: SignalRecord, controls: bool) -> Iterator[int]:
+        """Lanes of this road that a signal rules: those that it names, else those of its direction."""
+
+        def away(piece: Piece) -> tuple[float, int]:
+            section = road.sections[piece.section]
+            return max(section.start - record.s, record.s - section.end, 0.0), -piece.section
+
+        # The section that the signal stands in, or the one beside it where that is left out for having no length.
+        here = min((piece for piece, _ in self._at[road.id]), key=away, default=None)
+        for piece, lane in self._at[road.id]:
+            if here is None or piece.section != here.section or not _names(road, record, piece.lane):
+                continue
+            if record.lanes or not controls or self._lanes[lane].in_junction or self._is_ahead(road, record, lane):
                 yield lane
-        elif record.orientation not in "+-" or (record.orientation == "+") == runs_forward(road, number):
-            yield lane
+
+    def _is_ahead(self, road: RoadRecord, record: SignalRecord, lane: int) -> bool:
+        """Whether a signal stands where a driver in its lane comes upon it before the junction."""
+        sections = [road.sections[piece.section] for piece, k in self._at[road.id] if k == lane]
+        behind = record.s - min(section.start for section in sections)
+        ahead = max(section.end for section in sections) - record.s
+        if not runs_forward(road, self._lanes[lane].lane_id):
+            behind, ahead = ahead, behind
+        return ahead <= max(behind, _NEAR_THE_END)
+
+    def approaches(self, lane: int, controls: bool) -> Iterator[int]:
+        """Lanes outside junctions by which one comes to a lane; for what controls a junction, those that end at it."""
+        if not self._lanes[lane].in_junction:
+            yield self._last_before_junction(lane) if controls else lane
+            return
+        seen, todo = {lane: None}, [lane]
+        while todo:
+            for before in self._before[todo.pop()]:
+                if not self._lanes[before].in_junction:
+                    yield before
+                elif before not in seen:
+                    seen[before] = None
+                    todo.append(before)
+
+    def _last_before_junction(self, lane: int) -> int:
+        """The lane that one comes to in going on to the next junction, if there is one near by and one way to it."""
+        way, further = lane, 0.0
+        while further <= _FARTHEST:
+            onward = self._after[way]
+            if any(self._lanes[k].in_junction for k in onward):
+                return way
+            if len(onward) != 1:
+                break
+            way, further = onward[0], further + self._lanes[onward[0]].length
+        return lane
+
+
+def _names(road: RoadRecord, record: SignalRecord, lane: int) -> bool:
+    """Whether a signal is for a lane; its orientation decides where it names lanes of both directions, or none."""
+    spans: list[tuple[float, float]] = [(min(span), max(span)) for span in record.lanes] or [(-math.inf, math.inf)]
+    if not any(low <= lane <= high for low, high in spans):
+        return False
+    both = min(low for low, _ in spans) < 0 < max(high for _, high in spans)
+    return not both or record.orientation not in "+-" or (record.orientation == "+") == runs_forward(road, lane)
 
 
 def _signal(
@@ -76,10 +140,9 @@ def _signal(
         facing = float(lanes[ruled[0]].headings[-1]) + np.pi
     else:
         facing = -(heading + record.heading + (0.0 if record.orientation == "-" else np.pi))
-    kind = SIGNAL_TYPES.get(record.type, SignalKind.TRAFFIC_LIGHT if record.dynamic else SignalKind.OTHER)
     return Signal(
         id=number,
-        kind=kind,
+        kind=_kind(record),
         position=(float(position[0]), float(position[1]), z),
         heading=float((facing + np.pi) % (2.0 * np.pi) - np.pi),
         lanes=ruled,

@@ -160,7 +160,10 @@ class Cubics:
 
     def __init__(self, rows: Array) -> None:
         self.rows = rows
-        self._simple = len(rows) == 0 or not np.any(rows[:, 2:]) and bool(np.all(rows[:, 1] == rows[0, 1]))
+        if len(rows) == 1:  # most profiles
+            self._simple = not rows[0, 2:].any()
+        else:
+            self._simple = len(rows) == 0 or not rows[:, 2:].any() and bool(np.all(rows[:, 1] == rows[0, 1]))
 
     def at(self, s: Array, pick: Array | None = None) -> Array:
         """Value (n,) at distances (n,) [m]; `pick` as in `ReferenceLine.place`."""
@@ -170,6 +173,10 @@ class Cubics:
         ds = s - row[:, 0]
         value: Array = row[:, 1] + ds * (row[:, 2] + ds * (row[:, 3] + ds * row[:, 4]))
         return value
+
+
+NO_CUBICS = Cubics(np.empty((0, 5)))
+"""The profile that is 0 everywhere, for the many that a file leaves out."""
 
 
 def _holding(starts: Array, s: Array) -> np.ndarray[tuple[int], np.dtype[np.intp]]:

@@ -6,18 +6,21 @@ is a chain of sections of one road that go on one to one; where a lane forks, jo
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from dorothie_gym.world.town.model import TownError
-from dorothie_gym.world.town.opendrive.records import ConnectionRecord, OpenDriveRecords, RoadLink, RoadRecord
+from dorothie_gym.world.town.opendrive.records import ConnectionRecord, OpenDriveRecords, RoadRecord
 
 # Sections shorter than this are joints, not road: they are left out and what they link is linked directly [m].
 JOINT_LENGTH = 1e-3
 
 # A merged lane shorter than this cannot be driven: its links are joined across it in the same way [m].
 SHORTEST_LANE = 0.1
+
+_log = logging.getLogger(__name__)
 
 
 class Piece(NamedTuple):
@@ -49,19 +52,23 @@ def runs_forward(road: RoadRecord, lane: int) -> bool:
 def build_topology(records: OpenDriveRecords) -> Topology:
     """Lanes of a file and how they go on.
 
+    Links that lead to no lane, or against the traffic, are slips of exporters: they are left out and logged.
+
     Raises:
-        TownError: no driving lanes, or a lane link that leads to a lane that is not there.
+        TownError: no driving lanes.
     """
     graph = _Graph()
     for road in records.roads.values():
         for k, section in enumerate(road.sections):
             for lane in section.lanes.values():
-                if lane.type == "driving":
+                if lane.drives:
                     graph.add(Piece(road.id, k, lane.id), section.end - section.start)
     for source, target in (*_lane_links(records, graph), *_connection_links(records, graph)):
         graph.link(source, target)
     for piece in [p for p, length in graph.length.items() if length < JOINT_LENGTH]:
         graph.contract(piece)
+    for piece in [p for p in graph.length if records.roads[p.road].sections[p.section].lanes[p.lane].is_closed]:
+        graph.remove(piece)
     chains = graph.chains()
     short = [chain for chain in chains if sum(graph.length[p] for p in chain) < SHORTEST_LANE]
     if short:
@@ -94,6 +101,13 @@ class _Graph:
 
     def contract(self, piece: Piece) -> None:
         """Takes a piece out and links what comes before it to what comes after it."""
+        before, after = self.remove(piece)
+        for source in before:
+            for target in after:
+                self.link(source, target)
+
+    def remove(self, piece: Piece) -> tuple[tuple[Piece, ...], tuple[Piece, ...]]:
+        """Takes a piece out; returns what came before it and what came after it."""
         before, after = self.before.pop(piece), self.after.pop(piece)
         before.pop(piece, None)
         after.pop(piece, None)
@@ -101,10 +115,8 @@ class _Graph:
             del self.after[source][piece]
         for target in after:
             del self.before[target][piece]
-        for source in before:
-            for target in after:
-                self.link(source, target)
         del self.length[piece]
+        return tuple(before), tuple(after)
 
     def chains(self) -> list[tuple[Piece, ...]]:
         """Pieces that go on one to one within a road, joined."""
@@ -125,64 +137,98 @@ class _Graph:
         return chains
 
 
+class _Touch(NamedTuple):
+    """An end of a lane section: the road, the section's number, and whether it is the end at the section's start."""
+
+    road: int
+    section: int
+    at_start: bool
+
+
 def _lane_links(records: OpenDriveRecords, graph: _Graph) -> Iterator[tuple[Piece, Piece]]:
     """Links that the lanes themselves name, in driving direction."""
     for piece in graph.length:
         road = records.roads[piece.road]
         lane = road.sections[piece.section].lanes[piece.lane]
-        forward = runs_forward(road, piece.lane)
         for number, step in ((lane.predecessor, -1), (lane.successor, 1)):
-            section = _neighbour_section(records, road, piece.section, step)
-            if number is None or section is None:
-                continue
-            other = Piece(*section, number)
-            if number not in records.roads[other.road].sections[other.section].lanes:
-                raise TownError(
-                    records.source,
-                    f"road {piece.road} / laneSection {piece.section} / lane {piece.lane}",
-                    f"links to lane {number} of road {other.road}, which has no such lane there",
-                )
-            if other in graph.length:  # a lane may end in one of another type
-                yield (piece, other) if forward == (step > 0) else (other, piece)
+            touch = _neighbour_section(records, road, piece.section, step)
+            if number is not None and touch is not None:
+                here = _Touch(piece.road, piece.section, step < 0)
+                where = f"road {piece.road} / laneSection {piece.section} / lane {piece.lane}"
+                yield from _joined(records, graph, (here, piece.lane), (touch, number), where)
 
 
-def _neighbour_section(records: OpenDriveRecords, road: RoadRecord, section: int, step: int) -> tuple[int, int] | None:
-    """Road and section before (-1) or behind (+1) a section; None at a junction and where the road ends."""
+def _neighbour_section(records: OpenDriveRecords, road: RoadRecord, section: int, step: int) -> _Touch | None:
+    """Section before (-1) or behind (+1) a section; None at a junction and where the road ends."""
     if 0 <= section + step < len(road.sections):
-        return road.id, section + step
+        return _Touch(road.id, section + step, step > 0)
     link = road.successor if step > 0 else road.predecessor
-    return _touched(records, link) if link is not None and link.is_road else None
+    return _touched(records, link.id, link.contact) if link is not None and link.is_road else None
 
 
-def _touched(records: OpenDriveRecords, link: RoadLink) -> tuple[int, int]:
-    """Road and lane section that a link touches."""
-    return link.id, 0 if link.contact == "start" else len(records.roads[link.id].sections) - 1
+def _touched(records: OpenDriveRecords, road: int, contact: str) -> _Touch:
+    """The lane section at an end of a road."""
+    return _Touch(road, 0, True) if contact == "start" else _Touch(road, len(records.roads[road].sections) - 1, False)
+
+
+def _joined(
+    records: OpenDriveRecords, graph: _Graph, a: tuple[_Touch, int], b: tuple[_Touch, int], where: str
+) -> Iterator[tuple[Piece, Piece]]:
+    """The link between two lanes that meet at ends of their sections, in driving direction; nothing if there is none.
+
+    Args:
+        records: the file.
+        graph: its driving lanes; a lane may end in one of another type.
+        a: where one lane is touched, and its number.
+        b: the same for the other.
+        where: element that says so, for the log.
+    """
+    pieces = []
+    for touch, number in (a, b):
+        if number not in records.roads[touch.road].sections[touch.section].lanes:
+            _log.warning(
+                "%s: %s: links lane %d of road %d: no such lane there", records.source, where, number, touch.road
+            )
+            return
+        pieces.append(Piece(touch.road, touch.section, number))
+    if any(piece not in graph.length for piece in pieces):
+        return
+    leaves = [runs_forward(records.roads[t.road], number) != t.at_start for t, number in (a, b)]
+    if leaves[0] == leaves[1]:
+        _log.warning("%s: %s: links lanes of opposite directions: left out", records.source, where)
+    else:
+        yield (pieces[0], pieces[1]) if leaves[0] else (pieces[1], pieces[0])
 
 
 def _connection_links(records: OpenDriveRecords, graph: _Graph) -> Iterator[tuple[Piece, Piece]]:
-    """Links that the junctions name; those against the traffic are an exporter's slips and left out."""
+    """Links that the junctions name."""
     for junction, connections in records.junctions.items():
         for connection in connections:
-            connecting = records.roads[connection.connecting]
-            entry = connecting.predecessor if connection.contact == "start" else connecting.successor
-            if entry is None or not entry.is_road or entry.id != connection.incoming:
-                continue  # the connecting road itself does not know of the incoming one
-            last = 0 if connection.contact == "start" else len(connecting.sections) - 1
-            for source, target in connection.lanes:
-                pair = Piece(*_touched(records, entry), source), Piece(connecting.id, last, target)
-                _check_lanes(records, junction, connection, pair)
-                enters = runs_forward(connecting, target) == (connection.contact == "start")
-                if enters and pair[0] in graph.length and pair[1] in graph.length:
-                    yield pair
+            there = _touched(records, connection.connecting, connection.contact)
+            where = f"junction {junction} / connection from road {connection.incoming} to road {connection.connecting}"
+            for here in _incoming_ends(records, junction, connection):
+                for source, target in connection.lanes or _equal_lanes(records, here, there):
+                    yield from _joined(records, graph, (here, source), (there, target), where)
 
 
-def _check_lanes(
-    records: OpenDriveRecords, junction: int, connection: ConnectionRecord, pair: tuple[Piece, Piece]
-) -> None:
-    for piece in pair:
-        if piece.lane not in records.roads[piece.road].sections[piece.section].lanes:
-            raise TownError(
-                records.source,
-                f"junction {junction} / connection from road {connection.incoming} to road {connection.connecting}",
-                f"links lane {piece.lane} of road {piece.road}, which has no such lane there",
-            )
+def _incoming_ends(records: OpenDriveRecords, junction: int, connection: ConnectionRecord) -> Iterator[_Touch]:
+    """Ends of the incoming road that a connection begins at; none where the connecting road knows better."""
+    if connection.direct:
+        road = records.roads[connection.incoming]
+        for link, contact in ((road.predecessor, "start"), (road.successor, "end")):
+            if link is not None and not link.is_road and link.id == junction:
+                yield _touched(records, road.id, contact)
+    else:
+        road = records.roads[connection.connecting]
+        link = road.predecessor if connection.contact == "start" else road.successor
+        if link is not None and link.is_road and link.id == connection.incoming:
+            yield _touched(records, link.id, link.contact)
+
+
+def _equal_lanes(records: OpenDriveRecords, here: _Touch, there: _Touch) -> Iterator[tuple[int, int]]:
+    """Lanes that a connection without lane links means: those of equal number, or opposite where the roads collide."""
+    sign = 1 if here.at_start != there.at_start else -1
+    beyond = records.roads[there.road].sections[there.section].lanes
+    for number, lane in records.roads[here.road].sections[here.section].lanes.items():
+        if lane.drives and sign * number in beyond and beyond[sign * number].drives:
+            yield number, sign * number
