@@ -42,7 +42,7 @@ def towns(
     if picture is not None:
         check_picture(picture)
     with told_plainly():
-        from dorothie_gym.world.town import describe, load_town
+        from dorothie_gym.world.town import describe, fold_of, load_town
         from dorothie_gym.world.town.check import check_town
 
         loaded = load_town(town)
@@ -51,7 +51,7 @@ def towns(
         if picture is not None:
             from dorothie_gym.world.graphics import town_picture
 
-            town_picture(loaded, picture)
+            town_picture(loaded, picture, fold=fold_of(loaded.name))
     if as_json:
         print_json({"town": loaded.name, "faults": [_fault_row(fault) for fault in faults]} if check else facts)
     else:
@@ -69,11 +69,9 @@ def _list_towns(check: bool, picture: Path | None, as_json: bool) -> None:
     if picture is not None:
         fail("--picture draws one town; name it: dorothie-gym towns NAME --picture")
     with told_plainly():
-        from dorothie_gym.world.town import describe, load_town, town_names
-        from dorothie_gym.world.town.catalogue import SEEN_TOWNS, UNSEEN_TOWNS
+        from dorothie_gym.world.town import describe, fold_of, load_town, town_names
 
-        folds = {**dict.fromkeys(SEEN_TOWNS, "seen"), **dict.fromkeys(UNSEEN_TOWNS, "unseen")}
-        rows = [{**describe(load_town(name)), "fold": folds.get(name)} for name in town_names()]
+        rows = [{**describe(load_town(name)), "fold": fold_of(name)} for name in town_names()]
     print_json(rows) if as_json else _show_towns(rows)
 
 

@@ -46,10 +46,10 @@ class AerialView:
         painter = self._painter(scene, follow)
         car = np.array([scene.car.x, scene.car.y])
         if follow:
-            picture = painter.window(car, self.size)
+            picture = painter.window(car, self.size, scene.time)
             corner = np.round(painter.to_pixel(car) - np.array(self.size) / 2.0)
         else:
-            picture = painter.surface()
+            picture = painter.surface(scene.time)
             corner = np.zeros(2)
         apply_weather(picture, scene.weather, scene.time)
         canvas = self._canvas

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from dorothie_gym.world.graphics import MapPainter, palette, town_picture
+from dorothie_gym.world.graphics.borders import BorderKind
 from dorothie_gym.world.graphics.fonts import font, font_path
 from dorothie_gym.world.graphics.plan import Plan
 from dorothie_gym.world.graphics.sky import darkness, weather_summary
 from dorothie_gym.world.graphics.text import shorten, wrap
-from dorothie_gym.world.town import Junction, Lane, LaneLink, LinkType, Street, Town, load_town
+from dorothie_gym.world.town import Junction, Lane, LaneLink, LinkType, Signal, SignalKind, Street, Town, load_town
 
 MAPS = Path(__file__).parents[2] / "../shared/maps"
 
@@ -57,24 +58,25 @@ def test_road_is_painted_where_the_lanes_are_and_country_elsewhere() -> None:
 
 
 def test_a_line_parts_the_two_directions() -> None:
-    kinds = {edge.kind for edge in Plan(two_way_street()).edges}
-    assert kinds == {"centre", "kerb"}
+    kinds = [border.kind for border in Plan(two_way_street()).borders.lines]
+    assert sorted(kinds) == [BorderKind.CENTRE, BorderKind.EDGE, BorderKind.EDGE]
 
 
 def test_dashes_part_lanes_of_the_same_direction() -> None:
     lanes = [straight(0, (0.0, 0.0), (100.0, 0.0)), straight(1, (0.0, 3.5), (100.0, 3.5))]
     plan = Plan(Town(name="wide", lanes=lanes, links=[], junctions=[]))
-    inner = [edge for edge in plan.edges if edge.kind == "lane"]
-    assert [(edge.lane, edge.beyond, edge.sign) for edge in inner] == [(1, 0, -1)]
+    inner = [border for border in plan.borders.lines if border.kind is BorderKind.LANE]
+    assert [(border.lanes, border.sign) for border in inner] == [((1,), -1)]
+    assert plan.borders.right_neighbour == {0: 1}
 
 
 @pytest.mark.parametrize("upper_first", [True, False])
 def test_the_higher_road_is_painted_over_the_lower(upper_first: bool) -> None:
     plan = Plan(overpass(upper_first))
-    assert [row[:2] for row in plan.bridges] == [(1, 0 if upper_first else 1)]
+    assert [(part.level, part.lane) for part in plan.stretches] == [(1, 0 if upper_first else 1)]
     painter = MapPainter(overpass(upper_first), size=(600, 600))
-    along = (0.0, 2.3) if upper_first else (2.3, 0.0)  # just beside the upper road, on the lower one
-    assert colour_at(painter, along) == palette.BRIDGE_EDGE
+    along = (0.0, 3.2) if upper_first else (3.2, 0.0)  # just beside the upper road, on the lower one
+    assert colour_at(painter, along) == palette.BRIDGE_SHADOW
     across = along[::-1]  # on the upper road, where the kerb of the lower one would be
     assert colour_at(painter, across) == palette.ROAD
 
@@ -132,8 +134,13 @@ def test_a_stop_line_and_an_arrow_stand_before_a_choice() -> None:
         lanes.append(Lane(id=k, road_id=k, lane_id=-1, junction_id=3, points=line, widths=widths, speed_limit=10.0))
     links = [LaneLink(0, 1, LinkType.STRAIGHT), LaneLink(0, 2, LinkType.LEFT)]
     junction = Junction(id=3, position=(66.0, 0.0), connectors=(1, 2))
-    colours = {shape.colour for shape in Plan(Town(name="fork", lanes=lanes, links=links, junctions=[junction])).shapes}
-    assert {palette.STOP_LINE, palette.ARROW} <= colours
+    stop = Signal(id=0, kind=SignalKind.STOP, position=(59.0, 3.0, 2.0), heading=0.0, lanes=(0,))
+    town = Town(name="fork", lanes=lanes, links=links, junctions=[junction], signals=[stop])
+    plan = Plan(town)
+    bars = [shape for shape in plan.shapes if shape.colour == palette.STOP_LINE]
+    assert len(bars) == 1 and bars[0].bounds[2] <= 60.0 and bars[0].bounds[0] > 58.0
+    assert [(arrow.shows, arrow.turns) for arrow in plan.arrows] == [(0, (LinkType.STRAIGHT, LinkType.LEFT))]
+    assert {palette.ARROW} <= {shape.colour for shape in plan.shapes}
 
 
 def test_a_surface_is_a_copy() -> None:
@@ -184,7 +191,8 @@ def test_imported_town_with_an_overpass_is_painted(tmp_path: Path) -> None:
         pytest.skip("../shared/maps is not there")
     painter = town_picture(load_town(str(file)), tmp_path / "town05.png", (1000, 800))
     assert {label.street for label in painter.labels} == set(range(len(painter.town.streets)))
-    assert Plan(painter.town).bridges
+    assert any(part.level > 0 for part in painter.plan.stretches)
+    assert painter.missing == ()
 
 
 def test_typeface_survives_pygame_being_quit() -> None:

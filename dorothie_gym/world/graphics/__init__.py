@@ -6,6 +6,7 @@ import os
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 
 from dorothie_gym.world.graphics.labels import Label  # noqa: E402
-from dorothie_gym.world.graphics.map import MapPainter, town_picture  # noqa: E402
+from dorothie_gym.world.graphics.map import MapPainter  # noqa: E402
+from dorothie_gym.world.graphics.sheet import town_picture  # noqa: E402
 
 __all__ = ["Label", "MapPainter", "town_picture"]

@@ -8,14 +8,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, label
 
 from dorothie_gym.world.graphics import palette
 from dorothie_gym.world.graphics.palette import Colour
-from dorothie_gym.world.graphics.shapes import Shape, disc, ribbon
+from dorothie_gym.world.graphics.shapes import Shape, disc, ribbon, simplified, strokes
 from dorothie_gym.world.town.model import Array, Town
 
 # Larger holes between connectors are islands (the middle of a roundabout), not asphalt [m2].
 _LARGEST_HOLE = 160.0
+_CLOSING = 2.5  # [m]
+_MOUTH = 6.0  # [m] of the lanes before and behind a junction that its asphalt meets
+_INSET = 0.1  # [m] that lanes are drawn narrower by: a grid makes everything wider
+_SMOOTHING = 5
+_RIM = 2.6  # [m]
 _BLOCK_SCALE = 1.0  # [px/m]: the edges of blocks lie under roads, so a metre is fine enough
 _HOLE_SCALE = 4.0
 _TREE_SPACING = 13.0  # [m]
@@ -53,25 +60,18 @@ class _Piece:
 
     @property
     def outline(self) -> Array:
-        """Its outline (n, 2) [m]; a small disc where it is too small to have one."""
-        line = np.array(self.mask.outline(), dtype=float).reshape(-1, 2)
-        if len(line) < 4:
-            return disc(np.array(self.mask.centroid()) / self.scale + self.low, 1.0 / self.scale, 8)
-        return (line + 0.5) / self.scale + self.low
+        """Its outline (n, 2) [m]."""
+        return _outline(self.mask, self.low, self.scale)
 
 
 def _free(outlines: Sequence[Array], scale: float, border: float) -> list[_Piece]:
     """What polygons (n, 2) [m] leave free inside a frame that is wider than they are by a border [m]."""
     import pygame
 
-    points = np.concatenate(outlines)
-    low, high = points.min(axis=0) - border, points.max(axis=0) + border
-    width, height = (int(n) for n in np.ceil((high - low) * scale))
-    surface = pygame.Surface((width, height), pygame.SRCALPHA, 32)
-    for outline in outlines:
-        pygame.draw.polygon(surface, (255, 255, 255, 255), ((outline - low) * scale).tolist())
+    surface, low = _painted(outlines, scale, border)
     free = pygame.mask.from_surface(surface)
     free.invert()
+    width, height = surface.get_size()
     pieces = []
     for mask in free.connected_components(minimum=1):
         rectangles: list[Any] = mask.get_bounding_rects()
@@ -81,15 +81,91 @@ def _free(outlines: Sequence[Array], scale: float, border: float) -> list[_Piece
     return pieces
 
 
-def junction_fillings(town: Town) -> list[Array]:
-    """Outlines (n, 2) [m] of the asphalt that lies between the connectors of junctions."""
-    fillings = []
-    for junction in town.junctions:
-        outlines = [ribbon(town.lanes[k], 0.15) for k in junction.connectors]
-        if outlines:
-            pieces = _free(outlines, _HOLE_SCALE, 1.0)
-            fillings += [piece.outline for piece in pieces if not piece.outside and piece.area < _LARGEST_HOLE]
-    return fillings
+def junction_areas(town: Town) -> list[Array]:
+    """Outlines (n, 2) [m] of the asphalt of junctions: their connectors and mouths, and the gaps between them.
+
+    Gaps narrower than five metres are closed, and so are holes; larger holes stay free, as the middle of a roundabout.
+    """
+    return [outline for junction in town.junctions for outline in _closed(town, junction.connectors)]
+
+
+def _closed(town: Town, connectors: Sequence[int]) -> Iterator[Array]:
+    import pygame
+
+    lanes = [town.lanes[k] for k in connectors]
+    outlines = [ribbon(lane, -_INSET) for lane in lanes]
+    for lane in dict.fromkeys(k for c in connectors for k in town.predecessors(c)):
+        if not (mouth := town.lanes[lane]).in_junction:
+            outlines.append(ribbon(mouth, -_INSET, max(0.0, mouth.length - _MOUTH)))
+    for lane in dict.fromkeys(link.target for c in connectors for link in town.successors(c)):
+        if not (mouth := town.lanes[lane]).in_junction:
+            outlines.append(ribbon(mouth, -_INSET, 0.0, min(mouth.length, _MOUTH)))
+    if not outlines:
+        return
+    surface, low = _painted(outlines, _HOLE_SCALE, 2.0 * _CLOSING)
+    solid = pygame.surfarray.array_alpha(surface) > 0
+    # Closing: grown by a radius, then shrunk by it, which only fills what is narrower than twice the radius.
+    radius = _CLOSING * _HOLE_SCALE
+    grown = distance_transform_edt(~solid) <= radius
+    solid |= distance_transform_edt(grown) > radius
+    for hole in _pieces(~solid):
+        if hole.mask.count() < _LARGEST_HOLE * _HOLE_SCALE**2 and not hole.outside:
+            solid |= hole.array
+    for piece in _pieces(solid):
+        yield simplified(smooth_outline(_outline(piece.mask, low, _HOLE_SCALE), _SMOOTHING), 0.03)
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A connected part of a grid: as a `pygame.mask.Mask`, as cells (width, height), and whether it is at the rim."""
+
+    mask: Any
+    array: NDArray[np.bool_]
+    outside: bool
+
+
+def _pieces(cells: NDArray[np.bool_]) -> Iterator[_Part]:
+    import pygame
+
+    numbers, count = label(cells)
+    for k in range(1, count + 1):
+        array = numbers == k
+        rim = array[0].any() or array[-1].any() or array[:, 0].any() or array[:, -1].any()
+        shown = pygame.Surface(array.shape, pygame.SRCALPHA, 32)
+        alpha = pygame.surfarray.pixels_alpha(shown)
+        alpha[:] = array * np.uint8(255)
+        del alpha  # unlocks the surface
+        yield _Part(pygame.mask.from_surface(shown), array, bool(rim))
+
+
+def _outline(mask: Any, low: Array, scale: float) -> Array:
+    """Outline (n, 2) [m] of a mask; a small disc where it is too small to have one."""
+    line = np.array(mask.outline(), dtype=float).reshape(-1, 2)
+    if len(line) < 4:
+        return disc(np.array(mask.centroid()) / scale + low, 1.0 / scale, 8)
+    return np.asarray((line + 0.5) / scale + low)
+
+
+def smooth_outline(outline: Array, size: int) -> Array:
+    """A closed outline (n, 2) without the steps of the grid it was taken from: a running mean over `size` points."""
+    if len(outline) <= 2 * size:
+        return outline
+    around = np.concatenate((outline[-(size // 2) :], outline, outline[: size // 2]))
+    kernel = np.full(size, 1.0 / size)
+    return np.stack([np.convolve(around[:, k], kernel, mode="valid") for k in (0, 1)], axis=-1)
+
+
+def _painted(outlines: Sequence[Array], scale: float, border: float) -> tuple[Any, Array]:
+    """Polygons (n, 2) [m] on a transparent surface that is wider than they are by a border [m], and its corner [m]."""
+    import pygame
+
+    points = np.concatenate(outlines)
+    low, high = points.min(axis=0) - border, points.max(axis=0) + border
+    width, height = (int(n) for n in np.ceil((high - low) * scale))
+    surface = pygame.Surface((width, height), pygame.SRCALPHA, 32)
+    for outline in outlines:
+        pygame.draw.polygon(surface, (255, 255, 255, 255), ((outline - low) * scale).tolist())
+    return surface, low
 
 
 def landscape(town: Town, border: float) -> list[Shape]:
@@ -108,7 +184,11 @@ def landscape(town: Town, border: float) -> list[Shape]:
     for rank, piece in enumerate(inner):
         # Every third large block is a park; slivers (medians, islands) are grass.
         park = piece.area < _SLIVER or (piece.area > _SMALLEST_PARK and rank % 3 == 1)
-        shapes.append(Shape(piece.outline, palette.PARK if park else palette.BLOCK))
+        colour = palette.PARK if park else palette.BLOCK
+        outline = simplified(smooth_outline(piece.outline, 5), 0.3)
+        shapes.append(Shape(outline, colour))
+        # The grid is coarse: what it leaves of the ground beside the road's edge is covered by a broad rim.
+        shapes += [Shape(part, colour) for part in strokes(np.concatenate((outline, outline[:1])), _RIM)]
         if park and piece.area > _SMALLEST_PARK:
             shapes += _trees(town, piece, rng, 0.8, palette.TREE)
     for piece in pieces:

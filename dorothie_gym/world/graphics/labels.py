@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
+from dorothie_gym.world.graphics.axes import Axis, street_axes
 from dorothie_gym.world.graphics.fonts import font
-from dorothie_gym.world.graphics.plan import Edge, Plan
-from dorothie_gym.world.graphics.shapes import sample, side_line, widths_at
-from dorothie_gym.world.town.model import NO_STREET, Array, Lane, Town
+from dorothie_gym.world.graphics.obstacles import LEVELS, Obstacles
+from dorothie_gym.world.graphics.plan import Plan
+from dorothie_gym.world.town.model import Array
 
-_MOST_LANES = 8  # of one carriageway
 _MOST_BENT = 0.9  # [rad] that the line under a name may turn
-_ARROWS = 9.0  # [m] of a lane's end that its arrow takes
+_TIGHTEST = 2.2  # sizes of type: the smallest radius that letters still stand well on
+_ROOM = 0.72  # of the road's width that type may take
+_HALF = 0.62  # of a name's height that is kept free on either side of its line
+_LONGER = 1.08  # times a name's length of road is taken
+_POINTS = 24
+_REPEATED = 0.8  # times its size a name may be set again where there is less room
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,173 +42,126 @@ class Label:
     path: Array
 
 
-@dataclass(frozen=True)
-class _Axis:
-    """A line (n, 2) [px] that a name may be set along, and the room across it [px]."""
-
-    street: int
-    line: Array
-    room: float
-
-
 @dataclass
 class LabelPlacer:
     """Sets the names of a town's streets.
 
     Attributes:
-        town: whose streets.
         names: by street index.
         scale: [px/m].
         origin: world position of pixel (0, 0) [m].
+        frame: left, top, right and bottom [px] that names stay inside.
         sizes: largest and smallest type [px].
         spacing: distance between two settings of the same name [px].
-        frame: width and height of the picture [px]; names stay inside.
+        placed: the names set so far.
+        missing: names of streets on which there is no room at all.
     """
 
-    town: Town
     names: Sequence[str]
     scale: float
     origin: Array
-    frame: tuple[int, int]
+    frame: tuple[int, int, int, int]
     sizes: tuple[int, int] = (20, 11)
     spacing: float = 420.0
     placed: list[Label] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
 
-    def place(self, plan: Plan) -> list[Label]:
+    def place(self, plan: Plan, fixed: Array) -> list[Label]:
         """Sets every name at least once where its street can be seen, and again where it is long.
 
         Streets with the least room come first; a name is made smaller before it may touch a junction.
+
+        Args:
+            plan: what is painted.
+            fixed: circles (n, 3) [px] that no name may touch: x, y, radius.
         """
-        right_of = {edge.beyond: edge.lane for edge in plan.edges if edge.kind == "lane"}
-        axes = [axis for edge in plan.edges if (axis := self._axis(edge, right_of)) is not None]
-        bridges = self._obstacles((self.town.lanes[k], start, end) for _, k, start, end in plan.bridges)
-        junctions = self._obstacles((lane, 0.0, lane.length) for lane in self.town.lanes if lane.in_junction)
-        arrows = self._obstacles(self._arrows())
-        # What a name keeps clear of: everything, if it can; then it may touch arrows, then junctions' edges, then all.
-        free = [
-            np.concatenate(parts)
-            for parts in (
-                (bridges, junctions, arrows),
-                (bridges, junctions),
-                (bridges, junctions * np.array([1.0, 1.0, 0.4])),
-                (bridges,),
-            )
-        ]
-        # Circles (x, y, radius) that names keep clear of.
-        taken = np.zeros((0, 3))
-        by_street = {
-            k: sorted((a for a in axes if a.street == k), key=_length, reverse=True) for k in range(len(self.names))
-        }
-        order = sorted(by_street, key=lambda k: (sum(_length(a) for a in by_street[k]), k))
-        self.placed = []
+        obstacles = Obstacles.of(plan, self.scale, self.origin, fixed)
+        axes = street_axes(plan, self.scale, self.origin)
+        by_street: dict[int, list[Axis]] = {k: [] for k in range(len(self.names))}
+        for axis in axes:
+            if axis.street in by_street:
+                by_street[axis.street].append(axis)
+        for row in by_street.values():
+            row.sort(key=lambda axis: -axis.length)
+            for axis in row:
+                axis.clear = obstacles.clearances(axis)
+        order = sorted(by_street, key=lambda k: (sum(axis.length for axis in by_street[k]), k))
+        self.placed, self.missing = [], []
         for street in order:
-            taken = self._place_first(street, by_street[street], free, taken)
+            if not self._place_first(street, by_street[street], axes):
+                self.missing.append(self.names[street])
         for street in order:
-            taken = self._place_more(street, by_street[street], free[0], taken)
+            first = next((label for label in self.placed if label.street == street), None)
+            if first is None:
+                continue
+            forced = first.size == self.sizes[1]
+            for size in dict.fromkeys((first.size, max(self.sizes[1], round(_REPEATED * first.size)))):
+                while self._try(street, by_street[street], axes, size, 0, forced):
+                    pass
         return self.placed
 
-    def _place_first(self, street: int, axes: list[_Axis], free: Sequence[Array], taken: Array) -> Array:
+    def _place_first(self, street: int, own: list[Axis], axes: list[Axis]) -> bool:
         large, small = self.sizes
-        middle = (large + small + 1) // 2
-        tries = [(free[0], large), (free[0], middle), (free[1], large), (free[1], middle)]
-        tries += [(blocked, size) for blocked in free for size in (middle, small)]
-        for force in (False, True):
-            for blocked, size in tries:
-                circles = self._try(street, axes, size, np.concatenate((blocked, taken)), force)
-                if circles is not None:
-                    return np.concatenate((taken, circles))
-        return taken
+        # Broad streets have large names; each size is tried on the road's free stretches, then over its arrows.
+        shares = (1.0, 0.85, 0.72, 0.6, 0.5, 0.42)
+        sizes = list(dict.fromkeys(max(small, round(share * large)) for share in shares))
+        tries = [(size, freedom, False) for part in (sizes[:4], sizes[4:]) for freedom in (0, 1) for size in part]
+        tries += [(sizes[len(sizes) // 2], 2, False), (small, 2, False)]
+        # Rather beyond the road's edges, or on a junction, than not at all.
+        tries += [(small, freedom, True) for freedom in range(LEVELS)]
+        return any(self._try(street, own, axes, *attempt) for attempt in tries)
 
-    def _place_more(self, street: int, axes: list[_Axis], blocked: Array, taken: Array) -> Array:
-        first = next((label for label in self.placed if label.street == street), None)
-        while first is not None:
-            circles = self._try(street, axes, first.size, np.concatenate((blocked, taken)), force=False)
-            if circles is None:
-                break
-            taken = np.concatenate((taken, circles))
-        return taken
-
-    def _try(self, street: int, axes: list[_Axis], size: int, blocked: Array, force: bool) -> Array | None:
+    def _try(
+        self, street: int, own: list[Axis], axes: list[Axis], size: int, freedom: int, force: bool = False
+    ) -> bool:
         text = self.names[street]
-        width = font(size, bold=True).size(text)[0]
-        same = np.array([label.path.mean(axis=0) for label in self.placed if label.street == street]).reshape(-1, 2)
-        for axis in axes:
-            if axis.room < 0.78 * size and not force:
+        width = font(size, bold=True).size(text)[0] * _LONGER
+        for axis in own:
+            path = self._window(axis, street, width, size, freedom, force)
+            if path is None:
                 continue
-            for path in _windows(axis.line, width):
-                if not self._inside(path, size):
-                    continue
-                if len(same) and np.hypot(*(same - path.mean(axis=0)).T).min() < self.spacing:
-                    continue
-                if _bent(path) > _MOST_BENT:
-                    continue
-                circles = _circles(path, size)
-                gap = np.hypot(circles[:, None, 0] - blocked[:, 0], circles[:, None, 1] - blocked[:, 1])
-                if (gap < circles[:, 2][:, None] + blocked[:, 2]).any():
-                    continue
-                self.placed.append(Label(text, street, size, _upright(path)))
-                return circles
-        return None
+            label = Label(text, street, size, _upright(path))
+            self.placed.append(label)
+            tree = cKDTree(label.path)
+            for other in axes:
+                other.keep_off(tree, _HALF * size)
+            return True
+        return False
 
-    def _inside(self, path: Array, size: int) -> bool:
-        low, high = path.min(axis=0) - size, path.max(axis=0) + size
-        return bool((low >= 0).all() and high[0] <= self.frame[0] and high[1] <= self.frame[1])
-
-    def _axis(self, edge: Edge, right_of: Mapping[int, int]) -> _Axis | None:
-        """The middle of the road where lanes of both directions meet, else the middle of the carriageway."""
-        lane = self.town.lanes[edge.lane]
-        if lane.street == NO_STREET or lane.street >= len(self.names) or edge.sign > 0 or edge.kind == "lane":
+    def _window(self, axis: Axis, street: int, width: float, size: int, freedom: int, force: bool) -> Array | None:
+        """The best place on an axis: straight, and near the middle of the stretch that is free."""
+        count = int(np.ceil(width / axis.step)) + 1
+        if count > len(axis.line):
             return None
-        s = sample(lane, edge.start, edge.end, 1.5)
-        widths = widths_at(lane, s)
-        if edge.kind == "centre":
-            line, room = side_line(lane, s, -widths / 2.0), 2.0 * float(widths.min())
-        else:
-            room, beside = float(widths.min()), lane.id
-            for _ in range(_MOST_LANES):
-                if beside not in right_of:
-                    break
-                beside = right_of[beside]
-                room += float(self.town.lanes[beside].widths.min())
-            line = side_line(lane, s, room / 2.0 - widths / 2.0)
-        return _Axis(lane.street, (line - self.origin) * self.scale, room * self.scale)
-
-    def _arrows(self) -> Iterator[tuple[Lane, float, float]]:
-        """Stretches of lanes that their arrows take."""
-        for lane in self.town.lanes:
-            if not lane.in_junction and lane.length > 3.0 * _ARROWS and len(self.town.exits(lane.id)) > 1:
-                yield lane, lane.length - _ARROWS, lane.length
-
-    def _obstacles(self, stretches: Iterable[tuple[Lane, float, float]]) -> Array:
-        """Circles (n, 3) [px] along stretches of lanes [m]."""
-        rows = [np.zeros((0, 3))]
-        for lane, start, end in stretches:
-            s = sample(lane, start, end, 2.0)
-            points = (side_line(lane, s, 0.0) - self.origin) * self.scale
-            rows.append(np.column_stack((points, np.full(len(points), 1.2 * self.scale))))
-        return np.concatenate(rows)
+        ok = np.minimum(axis.clear[freedom], axis.taken) >= _HALF * size
+        if not force:
+            ok &= axis.room * _ROOM >= size
+        left, top, right, bottom = self.frame
+        inside = (axis.line > np.array([left, top]) + size) & (axis.line < np.array([right, bottom]) - size)
+        ok &= inside.all(axis=1)
+        ok &= np.abs(np.gradient(axis.heading, axis.step)) < 1.0 / (_TIGHTEST * size)
+        starts = np.flatnonzero(sliding_window_view(ok, count).all(axis=1))
+        if not len(starts):
+            return None
+        turned = sliding_window_view(axis.heading, count)[starts]
+        bent = turned.max(axis=1) - turned.min(axis=1)
+        middle = axis.line[starts + count // 2]
+        good = bent <= _MOST_BENT
+        same = np.array([label.path.mean(axis=0) for label in self.placed if label.street == street]).reshape(-1, 2)
+        if len(same):
+            good &= np.hypot(*(middle[:, None] - same).transpose(2, 0, 1)).min(axis=1) >= self.spacing
+        if not good.any():
+            return None
+        centred = np.abs(starts - _middle_of_run(starts)) * axis.step
+        cost = np.where(good, centred / self.spacing + 1.2 * bent, np.inf)
+        first = int(starts[int(np.argmin(cost))])
+        return axis.along(first * axis.step + 0.5 * (width - width / _LONGER), width / _LONGER, _POINTS)
 
 
-def _length(axis: _Axis) -> float:
-    return float(np.hypot(*np.diff(axis.line, axis=0).T).sum())
-
-
-def _windows(line: Array, width: float) -> Iterator[Array]:
-    """Stretches of a line as long as a text, from its middle outwards."""
-    stations = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))))
-    spare = float(stations[-1]) - width * 1.08
-    if spare < 0:
-        return
-    starts = np.linspace(0.0, spare, max(1, int(spare // 16) + 1))
-    for start in sorted(starts.tolist(), key=lambda s: abs(s - spare / 2.0)):
-        s = np.linspace(start + 0.04 * width, start + 1.04 * width, 24)
-        yield np.stack((np.interp(s, stations, line[:, 0]), np.interp(s, stations, line[:, 1])), axis=-1)
-
-
-def _bent(path: Array) -> float:
-    """How far the direction of a path turns in all [rad]."""
-    angle = np.unwrap(np.arctan2(*np.diff(path, axis=0).T[::-1]))
-    return float(angle.max() - angle.min())
+def _middle_of_run(starts: NDArray[np.int64]) -> Array:
+    """For each of ascending integers (n,), the middle of the run of successive ones that it belongs to."""
+    cuts = np.flatnonzero(np.diff(starts) > 1) + 1
+    return np.concatenate([np.full(len(run), (run[0] + run[-1]) / 2.0) for run in np.split(starts, cuts)])
 
 
 def _upright(path: Array) -> Array:
@@ -210,6 +171,8 @@ def _upright(path: Array) -> Array:
     return path[::-1] if backwards else path
 
 
-def _circles(path: Array, size: int) -> Array:
-    """Circles (n, 3) that cover a text."""
-    return np.column_stack((path, np.full(len(path), 0.62 * size)))
+def covering(labels: Iterable[Label]) -> Iterator[tuple[float, float, float]]:
+    """Circles (x, y, radius) [px] that cover names."""
+    for label in labels:
+        for x, y in label.path.tolist():
+            yield x, y, _HALF * label.size

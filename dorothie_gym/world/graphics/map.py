@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
 from dorothie_gym.world.graphics import palette
+from dorothie_gym.world.graphics.arrows import ARROW_LENGTH, one_way_arrow, one_way_places
 from dorothie_gym.world.graphics.ground import town_bounds
-from dorothie_gym.world.graphics.labels import Label, LabelPlacer
+from dorothie_gym.world.graphics.icons import lamp_colour, pin_icon, sign_icon, stamp
+from dorothie_gym.world.graphics.labels import Label, LabelPlacer, covering
+from dorothie_gym.world.graphics.markings import stop_bar
 from dorothie_gym.world.graphics.plan import Plan
+from dorothie_gym.world.graphics.shapes import Shape, longer, strokes
 from dorothie_gym.world.graphics.text import set_along, words
-from dorothie_gym.world.town.model import Array, Town
+from dorothie_gym.world.town.model import Array, Lane, SignalKind, Town
 
 SUPERSAMPLING = 2
+GROUND = 14.0
+"""Country around the outermost roads [m]."""
+
 _TILE = 1024  # [px]: what is painted at a time, so that large maps need little memory
-_GROUND = 14.0  # [m] of country around the outermost roads
 _BAR_LENGTHS = (10, 20, 50, 100, 200, 500, 1000, 2000)
+_SIGN = (4.2, 54)  # height of signs [m], but not larger than this [px]
+_PIN = (2.9, 34)  # radius of pins, likewise
+_NAME_GROUND = (1.16, 0.25)  # times the size of type: height, and what it is longer, of the bare road under a name
 
 
 class MapPainter:
@@ -33,6 +41,8 @@ class MapPainter:
         origin: world position (2,) of the picture's upper left corner [m].
         street_names: names by street index.
         labels: the names as they were set.
+        missing: names of streets on which there is no room for them.
+        plan: what was painted.
     """
 
     def __init__(
@@ -45,6 +55,8 @@ class MapPainter:
         type_sizes: tuple[int, int] = (20, 11),
         label_spacing: float = 380.0,
         border: float | None = None,
+        numbered: bool = False,
+        smallest_sign: int = 12,
     ) -> None:
         """Fits a town into a picture.
 
@@ -56,6 +68,8 @@ class MapPainter:
             type_sizes: largest and smallest type of street names [px].
             label_spacing: distance between two settings of one name [px].
             border: how far trees stand beyond the roads [m]; to the edge of the picture where absent.
+            numbered: whether the sites of landmarks have pins with their numbers.
+            smallest_sign: height of lights and signs, however small the scale [px].
 
         Raises:
             ValueError: `size` leaves no room inside `margin`, or there are too few names.
@@ -68,48 +82,87 @@ class MapPainter:
         if len(names) < len(town.streets):
             raise ValueError(f"street_names: {len(names)} names for {len(town.streets)} streets of {town.name}")
         self.town, self.size, self.street_names = town, size, tuple(names)
-        x0, y0, x1, y1 = town_bounds(town, _GROUND)
+        x0, y0, x1, y1 = town_bounds(town, GROUND)
         extent = np.array([x1 - x0, y1 - y0])
         self.scale = float((room / extent).min())
         self.origin: Array = (
             np.array([x0, y0]) - (np.array([left, top]) + (room - extent * self.scale) / 2.0) / self.scale
         )
         border = float(max(size)) / self.scale / 3.0 if border is None else border
-        plan = Plan(town, pen=0.8 / self.scale, border=border)
+        self.plan = Plan(town, scale=self.scale, border=border)
+        self._pins = _sized(_PIN, self.scale, 0.7 * smallest_sign) if numbered else 0
+        self._signs = _sized(_SIGN, self.scale, smallest_sign)
         placer = LabelPlacer(
-            town=town,
             names=names[: len(town.streets)],
             scale=self.scale,
             origin=self.origin,
-            frame=size,
+            frame=(0, 0, *size),
             sizes=type_sizes,
             spacing=label_spacing,
         )
-        self.labels: tuple[Label, ...] = tuple(placer.place(plan))
-        self._surface = self._paint(plan)
+        self.labels: tuple[Label, ...] = tuple(placer.place(self.plan, self._fixed()))
+        self.missing: tuple[str, ...] = tuple(placer.missing)
+        self._surface = self._paint()
 
     @classmethod
     def at_scale(cls, town: Town, scale: float, **options: Any) -> MapPainter:
         """A painter whose picture is as large as the town needs at a scale [px/m]; other options as in the class."""
         margin = options.setdefault("margin", 24)
         left, top, right, bottom = (margin,) * 4 if isinstance(margin, int) else margin
-        x0, y0, x1, y1 = town_bounds(town, _GROUND)
+        x0, y0, x1, y1 = town_bounds(town, GROUND)
         size = (round((x1 - x0) * scale) + left + right, round((y1 - y0) * scale) + top + bottom)
-        return cls(town, size=size, border=_GROUND + min(left, top, right, bottom) / scale, **options)
+        return cls(town, size=size, border=GROUND + min(left, top, right, bottom) / scale, **options)
 
-    def surface(self) -> Any:
-        """A copy of the base map, a `pygame.Surface`, to draw on."""
-        return self._surface.copy()
+    def surface(self, time: float | None = None) -> Any:
+        """A copy of the base map, a `pygame.Surface`, to draw on; with the colours that lights show at a time [s]."""
+        copy = self._surface.copy()
+        if time is not None:
+            self.draw_lights(copy, time)
+        return copy
 
-    def window(self, centre: ArrayLike, size: tuple[int, int]) -> Any:
-        """A part of the base map around a world position (2,), as a new surface of a size [px]."""
+    def window(self, centre: ArrayLike, size: tuple[int, int], time: float | None = None) -> Any:
+        """A part of the base map around a world position (2,), as a new surface of a size [px].
+
+        Lights show their colours at a time [s], if one is given.
+        """
         import pygame
 
         view = pygame.Surface(size)
         view.fill(palette.COUNTRY)
         corner = np.round(self.to_pixel(centre) - np.array(size) / 2.0).astype(int)
         view.blit(self._surface, (0, 0), (int(corner[0]), int(corner[1]), *size))
+        if time is not None:
+            self.draw_lights(view, time, corner)
         return view
+
+    def draw_lights(self, picture: Any, time: float, corner: ArrayLike = (0.0, 0.0)) -> None:
+        """Draws what the lights show at a time [s]: lamps and stop lines; lights without a programme stay as they are.
+
+        Args:
+            picture: a `pygame.Surface` with this map or a part of it.
+            time: simulated time [s].
+            corner: pixel of the map that is the upper left one of the picture.
+        """
+        import pygame
+
+        shift = np.asarray(corner, dtype=float)
+        reach = np.array(picture.get_size()) + 2.0 * self._signs
+        for lane, kind in self.plan.ruled.items():
+            shown = self.town.light(lane, time) if kind is SignalKind.TRAFFIC_LIGHT else None
+            if shown is None:
+                continue
+            bar = stop_bar(self.town.lanes[lane], self.plan.stops.get(lane, 0.0), self.plan.detail.pen)
+            points = self.to_pixel(bar) - shift
+            if (points > -2.0 * self._signs).all() and (points < reach).all():
+                pygame.draw.polygon(picture, lamp_colour(shown), points.tolist())
+                pygame.draw.aalines(picture, lamp_colour(shown), True, points.tolist())
+        for post in self.plan.posts:
+            at = self.to_pixel(post.at) - shift
+            if post.kind is not SignalKind.TRAFFIC_LIGHT or (at < -self._signs).any() or (at > reach).any():
+                continue
+            colours = [self.town.light(lane, time) for lane in post.lanes]
+            if colours and colours[0] is not None:
+                stamp(picture, sign_icon(post.kind, self._signs, colours[0]), at)
 
     def to_pixel(self, xy: ArrayLike) -> NDArray[np.float64]:
         """World positions (..., 2) [m] as pixels (..., 2)."""
@@ -119,17 +172,74 @@ class MapPainter:
         """A scale bar whose lower left corner is at a pixel, no longer than so many pixels; north is up."""
         draw_scale_bar(surface, self.scale, corner, longest)
 
-    def _paint(self, plan: Plan) -> Any:
+    def _fixed(self) -> Array:
+        """Circles (n, 3) [px] that names keep off: signs and pins."""
+        rows = [(*self.to_pixel(post.at).tolist(), 0.5 * self._signs) for post in self.plan.posts]
+        if self._pins:
+            rows += [(*self.to_pixel(site.position).tolist(), 1.3 * self._pins) for site in self.town.sites]
+        return np.array(rows, dtype=float).reshape(-1, 3)
+
+    def _uncovered(self) -> Iterator[Shape]:
+        """The shapes of the plan without the turn arrows that a name would cover in part."""
+        arrows, lanes = self.plan.arrows, self.town.lanes
+        names = np.array([*covering(self.labels)]).reshape(-1, 3)
+        if not arrows or not len(names):
+            yield from self.plan.shapes
+            return
+        along = np.array([0.0, 0.5, 1.0]) * ARROW_LENGTH
+        places = np.array([[lanes[a.lane].position(a.station + s) for s in along] for a in arrows])  # (n, 3, 2)
+        gap = np.hypot(*(self.to_pixel(places)[:, :, None] - names[:, :2]).transpose(3, 0, 1, 2)) - names[:, 2]
+        covered = (gap < 0.0).any(axis=(1, 2))
+        tree = cKDTree(places[:, 1])
+        for shape in self.plan.shapes:
+            if shape.colour != palette.ARROW or not covered[tree.query(shape.points.mean(axis=0))[1]]:
+                yield shape
+
+    def _one_way_arrows(self) -> Iterator[Shape]:
+        """Arrows along one-way streets, where neither a name nor a turn arrow is in the way."""
+        if not self.plan.detail.arrows:
+            return
+        taken = np.array([*covering(self.labels), *self._turn_arrows()]).reshape(-1, 3)
+        for number, middle in one_way_places(self.town, self.plan.borders):
+            lane = self.town.lanes[number]
+            for station in (middle, middle - 9.0, middle + 9.0):
+                if 5.0 < station < lane.length - 5.0 and self._free(lane, station, taken):
+                    for outline in one_way_arrow(lane.position(station), lane.heading_at(station)):
+                        yield Shape(outline, palette.ONE_WAY)
+                    break
+
+    def _free(self, lane: Lane, station: float, taken: Array) -> bool:
+        """Whether an arrow on a lane would touch none of the circles (n, 3) [px], no bridge and no tunnel."""
+        at = lane.position(station)
+        gap = np.hypot(*(taken[:, :2] - self.to_pixel(at)).T) - taken[:, 2]
+        place = np.array([[*at, lane.height_at(station)]])
+        raised = self.plan.raised
+        return bool((gap > 4.0 * self.scale).all()) and not bool(raised.hold(place)[0] or raised.cross(place, 9.0)[0])
+
+    def _turn_arrows(self) -> Iterator[tuple[float, float, float]]:
+        for arrow in self.plan.arrows:
+            x, y = self.to_pixel(self.town.lanes[arrow.lane].position(arrow.station + 3.0)).tolist()
+            yield x, y, 3.5 * self.scale
+
+    def _paint(self) -> Any:
         import pygame
 
+        shapes = [*self._uncovered(), *self._one_way_arrows()]
+        bounds = np.array([shape.bounds for shape in shapes])
         picture = pygame.Surface(self.size)
         for left in range(0, self.size[0], _TILE):
             for top in range(0, self.size[1], _TILE):
                 size = (min(_TILE, self.size[0] - left), min(_TILE, self.size[1] - top))
-                picture.blit(self._paint_tile(plan, left, top, size), (left, top))
+                picture.blit(self._paint_tile(shapes, bounds, left, top, size), (left, top))
+        for post in self.plan.posts:
+            stamp(picture, sign_icon(post.kind, self._signs), self.to_pixel(post.at))
+        for site in self.town.sites if self._pins else ():
+            away = np.array(site.waypoint) - np.array(site.position)
+            bearing = round(float(np.degrees(np.arctan2(away[1], away[0]))))
+            stamp(picture, pin_icon(str(site.id + 1), self._pins, bearing), self.to_pixel(site.position))
         return picture
 
-    def _paint_tile(self, plan: Plan, left: int, top: int, size: tuple[int, int]) -> Any:
+    def _paint_tile(self, shapes: Sequence[Shape], bounds: Array, left: int, top: int, size: tuple[int, int]) -> Any:
         import pygame
 
         factor = SUPERSAMPLING
@@ -138,23 +248,25 @@ class MapPainter:
         corner = np.array([left, top], dtype=float)
         low = self.origin + corner / self.scale
         high = low + np.array(size) / self.scale
-        for shape in plan.shapes:
-            x0, y0, x1, y1 = shape.bounds
-            if x1 < low[0] or y1 < low[1] or x0 > high[0] or y0 > high[1]:
-                continue
-            pygame.draw.polygon(tile, shape.colour, ((shape.points - low) * (self.scale * factor)).tolist())
+        seen = (bounds[:, 2:] >= low).all(axis=1) & (bounds[:, :2] <= high).all(axis=1)
+        for k in np.flatnonzero(seen).tolist():
+            points = (shapes[k].points - low) * (self.scale * factor)
+            pygame.draw.polygon(tile, shapes[k].colour, points.tolist())
         for label in self.labels:
-            path = (label.path - corner) * factor
-            set_along(
-                tile,
-                label.text,
-                path,
-                label.size * factor,
-                palette.INK,
-                halo=2 * factor,
-                around=palette.ROAD,
-            )
+            path = label.path - corner
+            if (path < -2.0 * label.size).all(axis=0).any() or (path > np.array(size) + 2.0 * label.size).all(
+                axis=0
+            ).any():
+                continue
+            for piece in strokes(longer(path, _NAME_GROUND[1] * label.size), _NAME_GROUND[0] * label.size, 12):
+                pygame.draw.polygon(tile, palette.ROAD, (piece * factor).tolist())
+            set_along(tile, label.text, path * factor, label.size * factor, palette.STREET_NAME)
         return pygame.transform.smoothscale(tile, size)
+
+
+def _sized(rule: tuple[float, int], scale: float, smallest: float) -> int:
+    metres, largest = rule
+    return int(np.clip(round(metres * scale), smallest, largest))
 
 
 def draw_scale_bar(surface: Any, scale: float, corner: tuple[int, int], longest: int) -> None:
@@ -179,54 +291,3 @@ def draw_scale_bar(surface: Any, scale: float, corner: tuple[int, int], longest:
     pygame.draw.polygon(surface, palette.INK, (tip + arrow).tolist())
     north = words("N", 11, palette.INK, True)
     surface.blit(north, north.get_rect(midtop=(int(tip[0]), y - 16)))
-
-
-def town_picture(
-    town: Town,
-    path: str | os.PathLike[str],
-    size: tuple[int, int] = (1600, 1200),
-    street_names: Sequence[str] | None = None,
-) -> MapPainter:
-    """Writes a map one would hang up, as a PNG file: the town with a title line and a scale bar.
-
-    Args:
-        town: what to paint.
-        path: where to write; the folder must exist.
-        size: width and height [px].
-        street_names: names by street index; the town's own where absent.
-
-    Returns:
-        The painter, which knows where everything is on the picture.
-
-    Raises:
-        FileNotFoundError: the folder of `path` does not exist.
-        ValueError: the size is too small for a title and a map.
-    """
-    import pygame
-
-    target = Path(path)
-    if not target.parent.is_dir():
-        raise FileNotFoundError(f"{target}: the folder {target.parent} does not exist; make it first")
-    painter = MapPainter(town, size=size, street_names=street_names, margin=(24, 92, 24, 30))
-    surface = painter.surface()
-    _draw_title(surface, town, size)
-    painter.draw_scale_bar(surface, (24, size[1] - 22))
-    pygame.image.save(surface, str(target), ".png")
-    return painter
-
-
-def _draw_title(surface: Any, town: Town, size: tuple[int, int]) -> None:
-    import pygame
-
-    pygame.draw.rect(surface, palette.PAPER, (0, 0, size[0], 72))
-    pygame.draw.rect(surface, palette.PANEL_EDGE, (0, 72, size[0], 2))
-    name = words(town.name[:1].upper() + town.name[1:], 32, palette.INK, True)
-    surface.blit(name, (28, 36 - name.get_height() // 2))
-    facts = (
-        f"{town.kilometres:.1f} km of lanes",
-        f"{len(town.lanes)} lanes",
-        f"{len(town.junctions)} junctions",
-        f"{len(town.streets)} streets",
-    )
-    line = words("   ·   ".join(facts), 16, palette.INK_SOFT)
-    surface.blit(line, line.get_rect(midright=(size[0] - 28, 37)))

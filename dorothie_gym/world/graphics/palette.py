@@ -1,4 +1,4 @@
-"""Colours of every picture, in one place: a calm paper map with a few loud things on it."""
+"""Colours of every picture, in one place: a calm paper map with slate streets and a few loud things on it."""
 
 from __future__ import annotations
 
@@ -7,43 +7,58 @@ from typing import TypeAlias
 Colour: TypeAlias = tuple[int, int, int]
 
 # The ground and what is built on it.
-COUNTRY: Colour = (226, 233, 218)
-BLOCK: Colour = (241, 239, 232)
-PARK: Colour = (208, 227, 196)
-TREE: Colour = (185, 211, 170)
-COUNTRY_TREE: Colour = (207, 220, 196)
-SIDEWALK: Colour = (225, 225, 221)
-KERB: Colour = (192, 197, 204)
-ROAD: Colour = (255, 255, 255)
-BRIDGE_EDGE: Colour = (148, 156, 168)
-BRIDGE_SHADOW: Colour = (205, 208, 208)
-PLOT: Colour = (233, 221, 196)
-PLOT_EDGE: Colour = (208, 188, 150)
+COUNTRY: Colour = (231, 235, 221)
+BLOCK: Colour = (244, 239, 228)
+PARK: Colour = (215, 228, 201)
+TREE: Colour = (196, 215, 181)
+COUNTRY_TREE: Colour = (217, 226, 206)
+SIDEWALK: Colour = (221, 216, 205)
+SIDEWALK_EDGE: Colour = (200, 194, 181)
+KERB: Colour = (82, 88, 99)
+ROAD: Colour = (121, 128, 140)
+MEDIAN: Colour = (178, 203, 158)
+MEDIAN_TREE: Colour = (152, 184, 132)
+MEDIAN_KERB: Colour = (212, 212, 206)
+BRIDGE_EDGE: Colour = (52, 58, 69)
+BRIDGE_PARAPET: Colour = (226, 224, 217)
+BRIDGE_SHADOW: Colour = (184, 185, 176)
+TUNNEL: Colour = (203, 204, 203)
+TUNNEL_EDGE: Colour = (128, 133, 142)
+BAY: Colour = (161, 167, 176)
+PIN: Colour = (178, 58, 72)
 
 # Paint on the road.
-LANE_LINE: Colour = (196, 202, 211)
-CENTRE_LINE: Colour = (240, 197, 92)
-STOP_LINE: Colour = (150, 158, 170)
-ZEBRA: Colour = (200, 205, 213)
-ARROW: Colour = (160, 170, 185)
+LANE_LINE: Colour = (240, 241, 242)
+EDGE_LINE: Colour = (196, 200, 206)
+CENTRE_LINE: Colour = (247, 201, 84)
+STOP_LINE: Colour = (250, 250, 250)
+ZEBRA: Colour = (246, 246, 244)
+ARROW: Colour = (243, 244, 245)
+ONE_WAY: Colour = (169, 206, 245)
 
-# Signals.
-LIGHT_BODY: Colour = (58, 64, 76)
-LIGHT_RED: Colour = (226, 84, 76)
-LIGHT_AMBER: Colour = (240, 180, 60)
-LIGHT_GREEN: Colour = (72, 176, 112)
+# Lights and signs.
+LIGHT_BODY: Colour = (34, 38, 47)
+LIGHT_RIM: Colour = (250, 250, 248)
+LIGHT_OFF: Colour = (84, 88, 96)
+LIGHT_RED: Colour = (235, 72, 62)
+LIGHT_AMBER: Colour = (250, 186, 48)
+LIGHT_GREEN: Colour = (58, 190, 110)
+SIGN_RED: Colour = (205, 42, 48)
+SIGN_WHITE: Colour = (252, 252, 250)
 
 # Words.
-INK: Colour = (52, 60, 74)
-INK_SOFT: Colour = (116, 124, 138)
+INK: Colour = (46, 54, 68)
+INK_SOFT: Colour = (112, 119, 131)
 PAPER: Colour = (255, 255, 255)
+SHEET: Colour = (251, 248, 241)
+STREET_NAME: Colour = (255, 255, 255)
 
 # Who and what moves.
 CAR: Colour = (36, 107, 235)
 CAR_GLASS: Colour = (205, 224, 255)
-TRAIL: Colour = (116, 166, 250)
-WAYPOINT: Colour = (146, 84, 222)
-VEHICLE: Colour = (122, 131, 145)
+TRAIL: Colour = (132, 180, 255)
+WAYPOINT: Colour = (226, 196, 255)
+VEHICLE: Colour = (66, 73, 86)
 CYCLIST: Colour = (18, 150, 150)
 PEDESTRIAN: Colour = (214, 92, 140)
 PROP: Colour = (230, 126, 34)

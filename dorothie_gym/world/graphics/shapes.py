@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from dorothie_gym.world.graphics.palette import Colour
-from dorothie_gym.world.town.model import Array, Lane, LinkType
+from dorothie_gym.world.town.model import Array, Lane
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A filled polygon: its corners (n, 2) [m] and its colour."""
+    """A filled polygon: its corners (n, 2) [m] and its colour; for paint on a road the height that lies at [m]."""
 
     points: Array
     colour: Colour
+    height: float = 0.0
 
     @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -84,22 +85,24 @@ def stroke(line: Array, width: float) -> Array:
     return np.concatenate((line + side, (line - side)[::-1]))
 
 
-def dashes(line: Array, width: float, dash: float, gap: float) -> list[Array]:
-    """Outlines of the dashes [m] along a line (n, 2), cut so that it starts and ends with a half dash."""
-    lengths = np.hypot(*np.diff(line, axis=0).T)
-    stations = np.concatenate(([0.0], np.cumsum(lengths)))
-    total = float(stations[-1])
+def cut(line: Array, pieces: Sequence[tuple[float, float]], step: float = 2.0) -> list[Array]:
+    """Parts (n, k) of a line (m, k) in space or in the plane, given by where they start and end along it [m]."""
+    stations = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))))
+    parts = []
+    for start, end in pieces:
+        s = np.linspace(start, end, max(2, int(np.ceil((end - start) / step)) + 1))
+        parts.append(np.stack([np.interp(s, stations, column) for column in line.T], axis=-1))
+    return parts
+
+
+def dash_pattern(total: float, dash: float, gap: float) -> list[tuple[float, float]]:
+    """Where dashes start and end along a line of a length [m], cut so that it starts and ends with half a gap."""
     if total < dash:
         return []
     count = max(1, round(total / (dash + gap)))
     period = total / count
     share = dash / (dash + gap) * period
-    out = []
-    for k in range(count):
-        s = np.array([0.0, 0.5, 1.0]) * share + k * period + (period - share) / 2.0
-        points = np.stack((np.interp(s, stations, line[:, 0]), np.interp(s, stations, line[:, 1])), axis=-1)
-        out.append(stroke(points, width))
-    return out
+    return [(k * period + (period - share) / 2.0, k * period + (period + share) / 2.0) for k in range(count)]
 
 
 def place(points: Array, origin: Array, heading: float) -> Array:
@@ -107,34 +110,6 @@ def place(points: Array, origin: Array, heading: float) -> Array:
     forward = np.array([np.cos(heading), np.sin(heading)])
     right = np.array([-np.sin(heading), np.cos(heading)])
     return np.asarray(origin + points[:, :1] * forward + points[:, 1:] * right)
-
-
-_SHAFT = {
-    LinkType.STRAIGHT: np.array([[0.0, 0.0], [3.2, 0.0]]),
-    LinkType.LEFT: np.array([[0.0, 0.0], [1.5, 0.0], [2.1, -0.12], [2.4, -0.45], [2.5, -0.7]]),
-    LinkType.U_TURN: np.array([[0.0, 0.0], [2.2, 0.0], [2.6, -0.3], [2.6, -0.7], [2.2, -0.95], [1.7, -0.95]]),
-}
-_HEAD = {
-    LinkType.STRAIGHT: np.array([[3.0, -0.7], [3.0, 0.7], [5.0, 0.0]]),
-    LinkType.LEFT: np.array([[1.7, -0.6], [3.3, -0.6], [2.5, -1.65]]),
-    LinkType.U_TURN: np.array([[1.8, -1.45], [1.8, -0.45], [0.6, -0.95]]),
-}
-_MIRROR = np.array([1.0, -1.0])
-
-
-def turn_arrow(kinds: Sequence[LinkType], origin: Array, heading: float, pen: float = 0.4) -> list[Array]:
-    """Outlines of the arrow painted on a lane that may be left in these ways; its tail is at the origin."""
-    out = []
-    for kind in kinds:
-        mirrored = kind is LinkType.RIGHT
-        base = LinkType.LEFT if mirrored else kind
-        if base not in _SHAFT:
-            continue
-        shaft, head = _SHAFT[base], _HEAD[base]
-        if mirrored:
-            shaft, head = shaft * _MIRROR, head * _MIRROR
-        out += [place(stroke(shaft, pen), origin, heading), place(head, origin, heading)]
-    return out
 
 
 def zebra(outline: Array, bar: float = 0.5, gap: float = 0.55) -> list[Array]:
@@ -155,3 +130,40 @@ def zebra(outline: Array, bar: float = 0.5, gap: float = 0.55) -> list[Array]:
         quad = np.array([[a, -half], [a + bar, -half], [a + bar, half], [a, half]])
         bars.append(centre + quad[:, :1] * along + quad[:, 1:] * across)
     return bars
+
+
+def strokes(line: Array, width: float, segments: int = 8) -> Iterator[Array]:
+    """Outlines of a line (n, 2) [m] in short pieces: one that crosses itself would have holes as a single polygon."""
+    for k in range(0, len(line) - 1, segments):
+        yield stroke(line[k : k + segments + 1], width)
+
+
+def simplified(line: Array, tolerance: float) -> Array:
+    """A line (n, 2) with fewer points, none of those left out further from it than a tolerance (Douglas, Peucker)."""
+    keep = np.zeros(len(line), dtype=bool)
+    keep[[0, -1]] = True
+    todo = [(0, len(line) - 1)]
+    while todo:
+        a, b = todo.pop()
+        if b - a < 2:
+            continue
+        along = line[b] - line[a]
+        offset = line[a + 1 : b] - line[a]
+        length = float(np.hypot(*along))
+        if length < 1e-9:
+            away = np.hypot(*offset.T)
+        else:
+            away = np.abs(offset[:, 0] * along[1] - offset[:, 1] * along[0]) / length
+        far = int(np.argmax(away))
+        if away[far] > tolerance:
+            middle = a + 1 + far
+            keep[middle] = True
+            todo += [(a, middle), (middle, b)]
+    return np.asarray(line[keep])
+
+
+def longer(path: Array, more: float) -> Array:
+    """A path (n, 2) that goes on straight at both ends by a length."""
+    first, last = path[0] - path[1], path[-1] - path[-2]
+    ends = path[0] + first / np.hypot(*first) * more, path[-1] + last / np.hypot(*last) * more
+    return np.concatenate((ends[0][None], path, ends[1][None]))

@@ -1,4 +1,4 @@
-"""Words on a picture: straight ones, ones with a halo, and ones set along a line."""
+"""Words on a picture: straight ones, and ones set along a line."""
 
 from __future__ import annotations
 
@@ -11,31 +11,14 @@ from dorothie_gym.world.graphics.fonts import font
 from dorothie_gym.world.graphics.palette import Colour
 from dorothie_gym.world.town.model import Array
 
-_RING = tuple((np.cos(a), np.sin(a)) for a in np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False))
-
 
 @lru_cache(maxsize=512)
-def words(
-    text: str, size: int, colour: Colour, bold: bool = False, halo: int = 0, around: Colour = (255, 255, 255)
-) -> Any:
-    """A surface with a line of text, with a halo of that many pixels around its letters."""
-    import pygame
-
-    face = font(size, bold)
-    inner = face.render(text, True, colour)
-    if not halo:
-        return inner
-    surface = pygame.Surface((inner.get_width() + 2 * halo, inner.get_height() + 2 * halo), pygame.SRCALPHA, 32)
-    outer = face.render(text, True, around)
-    for dx, dy in _RING:
-        surface.blit(outer, (round(halo + halo * dx), round(halo + halo * dy)))
-    surface.blit(inner, (halo, halo))
-    return surface
+def words(text: str, size: int, colour: Colour, bold: bool = False) -> Any:
+    """A surface with a line of text."""
+    return font(size, bold).render(text, True, colour)
 
 
-def set_along(
-    surface: Any, text: str, path: Array, size: int, colour: Colour, *, halo: int, around: Colour, bold: bool = True
-) -> None:
+def set_along(surface: Any, text: str, path: Array, size: int, colour: Colour, bold: bool = True) -> None:
     """Sets a text along a path (n, 2) [px], its letters centred on the line.
 
     A straight path takes the whole line of text at once, which keeps the spacing of its letters exact.
@@ -44,19 +27,16 @@ def set_along(
     angle = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
     stations = np.concatenate(([0.0], np.cumsum(np.hypot(*steps.T))))
     if angle.max() - angle.min() < 0.03:
-        _stamp(surface, words(text, size, colour, bold, halo, around), path.mean(axis=0), float(angle.mean()))
+        _stamp(surface, words(text, size, colour, bold), path.mean(axis=0), float(angle.mean()))
         return
     face = font(size, bold)
     total = face.size(text)[0]
     start = (stations[-1] - total) / 2.0
     middles = stations[:-1] + np.diff(stations) / 2.0
-    # Halos first: none may lie over the neighbouring letter.
-    for ring in (halo, 0):
-        for k, letter in enumerate(text):
-            s = start + (face.size(text[:k])[0] + face.size(text[: k + 1])[0]) / 2.0
-            at = np.array([np.interp(s, stations, path[:, 0]), np.interp(s, stations, path[:, 1])])
-            ink = around if ring else colour
-            _stamp(surface, words(letter, size, ink, bold, ring, around), at, float(np.interp(s, middles, angle)))
+    for k, letter in enumerate(text):
+        s = start + (face.size(text[:k])[0] + face.size(text[: k + 1])[0]) / 2.0
+        at = np.array([np.interp(s, stations, path[:, 0]), np.interp(s, stations, path[:, 1])])
+        _stamp(surface, words(letter, size, colour, bold), at, float(np.interp(s, middles, angle)))
 
 
 def _stamp(surface: Any, piece: Any, centre: Array, angle: float) -> None:

@@ -1,6 +1,6 @@
 """Towns to drive in: the model, towns that are shipped or read from files, and a town in figures."""
 
-from dorothie_gym.world.town.catalogue import load_town, town_names
+from dorothie_gym.world.town.catalogue import SEEN_TOWNS, UNSEEN_TOWNS, fold_of, load_town, town_names
 from dorothie_gym.world.town.describe import describe
 from dorothie_gym.world.town.lights import LightColour, LightPhase, LightProgramme
 from dorothie_gym.world.town.model import (
@@ -24,6 +24,8 @@ from dorothie_gym.world.town.model import (
 __all__ = [
     "NO_JUNCTION",
     "NO_STREET",
+    "SEEN_TOWNS",
+    "UNSEEN_TOWNS",
     "Crosswalk",
     "Exit",
     "Junction",
@@ -41,6 +43,7 @@ __all__ = [
     "Town",
     "TownError",
     "describe",
+    "fold_of",
     "load_town",
     "town_names",
 ]

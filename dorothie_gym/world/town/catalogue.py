@@ -26,6 +26,13 @@ def town_names() -> tuple[str, ...]:
     )
 
 
+def fold_of(name: str) -> str | None:
+    """The fold that a town belongs to: "seen", "unseen", or None for a town of one's own."""
+    if name in SEEN_TOWNS:
+        return "seen"
+    return "unseen" if name in UNSEEN_TOWNS else None
+
+
 def load_town(name_or_path: str | Path) -> Town:
     """The town of that name, or the one in that file (`.xodr` for OpenDRIVE, `.yaml` for the town language).
 

@@ -10,12 +10,15 @@ import enum
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.world.town.lights import LightColour, LightProgramme
+
+if TYPE_CHECKING:
+    from dorothie_gym.world.town.graph import LaneGraph
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -358,6 +361,16 @@ class Town:
         """What the traffic light at the end of a lane shows at a simulated time [s]; None where there is no light."""
         found = self._lights.get(lane)
         return None if found is None else found[0].colour(found[1], time)
+
+    def to_graph(self) -> LaneGraph:
+        """The town as a lane graph with its junction graph, as TOTO reads it; made once."""
+        return self._graph
+
+    @cached_property
+    def _graph(self) -> LaneGraph:
+        from dorothie_gym.world.town.graph import lane_graph  # it needs the model itself
+
+        return lane_graph(self)
 
     @cached_property
     def _exits(self) -> tuple[tuple[Exit, ...], ...]:

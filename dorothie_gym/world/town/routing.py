@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -13,38 +12,43 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import breadth_first_order, dijkstra
 
-from dorothie_gym.world.town.model import LinkType, Town
-from dorothie_gym.world.town.oncoming import oncoming_lanes
+from dorothie_gym.world.town.cells import (
+    CELL,
+    CHANGE_COST,
+    CHANGE_LENGTH,
+    SHORT_CHANGE,
+    TURN_COST,
+    U_TURN_COST,
+    CellGraph,
+    Place,
+)
+from dorothie_gym.world.town.model import NO_JUNCTION, LinkType, Town
+from dorothie_gym.world.town.moves import ENTRIES, Entry, IntArray, Moves
 
-CELL = 10.0
-"""Lanes are cut into cells of about this length for the search [m]."""
+__all__ = [
+    "CELL",
+    "CHANGE_COST",
+    "CHANGE_LENGTH",
+    "SHORT_CHANGE",
+    "TURN_COST",
+    "U_TURN_COST",
+    "Entry",
+    "Instruction",
+    "Leg",
+    "Place",
+    "Route",
+    "Router",
+    "router",
+]
 
-CHANGE_LENGTH = 36.0
-"""Road that a lane change takes in a plan [m]: three seconds at 40 km/h, and the first metre."""
+_FOLLOW = ENTRIES.index(Entry.FOLLOW)
 
-SHORT_CHANGE = 16.0
-"""Road that it takes at least, at a walking pace [m]; every metre less than `CHANGE_LENGTH` counts double."""
-
-CHANGE_COST = 10.0
-"""Metres of detour that a lane change is worth."""
-
-TURN_COST = {LinkType.STRAIGHT: 0.0, LinkType.RIGHT: 5.0, LinkType.LEFT: 10.0, LinkType.U_TURN: 60.0}
-"""Metres of detour that a turn at a junction is worth."""
-
-U_TURN_COST = 60.0
-"""Metres of detour that turning round in the road is worth."""
-
-
-class Entry(enum.StrEnum):
-    """How a lane of a route is entered."""
-
-    FOLLOW = "follow"
-    CHANGE_LEFT = "change_left"
-    CHANGE_RIGHT = "change_right"
-    U_TURN = "u_turn"
-
-
-_KINDS = tuple(Entry)
+# What a lane that is not simply followed is called, and its angle as the actions say it [degrees, positive left].
+_MANOEUVRES = {
+    Entry.CHANGE_LEFT: (LinkType.LANE_CHANGE_LEFT, 90),
+    Entry.CHANGE_RIGHT: (LinkType.LANE_CHANGE_RIGHT, -90),
+    Entry.U_TURN: (LinkType.U_TURN, -180),
+}
 
 
 @dataclass(frozen=True)
@@ -58,11 +62,45 @@ class Leg:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Instruction:
+    """One thing to do on a route, as a person would say it: a turn at a junction, a lane change or a U-turn.
+
+    Attributes:
+        entry: FOLLOW for a way across a junction.
+        type: of the turn or lane change; U_TURN for turning round in the road, too.
+        angle: degrees, positive left: that of the exit, 90 or -90 for a lane change, -180 for turning round.
+        lane: lane that is left.
+        onto: lane that the car is on afterwards.
+        junction_id: junction that is crossed, or -1.
+        street: index of the street of `onto`, or -1.
+        choice: whether there is another way on, so that it has to be said; always for lane changes and U-turns.
+        distance: from the start of the route to where it begins [m].
+    """
+
+    entry: Entry
+    type: LinkType
+    angle: int
+    lane: int
+    onto: int
+    junction_id: int = NO_JUNCTION
+    street: int
+    choice: bool
+    distance: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Route:
-    """Legs from a place to another; `length` [m] counts the driven road only."""
+    """Legs from a place to another.
+
+    Attributes:
+        legs: in order.
+        length: way that is driven, with that of lane changes and U-turns between legs [m].
+        cost: what the way takes or is worth [m at 40 km/h]: shorter where the speed limit is higher, more for turns.
+    """
 
     legs: tuple[Leg, ...]
     length: float
+    cost: float = math.nan
 
     @property
     def lanes(self) -> tuple[int, ...]:
@@ -70,7 +108,7 @@ class Route:
         return tuple(leg.lane for leg in self.legs)
 
     def junctions(self, town: Town) -> tuple[int, ...]:
-        """Ids of the junctions that are crossed, in order."""
+        """Ids of the junctions that are crossed, in order; one that is crossed twice in a row counts once."""
         found: list[int] = []
         for leg in self.legs:
             junction = town.lanes[leg.lane].junction_id
@@ -78,9 +116,48 @@ class Route:
                 found.append(junction)
         return tuple(found)
 
+    def turns(self, town: Town) -> tuple[Instruction, ...]:
+        """What there is to do on the way, in order: ways across junctions, lane changes and U-turns."""
+        found: list[Instruction] = []
+        distance = 0.0
+        for one, two in zip(self.legs[:-1], self.legs[1:], strict=True):
+            distance += one.end - one.start
+            instruction = _instruction(town, one, two, distance)
+            if instruction is not None:
+                found.append(instruction)
+        return tuple(found)
 
-Place = tuple[int, float]
-"""A lane and the distance along it [m]."""
+
+def _instruction(town: Town, one: Leg, two: Leg, distance: float) -> Instruction | None:
+    """How to come from one leg to the next; None where the road just goes on."""
+    if two.entry is not Entry.FOLLOW:
+        kind, angle = _MANOEUVRES[two.entry]
+        street = town.lanes[two.lane].street
+        return Instruction(
+            entry=two.entry,
+            type=kind,
+            angle=angle,
+            lane=one.lane,
+            onto=two.lane,
+            street=street,
+            choice=True,
+            distance=distance,
+        )
+    exits = town.exits(one.lane)
+    way = next(way for way in exits if way.connector == two.lane)
+    if way.junction_id == NO_JUNCTION or (town.lanes[one.lane].in_junction and len(exits) == 1):
+        return None
+    return Instruction(
+        entry=Entry.FOLLOW,
+        type=way.type,
+        angle=way.angle,
+        lane=one.lane,
+        onto=way.lane,
+        junction_id=way.junction_id,
+        street=town.lanes[way.lane].street,
+        choice=len(exits) > 1,
+        distance=distance,
+    )
 
 
 class Router:
@@ -88,75 +165,15 @@ class Router:
 
     def __init__(self, town: Town) -> None:
         self._town = town
-        counts = [max(1, round(lane.length / CELL)) for lane in town.lanes]
-        self._first = np.concatenate(([0], np.cumsum(counts)))
-        self._counts = counts
-        self._lane_of = np.repeat(np.arange(len(town.lanes)), counts)
-        rows: list[int] = []
-        columns: list[int] = []
-        costs: list[float] = []
-        lengths: list[float] = []
-        kinds: list[int] = []
-
-        def edge(source: int, target: int, extra: float, length: float, kind: Entry) -> None:
-            rows.append(source)
-            columns.append(target)
-            costs.append(max(length + extra, 1e-3))
-            lengths.append(length)
-            kinds.append(_KINDS.index(kind))
-
-        for lane in town.lanes:
-            size = lane.length / counts[lane.id]
-            first = int(self._first[lane.id])
-            for k in range(counts[lane.id] - 1):
-                edge(first + k, first + k + 1, 0.0, size, Entry.FOLLOW)
-            for link in town.successors(lane.id):
-                edge(
-                    first + counts[lane.id] - 1, int(self._first[link.target]), TURN_COST[link.type], size, Entry.FOLLOW
-                )
-            self._add_side_edges(lane.id, edge)
-        self._edge_kind = {(r, c): kind for r, c, kind in zip(rows, columns, kinds, strict=True)}
-        self._edge_length = {(r, c): length for r, c, length in zip(rows, columns, lengths, strict=True)}
-        size_of = int(self._first[-1])
-        self._graph: csr_matrix[np.float64] = csr_matrix((costs, (rows, columns)), shape=(size_of, size_of))
-
-    def _add_side_edges(self, lane_id: int, edge: object) -> None:
-        assert callable(edge)
-        town, lane = self._town, self._town.lanes[lane_id]
-        if lane.in_junction:
-            return
-        size = lane.length / self._counts[lane_id]
-        for side, kind in (
-            (LinkType.LANE_CHANGE_LEFT, Entry.CHANGE_LEFT),
-            (LinkType.LANE_CHANGE_RIGHT, Entry.CHANGE_RIGHT),
-        ):
-            target = town.neighbour(lane_id, side)
-            if target is None:
-                continue
-            for k in range(self._counts[lane_id]):
-                start = (k + 0.5) * size
-                length = min(CHANGE_LENGTH, lane.length - start)
-                if length < SHORT_CHANGE:
-                    break
-                there, _ = town.lanes[target].project(lane.position(start + length))
-                extra = CHANGE_COST + 2.0 * (CHANGE_LENGTH - length)
-                edge(self.cell(lane_id, start), self.cell(target, there), extra, length, kind)
-        table = oncoming_lanes(town)
-        for k in range(self._counts[lane_id]):
-            oncoming = table.at(lane_id, (k + 0.5) * size)
-            if oncoming is not None and town.lanes[oncoming.lane].length - oncoming.station > CELL:
-                source, target_cell = self.cell(lane_id, (k + 0.5) * size), self.cell(oncoming.lane, oncoming.station)
-                edge(source, target_cell, U_TURN_COST, 20.0, Entry.U_TURN)
+        self._graph = CellGraph(town)
 
     def cell(self, lane: int, station: float) -> int:
         """Number of the cell that holds a place."""
-        count = self._counts[lane]
-        k = int(station / self._town.lanes[lane].length * count)
-        return int(self._first[lane]) + min(max(k, 0), count - 1)
+        return self._graph.cell(lane, station)
 
     def cells_of(self, places: Iterable[Place]) -> set[int]:
         """Cells that hold places."""
-        return {self.cell(lane, station) for lane, station in places}
+        return self._graph.cells_of(places)
 
     def route(self, start: Place, goal: Place, blocked: Sequence[Place] = ()) -> Route | None:
         """Cheapest way between two places, or None.
@@ -164,84 +181,71 @@ class Router:
         Args:
             start: where the car is.
             goal: where it is to go; a goal a little behind the start on its own lane means a way round.
-            blocked: places that cannot be passed (roadblocks).
+            blocked: places that cannot be passed (roadblocks). No way leads through the cells that hold them, or into
+                those by a lane change; in the start's own cell only those ahead count.
         """
-        source, target = self.cell(*start), self.cell(*goal)
-        graph = self._without(self.cells_of(blocked) - {source})
-        if source == target and goal[1] >= start[1] - 1.0:
-            return Route(legs=(Leg(start[0], Entry.FOLLOW, start[1], goal[1]),), length=max(goal[1] - start[1], 0.0))
-        if source == target:
-            return self._round_trip(graph, start, goal)
-        cost, previous = dijkstra(graph, indices=np.array(source), return_predecessors=True)
-        if not math.isfinite(cost[target]):
+        graph = self._graph
+        extra = Moves.join([graph.departures(start, goal, blocked), graph.arrivals(goal)])
+        moves = self._open(blocked, extra)
+        cost, previous = dijkstra(self._matrix(moves), indices=np.array(graph.start), return_predecessors=True)
+        if not math.isfinite(cost[graph.goal]):
             return None
-        return self._compress(_trace(previous, source, target), start, goal)
-
-    def _round_trip(self, graph: csr_matrix[np.float64], start: Place, goal: Place) -> Route | None:
-        cell = self.cell(*start)
-        cost, previous = dijkstra(graph, indices=np.array(cell), return_predecessors=True)
-        column = self._graph.tocsc()[:, [cell]].tocoo()
-        ends = [
-            (float(cost[k] + last), int(k))
-            for k, last in zip(column.row, column.data, strict=True)
-            if math.isfinite(cost[k]) and (int(k), cell) in self._edge_kind
-        ]
-        if not ends:
-            return None
-        cells = _trace(previous, cell, min(ends)[1])
-        return self._compress([*cells, cell], start, goal)
+        nodes = _trace(previous, graph.start, graph.goal)
+        keys = moves.source * graph.nodes + moves.target
+        taken = moves.take(np.searchsorted(keys, nodes[:-1] * graph.nodes + nodes[1:]))
+        return _lay(taken, start, goal, float(cost[graph.goal]))
 
     def reachable(self, start: Place, blocked: Sequence[Place] = ()) -> NDArray[np.bool_]:
-        """For every cell, whether it can be reached from a place past the roadblocks."""
-        source = self.cell(*start)
-        graph = self._without(self.cells_of(blocked) - {source})
-        order = breadth_first_order(graph, source, directed=True, return_predecessors=False)
-        found = np.zeros(graph.shape[0], dtype=np.bool_)
+        """For every cell, whether it can be reached from a place past the roadblocks; the start's own always can."""
+        moves = self._open(blocked, self._graph.departures(start, None, blocked))
+        order = breadth_first_order(self._matrix(moves), self._graph.start, directed=True, return_predecessors=False)
+        found = np.zeros(self._graph.nodes, dtype=np.bool_)
         found[order] = True
-        return found
+        found[self.cell(*start)] = True
+        return found[: self._graph.cells]
 
     def distances_to(self, goal: Place, blocked: Sequence[Place] = ()) -> NDArray[np.float64]:
-        """Cost of the way from every cell to a goal [m of driving and its worth in detour]; inf where there is none."""
-        target = self.cell(*goal)
-        graph = self._without(self.cells_of(blocked) - {target})
-        result: NDArray[np.float64] = dijkstra(graph.T, indices=np.array(target))
-        return result
+        """Cost of the way from the start of every cell to a goal [m at 40 km/h]; inf where there is none."""
+        moves = self._open(blocked, self._graph.arrivals(goal))
+        result: NDArray[np.float64] = dijkstra(self._matrix(moves).T, indices=np.array(self._graph.goal))
+        return result[: self._graph.cells]
 
-    def _without(self, cells: set[int]) -> csr_matrix[np.float64]:
-        if not cells:
-            return self._graph
-        keep = np.ones(self._graph.shape[0])
-        keep[sorted(cells)] = 0.0
-        graph = self._graph.copy()
-        graph.data = graph.data * keep[graph.indices]
-        graph.eliminate_zeros()
-        return graph
+    def _open(self, blocked: Sequence[Place], extra: Moves) -> Moves:
+        """The town's moves and some more, without those that roadblocks prevent; ordered, each pair of nodes once."""
+        moves = Moves.join([self._graph.moves, extra.cheapest(self._graph.nodes)])
+        if blocked:
+            closed = np.zeros(self._graph.nodes, dtype=np.bool_)
+            closed[sorted(self.cells_of(blocked))] = True
+            moves = moves.take(moves.clear_of(closed))
+        return moves.take(np.argsort(moves.source * self._graph.nodes + moves.target, kind="stable"))
 
-    def _compress(self, cells: list[int], start: Place, goal: Place) -> Route:
-        legs: list[Leg] = []
-        length = 0.0
-        lane, entry, begin = start[0], Entry.FOLLOW, start[1]
-        for k in range(1, len(cells)):
-            kind = _KINDS[self._edge_kind[(cells[k - 1], cells[k])]]
-            length += self._edge_length[(cells[k - 1], cells[k])]
-            next_lane = int(self._lane_of[cells[k]])
-            if next_lane == lane and kind is Entry.FOLLOW and cells[k] == cells[k - 1] + 1:
-                continue
-            size = self._town.lanes[lane].length / self._counts[lane]
-            position = cells[k - 1] - int(self._first[lane])
-            end = self._town.lanes[lane].length if kind is Entry.FOLLOW else (position + 0.5) * size
-            legs.append(Leg(lane, entry, begin, max(end, begin)))
-            lane, entry = next_lane, kind
-            begin = (cells[k] - int(self._first[lane])) * self._town.lanes[lane].length / self._counts[lane]
-        legs.append(Leg(lane, entry, min(begin, goal[1]), goal[1]))
-        return Route(legs=tuple(legs), length=length)
+    def _matrix(self, moves: Moves) -> csr_matrix[np.float64]:
+        """Moves in their order as a matrix of costs."""
+        nodes = self._graph.nodes
+        rows = np.searchsorted(moves.source, np.arange(nodes + 1))
+        return csr_matrix((moves.cost, moves.target, rows), shape=(nodes, nodes))
 
 
-def _trace(previous: NDArray[np.int32], source: int, target: int) -> list[int]:
-    cells = [target]
-    while cells[-1] != source:
-        cells.append(int(previous[cells[-1]]))
-    return cells[::-1]
+def _trace(previous: NDArray[np.int32], source: int, target: int) -> IntArray:
+    nodes = [target]
+    while nodes[-1] != source:
+        nodes.append(int(previous[nodes[-1]]))
+    return np.array(nodes[::-1], dtype=np.int64)
+
+
+def _lay(moves: Moves, start: Place, goal: Place, cost: float) -> Route:
+    """Legs along the moves of a way."""
+    legs: list[Leg] = []
+    lane, entry, begin = start[0], Entry.FOLLOW, start[1]
+    for k in range(len(moves)):
+        within = moves.entry[k] == _FOLLOW and moves.leave[k] == moves.land[k]
+        if within:
+            continue
+        legs.append(Leg(lane, entry, begin, float(moves.leave[k])))
+        lane, entry, begin = int(moves.lane[k]), ENTRIES[moves.entry[k]], float(moves.land[k])
+    legs.append(Leg(lane, entry, begin, goal[1]))
+    length = sum(max(leg.end - leg.start, 0.0) for leg in legs) + float(moves.driven.sum())
+    return Route(legs=tuple(legs), length=length, cost=cost)
 
 
 @lru_cache(maxsize=16)

@@ -444,7 +444,9 @@ def test_faults_do_not_depend_on_where_the_town_lies(
         return np.column_stack((c * x - s * y + shift[0], s * x + c * y + shift[1], points[:, 2] + rise))
 
     town = make()
-    there = check_town(rebuilt(town, lanes=[replace(row, points=moved(row.points)) for row in town.lanes], signals=()))
+    lanes = [replace(row, points=moved(row.points)) for row in town.lanes]
+    sidewalks = [replace(row, points=moved(row.points)) for row in town.sidewalks]
+    there = check_town(rebuilt(town, lanes=lanes, sidewalks=sidewalks, signals=()))
     here = check_town(rebuilt(town, signals=()))
     assert [(fault.kind, fault.lanes) for fault in there] == [(fault.kind, fault.lanes) for fault in here]
     for fault, other in zip(here, there, strict=True):

@@ -1,9 +1,11 @@
-"""From centre lines to a `Town`: lanes, typed connectors, streets, lights, crosswalks and sites."""
+"""From lines to a `Town`: lanes, connectors, links, and what stands beside them."""
 
 from __future__ import annotations
 
-import math
+from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -13,30 +15,26 @@ from dorothie_gym.world.town.model import (
     NO_JUNCTION,
     NO_STREET,
     Array,
-    Crosswalk,
     Junction,
     Lane,
     LaneLink,
     LinkType,
-    Signal,
-    SignalKind,
     Street,
     Town,
 )
-from dorothie_gym.world.town.yaml_town.geometry import Path, connect, wrap
-from dorothie_gym.world.town.yaml_town.layout import SMALLEST_RADIUS, Arm, Layout, lay_out
-from dorothie_gym.world.town.yaml_town.schema import JunctionPlan, read_plan
+from dorothie_gym.world.town.yaml_town.approaches import Approach
+from dorothie_gym.world.town.yaml_town.arms import POCKET, Arm, LaneEnd
+from dorothie_gym.world.town.yaml_town.furniture import crosswalks, sidewalks
+from dorothie_gym.world.town.yaml_town.layout import Layout, lay_out
+from dorothie_gym.world.town.yaml_town.movements import kinds_of
+from dorothie_gym.world.town.yaml_town.room import Way
+from dorothie_gym.world.town.yaml_town.schema import read_plan
+from dorothie_gym.world.town.yaml_town.signals import place_signals
+from dorothie_gym.world.town.yaml_town.sites import place_sites
+from dorothie_gym.world.town.yaml_town.stretches import Crossing
 
-STRAIGHT_BELOW = math.radians(35.0)
-"""A way through a junction that turns less than this goes straight on [rad]."""
-LIGHT_HEIGHT, LIGHT_ASIDE = 3.0, 1.0
-"""A traffic light hangs this high, and stands this far from the edge of the lane [m]."""
-CROSSWALK_SPAN = (0.5, 3.5)
-"""A crosswalk lies between these distances beyond the ends of the lanes, towards the junction [m]."""
-CROSSWALK_ASIDE = 0.5
-"""A crosswalk reaches this far beyond the edges of the lanes [m]."""
 SITES = 24
-"""Landmark sites in a town."""
+"""Landmark sites in a town that does not say where they are."""
 _KMH = 1.0 / 3.6
 
 
@@ -50,166 +48,184 @@ def read_yaml_town(path: str | FilePath) -> Town:
 
 
 def compile_town(layout: Layout) -> Town:
-    """Builds the town of a layout: first the lanes of all stretches, two for each, then the connectors."""
+    """Builds the town of a layout: first the lanes of all stretches, then the connectors.
+
+    Raises:
+        TownError: a light's phases do not fit the lights that stand there, or a site is nowhere near a street.
+    """
     build = _Build(layout)
     for k in range(len(layout.stretches)):
         build.add_stretch(k)
-    for junction in layout.plan.junctions.values():
-        build.add_junction(junction)
+    for crossing in layout.crossings:
+        build.add_crossing(crossing)
     lanes = tuple(build.lanes)
-    links = tuple(sorted(build.links, key=lambda link: (link.source, link.target)))
-    streets = tuple(
-        Street(id=s.id, name=s.name, lanes=tuple(lane.id for lane in lanes if lane.street == s.id))
-        for s in layout.plan.streets
-    )
+    links = tuple(sorted(build.links, key=lambda link: (link.type.is_lane_change, link.source, link.target)))
+    signals, programmes = place_signals(layout, build.approaches, lanes, links, build.junctions)
     return Town(
         name=layout.plan.name,
         lanes=lanes,
         links=links,
         junctions=build.junctions,
-        streets=streets,
-        sites=lay_sites(lanes, links, count=SITES),
-        signals=build.signals(),
-        crosswalks=build.crosswalks(),
+        streets=tuple(
+            Street(id=street.id, name=street.name, lanes=tuple(lane.id for lane in lanes if lane.street == street.id))
+            for street in layout.streets
+        ),
+        sites=place_sites(layout.plan.sites, lanes) if layout.plan.sites else lay_sites(lanes, links, count=SITES),
+        signals=signals,
+        crosswalks=crosswalks(layout, build.approaches),
+        sidewalks=sidewalks(layout),
+        programmes=programmes,
     )
 
 
 @dataclass
 class _Build:
-    """Lanes, links and junctions as they are added."""
+    """Lanes, links and junctions as they are added.
+
+    Attributes:
+        layout: what is built.
+        lanes, links, junctions: what there is so far.
+        first, last: by stretch, whether along its course, and number of a lane: the lanes at its start and its end.
+        roads: number of roads so far.
+    """
 
     layout: Layout
     lanes: list[Lane] = field(default_factory=list)
     links: list[LaneLink] = field(default_factory=list)
     junctions: list[Junction] = field(default_factory=list)
+    first: dict[tuple[int, bool, int], int] = field(default_factory=dict)
+    last: dict[tuple[int, bool, int], int] = field(default_factory=dict)
     roads: int = 0
 
     def add_stretch(self, k: int) -> None:
-        """Adds the lane along the street's direction (id 2k) and the one against it (id 2k + 1)."""
-        street, centre = self.layout.stretches[k].street, self.layout.centres[k]
-        for lane_id, path in ((-1, centre), (1, centre.reversed())):
-            self._add(
-                path.offset(street.width / 2.0).sample(),
-                lane_id=lane_id,
+        """Adds the lanes along a stretch's course, innermost first, then those against it.
+
+        Where a left-turn lane opens they are cut, and a new road begins.
+        """
+        length, section = self.layout.courses[k].path.length, self.layout.stretches[k].section
+        road = self._road()
+        for along, offsets, pocket in (
+            (True, section.forward, section.pocket),
+            (False, section.backward, -section.pocket),
+        ):
+            # What is left of the street, in driving direction, where the left-turn lane opens.
+            room = self.layout.pockets.get((k, not along), 0.0)
+            opening = length - room if along else room
+            before = (0.0, opening) if along else (opening, length)
+            lanes = self._add_side(k, road, list(enumerate(offsets)), before, along=along)
+            self.first.update({(k, along, number): lane for number, lane in lanes.items()})
+            if room:
+                after = (opening, length) if along else (0.0, opening)
+                beside = self._add_side(k, self._road(), [(POCKET, pocket), *enumerate(offsets)], after, along=along)
+                for number, lane in lanes.items():
+                    self._join(lane, beside[number])
+                lanes = beside
+            self.last.update({(k, along, number): lane for number, lane in lanes.items()})
+
+    def _add_side(
+        self, k: int, road: int, offsets: Sequence[tuple[int, float]], span: tuple[float, float], *, along: bool
+    ) -> dict[int, int]:
+        """Adds lanes side by side, innermost first, between two distances along a stretch; returns ids by number."""
+        street, course = self.layout.stretches[k].street, self.layout.courses[k]
+        whole = span == (0.0, course.path.length)
+        ids: dict[int, int] = {}
+        for place, (number, offset) in enumerate(offsets, start=1):
+            points = course.beside(offset, None if whole else span)
+            ids[number] = self._add(
+                points if along else points[::-1].copy(),
+                road_id=road,
+                lane_id=-place if along else place,
                 widths=(street.width, street.width),
                 speed_limit=street.speed * _KMH,
                 street=street.id,
             )
-        self.roads += 1
+        for inner, outer in pairwise(ids.values()):
+            self.links.append(LaneLink(inner, outer, LinkType.LANE_CHANGE_RIGHT))
+            self.links.append(LaneLink(outer, inner, LinkType.LANE_CHANGE_LEFT))
+        return ids
 
-    def add_junction(self, plan: JunctionPlan) -> None:
-        """Adds a connector from every arm to every other one."""
-        first = len(self.lanes)
-        arms = self.layout.arms[plan.name]
-        for arm in arms:
-            for other in arms:
-                if other is not arm:
-                    self._connect(plan, arm, other)
-        self.junctions.append(
-            Junction(id=plan.id, position=plan.centre, connectors=tuple(range(first, len(self.lanes))))
-        )
+    def _join(self, source: int, target: int) -> None:
+        """Links a lane to the one that goes on from its end, at exactly the same point."""
+        self.lanes[target].points[0] = self.lanes[source].points[-1]
+        self.links.append(LaneLink(source, target, LinkType.STRAIGHT))
 
-    def _connect(self, plan: JunctionPlan, arm: Arm, other: Arm) -> None:
-        source, target = self.lanes[_incoming(arm)], self.lanes[_outgoing(other)]
-        (_, out), (into, _) = self._ends(arm), self._ends(other)
-        entry = (float(source.points[-1, 0]), float(source.points[-1, 1]), out)
-        exit_ = (float(target.points[0, 0]), float(target.points[0, 1]), into)
-        path = connect(entry, exit_)
-        if path.smallest_radius < SMALLEST_RADIUS:
-            plan.entry.fail(
-                f"the way from {arm.street.name!r} to {other.street.name!r} is too tight: radius"
-                f" {path.smallest_radius:.1f} m, at least {SMALLEST_RADIUS:g} m are needed; let them meet less sharply"
-            )
-        points = path.sample()
-        points[0], points[-1] = entry[:2], exit_[:2]
+    def add_crossing(self, crossing: Crossing) -> None:
+        """Adds a connector for every way through a crossing."""
+        begin = len(self.lanes)
+        onward: dict[int, dict[int, Way]] = defaultdict(dict)
+        for way in self.layout.ways[crossing.id]:
+            source, connector = self._connect(crossing, way)
+            onward[source][connector] = way
+        for source, ways in onward.items():
+            kinds = kinds_of({connector: way.turn for connector, way in ways.items()})
+            self.links.extend(LaneLink(source, connector, kinds[connector]) for connector in ways)
+        connectors = tuple(range(begin, len(self.lanes)))
+        self.junctions.append(Junction(id=crossing.id, position=crossing.centre, connectors=connectors))
+
+    def _connect(self, crossing: Crossing, way: Way) -> tuple[int, int]:
+        """Adds the connector of a way; returns the lane that leads into it and the connector."""
+        movement = way.movement
+        source = self.lanes[self._incoming(movement.source, movement.source_lane)]
+        target = self.lanes[self._outgoing(movement.target, movement.target_lane)]
+        plane, _ = way.path.sample()
+        points = np.column_stack((plane, np.full(len(plane), crossing.height)))
+        points[0], points[-1] = source.points[-1], target.points[0]
+        same = movement.source.street is movement.target.street
         connector = self._add(
             points,
+            road_id=self._road(),
             lane_id=-1,
-            widths=(arm.street.width, other.street.width),
+            widths=(movement.source.street.width, movement.target.street.width),
             speed_limit=min(source.speed_limit, target.speed_limit),
-            street=arm.street.id if arm.street is other.street else NO_STREET,
-            junction_id=plan.id,
+            street=movement.source.street.id if same else NO_STREET,
+            junction_id=crossing.id,
         )
-        self.roads += 1
-        self.links.append(LaneLink(source.id, connector, _turn_type(wrap(into - out))))
         self.links.append(LaneLink(connector, target.id, LinkType.STRAIGHT))
+        return source.id, connector
 
-    def _ends(self, arm: Arm) -> tuple[float, float]:
-        """Headings of an arm's lanes at the junction's edge: outgoing, incoming [rad]."""
-        centre: Path = self.layout.centres[arm.stretch]
-        outgoing = centre.start[2] if arm.at_start else wrap(centre.end[2] + math.pi)
-        return outgoing, wrap(outgoing + math.pi)
+    def _incoming(self, arm: Arm, lane: LaneEnd) -> int:
+        return self.last[arm.stretch, not arm.at_start, lane.number]
+
+    def _outgoing(self, arm: Arm, lane: LaneEnd) -> int:
+        return self.first[arm.stretch, arm.at_start, lane.number]
+
+    def approaches(self, crossing: Crossing) -> list[Approach]:
+        """The arms of a crossing with their lanes."""
+        return [
+            Approach(
+                arm=arm,
+                through=tuple(self.lanes[self._incoming(arm, lane)] for lane in arm.through),
+                pocket=self.lanes[self._incoming(arm, arm.pocket)] if arm.pocket else None,
+                outgoing=tuple(self.lanes[self._outgoing(arm, lane)] for lane in arm.outgoing),
+            )
+            for arm in self.layout.arms[crossing.id]
+        ]
+
+    def _road(self) -> int:
+        self.roads += 1
+        return self.roads - 1
 
     def _add(
         self,
         points: Array,
         *,
+        road_id: int,
         lane_id: int,
         widths: tuple[float, float],
         speed_limit: float,
         street: int,
         junction_id: int = NO_JUNCTION,
     ) -> int:
-        """Adds a lane of the current road; its width goes evenly from the first value to the second."""
+        """Adds a lane; its width goes evenly from the first value to the second."""
         lane = Lane(
             id=len(self.lanes),
-            road_id=self.roads,
+            road_id=road_id,
             lane_id=lane_id,
             junction_id=junction_id,
-            points=np.column_stack([points, np.zeros(len(points))]),
+            points=points,
             widths=np.linspace(*widths, len(points)),
             speed_limit=speed_limit,
             street=street,
         )
         self.lanes.append(lane)
         return lane.id
-
-    def signals(self) -> list[Signal]:
-        """One light for each approach of a lit junction, at the right of the end of its lane."""
-        approaches = [_incoming(arm) for name in self.layout.plan.lights for arm in self.layout.arms[name]]
-        signals = []
-        for k, lane in enumerate(self.lanes[approach] for approach in approaches):
-            x, y = lane.position(lane.length, lane.widths[-1] / 2.0 + LIGHT_ASIDE)
-            signals.append(
-                Signal(
-                    id=k,
-                    kind=SignalKind.TRAFFIC_LIGHT,
-                    position=(float(x), float(y), LIGHT_HEIGHT),
-                    heading=wrap(lane.heading_at(lane.length) + math.pi),
-                    lanes=(lane.id,),
-                )
-            )
-        return signals
-
-    def crosswalks(self) -> list[Crosswalk]:
-        """One for each arm of the street at the junction."""
-        plan, crosswalks = self.layout.plan, list[Crosswalk]()
-        for name, street in plan.crosswalks:
-            for arm in self.layout.arms[name]:
-                if arm.street.id == street.id:
-                    crosswalks.append(Crosswalk(id=len(crosswalks), outline=self._crosswalk(arm)))
-        return crosswalks
-
-    def _crosswalk(self, arm: Arm) -> Array:
-        lane = self.lanes[_incoming(arm)]
-        near, far = (lane.length + beyond for beyond in CROSSWALK_SPAN)
-        right = lane.widths[-1] / 2.0 + CROSSWALK_ASIDE
-        left = -1.5 * lane.widths[-1] - CROSSWALK_ASIDE  # across the other lane too
-        return np.array([lane.position(s, d) for s, d in ((near, left), (near, right), (far, right), (far, left))])
-
-
-def _incoming(arm: Arm) -> int:
-    """Lane of the arm that drives towards the junction."""
-    return 2 * arm.stretch + (1 if arm.at_start else 0)
-
-
-def _outgoing(arm: Arm) -> int:
-    """Lane of the arm that drives away from the junction."""
-    return 2 * arm.stretch + (0 if arm.at_start else 1)
-
-
-def _turn_type(turn: float) -> LinkType:
-    """Type of a way through a junction by its change of heading [rad], positive to the right."""
-    if abs(turn) < STRAIGHT_BELOW:
-        return LinkType.STRAIGHT
-    return LinkType.RIGHT if turn > 0 else LinkType.LEFT

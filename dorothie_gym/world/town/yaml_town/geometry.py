@@ -24,8 +24,10 @@ CURVE_SPACING, LINE_SPACING = 2.0, 20.0
 """Largest distance between samples on arcs and on straights [m]."""
 LINE_GUARD = 1.0
 """A straight has samples this close to its ends [m], so that headings taken from samples do not smear into it."""
+CLOSEST = 0.1
+"""Samples are not closer than this [m]: where ends are joined, a rounding error must not turn the last step."""
 _STRAIGHT = 1e-9  # [1/m] curvatures below this are lines; at 1 km they are 0.5 mm off
-_TINY = 1e-3  # [m] pieces shorter than this are left out: a millimetre is less than CHORD_ERROR
+_TINY = 1e-6  # [m] pieces shorter than this are left out
 
 
 def wrap(angle: float) -> float:
@@ -66,16 +68,25 @@ class Piece:
         y = self.y + right * math.cos(self.heading)
         return Piece(x, y, self.heading, self.length * scale, self.curvature / scale)
 
-    def samples(self) -> list[float]:
-        """Distances along the piece [m], both ends included, close enough together for the spacings above."""
+    def points(self, s: Array) -> Array:
+        """Places (n, 2) [m] at distances (n,) along the piece [m]."""
+        if abs(self.curvature) < _STRAIGHT:
+            return np.column_stack((self.x + s * math.cos(self.heading), self.y + s * math.sin(self.heading)))
+        heading = self.heading + self.curvature * s
+        x = self.x + (np.sin(heading) - math.sin(self.heading)) / self.curvature
+        y = self.y - (np.cos(heading) - math.cos(self.heading)) / self.curvature
+        return np.column_stack((x, y))
+
+    def samples(self, line_spacing: float) -> Array:
+        """Distances (n,) along the piece [m], both ends included, close enough together for the spacings above."""
         if abs(self.curvature) >= _STRAIGHT:
             spacing = min(CURVE_SPACING, math.sqrt(8.0 * CHORD_ERROR / abs(self.curvature)))
-            return [float(s) for s in np.linspace(0.0, self.length, max(3, math.ceil(self.length / spacing) + 1))]
+            return np.linspace(0.0, self.length, max(3, math.ceil(self.length / spacing) + 1))
         if self.length <= 3.0 * LINE_GUARD:
-            return [0.0, self.length / 2.0, self.length]
+            return np.array([0.0, self.length / 2.0, self.length])
         inner = self.length - 2.0 * LINE_GUARD
-        steps = np.linspace(LINE_GUARD, self.length - LINE_GUARD, math.ceil(inner / LINE_SPACING) + 1)
-        return [0.0, *(float(s) for s in steps), self.length]
+        steps = np.linspace(LINE_GUARD, self.length - LINE_GUARD, math.ceil(inner / line_spacing) + 1)
+        return np.concatenate(([0.0], steps, [self.length]))
 
 
 @dataclass(frozen=True)
@@ -104,20 +115,57 @@ class Path:
         """Radius of the tightest arc [m], infinite where there is none."""
         return 1.0 / max(max((abs(piece.curvature) for piece in self.pieces), default=0.0), 1e-12)
 
-    def reversed(self) -> Path:
-        """The same path, driven the other way."""
-        return Path(tuple(piece.reversed() for piece in reversed(self.pieces)))
-
-    def offset(self, right: float) -> Path:
-        """The parallel path a distance to the right [m]."""
-        return Path(tuple(piece.offset(right) for piece in self.pieces))
-
-    def sample(self) -> Array:
-        """Points (n, 2) [m] on the path, its ends included."""
-        points = [self.start[:2]]
+    def part(self, start: float, end: float) -> Path:
+        """What lies between two distances along the path [m]."""
+        pieces, begin = [], 0.0
         for piece in self.pieces:
-            points.extend(piece.at(s)[:2] for s in piece.samples()[1:])
-        return np.array(points)
+            low, high = max(start - begin, 0.0), min(end - begin, piece.length)
+            if high - low > _TINY:
+                pieces.append(Piece(*piece.at(low), high - low, piece.curvature))
+            begin += piece.length
+        return Path(tuple(pieces))
+
+    def sample(self, right: float = 0.0, *, line_spacing: float = LINE_SPACING) -> tuple[Array, Array]:
+        """Points on the parallel path a distance to the right, its ends included.
+
+        Args:
+            right: distance [m]; it must be smaller than every radius on that side.
+            line_spacing: largest distance between points on straights [m].
+
+        Returns:
+            The points (n, 2), and how far along this path each of them lies (n,) [m].
+        """
+        points, stations, begin = [], [], 0.0
+        for k, piece in enumerate(self.pieces):
+            beside = piece.offset(right)
+            s = beside.samples(line_spacing)[min(k, 1) :]
+            points.append(beside.points(s))
+            stations.append(begin + s * (piece.length / beside.length))
+            begin += piece.length
+        table = np.column_stack((np.concatenate(points), np.concatenate(stations)))
+        table = table[_apart(table[:, :2])]
+        return table[:, :2], table[:, 2]
+
+    def every(self, spacing: float, right: float = 0.0) -> tuple[Array, Array]:
+        """The same as `sample`, at points that are nowhere further apart than `spacing` on this path [m]."""
+        points, stations, begin = [], [], 0.0
+        for piece in self.pieces:
+            s = np.linspace(0.0, piece.length, math.ceil(piece.length / spacing) + 1)
+            beside = piece.offset(right)
+            points.append(beside.points(s * (beside.length / piece.length)))
+            stations.append(begin + s)
+            begin += piece.length
+        return np.concatenate(points), np.concatenate(stations)
+
+
+def _apart(points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Which of points (n, 2) to keep so that none but the ends follows close on the one before it."""
+    close = np.hypot(*np.diff(points, axis=0).T) < CLOSEST
+    keep = np.concatenate(([True], ~close))
+    keep[-1] = True
+    if close[-1] and len(points) > 2:
+        keep[-2] = False
+    return keep
 
 
 def line(a: Point, b: Point) -> Piece:
@@ -151,6 +199,19 @@ def rounded(points: Sequence[Point], radii: Sequence[float]) -> Path:
     return Path(tuple(piece for piece in pieces if piece.length > _TINY))
 
 
+def bend_stations(points: Sequence[Point], radii: Sequence[float]) -> list[float]:
+    """How far along the `rounded` polyline the middles of its bends lie [m]."""
+    stations, here = list[float](), 0.0
+    shortened = 0.0  # what the bend before takes of the leg
+    for k, radius in enumerate(radii, start=1):
+        turn = abs(turn_at(points[k - 1], points[k], points[k + 1]))
+        tangent = radius * math.tan(turn / 2.0)
+        here += math.dist(points[k - 1], points[k]) - shortened - tangent
+        stations.append(here + radius * turn / 2.0)
+        here, shortened = here + radius * turn, tangent
+    return stations
+
+
 def connect(entry: Pose, exit_: Pose) -> Path:
     """The gentler of the two smooth ways from one pose to another: line-arc-line where it exists, or two arcs."""
     ways = [way for way in (_fillet(entry, exit_), _biarc(entry, exit_)) if way is not None]
@@ -174,16 +235,18 @@ def _fillet(entry: Pose, exit_: Pose) -> Path | None:
 
 def _biarc(entry: Pose, exit_: Pose) -> Path:
     """Two arcs with equal tangent lengths (Bolton, "Biarc curves", Computer-Aided Design 7(2), 1975)."""
-    p, q = np.array(entry[:2]), np.array(exit_[:2])
-    t, u = (np.array((math.cos(pose[2]), math.sin(pose[2]))) for pose in (entry, exit_))
-    chord = q - p
-    along, bend = float(chord @ (t + u)), 2.0 * (1.0 - float(t @ u))
+    dx, dy = exit_[0] - entry[0], exit_[1] - entry[1]
+    tx, ty, ux, uy = math.cos(entry[2]), math.sin(entry[2]), math.cos(exit_[2]), math.sin(exit_[2])
+    along, bend, square = dx * (tx + ux) + dy * (ty + uy), 2.0 * (1.0 - tx * ux - ty * uy), dx * dx + dy * dy
     if bend < 1e-9:
-        tangent = float(chord @ chord) / (2.0 * along)
+        tangent = square / (2.0 * along)
     else:
-        tangent = (-along + math.sqrt(along * along + bend * float(chord @ chord))) / bend
-    middle = (p + q + tangent * (t - u)) / 2.0
-    first = _arc_to(entry, (float(middle[0]), float(middle[1])))
+        tangent = (-along + math.sqrt(along * along + bend * square)) / bend
+    middle = (
+        (entry[0] + exit_[0] + tangent * (tx - ux)) / 2.0,
+        (entry[1] + exit_[1] + tangent * (ty - uy)) / 2.0,
+    )
+    first = _arc_to(entry, middle)
     second = _arc_to(first.at(first.length), exit_[:2])
     return Path((first, second))
 

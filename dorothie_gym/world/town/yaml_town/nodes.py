@@ -1,19 +1,22 @@
-"""YAML read with its line numbers: typed access to nodes, where every mistake names the file, the line and the key."""
+"""Typed access to YAML nodes, where every mistake names the file, the line, the key and what to do."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Collection
+import difflib
+import re
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NoReturn
 
 import yaml
 
 from dorothie_gym.world.town.model import TownError
 
-_NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
-_NULL = "tag:yaml.org,2002:null"
+_NULL, _BOOL, _MERGE = (f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "merge"))
+_PLAIN_NUMBER = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?")
+"""What counts as a number: YAML 1.1 also reads 017 as 15, 12:30 as 750 and 1_0 as 10, which nobody means here."""
+_LISTED, _LONGEST = 12, 60
+"""How many known names a message lists, and how many characters of a value it shows."""
 
 
 @dataclass(frozen=True)
@@ -59,11 +62,13 @@ class Entry:
     def items(self, expected: str) -> list[tuple[Entry, Entry]]:
         """Keys and values, in the order of the file; `expected` says in messages what should stand here."""
         if not isinstance(self.node, yaml.MappingNode):
-            self.fail(f"this must be {expected}, not {self._shown()}")
+            self.fail(f"this must be {expected}, not {self.shown()}")
         pairs, seen = [], dict[str, int]()
         for key_node, value in self.node.value:
             key = self._child(key_node, self.element)
-            name = key.text("a name")
+            if key_node.tag == _MERGE:
+                key.fail("merge keys (<<) are not read; write the keys out")
+            name = key.text("a name before the colon")
             if name in seen:
                 key.fail(f"{name!r} is there twice (first in line {seen[name]}); rename or remove one")
             seen[name] = key.line
@@ -76,7 +81,9 @@ class Entry:
         for key, value in self.items(f"keys and values ({', '.join(allowed)})"):
             name = key.text("a name")
             if name not in allowed:
-                key.fail(f"unknown key {name!r}; known keys are {', '.join(allowed)}")
+                guess = closest(name, allowed)
+                advice = f"did you mean {guess!r}?" if guess else "remove it"
+                key.fail(f"unknown key {name!r}; known keys are {', '.join(allowed)}; {advice}")
             found[name] = value
         for name in required:
             if name not in found:
@@ -84,56 +91,99 @@ class Entry:
         return found
 
     def elements(self, expected: str) -> list[Entry]:
-        """Elements of a list."""
+        """Elements of a list; `expected` says in messages what should stand here."""
         if not isinstance(self.node, yaml.SequenceNode):
-            self.fail(f"this must be {expected}, not {self._shown()}")
+            self.fail(f"this must be {expected}, not {self.shown()}")
         return [self._child(node, self.element) for node in self.node.value]
 
-    def text(self, expected: str) -> str:
-        """A text as it is written: `no` or `12` are fine as names."""
-        if not isinstance(self.node, yaml.ScalarNode) or self.node.tag == _NULL or not self.node.value.strip():
-            self.fail(f"this must be {expected}, not {self._shown()}")
-        return str(self.node.value).strip()
+    def names(self, expected: str) -> list[Entry]:
+        """Elements of a list of names, which may be one name short of its brackets by mistake."""
+        if isinstance(self.node, yaml.ScalarNode) and self.node.value.strip():
+            self.fail(f"this must be {expected}, not {self.shown()}; put it into brackets: [{self.node.value}]")
+        return self.elements(expected)
 
-    def number(self, low: float, high: float, unit: str) -> float:
-        """A number in [low, high]."""
-        value = math.nan
-        if isinstance(self.node, yaml.ScalarNode) and self.node.tag in _NUMBERS:
-            try:
-                value = float(yaml.SafeLoader("").construct_object(self.node))
-            except (ValueError, OverflowError):
-                self.fail(f"{self._shown()} is not a number that can be read; write it in plain digits")
-        if not low <= value <= high:
-            self.fail(f"this must be a number of {unit} from {low:g} to {high:g}, not {self._shown()}")
+    def pair(self, expected: str) -> tuple[Entry, Entry]:
+        """Elements of a list of two."""
+        elements = self.elements(expected)
+        if len(elements) != 2:
+            self.fail(f"this must be {expected}, not a list of {len(elements)}")
+        return elements[0], elements[1]
+
+    def text(self, expected: str) -> str:
+        """A text of one line as it is written, without spaces around it: `No` or `12` are fine as names."""
+        node = self.node
+        if not isinstance(node, yaml.ScalarNode):
+            self.fail(f"this must be {expected}, not {self.shown()}")
+        value = str(node.value).strip()
+        if not value:
+            self.fail(f"this must be {expected}, not {self.shown()}; write one")
+        if node.tag == _NULL:
+            self.fail(f"this must be {expected}; {value} is YAML's word for nothing: put it into quotes, '{value}'")
+        if not value.isprintable():
+            self.fail(f"this must be {expected} on a single line of plain characters, not {self.shown()}")
         return value
 
-    def _shown(self) -> str:
+    def choice(self, known: Collection[str], what: str, expected: str) -> str:
+        """One of the known names; `what` is what is named (junction, street)."""
+        name = self.text(expected)
+        if name not in known:
+            guess = closest(name, known)
+            advice = f"; did you mean {guess!r}?" if guess else ""
+            self.fail(f"unknown {what} {name!r}; known are {listed(known)}{advice}")
+        return name
+
+    def number(self, low: float, high: float, unit: str) -> float:
+        """A number in [low, high], in plain decimal digits."""
+        expected = f"a number of {unit} from {low:g} to {high:g}"
+        node = self.node
+        if not isinstance(node, yaml.ScalarNode) or not str(node.value).strip():
+            self.fail(f"this must be {expected}, not {self.shown()}")
+        value = str(node.value)
+        if not _PLAIN_NUMBER.fullmatch(value):
+            digits = "; write it in plain decimal digits (12.5)" if value[:1] in set("+-.0123456789") else ""
+            self.fail(f"this must be {expected}, not {self.shown()}{digits}")
+        if node.style:  # None or '' (libyaml) where it is plain
+            self.fail(f"this must be {expected}, not a text; remove the quotes around {value}")
+        if not low <= float(value) <= high:
+            self.fail(f"this must be {expected}, not {self.shown()}")
+        return float(value) + 0.0  # -0.0 is 0.0
+
+    def whole(self, low: int, high: int, what: str) -> int:
+        """A whole number in [low, high] of what is counted."""
+        value = self.number(low, high, what)
+        if not value.is_integer():
+            self.fail(f"this must be a whole number of {what} from {low} to {high}, not {self.shown()}")
+        return int(value)
+
+    def boolean(self) -> bool:
+        """True or false, in any of YAML's spellings."""
+        node = self.node
+        if not isinstance(node, yaml.ScalarNode) or node.tag != _BOOL:
+            self.fail(f"this must be true or false, not {self.shown()}")
+        return str(node.value).lower() in ("true", "yes", "on")
+
+    def shown(self) -> str:
+        """What stands here, for messages."""
         if self.is_mapping:
             return "keys and values"
         if self.is_sequence:
-            return "a list"
-        return "nothing" if self.node.tag == _NULL else repr(self.node.value)
+            return f"a list of {len(self.node.value)}"
+        value = str(self.node.value)
+        if self.node.tag == _NULL or not value.strip():
+            return "nothing"
+        return repr(value if len(value) <= _LONGEST else f"{value[:_LONGEST]}...")
 
 
-def read_nodes(path: Path) -> Entry:
-    """The top of a YAML file.
+def closest(name: str, known: Iterable[str]) -> str | None:
+    """The known name that is most like `name`, whatever its capitals, or None where none comes near."""
+    by_folded = {other.casefold(): other for other in known}
+    found = difflib.get_close_matches(name.casefold(), list(by_folded), n=1)
+    return by_folded[found[0]] if found else None
 
-    Raises:
-        TownError: the file cannot be read, is empty or is not YAML.
-    """
-    source = str(path)
-    try:
-        node = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
-    except OSError as error:
-        raise TownError(source, "file", f"cannot be read ({error.strerror}); check the path") from error
-    except UnicodeDecodeError as error:
-        raise TownError(source, "file", f"is not UTF-8 text (byte {error.start}); save it as UTF-8") from error
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        where = f"line {mark.line + 1}" if mark else "file"
-        raise TownError(source, where, f"is not YAML ({error.problem}); check brackets, colons, indents") from error
-    except yaml.YAMLError as error:
-        raise TownError(source, "file", f"is not YAML ({error}); check for stray characters") from error
-    if node is None:
-        raise TownError(source, "file", "is empty; give it junctions and streets")
-    return Entry(source, "town", node)
+
+def listed(names: Collection[str]) -> str:
+    """Names in a row for a message, the first dozen of them."""
+    if not names:
+        return "none"
+    rest = len(names) - _LISTED
+    return ", ".join(list(names)[:_LISTED]) + (f" and {rest} more" if rest > 0 else "")
