@@ -6,7 +6,7 @@ Both are functions of the lanes and links alone: the same map always gives the s
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,6 +29,8 @@ SITE_OFFSET = 6.0
 SITE_STEP = 5.0
 # (shortest lane, distance from either of its ends) [m]: the next pair is tried where a map has too few such places.
 SITE_RULES = ((40.0, 15.0), (25.0, 10.0), (12.0, 5.0), (2.0, 1.0))
+# Nobody stops beside a faster road than this [m/s], 70 km/h and a little.
+FASTEST_STOP = 20.0
 # A landmark must be nearer to its lane than to any other by this [m].
 SITE_CLEARANCE = 0.5
 
@@ -227,7 +229,9 @@ def _plain_ends(lanes: Sequence[Lane], table: list[list[int]], start: int) -> It
                 todo.append(lane)
 
 
-def lay_sites(lanes: Sequence[Lane], links: Sequence[LaneLink], count: int = 24) -> tuple[Site, ...]:
+def lay_sites(
+    lanes: Sequence[Lane], links: Sequence[LaneLink], count: int = 24, avoid: Collection[int] = ()
+) -> tuple[Site, ...]:
     """Lays places for landmarks at the kerb, spread over the town by farthest-point sampling.
 
     A site stands to the right of the outermost lane of a road, at half the lane's width and 6 m more, where no other
@@ -237,11 +241,12 @@ def lay_sites(lanes: Sequence[Lane], links: Sequence[LaneLink], count: int = 24)
         lanes: lanes of the town, with their streets.
         links: links between them, lane changes included.
         count: how many sites are wanted.
+        avoid: lanes that no site is reached from.
 
     Returns:
         At most `count` sites; fewer on a map that has no room for them.
     """
-    usable = _kerb_lanes(lanes, links)
+    usable = _calm([lane for lane in _kerb_lanes(lanes, links) if lane.id not in avoid])
     for shortest, margin in SITE_RULES:
         places = _candidates([lane for lane in usable if lane.length >= shortest], margin)
         if len(places):
@@ -269,6 +274,12 @@ def _kerb_lanes(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> list[Lane]:
         and part[lane.id] == largest
         and abs(lane.lane_id) == outermost[lane.road_id, lane.lane_id > 0]
     ]
+
+
+def _calm(lanes: list[Lane]) -> list[Lane]:
+    """Those lanes on which a car may stop for a landmark: not a motorway's, unless most of the map is that fast."""
+    calm = [lane for lane in lanes if lane.speed_limit <= FASTEST_STOP]
+    return calm if 2 * len(calm) >= len(lanes) else lanes
 
 
 def _candidates(lanes: Iterable[Lane], margin: float) -> Array:

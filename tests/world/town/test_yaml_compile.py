@@ -140,16 +140,29 @@ def test_roundabouts_are_entered_and_left_by_right_turns(towns: dict[str, Town])
 def test_ramps_join_with_a_yield_sign(towns: dict[str, Town]) -> None:
     town = towns["interchange"]
     assert [signal.kind for signal in town.signals] == [SignalKind.YIELD] * 2
-    assert {street_of(town, lane) for signal in town.signals for lane in signal.lanes} == {"On East", "On West"}
-    assert ways(town, "Highway", "Off East") == [(2, 1)] == [way[::-1] for way in ways(town, "On East", "Highway")]
+    for signal in town.signals:
+        (lane,) = (town.lanes[k] for k in signal.lanes)
+        assert street_of(town, lane.id) == "Highway" and lane.speed_limit < 20.0  # a ramp, not the carriageway
+
+
+def test_ramps_belong_to_the_street_that_they_leave_or_join(towns: dict[str, Town]) -> None:
+    town = towns["interchange"]
+    assert not any(street.name.startswith(("Off", "On")) for street in town.streets)
+    highway = next(street for street in town.streets if street.name == "Highway")
+    assert {town.lanes[k].lane_id for k in highway.lanes if not town.lanes[k].in_junction} == {-1, -2, 1, 2}
+    assert all(
+        lane.street == street.id for street in town.streets for lane in map(town.lanes.__getitem__, street.lanes)
+    )
+    on_ramps = {lane for signal in town.signals for lane in signal.lanes}
+    assert not on_ramps & {site.lane for site in town.sites}
 
 
 def test_lanes_have_heights_and_connectors_those_of_their_junction(towns: dict[str, Town]) -> None:
     town = towns["interchange"]
     bridge = [town.lanes[k] for k in town.streets[1].lanes if not town.lanes[k].in_junction]
     assert all(np.all(lane.points[:, 2] == 6.0) for lane in bridge)
-    ramp = next(town.lanes[k] for k in town.streets[2].lanes)
-    assert ramp.points[0, 2] == 0.0 and ramp.points[-1, 2] == 6.0
+    climbs = [lane.points[-1, 2] - lane.points[0, 2] for lane in town.lanes if not lane.in_junction]
+    assert sorted(round(climb, 6) for climb in climbs if climb != 0.0) == [-6.0] * 4 + [6.0] * 4  # ramps, North, South
     for lane in town.lanes:
         if lane.in_junction:
             assert np.ptp(lane.points[:, 2]) == 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path as FilePath
@@ -19,6 +19,7 @@ from dorothie_gym.world.town.model import (
     Lane,
     LaneLink,
     LinkType,
+    Site,
     Street,
     Town,
 )
@@ -67,15 +68,24 @@ def compile_town(layout: Layout) -> Town:
         links=links,
         junctions=build.junctions,
         streets=tuple(
-            Street(id=street.id, name=street.name, lanes=tuple(lane.id for lane in lanes if lane.street == street.id))
-            for street in layout.streets
+            Street(id=k, name=street.name, lanes=tuple(lane.id for lane in lanes if lane.street == k))
+            for k, street in enumerate(layout.named_streets)
         ),
-        sites=place_sites(layout.plan.sites, lanes) if layout.plan.sites else lay_sites(lanes, links, count=SITES),
+        sites=_sites(layout, lanes, links, build.on_ramps),
         signals=signals,
         crosswalks=crosswalks(layout, build.approaches),
         sidewalks=sidewalks(layout),
         programmes=programmes,
     )
+
+
+def _sites(
+    layout: Layout, lanes: Sequence[Lane], links: Sequence[LaneLink], on_ramps: Collection[int]
+) -> tuple[Site, ...]:
+    """Where landmarks stand: as written, or spread by themselves; nobody stops for one on a ramp."""
+    if layout.plan.sites:
+        return place_sites(layout.plan.sites, lanes)
+    return lay_sites(lanes, links, count=SITES, avoid=on_ramps)
 
 
 @dataclass
@@ -86,6 +96,7 @@ class _Build:
         layout: what is built.
         lanes, links, junctions: what there is so far.
         first, last: by stretch, whether along its course, and number of a lane: the lanes at its start and its end.
+        on_ramps: lanes of ramps.
         roads: number of roads so far.
     """
 
@@ -95,6 +106,7 @@ class _Build:
     junctions: list[Junction] = field(default_factory=list)
     first: dict[tuple[int, bool, int], int] = field(default_factory=dict)
     last: dict[tuple[int, bool, int], int] = field(default_factory=dict)
+    on_ramps: list[int] = field(default_factory=list)
     roads: int = 0
 
     def add_stretch(self, k: int) -> None:
@@ -137,11 +149,13 @@ class _Build:
                 lane_id=-place if along else place,
                 widths=(street.width, street.width),
                 speed_limit=street.speed * _KMH,
-                street=street.id,
+                street=self.layout.numbers[street.id],
             )
         for inner, outer in pairwise(ids.values()):
             self.links.append(LaneLink(inner, outer, LinkType.LANE_CHANGE_RIGHT))
             self.links.append(LaneLink(outer, inner, LinkType.LANE_CHANGE_LEFT))
+        if street.ramp:
+            self.on_ramps.extend(ids.values())
         return ids
 
     def _join(self, source: int, target: int) -> None:
@@ -177,7 +191,7 @@ class _Build:
             lane_id=-1,
             widths=(movement.source.street.width, movement.target.street.width),
             speed_limit=min(source.speed_limit, target.speed_limit),
-            street=movement.source.street.id if same else NO_STREET,
+            street=self.layout.numbers[movement.source.street.id] if same else NO_STREET,
             junction_id=crossing.id,
         )
         self.links.append(LaneLink(connector, target.id, LinkType.STRAIGHT))

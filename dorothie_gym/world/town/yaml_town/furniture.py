@@ -57,5 +57,5 @@ def sidewalks(layout: Layout) -> tuple[Sidewalk, ...]:
         if width > 0.0:
             for offset in (stretch.section.right + width / 2.0, -stretch.section.left - width / 2.0):
                 points = course.beside(offset)
-                found.append(Sidewalk(id=len(found), points=points, width=width, street=street.id))
+                found.append(Sidewalk(id=len(found), points=points, width=width, street=layout.numbers[street.id]))
     return tuple(found)

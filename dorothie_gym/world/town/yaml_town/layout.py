@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from dorothie_gym.world.town.yaml_town.arms import Arm, arms_at
 from dorothie_gym.world.town.yaml_town.clearance import check_clearance, check_crossings
@@ -37,6 +38,7 @@ class Layout:
         arms: by id of the crossing, in order of heading.
         ways: by id of the crossing, all ways through it.
         pockets: length of left-turn lanes [m], by stretch and whether they lead to its start.
+        hosts: by id of each ramp the id of the street that it belongs to: the one that it leaves, or else joins.
     """
 
     plan: TownPlan
@@ -47,6 +49,18 @@ class Layout:
     arms: Mapping[int, tuple[Arm, ...]]
     ways: Mapping[int, tuple[Way, ...]]
     pockets: Mapping[tuple[int, bool], float]
+    hosts: Mapping[int, int]
+
+    @property
+    def named_streets(self) -> tuple[StreetPlan, ...]:
+        """Streets of the town: all but ramps, which belong to others."""
+        return tuple(street for street in self.streets if street.id not in self.hosts)
+
+    @cached_property
+    def numbers(self) -> Mapping[int, int]:
+        """Number in the town of each street, by its id in the plan."""
+        own = {street.id: k for k, street in enumerate(self.named_streets)}
+        return own | {ramp: own[host] for ramp, host in self.hosts.items()}
 
     def crossings_of(self, junction: str) -> list[Crossing]:
         """The crossing of a junction, or all those on the ring of a roundabout."""
@@ -72,7 +86,7 @@ def lay_out(plan: TownPlan) -> Layout:
         room = make_room(crossing, here, movements_at(crossing, here))
         arms[crossing.id], ways[crossing.id] = here, room.ways
         trims.update({(arm.stretch, arm.at_start): trim for arm, trim in zip(here, room.trims, strict=True)})
-    _check_ramps(plan, crossings, arms)
+    hosts = _hosts(plan, crossings, arms)
     check_crossings(crossings, arms, trims)
     courses = tuple(course_of(stretch, trims[k, True], trims[k, False]) for k, stretch in enumerate(stretches))
     layout = Layout(
@@ -84,6 +98,7 @@ def lay_out(plan: TownPlan) -> Layout:
         arms=arms,
         ways=ways,
         pockets=_pockets(stretches, courses, arms),
+        hosts=hosts,
     )
     check_clearance(crossings, stretches, courses, ways)
     return layout
@@ -115,20 +130,23 @@ def _graph(plan: TownPlan) -> tuple[tuple[StreetPlan, ...], tuple[Crossing, ...]
     return tuple(streets), tuple(crossings), (*stretches, *ring_stretches)
 
 
-def _check_ramps(plan: TownPlan, crossings: Sequence[Crossing], arms: Mapping[int, tuple[Arm, ...]]) -> None:
-    """Refuses ramps that meet every street at a large angle."""
-    slipping = {
-        arms[crossing.id][index].street.id
-        for crossing in crossings
-        for index in find_slips(crossing, arms[crossing.id])
-    }
+def _hosts(plan: TownPlan, crossings: Sequence[Crossing], arms: Mapping[int, tuple[Arm, ...]]) -> dict[int, int]:
+    """Streets that ramps belong to; refuses ramps that meet every street at a large angle."""
+    left, joined = dict[int, int](), dict[int, int]()
+    for crossing in crossings:
+        here = arms[crossing.id]
+        for index, partner in find_slips(crossing, here).items():
+            hosts = left if here[index].outgoing else joined
+            hosts[here[index].street.id] = here[partner].street.id
+    hosts = joined | left
     for street in plan.streets:
-        if street.ramp and street.id not in slipping:
+        if street.ramp and street.id not in hosts:
             street.entry.fail(
                 "it is a ramp, but neither leaves nor joins a street at a small angle (from"
                 f" {math.degrees(SMALLEST_ANGLE):.0f} to {math.degrees(LARGEST_ANGLE):.0f} degrees): put a point beside"
                 " that street next to its junction, or remove `ramp`"
             )
+    return hosts
 
 
 def _pockets(
