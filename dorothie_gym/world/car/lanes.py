@@ -27,6 +27,9 @@ SETTLE = 15.0
 EXACT = 5.0
 """An exit within this many degrees is the one that was meant."""
 
+ANOTHER_WAY = 15.0
+"""Exits whose angles differ by more than this are different turns [degrees]."""
+
 LEAD = 1.0
 """Room that a manoeuvre leaves to the car before it begins [m]."""
 
@@ -52,11 +55,31 @@ class Lanes:
 
     def __init__(self, town: Town) -> None:
         self._town = town
+        self._choices: dict[int, bool] = {}
 
     def is_choice(self, lane: int) -> bool:
         """Whether a turn has to be chosen at the end of a lane."""
         exits = self._town.exits(lane)
         return len(exits) > 1 and any(way.junction_id >= 0 for way in exits)
+
+    def offers_turns(self, lane: int) -> bool:
+        """Whether the junction at the end of a lane offers a turn: from this lane or, as beside a turn lane, others."""
+        if lane not in self._choices:
+            ways = [way for beside in self._side_by_side(lane) for way in self._town.exits(beside)]
+            turns = [way.angle for way in ways if way.junction_id >= 0]
+            apart = max((abs(wrap_degrees(turn - turns[0])) for turn in turns), default=0.0)
+            self._choices[lane] = self.is_choice(lane) or (bool(self._town.exits(lane)) and apart > ANOTHER_WAY)
+        return self._choices[lane]
+
+    def _side_by_side(self, lane: int) -> list[int]:
+        """A lane and all that one comes to from it by lane changes."""
+        found = [lane]
+        for known in found:
+            for side in SIDES:
+                beside = self._town.neighbour(known, side)
+                if beside is not None and beside not in found:
+                    found.append(beside)
+        return found
 
     def default_successor(self, lane: int) -> int | None:
         """The lane that follows without being asked: the only one, or outside junctions the straightest."""
@@ -94,7 +117,7 @@ class Lanes:
         """
         town = self._town
         own = first[-1].lane
-        if not self.is_choice(own):
+        if not self.offers_turns(own):
             # where the lane itself leads on as asked, it is kept to its end: a lane is changed further on, if at all
             fits = [way for way in town.exits(own) if abs(wrap_degrees(way.angle - angle)) <= EXACT]
             if fits:
@@ -106,7 +129,7 @@ class Lanes:
         while queue:
             steps, changes = queue.popleft()
             lane = steps[-1].lane
-            if self.is_choice(lane):
+            if self.offers_turns(lane):
                 for way in town.exits(lane):
                     misfit = abs(wrap_degrees(way.angle - angle)) + SWITCH_COST * changes
                     if best is None or misfit < best[0]:
