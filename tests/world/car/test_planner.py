@@ -4,11 +4,16 @@ import numpy as np
 import pytest
 
 from dorothie_gym.ontology import PhysicalAction
-from dorothie_gym.world.town import LinkType
+from dorothie_gym.world.town import LinkType, town_names
 from tests.world.driving import drive, long_lane, network, off_centre, on_lane
 
 LEFT, RIGHT = LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT
-EVERY = ["brookside", "Town01", "Town02", pytest.param("Town05", marks=pytest.mark.slow)]
+EVERY = [
+    *(pytest.param(name, marks=[pytest.mark.slow] * (name in ("midtown", "northgate"))) for name in town_names()),
+    "Town01",
+    "Town02",
+    pytest.param("Town05", marks=pytest.mark.slow),
+]
 
 
 @pytest.mark.parametrize("name", EVERY)
@@ -29,8 +34,8 @@ def test_jturn_with_the_angle_of_an_exit_ends_in_its_lane(name: str) -> None:
             if not trip.arrived or off_centre(town, way.lane, car) > 0.5:
                 failed.append((lane.id, way.angle))
     assert tried > 50
-    assert len(failed) <= 0.01 * tried, failed
-    assert worst < 0.6
+    assert len(failed) <= 0.005 * tried, failed
+    assert worst < 0.5
 
 
 @pytest.mark.parametrize("name", EVERY)
@@ -51,10 +56,10 @@ def test_u_turn_where_legal_ends_in_the_oncoming_lane(name: str) -> None:
             before = lane.heading_at(float(station))
             turned = abs(np.angle(np.exp(1j * (float(car.heading) - before))))
             tried += 1
-            if not trip.arrived or off_centre(roads.town, planner.lane, car) > 0.5 or trip.worst > 0.8 or turned < 2.0:
+            if not trip.arrived or off_centre(roads.town, planner.lane, car) > 0.5 or trip.worst > 0.5 or turned < 2.0:
                 failed.append((lane.id, float(station)))
     assert tried > 40
-    assert len(failed) <= 0.01 * tried, failed
+    assert len(failed) <= 0.005 * tried, failed
 
 
 @pytest.mark.parametrize("step", [4, pytest.param(1, marks=pytest.mark.slow)])
