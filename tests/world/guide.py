@@ -8,7 +8,8 @@ import numpy as np
 
 from dorothie_gym.ontology import ARRIVAL_DISTANCE, PhysicalAction
 from dorothie_gym.world.car.driver import GoalAhead
-from dorothie_gym.world.car.planner import LocalPlanner
+from dorothie_gym.world.car.lanes import LEAD
+from dorothie_gym.world.car.planner import BRAKING, U_TURN_SPEED, LocalPlanner
 from dorothie_gym.world.config import FRAME_RATE
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.town import Site, Town
@@ -81,10 +82,12 @@ def _aside(planner: LocalPlanner, before: Leg, leg: Leg, speed: float) -> Instru
     """A lane switch or U-turn, when the car is where it is to begin."""
     if before.lane != planner.lane or planner.manoeuvre[0] not in (None, PhysicalAction.J_TURN):
         return None
-    if before.end - planner.station > max(3.0, 0.8 * speed):
-        return None
+    left = before.end - planner.station
     if leg.entry is Entry.U_TURN:
-        return PhysicalAction.U_TURN, 0
+        braking = LEAD + max(speed**2 - U_TURN_SPEED**2, 0.0) / (2.0 * BRAKING)
+        return (PhysicalAction.U_TURN, 0) if left <= max(3.0, braking + DECISION * speed) else None
+    if left > max(3.0, 0.8 * speed):
+        return None
     return PhysicalAction.LANE_SWITCH, STRAIGHT[leg.entry]
 
 

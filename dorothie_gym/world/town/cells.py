@@ -55,6 +55,9 @@ U_TURN_COST = 60.0
 U_TURN_LENGTH = 20.0
 """Way that turning round takes [m]."""
 
+U_TURN_REST = 6.0
+"""Way that a car which has turned round goes on before it can stand: a goal is not nearer than this behind it [m]."""
+
 SLIGHTLY_BEHIND = 1.0
 """A goal that lies no further behind than this is not worth a way round [m]."""
 
@@ -246,18 +249,21 @@ class CellGraph:
                 found.append((lane, begin, leave, oncoming.lane, oncoming.station))
         lanes, begins, leaves, others, stations = np.array(found, dtype=np.float64).reshape(-1, 5).T
         source, target = lanes.astype(np.int64), others.astype(np.int64)
-        landing = self._cells_at(target, stations)
+        landing = self._cells_at(target, stations + U_TURN_REST)
         return Moves.make(
             len(found),
             source=self._cells_at(source, begins),
             target=landing,
-            cost=(leaves - begins) * self._weights[source] + U_TURN_LENGTH + U_TURN_COST,
+            cost=(leaves - begins) * self._weights[source]
+            + U_TURN_LENGTH
+            + U_TURN_COST
+            + U_TURN_REST * self._weights[target],
             entry=ENTRIES.index(Entry.U_TURN),
             lane=target,
             leave=leaves,
-            land=stations,
-            driven=U_TURN_LENGTH,
-            onto=landing,
+            land=stations + U_TURN_REST,
+            driven=U_TURN_LENGTH + U_TURN_REST,
+            onto=self._cells_at(target, stations),
             until=landing,
         )
 
