@@ -307,16 +307,16 @@ def _is_clear(lanes: Sequence[Lane], places: Array) -> np.ndarray[tuple[int], np
     points, owner = [], []
     for lane in lanes:
         s = np.linspace(0.0, lane.length, int(np.ceil(lane.length)) + 1)
-        points.append(np.column_stack([np.interp(s, lane.stations, lane.points[:, k]) for k in (0, 1)]))
+        points.append([np.interp(s, lane.stations, lane.points[:, k]) for k in (0, 1)])
         owner.append(np.full(len(s), lane.id))
-    tree, owners = cKDTree(np.concatenate(points)), np.concatenate(owner)
+    tree, owners = cKDTree(np.concatenate(points, axis=1).T), np.concatenate(owner)
     aside = np.hypot(*(places[:, 2:4] - places[:, 4:6]).T)
     # Lanes are looked at every metre, which is at most 2 cm off their true distance here: the waypoint must come out.
     near, index = tree.query(places[:, 2:4], k=1)
     clear = (owners[index] == places[:, 0].astype(int)) & (near >= aside - 0.05)
-    for row in np.flatnonzero(clear):
-        around = np.asarray(tree.query_ball_point(places[row, 2:4], aside[row] + SITE_CLEARANCE), dtype=int)
-        clear[row] = bool(np.all(owners[around] == int(places[row, 0])))
+    rows = np.flatnonzero(clear)
+    around = tree.query_ball_point(places[rows, 2:4], aside[rows] + SITE_CLEARANCE)
+    clear[rows] = [bool(np.all(owners[found] == place)) for found, place in zip(around, places[rows, 0], strict=True)]
     result: np.ndarray[tuple[int], np.dtype[np.bool_]] = clear
     return result
 

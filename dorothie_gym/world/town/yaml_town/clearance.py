@@ -97,8 +97,10 @@ def check_clearance(
     # What is wider apart than two of the widest roads cannot touch.
     farthest = 2.0 * float(samples.reach.max() + samples.pavement.max())
     pairs = cKDTree(samples.points[:, :2]).query_pairs(farthest, output_type="ndarray")
-    dx, dy, dz = (samples.points[pairs[:, 0]] - samples.points[pairs[:, 1]]).T
-    room = samples.reach[pairs].sum(axis=1) + samples.pavement[pairs].max(axis=1) - _SLACK  # (pairs,)
+    a, b = np.ascontiguousarray(pairs.T)
+    x, y, z = np.ascontiguousarray(samples.points.T)
+    dx, dy, dz = x[a] - x[b], y[a] - y[b], z[a] - z[b]
+    room = samples.reach[a] + samples.reach[b] + np.maximum(samples.pavement[a], samples.pavement[b]) - _SLACK
     near = (dx**2 + dy**2 < room**2) & (np.abs(dz) < HEADROOM)
     pairs, room = pairs[near], room[near]
     touching = pairs[~_may_be_near(samples, crossings, stretches, pairs, room)]
