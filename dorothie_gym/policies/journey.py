@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.ontology import StreetName
 from dorothie_gym.world.town import Town
+from dorothie_gym.world.town.lights import LightColour
 from dorothie_gym.world.town.model import Exit, LinkType, wrap_degrees
 from dorothie_gym.world.town.routing import Entry, Leg, Place, Route, router
 
@@ -32,6 +33,9 @@ BRAKING = 3.0
 
 U_TURN_SPEED_SQUARED = 12.0
 """Square of the speed at which the car turns round [m^2/s^2]."""
+
+LIGHT_SIGHT = 60.0
+"""A traffic light no farther than this is what holds up a car that stands before it [m]."""
 
 LAG = 0.56
 """Time that the brakes seem to take until they bite, measured at 3 to 11 m/s [s]."""
@@ -106,6 +110,19 @@ def lanes_ahead(town: Town, lane: int, station: float, distance: float) -> tuple
         ahead += town.lanes[following].length
         following = default_successor(town, following)
     return tuple(found)
+
+
+def light_ahead(town: Town, lane: int, station: float, time: float) -> LightColour | None:
+    """What the next traffic light on the way that the car takes by default shows; None if none is in sight."""
+    ahead = -station
+    for passed in lanes_ahead(town, lane, station, LIGHT_SIGHT):
+        ahead += town.lanes[passed].length
+        if ahead > LIGHT_SIGHT:
+            return None
+        colour = town.light(passed, time)
+        if colour is not None:
+            return colour
+    return None
 
 
 def next_choice(town: Town, lane: int, station: float) -> Choice | None:

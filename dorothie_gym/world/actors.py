@@ -28,7 +28,7 @@ TOW_FACING = 6.0
 """A vehicle that stands before a car that stands in the middle of a U-turn gives way to it after this long [s]."""
 
 TOW_STUCK = 60.0
-"""Any vehicle that stands for this long is towed away, so that no knot lasts for ever [s]."""
+"""Any vehicle that stands for this long, not for a red light, is towed away: no knot lasts for ever [s]."""
 
 STANDING = 0.1
 """Slower than this the car stands [m/s]."""
@@ -125,9 +125,9 @@ class Actors:
     def tidy(self) -> None:
         """Tows crashed and stuck vehicles away and brings others in; to be called once a decision."""
         for vehicle in list(self.vehicles):
-            blocked = vehicle.standing > TOW_BLOCKED and self._before_prop(vehicle)
-            blocked |= vehicle.standing > TOW_FACING and self._faces_turning_car(vehicle)
-            if vehicle.crash_age > TOW_CRASHED or vehicle.standing > TOW_STUCK or blocked:
+            blocked = vehicle.stuck > TOW_BLOCKED and self._before_prop(vehicle)
+            blocked |= vehicle.stuck > TOW_FACING and self._faces_turning_car(vehicle)
+            if vehicle.crash_age > TOW_CRASHED or vehicle.stuck > TOW_STUCK or blocked:
                 self._remove(vehicle)
                 self._replace()
         self.pedestrians = [p for p in self.pedestrians if not p.crashed]

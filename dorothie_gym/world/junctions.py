@@ -1,52 +1,112 @@
-"""Who may cross a junction: one vehicle at a time on paths that cross (until lights and priorities rule them).
+"""Who may cross a junction: lights and signs first, then priority, then whoever came first.
 
-Stock IDM vehicles do not see each other across a junction. Here each asks before it enters; it is let in when nobody
-holds a connector that crosses its own, nobody asked for one before, and there is room behind the junction.
+Stock IDM vehicles do not see each other across a junction. Here each announces where it is going, as indicators do, and
+asks before it enters. Those whose paths cross are never let in together, whatever lights and signs say: who is on its
+way across clears the junction first.
 """
 
 from __future__ import annotations
 
+import enum
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-from scipy.spatial.distance import cdist
+from dorothie_gym.world.town.lights import LightColour
+from dorothie_gym.world.town.model import SignalKind, Town
+from dorothie_gym.world.town.right_of_way import right_of_way
 
-from dorothie_gym.world.town.model import Array, Lane, Town
+COMFORTABLE_BRAKING = 3.0
+"""Who can stop before a yellow light no harder than this does so (ITE's 10 ft/s^2 for yellow times) [m/s^2]."""
 
-CIRCLE_OFFSET = 1.7
-"""Three circles of radius 1.3 m, one in the middle and one this far to either side, cover a car of 5 m x 2 m [m]."""
+HARDEST_BRAKING = 6.0
+"""Who cannot stop before a red light with this any more goes on [m/s^2]."""
 
-CLEARANCE = 3.1
-"""Circles of two vehicles that go straight, closer than this, touch or nearly so [m]."""
+CRITICAL_GAP = 4.5
+"""Who gives way goes if nobody with priority comes sooner (Highway Capacity Manual 2010, permitted left turns) [s]."""
 
-TURNING_CLEARANCE = 3.9
-"""The same where one of them turns: stock steering cuts corners by up to 0.8 m [m]."""
+GIVING_WAY_PATIENCE = 30.0
+"""Who has been giving way for longer than this has its turn like anybody else [s]."""
 
-TURN = np.radians(20.0)
-"""A connector that changes direction by more than this is a turn [rad]."""
+SNEAKING = 2.0
+"""Who has been giving way at a green light for this long may go when it turns yellow (HCM's sneakers) [s]."""
 
-HEIGHT = 2.5
-"""Connectors further apart in height do not meet [m]."""
+START = 1.2
+"""Time from a stand at the line until the front is over it [s]."""
 
-PATIENCE = 3.0
-"""Who holds a connector and stands before it for this long loses it [s]."""
+AT_LINE = 3.5
+"""Who stands with its front this close before the line stands at it [m]."""
+
+OVER_LINE = 0.5
+"""Who is this far over the line does not stop for its light any more [m]."""
+
+STANDING = 0.3
+"""Slower than this a vehicle stands [m/s]."""
+
+UNUSED = 3.0
+"""Who was let in and stands before the junction for this long has to ask again [s]."""
 
 LAPSE = 1.0
-"""Who holds a connector without asking for it any more (it goes elsewhere) loses it after this long [s]."""
+"""Who was let in, or waits, and asks no more (it goes elsewhere) has lost its place after this long [s]."""
+
+
+class Wait(enum.Enum):
+    """Why a vehicle may not enter a junction."""
+
+    LIGHT = "its light is red, or yellow and it can stop"
+    STOP_SIGN = "it has not come to a stand at its stop sign"
+    GIVING_WAY = "somebody comes who has priority"
+    TURN = "somebody else has been waiting for longer"
+    OCCUPIED = "somebody is on a path that crosses its own"
+    CLOSED = "somebody turns round in the junction"
+    NO_ROOM = "there is no room behind the junction"
 
 
 @dataclass
-class _Claim:
-    """A connector that a vehicle holds or waits for.
+class _Approach:
+    """A vehicle that comes to a junction or waits before it.
 
     Attributes:
-        connector: the lane.
-        since: when the vehicle began to wait, or to stand before it [s].
+        lane: where it comes from.
+        connector: where it goes.
+        distance: from its front to the line [m].
+        speed: [m/s].
+        seen: when it was announced last [s].
         asked: when it asked last [s].
-        entered: whether it is on it.
+        since: when it began to wait, later by the time for which its light was red; infinite while it does not [s].
+        stood: whether it has come to a stand at the line.
+        wait: why it waited when it asked last.
     """
 
+    lane: int
+    connector: int
+    distance: float
+    speed: float
+    seen: float
+    asked: float = -math.inf
+    since: float = math.inf
+    stood: bool = False
+    wait: Wait | None = None
+
+    @property
+    def braking(self) -> float:
+        """Deceleration that stops it at the line [m/s^2]."""
+        return self.speed**2 / (2 * max(self.distance, 0.1))
+
+
+@dataclass(eq=False)
+class _Claim:
+    """A connector that a vehicle was let into.
+
+    Attributes:
+        key: tells the vehicle apart.
+        connector: the lane.
+        since: when it was let in, or was last seen moving before the junction [s].
+        asked: when it asked last [s].
+        entered: whether it is in the junction.
+    """
+
+    key: int
     connector: int
     since: float
     asked: float
@@ -54,14 +114,71 @@ class _Claim:
 
 
 class JunctionControl:
-    """Grants the connectors of all junctions of a town, first come, first served."""
+    """Lets vehicles into the junctions of a town."""
 
     def __init__(self, town: Town) -> None:
         self._town = town
-        self._crossing: dict[tuple[int, int], bool] = {}
+        self._rules = right_of_way(town)
+        self._foes = {lane.id: frozenset(self._rules.foes(lane.id)) for lane in town.lanes if lane.in_junction}
+        self._approaches: dict[int, _Approach] = {}
+        self._towards: dict[int, dict[int, _Approach]] = {connector: {} for connector in self._foes}
         self._held: dict[int, list[_Claim]] = {}
-        self._waiting: dict[int, _Claim] = {}
+        self._inside: dict[int, list[_Claim]] = {self._junction(connector): [] for connector in self._foes}
         self._closed: dict[int, tuple[int, float]] = {}  # junction: who closed it, and when it asked last
+
+    # --- asking -----------------------------------------------------------------------------------------------------
+
+    def announce(self, key: int, lane: int, connector: int, now: float, *, distance: float, speed: float) -> None:
+        """Tells that a vehicle comes to a junction; to be repeated at least for the last `CRITICAL_GAP`.
+
+        Args:
+            key: tells the vehicle apart.
+            lane: it comes on.
+            connector: lane across the junction that it will take.
+            now: simulated time [s].
+            distance: from its front to the end of the lane [m].
+            speed: [m/s].
+        """
+        approach = self._approaches.get(key)
+        if approach is None or approach.connector != connector or approach.lane != lane:
+            stood = approach is not None and approach.lane == lane and approach.stood
+            self._forget(key)
+            approach = self._approaches[key] = _Approach(lane, connector, distance, speed, now, stood=stood)
+            self._towards[connector][key] = approach
+        approach.distance, approach.speed, approach.seen = distance, speed, now
+        approach.stood |= speed < STANDING and distance < AT_LINE
+
+    def request(self, key: int, now: float, *, room: Callable[[int], bool]) -> Wait | None:
+        """Asks to enter the connector that was announced last; to be repeated until the vehicle is on it.
+
+        Args:
+            key: tells the vehicle apart.
+            now: simulated time [s].
+            room: tells whether there is room behind the junction, for that many others as well.
+
+        Returns:
+            Why it has to wait, or None: it may enter. Then nobody is let in whose path crosses its own until it has
+            crossed, loses its green light, or does not use the permission.
+        """
+        approach = self._approaches[key]
+        if now - approach.asked > LAPSE:
+            approach.since = math.inf
+        for claim in list(self._held.get(key, ())):
+            # a vehicle may still be crossing the last junction, but heads for one connector only
+            elsewhere = claim.connector != approach.connector
+            if not claim.entered and (elsewhere or self._light_stops(approach, now, let_in=True)):
+                self._drop(claim)
+            elif claim.connector == approach.connector:
+                claim.asked = approach.asked = now
+                approach.wait = None
+                return None
+        approach.wait = self._reason_to_wait(key, approach, now, room)
+        approach.asked = now
+        if approach.wait is None:
+            claim = _Claim(key, approach.connector, now, now)
+            self._held.setdefault(key, []).append(claim)
+            self._inside[self._junction(approach.connector)].append(claim)
+        return approach.wait
 
     def close(self, key: int, junction: int, now: float) -> bool:
         """Asks for a whole junction, to turn round in its mouth; to be repeated as long as it is needed.
@@ -75,67 +192,7 @@ class JunctionControl:
             Whether it is empty; then nobody else is let in while this is repeated.
         """
         self._closed[junction] = (key, now)
-        return not any(
-            self._junction(claim.connector) == junction
-            for other, claims in self._held.items()
-            if other != key
-            for claim in claims
-        )
-
-    def _is_closed_to(self, key: int, junction: int, now: float) -> bool:
-        closed = self._closed.get(junction)
-        return closed is not None and closed[0] != key and now - closed[1] < LAPSE
-
-    def request(self, key: int, connector: int, now: float, *, room: bool) -> bool:
-        """Asks to enter a connector; to be repeated until the vehicle is on it.
-
-        Args:
-            key: tells the vehicle apart.
-            connector: lane across the junction.
-            now: simulated time [s].
-            room: whether there is room for the vehicle behind the junction.
-
-        Returns:
-            Whether it may enter. The grant stays until the vehicle has crossed, or lapses if it is not used.
-        """
-        held = self._held.get(key, [])
-        # a vehicle may still be crossing the last junction, but heads for one connector only
-        held[:] = [claim for claim in held if claim.entered or claim.connector == connector]
-        for claim in held:
-            if claim.connector == connector:
-                claim.asked = now
-                return True
-        waiting = self._waiting.get(key)
-        if waiting is None or waiting.connector != connector:
-            waiting = self._waiting[key] = _Claim(connector, now, now)
-        waiting.asked = now
-        if not room:
-            waiting.since = math.inf  # whoever cannot leave the junction keeps nobody waiting
-            return False
-        waiting.since = min(waiting.since, now)
-        if self._is_closed_to(key, self._junction(connector), now):
-            return False
-        if any(
-            self.crosses(connector, claim.connector)
-            for other, claims in self._held.items()
-            if other != key
-            for claim in claims
-        ):
-            return False
-        if any(
-            other.since < waiting.since and now - other.asked < LAPSE and self.crosses(connector, other.connector)
-            for k, other in self._waiting.items()
-            if k != key
-        ):
-            return False
-        del self._waiting[key]
-        self._held.setdefault(key, []).append(_Claim(connector, now, now))
-        return True
-
-    def holds(self, key: int) -> int | None:
-        """Connector that a vehicle was granted last."""
-        held = self._held.get(key)
-        return held[-1].connector if held else None
+        return all(claim.key == key for claim in self._inside.get(junction, ()))
 
     def note(self, key: int, lane: int, speed: float, now: float) -> None:
         """Takes note of where a vehicle is: enters or leaves its connector, or does not use what it was granted."""
@@ -143,47 +200,135 @@ class JunctionControl:
         if not held:
             return
         junction = self._junction(lane)
-        held[:] = [claim for claim in held if self._stands(claim, junction, speed, now)]
-
-    def _stands(self, claim: _Claim, junction: int, speed: float, now: float) -> bool:
-        if junction == self._junction(claim.connector):
-            claim.entered = True
-            return True
-        if claim.entered:
-            return False
-        if speed > 0.3:
-            claim.since = now
-        return now - claim.since <= PATIENCE and now - claim.asked <= LAPSE
+        for claim in list(held):
+            if junction == self._junction(claim.connector):
+                claim.entered = True
+                approach = self._approaches.get(key)
+                if approach is not None and approach.connector == claim.connector:
+                    self._forget(key)
+            elif claim.entered:
+                self._drop(claim)
+            else:
+                claim.since = now if speed > STANDING else claim.since
+                if now - claim.since > UNUSED or now - claim.asked > LAPSE:
+                    self._drop(claim)
 
     def release(self, key: int) -> None:
         """Gives back what a vehicle holds or waits for."""
-        self._held.pop(key, None)
-        self._waiting.pop(key, None)
+        for claim in list(self._held.get(key, ())):
+            self._drop(claim)
+        self._forget(key)
 
-    def crosses(self, one: int, other: int) -> bool:
-        """Whether two connectors cannot be driven at the same time by two vehicles."""
-        if one == other or self._junction(one) != self._junction(other):
+    def holds(self, key: int) -> int | None:
+        """Connector that a vehicle was let into last."""
+        held = self._held.get(key)
+        return held[-1].connector if held else None
+
+    # --- the rules --------------------------------------------------------------------------------------------------
+
+    def obeys_sign(self, lane: int) -> bool:
+        """Whether a stop or yield sign stands at the end of a lane."""
+        return self._rules.control(lane) in (SignalKind.STOP, SignalKind.YIELD)
+
+    def _reason_to_wait(self, key: int, own: _Approach, now: float, room: Callable[[int], bool]) -> Wait | None:
+        if self._light_stops(own, now):
+            own.since += max(now - own.asked, 0.0) if math.isfinite(own.since) else 0.0
+            return Wait.LIGHT
+        if self._has_to_stop(own):
+            return Wait.STOP_SIGN
+        if not room(self._heading_to_exit(key, own)):
+            own.since = math.inf  # whoever cannot leave the junction keeps nobody waiting
+            return Wait.NO_ROOM
+        own.since = min(own.since, now)
+        closed = self._closed.get(self._junction(own.connector))
+        if closed is not None and closed[0] != key and now - closed[1] < LAPSE:
+            return Wait.CLOSED
+        if self._is_occupied(key, own.connector):
+            return Wait.OCCUPIED
+        if self._is_anothers_turn(key, own, now):
+            return Wait.TURN
+        return Wait.GIVING_WAY if self._gives_way(key, own, now) else None
+
+    def _light_stops(self, approach: _Approach, now: float, *, let_in: bool = False) -> bool:
+        """Whether a vehicle has to stop for its light, and can; `let_in` if it was about to enter."""
+        colour = self._town.light(approach.lane, now)
+        if colour is None or colour is LightColour.GREEN or approach.distance < -OVER_LINE:
             return False
-        pair = (min(one, other), max(one, other))
-        if pair not in self._crossing:
-            self._crossing[pair] = _meet(self._town.lanes[pair[0]], self._town.lanes[pair[1]])
-        return self._crossing[pair]
+        # who has begun to stop goes on stopping
+        if colour is LightColour.RED or approach.wait is Wait.LIGHT:
+            return approach.braking <= HARDEST_BRAKING
+        return approach.braking <= COMFORTABLE_BRAKING and not self._may_sneak(approach, now, let_in)
+
+    def _may_sneak(self, approach: _Approach, now: float, let_in: bool) -> bool:
+        """Whether who gave way at the line all the green time may use the yellow: it must not last into the red."""
+        waited = now - approach.since > SNEAKING and approach.distance < AT_LINE
+        if not waited or not self._rules.waits_for(approach.connector):
+            return False
+        return let_in or self._town.light(approach.lane, now + START) is LightColour.YELLOW
+
+    def _has_to_stop(self, approach: _Approach) -> bool:
+        return not approach.stood and self._rules.control(approach.lane) is SignalKind.STOP
+
+    def _heading_to_exit(self, key: int, own: _Approach) -> int:
+        """How many others have been let into the junction who will leave it on the same lane."""
+        exits = {link.target for link in self._town.successors(own.connector)}
+        return sum(
+            claim.key != key and any(link.target in exits for link in self._town.successors(claim.connector))
+            for claim in self._inside[self._junction(own.connector)]
+        )
+
+    def _is_occupied(self, key: int, connector: int) -> bool:
+        foes = self._foes[connector]
+        return any(claim.connector in foes and claim.key != key for claim in self._inside[self._junction(connector)])
+
+    def _is_anothers_turn(self, key: int, own: _Approach, now: float) -> bool:
+        return any(
+            other_key != key and self._comes_first(other, own, now)
+            for foe in self._rules.foes(own.connector)
+            for other_key, other in self._towards[foe].items()
+        )
+
+    def _comes_first(self, other: _Approach, own: _Approach, now: float) -> bool:
+        """Whether one who waits goes before another by the time of waiting; priority is none of it, but patience is."""
+        if other.since >= own.since or now - other.asked >= LAPSE:
+            return False
+        if other.wait in (Wait.LIGHT, Wait.STOP_SIGN, Wait.NO_ROOM):
+            return False
+        if now - other.since > GIVING_WAY_PATIENCE:
+            return True
+        if other.wait is Wait.GIVING_WAY or other.connector in self._rules.waits_for(own.connector):
+            return False
+        return own.connector not in self._rules.waits_for(other.connector)
+
+    def _gives_way(self, key: int, own: _Approach, now: float) -> bool:
+        if now - own.since > GIVING_WAY_PATIENCE:
+            return False
+        return any(
+            other_key != key and self._is_coming(other_key, other, now)
+            for foe in self._rules.waits_for(own.connector)
+            for other_key, other in self._towards[foe].items()
+        )
+
+    def _is_coming(self, key: int, other: _Approach, now: float) -> bool:
+        """Whether one who has priority would be in the junction within the critical gap."""
+        if now - other.seen >= LAPSE or self._light_stops(other, now) or self._has_to_stop(other):
+            return False
+        if other.wait in (Wait.GIVING_WAY, Wait.TURN, Wait.CLOSED, Wait.NO_ROOM):
+            return False  # it waits for others itself
+        if other.speed < STANDING:  # about to start, unless somebody is in its way
+            return other.distance < AT_LINE and not self._is_occupied(key, other.connector)
+        return other.distance < CRITICAL_GAP * other.speed
+
+    # --- bookkeeping ------------------------------------------------------------------------------------------------
 
     def _junction(self, lane: int) -> int:
         return self._town.lanes[lane].junction_id
 
+    def _forget(self, key: int) -> None:
+        approach = self._approaches.pop(key, None)
+        if approach is not None:
+            del self._towards[approach.connector][key]
 
-def _meet(one: Lane, other: Lane) -> bool:
-    level = abs(one.height_at(one.length / 2) - other.height_at(other.length / 2)) <= HEIGHT
-    turning = any(abs(lane.headings[-1] - lane.headings[0]) > TURN for lane in (one, other))
-    clearance = TURNING_CLEARANCE if turning else CLEARANCE
-    return bool(level and cdist(_swept(one), _swept(other)).min() < clearance)
-
-
-def _swept(lane: Lane) -> Array:
-    """Centres of the circles that cover a vehicle, at every metre of its way along a lane (n, 2) [m]."""
-    stations = np.linspace(0.0, lane.length, int(lane.length) + 2)
-    headings = np.array([lane.heading_at(s) for s in stations])
-    middles = np.array([lane.position(s) for s in stations])
-    along = np.column_stack((np.cos(headings), np.sin(headings)))
-    return np.concatenate([middles + offset * along for offset in (-CIRCLE_OFFSET, 0.0, CIRCLE_OFFSET)])
+    def _drop(self, claim: _Claim) -> None:
+        self._held[claim.key].remove(claim)
+        self._inside[self._junction(claim.connector)].remove(claim)

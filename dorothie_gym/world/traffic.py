@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any
 
@@ -10,10 +11,11 @@ from highway_env.utils import not_zero
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
-from dorothie_gym.world.junctions import JunctionControl
+from dorothie_gym.world.junctions import CRITICAL_GAP, JunctionControl
 from dorothie_gym.world.network.ahead import LEVEL
 from dorothie_gym.world.network.network import LaneIndex
 from dorothie_gym.world.network.road import TownRoad
+from dorothie_gym.world.town.lights import LightColour
 from dorothie_gym.world.town.model import Lane, Town
 
 ROUTE_AHEAD = 70.0
@@ -28,8 +30,20 @@ CURVE_BRAKING = 2.0
 STOP_BRAKING = 3.0
 """Deceleration towards a junction [m/s^2]."""
 
+ASKING = 9.5
+"""A vehicle asks for a junction this far before it would have to brake for it [m]."""
+
+LINE_GAP = 1.0
+"""Room that is left before a line [m]."""
+
 ROOM_BEHIND = 9.0
 """Free lane that a vehicle wants behind a junction before it enters [m]."""
+
+ROOM_SIGHT = 60.0
+"""How far from the start of the lane behind a junction others count who may come to a stand on it [m]."""
+
+ROOM_EACH = 10.0
+"""Lane that a vehicle takes up in a queue: its length and the distance that stock's IDM keeps [m]."""
 
 SLOW = 4.0
 """Slower than this a vehicle behind a junction may be in the way: a car that turns round does 3.5 [m/s]."""
@@ -69,6 +83,7 @@ class TrafficVehicle(IDMVehicle):
         height: of the road under it [m].
         crossing: the car while it turns round, across lanes where others do not expect it.
         standing: how long it has been standing [s].
+        stuck: the same less the time for which the next light was not green [s].
     """
 
     # set by stock's initialisers, which carry no types
@@ -96,8 +111,9 @@ class TrafficVehicle(IDMVehicle):
         self._front: Any | None = None
         self._front_gap = math.inf
         self.crossing: Any | None = None
-        self.standing = 0.0
+        self.standing = self.stuck = 0.0
         self.crash_age = 0.0
+        self._line_lane = -1  # at whose end the next junction begins
         super().__init__(
             road,
             lane.position(station),
@@ -118,7 +134,11 @@ class TrafficVehicle(IDMVehicle):
     def step(self, dt: float) -> None:
         """Moves on by `dt` [s] and counts how long it has been standing."""
         super().step(dt)
-        self.standing = self.standing + dt if self.speed < STUCK_SPEED else 0.0
+        if self.speed < STUCK_SPEED:
+            self.standing += dt
+            self.stuck += dt * self._may_go()
+        else:
+            self.standing = self.stuck = 0.0
         self.crash_age = self.crash_age + dt if self.crashed else 0.0
 
     def act(self, action: dict[str, float] | str | None = None) -> None:
@@ -239,20 +259,30 @@ class TrafficVehicle(IDMVehicle):
         """Acceleration that stops the vehicle before a junction it may not enter [m/s^2]; inf where it may."""
         now = self.road.time
         self._junctions.note(self.key, self.lane_id, self.speed, now)
-        distance = -station
+        self._line_lane = -1
+        distance = -station - self.LENGTH / 2  # from its front
+        before = -1
         for k, index in enumerate(self.route):
-            lane = self._network.get_lane(index)
-            if lane.town_lane.in_junction and k > 0:
-                stopping = self.speed**2 / (2 * STOP_BRAKING)
-                if distance > stopping + 12.0:
+            lane = self._network.get_lane(index).town_lane
+            if lane.in_junction and k > 0:
+                self._line_lane = before
+                stopping = self.speed**2 / (2 * STOP_BRAKING) + ASKING
+                if distance > max(stopping, CRITICAL_GAP * self.speed):
                     return math.inf
-                if self._junctions.request(self.key, lane.town_lane.id, now, room=self._room_after(k)):
+                self._junctions.announce(self.key, before, lane.id, now, distance=distance, speed=self.speed)
+                if distance > stopping:
                     return math.inf
-                return self._brake_to(distance - self.LENGTH / 2 - 1.0)
-            if lane.town_lane.in_junction:
-                return math.inf  # on its way across
+                wait = self._junctions.request(self.key, now, room=functools.partial(self._room_after, k))
+                return math.inf if wait is None else self._brake_to(distance - LINE_GAP)
             distance += lane.length
+            before = lane.id
         return math.inf
+
+    def _may_go(self) -> bool:
+        """Whether no light holds the vehicle up."""
+        if self._line_lane < 0:
+            return True
+        return self._network.town.light(self._line_lane, self.road.time) in (None, LightColour.GREEN)
 
     def _crossing_acceleration(self, other: Any) -> float:
         """Acceleration that stops the vehicle before the way of one that turns round [m/s^2]; inf where it is clear."""
@@ -280,27 +310,47 @@ class TrafficVehicle(IDMVehicle):
             return math.inf if self.speed > 2.0 else 0.5 * min(distance, 1.0)
         return -needed
 
-    def _room_after(self, k: int) -> bool:
-        """Whether the lane behind the junction has room for one more vehicle."""
+    def _room_after(self, k: int, others: int) -> bool:
+        """Whether the lane behind the junction has room for this vehicle and so many others that will be there."""
         after = next((i for i in self.route[k:] if not self._network.get_lane(i).town_lane.in_junction), None)
-        if after is None:
-            return True
-        return room_at_start(self.road, self._network.get_lane(after), exclude=self)
+        return after is None or room_at_start(self.road, self._network.get_lane(after), exclude=self, others=others)
 
 
-def room_at_start(road: TownRoad, lane: Any, exclude: Any) -> bool:
-    """Whether nothing slow stands on the first metres of a lane."""
+def room_at_start(road: TownRoad, lane: Any, exclude: Any, others: int = 0) -> bool:
+    """Whether a lane has room at its start for one more vehicle, should those on it come to a stand.
+
+    Args:
+        road: with all that may stand there.
+        lane: the network's.
+        exclude: who asks.
+        others: who is about to come on the lane before it.
+
+    Returns:
+        Whether it fits behind the first that is slow, with all those between; and before the end of the lane, with all
+        those who are on it, where a junction is there at which they may have to wait.
+    """
     start = lane.position(0.0, 0.0)
+    slow, moving = math.inf, []
     for other in [*road.vehicles, *road.objects]:
-        if other is exclude or other.speed > SLOW:
+        if other is exclude:
             continue
         dx, dy = other.position[0] - start[0], other.position[1] - start[1]
-        if dx * dx + dy * dy > (ROOM_BEHIND + 6.0) ** 2:
+        if dx * dx + dy * dy > ROOM_SIGHT**2:
             continue
         station, lateral = lane.local_coordinates(other.position)
-        if abs(lateral) < lane.width / 2 and -1.0 < station < ROOM_BEHIND + other.LENGTH / 2:
-            return False
-    return True
+        if not (abs(lateral) < lane.width / 2 and -1.0 < station < lane.length + other.LENGTH / 2):
+            continue
+        if other.speed > SLOW:
+            moving.append(station)
+        else:
+            slow = min(slow, station - other.LENGTH / 2)
+    before = others + sum(station < slow for station in moving)
+    if slow < ROOM_BEHIND + ROOM_EACH * before:
+        return False
+    town = road.network.town
+    if not before or not any(town.lanes[link.target].in_junction for link in town.successors(lane.town_lane.id)):
+        return True
+    return bool(lane.length > ROOM_EACH * (before + 0.5))
 
 
 def free_places(town: Town, rng: np.random.Generator, count: int) -> list[tuple[int, float]]:

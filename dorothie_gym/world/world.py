@@ -19,7 +19,7 @@ from dorothie_gym.world.car.path import U_TURN_REACH
 from dorothie_gym.world.car.planner import BEGUN, BRAKING, LocalPlanner
 from dorothie_gym.world.car.vehicle import Car
 from dorothie_gym.world.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
-from dorothie_gym.world.junctions import JunctionControl
+from dorothie_gym.world.junctions import CRITICAL_GAP, JunctionControl, Wait
 from dorothie_gym.world.localizer import Localizer
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.network.road import TownRoad
@@ -38,6 +38,9 @@ BLUR = 0.5
 
 TURN_ROUND_SPEED = 4.0
 """Whoever comes towards a car that turns round is taken to be at least this fast soon [m/s]."""
+
+ASKING = 11.5
+"""The car asks for a junction this far before it would have to brake for it [m]."""
 
 UPSTREAM = 50.0
 """How far before a lane's start vehicles that come towards it are looked for [m]."""
@@ -111,6 +114,7 @@ class World:
         self.planner = LocalPlanner(town, lane, station)
         self.driver = Driver(self.planner, length=self.car.LENGTH, cruise=config.cruise_speed)
         self.junctions = JunctionControl(town)
+        self._is_connector = np.array([lane.in_junction for lane in town.lanes])  # (lanes,)
         self.weather = Weather()
         self.actors = Actors(
             self.road, self.junctions, self.car,
@@ -195,7 +199,7 @@ class World:
     def sight(self) -> float:
         """How far the car perceives bodies now [m]."""
         if Sensor.VIEW in self.faults:
-            return 12.0  # bumper radar: enough to stop at walking pace, which a blind car is held to
+            return 16.5  # bumper radar: enough to stop at walking pace, with room to turn round before a roadblock
         sight = self.weather.sight(lights=self.lights)
         return sight * BLUR if Sensor.BLUR in self.faults else sight
 
@@ -215,7 +219,9 @@ class World:
         found = bodies_ahead(
             planner.path, planner.s, bodies, length=car.LENGTH, width=car.WIDTH, speed=float(car.speed)
         )
-        hazards = [h for h in (found, self._junction_ahead(), self._gap_to_traffic(bodies)) if h is not None]
+        blocked = found is not None and found.safe_speed() <= 0.0
+        gap = self._gap_to_traffic(bodies, blocked=blocked)
+        hazards = [h for h in (found, self._junction_ahead(), gap) if h is not None]
         return min(hazards, key=Hazard.safe_speed, default=None)
 
     def _junction_ahead(self) -> Hazard | None:
@@ -223,33 +229,54 @@ class World:
         path, planner, speed = self.planner.path, self.planner, float(self.car.speed)
         if planner.held and speed < STANDING:
             return None  # asks for nothing that it does not use
-        reach = speed**2 / (2 * BRAKING) + 14.0
-        first, last = path.index_at(planner.s), path.index_at(planner.s + reach)
-        here = int(path.lanes[first])
-        for k in range(first + 1, last + 1):
-            lane = int(path.lanes[k])
-            if lane == here:
-                continue
-            if self.town.lanes[lane].in_junction and not self.town.lanes[here].in_junction:
-                line = float(path.s[k]) - planner.s - self.car.LENGTH / 2
-                if line < -self.car.LENGTH / 2:
-                    return None  # over the line already
-                after = next((n for n in planner.lanes_ahead[1:] if not self.town.lanes[n].in_junction), None)
-                room = after is None or room_at_start(self.road, self.network.lane_of(after), exclude=self.car)
-                if self.junctions.request(CAR, lane, self.time, room=room):
-                    return None
-                return Hazard(kind=ObjectClass.VEHICLES, gap=line + 2.0, key=-2)
-            here = lane
-        return None
+        asking = speed**2 / (2 * BRAKING) + ASKING
+        first = path.index_at(planner.s)
+        lanes = path.lanes[
+            first : path.index_at(planner.s + max(asking, CRITICAL_GAP * speed) + self.car.LENGTH / 2) + 1
+        ]
+        entries = np.flatnonzero((lanes[1:] != lanes[:-1]) & self._is_connector[lanes[1:]])
+        if not len(entries):
+            return None
+        k = int(entries[0])
+        entered = first + k + 1  # the first point of the path that is on the connector, not quite at its start
+        line = float(path.s[entered] - path.stations[entered]) - planner.s - self.car.LENGTH / 2
+        if line < -self.car.LENGTH / 2:
+            return None  # over the line already
+        lane, connector = int(lanes[k]), int(lanes[k + 1])
+        self.junctions.announce(CAR, lane, connector, self.time, distance=line, speed=speed)
+        if line > asking:
+            return None
+        wait = self.junctions.request(CAR, self.time, room=self._has_room)
+        return None if wait is None else Hazard(kind=self._holder(wait, lane), gap=line, key=-2, line=True)
 
-    def _gap_to_traffic(self, bodies: list[Body]) -> Hazard | None:
-        """Before a lane switch or U-turn: the place where it begins, while others are in its way."""
+    def _has_room(self, others: int) -> bool:
+        """Whether there is room behind the junction ahead for the car and so many others."""
+        after = next((lane for lane in self.planner.lanes_ahead[1:] if not self.town.lanes[lane].in_junction), None)
+        if after is None:
+            return True
+        return room_at_start(self.road, self.network.lane_of(after), exclude=self.car, others=others)
+
+    def _holder(self, wait: Wait, lane: int) -> ObjectClass:
+        """What holds the car before a junction, as a driver would say."""
+        if wait is Wait.LIGHT:
+            return ObjectClass.TRAFFIC_LIGHT
+        if self.junctions.obeys_sign(lane) and wait not in (Wait.NO_ROOM, Wait.CLOSED):
+            return ObjectClass.TRAFFIC_SIGN
+        return ObjectClass.VEHICLES
+
+    def _gap_to_traffic(self, bodies: list[Body], *, blocked: bool) -> Hazard | None:
+        """Before a lane switch or U-turn: the place where it begins, while others are in its way.
+
+        Args:
+            bodies: all that is perceived.
+            blocked: whether the car stands behind something: it may be waiting for the junction, which stays open then.
+        """
         planner, path = self.planner, self.planner.path
         action, _ = planner.manoeuvre
         k = path.index_at(planner.s)
         turning = action is PhysicalAction.U_TURN
         if path.manoeuvre[k] and (planner.s > BEGUN or float(self.car.speed) > STANDING):
-            if turning:
+            if turning and not blocked:
                 self._close_junction(path.points[k])
             return None
         if not path.manoeuvre[k:].any():
@@ -273,7 +300,7 @@ class World:
             if -behind < station - meeting < 9.0:
                 return Hazard(kind=ObjectClass.VEHICLES, gap=max(ahead, 0.0) + 2.0, key=body.key)
         # asked for last: those who wait before the junction have to go first
-        if turning and not self._close_junction(path.points[start]):
+        if turning and not blocked and not self._close_junction(path.points[start]):
             return Hazard(kind=ObjectClass.VEHICLES, gap=max(ahead, 0.0) + 2.0, key=-2)
         return None
 

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,11 +11,14 @@ from dorothie_gym.ontology import (
     DialogueAct,
     DialogueMove,
     GoalStatus,
+    ObjectClass,
     PhysicalAction,
     Role,
+    Slot,
 )
 from dorothie_gym.policies import ScriptedCoWizard
-from dorothie_gym.spaces import NO_MOVE, CoWizardAction, ParticipantAction, Speech, noop
+from dorothie_gym.policies.co_wizard.mind import Wish
+from dorothie_gym.spaces import NO_MOVE, CoWizardAction, Motion, ParticipantAction, Speech, noop
 
 
 class Talk:
@@ -118,3 +123,46 @@ def test_a_step_leaves_the_state_it_was_given_as_it_was():
     assert vars(talk.state) == before
     assert all(np.array_equal(first[key], second[key]) for key in first)
     assert first["move"] <= NO_MOVE
+
+
+def test_red_light_is_explained_and_makes_nobody_turn_round_or_ask():
+    talk = Talk()
+    talk.say(DialogueMove.INSTRUCT, talk.landmarks(hidden=False)[0].name)
+    assert talk.state.journey is not None
+    way, told = talk.state.journey.route, 0
+    for seed in range(6):
+        observation, state = dict(talk.observations["co_wizard"]), talk.state
+        state = replace(state, seed=seed, hazard_told=-100.0)
+        observation |= {
+            "motion": np.int64(Motion.HAZARD),
+            "hazard": np.int64(ObjectClass.TRAFFIC_LIGHT.value),
+            "hazard_distance": np.array([1.5]),
+            "speed": np.zeros(1),
+        }
+        for _ in range(80):
+            observation["time"] = observation["time"] + 0.5
+            action, state = talk.policy.step(observation, state)
+            done = CoWizardAction.decode(action, talk.env.limits)
+            assert done.physical is None or done.physical.action is PhysicalAction.J_TURN  # planned for afterwards
+            told += done.speech is not None and ObjectClass.TRAFFIC_LIGHT in done.speech.act.values(Slot.OBJECT)
+        assert state.journey is not None
+        assert state.journey.route == way
+        assert not state.halted
+    assert told > 0
+
+
+def test_wish_is_not_given_up_at_a_red_light():
+    talk = Talk()
+    talk.say(DialogueMove.INSTRUCT, ActionValue.U_TURN, decisions=0)
+    observation, state = dict(talk.observations["co_wizard"]), talk.state
+    state = replace(state, wish=Wish.SWITCH_LEFT, wish_until=float(observation["time"][0]) + 5.0)
+    observation |= {"motion": np.int64(Motion.HAZARD), "hazard": np.int64(ObjectClass.TRAFFIC_LIGHT.value)}
+    for _ in range(100):
+        observation["time"] = observation["time"] + 0.5
+        _, state = talk.policy.step(observation, state)
+    assert state.wish is Wish.SWITCH_LEFT
+    observation |= {"motion": np.int64(Motion.DRIVING), "hazard": np.int64(0)}
+    for _ in range(40):
+        observation["time"] = observation["time"] + 0.5
+        _, state = talk.policy.step(observation, state)
+    assert state.wish is None

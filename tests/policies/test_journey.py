@@ -1,6 +1,7 @@
 from dorothie_gym.dialogue import Direction
-from dorothie_gym.policies.journey import Journey, find_exit, is_choice, next_choice, stopping_distance
+from dorothie_gym.policies.journey import Journey, find_exit, is_choice, light_ahead, next_choice, stopping_distance
 from dorothie_gym.world.town import load_town
+from dorothie_gym.world.town.lights import LightColour
 
 TOWN = load_town("brookside")
 CHOICES = [lane.id for lane in TOWN.lanes if is_choice(TOWN, lane.id)]
@@ -57,3 +58,12 @@ def test_goal_that_was_passed_is_astray():
 
 def test_stopping_distance_grows_with_speed():
     assert 0.0 == stopping_distance(0.0) < stopping_distance(4.0) < stopping_distance(8.0)
+
+
+def test_only_a_traffic_light_in_sight_is_seen():
+    lane = next(lane for lane in TOWN.lanes if lane.length > 75.0 and TOWN.light(lane.id, 0.0) is not None)
+    colours = {light_ahead(TOWN, lane.id, lane.length - 5.0, float(time)) for time in range(120)}
+    assert colours == set(LightColour)
+    assert light_ahead(TOWN, lane.id, lane.length - 70.0, 0.0) is None
+    dark = next(lane for lane in TOWN.lanes if lane.id in CHOICES and TOWN.light(lane.id, 0.0) is None)
+    assert light_ahead(TOWN, dark.id, dark.length - 5.0, 0.0) is None

@@ -2,9 +2,12 @@ import numpy as np
 import pytest
 
 from dorothie_gym.envs.config import EnvConfig
-from dorothie_gym.ontology import Role
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.ontology import ActionValue, Role, Slot
 from dorothie_gym.policies import ScriptedParticipant
 from dorothie_gym.policies.participant.mind import Style
+from dorothie_gym.spaces import ParticipantAction
+from dorothie_gym.world.town.lights import LightColour
 from tests.policies.walk import play
 
 BY_GOALS = Style(guides=0.0, names_goal=1.0, names_street=0.5, hurries=1.0, patience=10.0, chat=1e4)
@@ -52,3 +55,37 @@ def test_same_seed_same_session():
     for a, b in zip(first.actions, second.actions, strict=True):
         for role in a:
             assert all(np.array_equal(a[role][key], b[role][key]) for key in a[role])
+
+
+@pytest.mark.parametrize("lit", [True, False])
+def test_nobody_asks_why_the_car_waits_at_a_red_light(lit):
+    env = DuoWizardEnv(town="brookside")
+    observations, _ = env.reset(seed=3)
+    policy = ScriptedParticipant(env.limits, style=BY_GOALS)
+    state = policy.initial_state(3, env.town)
+    lane = next(lane for lane in env.town.lanes if env.town.exits(lane.id) and is_dark(env.town, lane) is not lit)
+    observation = dict(observations["participant"])
+    begin = next(t for t in range(200) if turned_red(env.town, lane.id, t)) if lit else 0
+    asked = 0
+    for k in range(60):
+        time = begin + 0.5 * k
+        if lit and env.town.light(lane.id, time) is not LightColour.RED:
+            break
+        observation |= {
+            "time": np.array([time]), "speed": np.zeros(1), "lane": np.int64(lane.id),
+            "station": np.array([lane.length - 4.0]),
+            "pose": np.array([*lane.position(lane.length - 4.0), lane.heading_at(lane.length - 4.0)]),
+        }  # fmt: skip
+        action, state = policy.step(observation, state)
+        speech = ParticipantAction.decode(action, env.limits).speech
+        asked += speech is not None and ActionValue.STOP in speech.act.values(Slot.ACTION)
+    assert k > 30
+    assert (asked == 0) is lit
+
+
+def is_dark(town, lane):
+    return town.light(lane.id, 0.0) is None
+
+
+def turned_red(town, lane, time):
+    return town.light(lane, time) is LightColour.RED and town.light(lane, time - 1.0) is not LightColour.RED

@@ -1,11 +1,14 @@
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from highway_env.vehicle.behavior import IDMVehicle
 
 from dorothie_gym.ontology import PhysicalAction, PropKind
 from dorothie_gym.world.config import WorldConfig
+from dorothie_gym.world.town.right_of_way import right_of_way
 from dorothie_gym.world.world import World
 from tests.world.driving import network, run, world_at
 
@@ -56,12 +59,12 @@ def test_vehicles_keep_to_their_lanes_keep_moving_and_hardly_crash(name: str, se
 @pytest.mark.parametrize("name", ["brookside", "Town02"])
 def test_crossing_connectors_are_never_driven_at_the_same_time(name: str) -> None:
     world = busy_world(name, vehicles=16)
+    foes = right_of_way(world.town).foes
     for _ in range(300):
         world.step(6)
-        held = [(key, claim.connector) for key, claims in world.junctions._held.items() for claim in claims]
-        for k, (one, first) in enumerate(held):
-            for two, second in held[k + 1 :]:
-                assert one == two or not world.junctions.crosses(first, second)
+        for claims in world.junctions._inside.values():
+            for one, two in itertools.combinations(claims, 2):
+                assert one.key == two.key or two.connector not in foes(one.connector)
 
 
 def test_crashed_vehicle_is_towed_and_another_comes() -> None:
@@ -85,42 +88,6 @@ def test_vehicle_before_a_roadblock_is_towed() -> None:
     assert not vehicle.crashed
     run(world, 40.0)
     assert vehicle not in world.actors.vehicles
-
-
-def test_unused_grant_lapses() -> None:
-    world = busy_world("brookside", vehicles=0)
-    control, town = world.junctions, world.town
-    junction = town.junctions[0]
-    first = junction.connectors[0]
-    second = next(c for c in junction.connectors if control.crosses(first, c))
-    assert control.request(7, first, 0.0, room=True)
-    assert not control.request(8, second, 0.1, room=True)
-    for step in range(1, 20):  # the one that holds it drives elsewhere
-        control.note(7, next(lane.id for lane in town.lanes if not lane.in_junction), 8.0, 0.1 * step)
-    assert control.holds(7) is None
-    assert control.request(8, second, 2.0, room=True)
-
-
-def test_first_come_first_served_and_nobody_waits_for_who_has_no_room() -> None:
-    world = busy_world("brookside", vehicles=0)
-    control = world.junctions
-    junction = world.town.junctions[0]
-    first = junction.connectors[0]
-    second = next(c for c in junction.connectors if control.crosses(first, c))
-    assert not control.request(1, first, 0.0, room=False)
-    assert control.request(2, second, 0.1, room=True)
-    assert not control.request(1, first, 0.2, room=True)
-    control.release(2)
-    assert control.request(1, first, 0.3, room=True)
-
-
-def test_closed_junction_lets_nobody_in() -> None:
-    control = busy_world("brookside", vehicles=0).junctions
-    junction = network("brookside").town.junctions[0]
-    assert control.close(0, junction.id, 0.0)
-    assert not control.request(1, junction.connectors[0], 0.5, room=True)
-    assert control.request(1, junction.connectors[0], 2.0, room=True)
-    assert not control.close(0, junction.id, 2.1)
 
 
 def test_traffic_is_finite_and_the_same_for_a_seed() -> None:

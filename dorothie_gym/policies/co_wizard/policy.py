@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology import ObjectClass, Role
 from dorothie_gym.policies.co_wizard.driving import creep, drive
 from dorothie_gym.policies.co_wizard.goals import note_plan
 from dorothie_gym.policies.co_wizard.listening import listen
@@ -17,11 +17,14 @@ from dorothie_gym.policies.co_wizard.mind import CoWizardMind, Style, View
 from dorothie_gym.policies.co_wizard.obstacles import watch_road
 from dorothie_gym.policies.co_wizard.talking import speak_up, tell_action
 from dorothie_gym.policies.policy import Policy
-from dorothie_gym.spaces import ActionDict, CoWizardAction, Mental, SpaceLimits
+from dorothie_gym.spaces import ActionDict, CoWizardAction, Mental, Motion, SpaceLimits
 from dorothie_gym.world.town import Town
 
 ASTRAY = 2
 """After so many decisions off the plan it is made anew."""
+
+AFTER_RED = 15.0
+"""A manoeuvre that was asked for is not given up before this time after a red light [s]."""
 
 
 class ScriptedCoWizard(Policy[CoWizardMind]):
@@ -69,6 +72,8 @@ def _notice(mind: CoWizardMind, view: View) -> None:
         mind.standing_since = None
     elif mind.standing_since is None:
         mind.standing_since = view.time
+    if view.motion is Motion.HAZARD and view.hazard is ObjectClass.TRAFFIC_LIGHT:
+        mind.wish_until = max(mind.wish_until, view.time + AFTER_RED)  # there is no place for it before
     _pass_junction(mind, view)
     if mind.journey is None or view.manoeuvring:
         return

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from dorothie_gym.ontology import Role
+from dorothie_gym.policies.journey import light_ahead
 from dorothie_gym.policies.participant.goals import choose_target, note_tasks, tell_target
 from dorothie_gym.policies.participant.guidance import follow_journey, guide, watch
 from dorothie_gym.policies.participant.mind import ParticipantMind, Style, View
@@ -18,6 +19,10 @@ from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.policy import Policy
 from dorothie_gym.spaces import ActionDict, ParticipantAction, SpaceLimits
 from dorothie_gym.world.town import Town
+from dorothie_gym.world.town.lights import LightColour
+
+START = 8.0
+"""A car is given this long to start after a light has turned green, for others may be before it [s]."""
 
 
 class ScriptedParticipant(Policy[ParticipantMind]):
@@ -55,6 +60,7 @@ class ScriptedParticipant(Policy[ParticipantMind]):
             mind.standing_since = None
         elif mind.standing_since is None:
             mind.standing_since = view.time
+        _excuse_at_light(mind, view)
         note_tasks(mind, view, rng)
         choose_target(mind, view, rng)
         follow_journey(mind, view)
@@ -66,3 +72,11 @@ class ScriptedParticipant(Policy[ParticipantMind]):
         speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng)
         mind.speed_before = view.speed
         return ParticipantAction(speech=speech).encode(self.limits), mind
+
+
+def _excuse_at_light(mind: ParticipantMind, view: View) -> None:
+    """Nobody wonders about a car that waits before a red light, nor right after it has turned green."""
+    if not view.standing or light_ahead(mind.town, view.lane, view.station, view.time) in (None, LightColour.GREEN):
+        return
+    mind.standing_since = view.time
+    mind.excused_until = max(mind.excused_until, view.time + START)

@@ -40,6 +40,9 @@ STANDSTILL_GAP = 2.5
 ROADBLOCK_GAP = 12.5
 """Gap that is left to a prop [m]: room for a U-turn (`path.U_TURN_REACH` from the car's middle)."""
 
+LINE_GAP = 1.5
+"""Gap that is left to the line before a junction [m]."""
+
 TIGHT_GAP = 1.0
 """Gap that is left to what stands, while the car turns or switches lanes [m]."""
 
@@ -77,7 +80,8 @@ class Body:
 class Hazard:
     """Something ahead on the path: its gap to the car's nose [m] and its speed along the path [m/s].
 
-    `tight` tells that the car is in the middle of a manoeuvre, in which it goes up to things more closely.
+    `tight` tells that the car is in the middle of a manoeuvre, in which it goes up to things more closely; `line` that
+    the gap is that to the line before a junction, and `kind` is what holds the car there.
     """
 
     kind: ObjectClass
@@ -85,6 +89,7 @@ class Hazard:
     speed: float = 0.0
     key: int = -1
     tight: bool = False
+    line: bool = False
 
     def safe_speed(self, friction: float = 1.0) -> float:
         """Speed from which the car can still stop behind it (Gipps 1981, with the leader braking as hard) [m/s]."""
@@ -99,7 +104,9 @@ class Hazard:
     @property
     def _room(self) -> float:
         """Way that is left to the place where the car is to stop [m]."""
-        if self.tight and self.speed < 0.5:
+        if self.line:
+            margin = LINE_GAP
+        elif self.tight and self.speed < 0.5:
             margin = TIGHT_GAP
         else:
             margin = ROADBLOCK_GAP if self.kind is ObjectClass.STATIC else STANDSTILL_GAP

@@ -73,3 +73,11 @@ def test_safe_speed_falls_with_gap_and_grip() -> None:
     assert speeds == sorted(speeds)
     assert Hazard(kind=ObjectClass.VEHICLES, gap=20.0).safe_speed(0.7) < speeds[-1]
     assert Hazard(kind=ObjectClass.VEHICLES, gap=20.0).braking(8.0) == pytest.approx(64 / 35)
+
+
+def test_car_comes_closer_to_a_line_than_to_a_body_and_stops_before_it() -> None:
+    gaps = [0.1 * k for k in range(60)]
+    light = [Hazard(kind=ObjectClass.TRAFFIC_LIGHT, gap=gap, line=True).safe_speed() for gap in gaps]
+    vehicle = [Hazard(kind=ObjectClass.VEHICLES, gap=gap).safe_speed() for gap in gaps]
+    stops = [gaps[speeds.index(next(speed for speed in speeds if speed > 0.0))] for speeds in (light, vehicle)]
+    assert 1.0 < stops[0] < 2.0 < stops[1]
