@@ -182,9 +182,10 @@ class Driver:
         self._profiled = path
         self._goals_on_path = []
         for goal in self.goals:
-            on = np.flatnonzero((path.lanes == goal.lane) & ~path.manoeuvre)
-            if len(on) and path.stations[on[0]] - 1.0 <= goal.station <= path.stations[on[-1]] + 1.0:
-                self._goals_on_path.append(float(np.interp(goal.station, path.stations[on], path.s[on])))
+            for lane, station in self.planner.beside(goal.lane, goal.station):
+                on = np.flatnonzero((path.lanes == lane) & ~path.manoeuvre)
+                if len(on) and path.stations[on[0]] - 1.0 <= station <= path.stations[on[-1]] + 1.0:
+                    self._goals_on_path.append(float(np.interp(station, path.stations[on], path.s[on])))
 
 
 def is_turning_round(planner: LocalPlanner) -> bool:

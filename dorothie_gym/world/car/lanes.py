@@ -65,13 +65,13 @@ class Lanes:
     def offers_turns(self, lane: int) -> bool:
         """Whether the junction at the end of a lane offers a turn: from this lane or, as beside a turn lane, others."""
         if lane not in self._choices:
-            ways = [way for beside in self._side_by_side(lane) for way in self._town.exits(beside)]
+            ways = [way for beside in self.side_by_side(lane) for way in self._town.exits(beside)]
             turns = [way.angle for way in ways if way.junction_id >= 0]
             apart = max((abs(wrap_degrees(turn - turns[0])) for turn in turns), default=0.0)
             self._choices[lane] = self.is_choice(lane) or (bool(self._town.exits(lane)) and apart > ANOTHER_WAY)
         return self._choices[lane]
 
-    def _side_by_side(self, lane: int) -> list[int]:
+    def side_by_side(self, lane: int) -> list[int]:
         """A lane and all that one comes to from it by lane changes."""
         found = [lane]
         for known in found:
@@ -122,6 +122,8 @@ class Lanes:
             fits = [way for way in town.exits(own) if abs(wrap_degrees(way.angle - angle)) <= EXACT]
             if fits:
                 first = [*first, Step(fits[0].connector), *self._onward(fits[0])]
+                if fits[0].junction_id >= 0 and abs(fits[0].angle) > ANOTHER_WAY:
+                    return first, fits[0]  # everybody has to turn there: that is the turn which was asked for
         best: tuple[float, list[Step], Exit] | None = None
         # lanes that go on are looked at before lanes beside, so that a lane is changed as late as there is room for it
         queue: deque[tuple[list[Step], int]] = deque([(first, 0)])

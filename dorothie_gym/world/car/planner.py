@@ -128,6 +128,14 @@ class LocalPlanner:
         if self.room < HORIZON and not self._open_end:
             self._lay_from_here(self._lanes.steps_along(self.lanes_ahead), speed)
 
+    def beside(self, lane: int, station: float) -> list[tuple[int, float]]:
+        """A place, and those beside it on the other lanes of its direction: lane and distance along it [m]."""
+        position = self._town.lanes[lane].position(station)
+        return [
+            (other, station if other == lane else self._town.lanes[other].project(position)[0])
+            for other in self._lanes.side_by_side(lane)
+        ]
+
     # --- turn options -----------------------------------------------------------------------------------------------
 
     def exits(self) -> tuple[tuple[Exit, ...], float]:
