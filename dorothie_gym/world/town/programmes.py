@@ -24,9 +24,11 @@ SHORTEST_GREEN = 12.0
 LEFT_GREEN = 8.0
 """Green of lanes that only turn left [s]: four cars."""
 
-YELLOW = 3.0
-"""Yellow after every green [s]: 3 to 6 s (MUTCD 2009, section 4D.26). The formula of the Institute of Transportation
-Engineers, 1 s to react and a braking of 3 m/s2, gives 3.0 s at 44 km/h."""
+YELLOW, LONGEST_YELLOW = 3.0, 6.0
+"""Yellow after a green [s], at least and at most (MUTCD 2009, section 4D.26)."""
+
+YELLOW_REACTION, YELLOW_BRAKING = 1.0, 3.0
+"""Who drives on at yellow has this long to react [s] and would have to brake this hard [m/s^2]."""
 
 ALL_RED = 2.0
 """Red for everybody before the next green [s], so that the junction clears: at most 6 s (MUTCD 2009, section 4D.26)."""
@@ -40,9 +42,18 @@ STAGGER = 7.0
 
 @dataclass(frozen=True)
 class _Movement:
-    """A way across a junction: the lane it comes from, its connector, where that leads, and whether it turns left."""
+    """A way across a junction.
+
+    Attributes:
+        source: the lane it comes from.
+        speed: limit there [m/s].
+        connector: the lane across.
+        targets: where that leads.
+        left: whether it turns left.
+    """
 
     source: int
+    speed: float
     connector: Lane
     targets: frozenset[int]
     left: bool
@@ -70,6 +81,16 @@ class _Head:
     def may_go_with(self, other: _Head) -> bool:
         """Whether the two may be green together."""
         return all(_compatible(a, b) for a in self.movements for b in other.movements)
+
+
+def yellow_time(speed: float) -> float:
+    """Yellow for an approach with a speed limit [m/s], to half a second [s].
+
+    So long that who can no longer stop is past the line: time to react and half of that to brake to a stand (Institute
+    of Transportation Engineers, Traffic Signal Timing Manual).
+    """
+    needed = YELLOW_REACTION + speed / (2.0 * YELLOW_BRAKING)
+    return float(np.clip(np.ceil(2.0 * needed) / 2.0, YELLOW, LONGEST_YELLOW))
 
 
 def derive_programmes(
@@ -138,6 +159,7 @@ def _heads(
         movements = tuple(
             _Movement(
                 source=link.source,
+                speed=lanes[link.source].speed_limit,
                 connector=lanes[link.target],
                 targets=frozenset(on.target for on in followers[link.target]),
                 left=turn_into(link, lanes) in LEFTWARD,
@@ -185,10 +207,12 @@ def _is_turn_lane(head: _Head, heads: Sequence[_Head]) -> bool:
 
 def _turn_of(heads: Iterable[_Head], green: float) -> tuple[LightPhase, LightPhase, LightPhase]:
     """What happens when it is the turn of some lights: green, yellow, and red for all."""
+    heads = tuple(heads)
     signals = tuple(sorted(signal for head in heads for signal in head.signals))
+    fastest = max(movement.speed for head in heads for movement in head.movements)
     return (
         LightPhase(duration=green, green=signals),
-        LightPhase(duration=YELLOW, yellow=signals),
+        LightPhase(duration=yellow_time(fastest), yellow=signals),
         LightPhase(duration=ALL_RED),
     )
 

@@ -23,6 +23,7 @@ from dorothie_gym.world.town.programmes import (
     THROUGH_GREEN,
     YELLOW,
     derive_programmes,
+    yellow_time,
 )
 from dorothie_gym.world.town.right_of_way import right_of_way
 from tests.world.town.crossings import LIGHT, STOP, Arm, Crossing, meeting, town_of
@@ -336,3 +337,10 @@ def test_every_light_has_its_green_at_any_meeting_of_roads(
     signals = [s for s in crossing.town.signals if leading.intersection(s.lanes)]
     town = crossing.town
     check(Town(name="t", lanes=town.lanes, links=town.links, junctions=town.junctions, signals=signals))
+
+
+@pytest.mark.parametrize(("kmh", "seconds"), [(30, 3.0), (40, 3.0), (50, 3.5), (60, 4.0), (90, 5.5), (130, 6.0)])
+def test_yellow_is_longer_where_cars_are_faster(kmh: float, seconds: float) -> None:
+    assert yellow_time(kmh / 3.6) == seconds
+    # who is too near to stop at 3 m/s2 after a second is over the line before red
+    assert seconds == 6.0 or 1.0 + kmh / 3.6 / 6.0 <= seconds

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from dorothie_gym.world.town.lights import LightPhase, LightProgramme
 from dorothie_gym.world.town.model import Junction, Lane, LaneLink, Signal, SignalKind
-from dorothie_gym.world.town.programmes import derive_programmes
+from dorothie_gym.world.town.programmes import derive_programmes, yellow_time
 from dorothie_gym.world.town.yaml_town.approaches import Approach
 from dorothie_gym.world.town.yaml_town.geometry import wrap
 from dorothie_gym.world.town.yaml_town.layout import Layout
@@ -20,8 +20,8 @@ SIGNAL_HEIGHT = 3.0
 """A light or a sign is this high above the road [m]."""
 SIGNAL_ASIDE, MEDIAN_ASIDE = 1.0, 0.5
 """It stands this far from the edge of the lane at the kerb, and from that of a left-turn lane in the median [m]."""
-YELLOW_TIME, CLEARANCE_TIME = 3.0, 2.0
-"""Between written phases: how long lights are yellow, and then all that change are red [s]."""
+CLEARANCE_TIME = 2.0
+"""Between written phases: how long after their yellow all lights that change are red [s]."""
 
 
 def place_signals(
@@ -140,7 +140,8 @@ def _written(plan: LightsPlan, junction_id: int, heads: Sequence[_Head]) -> Ligh
         stay = tuple(signal for signal in green if signal in after)
         if len(stay) < len(green):
             yellow = tuple(signal for signal in green if signal not in after)
-            phases.append(LightPhase(duration=YELLOW_TIME, green=stay, yellow=yellow))
+            fastest = max(head.street.speed for head in heads if head.signal.id in yellow) / 3.6
+            phases.append(LightPhase(duration=yellow_time(fastest), green=stay, yellow=yellow))
             phases.append(LightPhase(duration=CLEARANCE_TIME, green=stay))
     return LightProgramme(
         junction_id=junction_id,
