@@ -62,10 +62,10 @@ def guided_trip(roads: TownNetwork, start: Site, goal: Site, *, most: float = 12
 
 def _next(town: Town, planner: LocalPlanner, goal: Site, speed: float) -> Instruction | None:
     """What a guide says now, if anything."""
-    if planner.held or planner.in_manoeuvre or town.lanes[planner.lane].in_junction:
+    if planner.held or town.lanes[planner.lane].in_junction:
         return None
     left = goal.station - planner.station
-    if planner.lane == goal.lane and -1.0 < left <= 0.56 * speed + speed**2 / 6.0 + 0.3:
+    if planner.lane == goal.lane and not planner.in_manoeuvre and -1.0 < left <= 0.56 * speed + speed**2 / 6.0 + 0.3:
         return PhysicalAction.STOP, 0
     route = router(town).route((planner.lane, planner.station), (goal.lane, goal.station))
     assert route is not None, (planner.lane, planner.station, goal)
@@ -80,7 +80,8 @@ def _next(town: Town, planner: LocalPlanner, goal: Site, speed: float) -> Instru
 
 def _aside(planner: LocalPlanner, before: Leg, leg: Leg, speed: float) -> Instruction | None:
     """A lane switch or U-turn, when the car is where it is to begin."""
-    if before.lane != planner.lane or planner.manoeuvre[0] not in (None, PhysicalAction.J_TURN):
+    busy = planner.in_manoeuvre or planner.manoeuvre[0] not in (None, PhysicalAction.J_TURN)
+    if busy or before.lane != planner.lane:
         return None
     left = before.end - planner.station
     if leg.entry is Entry.U_TURN:

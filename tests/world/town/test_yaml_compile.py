@@ -197,7 +197,7 @@ def test_a_written_programme_is_kept_with_yellow_and_clearance_between(towns: di
     town = towns["avenues"]
     (programme,) = town.programmes
     assert (programme.junction_id, programme.offset) == (0, 7.0)
-    assert [phase.duration for phase in programme.phases] == [20.0, 4.0, 2.0, 8.0, 4.0, 2.0, 10.0, 3.0, 2.0]
+    assert [phase.duration for phase in programme.phases] == [20.0, 4.0, 2.0, 8.0, 4.0, 2.0, 10.0, 3.5, 2.0]
     avenue = {
         s.id for s in town.signals if s.kind is SignalKind.TRAFFIC_LIGHT and street_of(town, s.lanes[0]) == "Avenue"
     }
