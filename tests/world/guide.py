@@ -8,7 +8,7 @@ import numpy as np
 
 from dorothie_gym.ontology import ARRIVAL_DISTANCE, PhysicalAction
 from dorothie_gym.world.car.driver import GoalAhead
-from dorothie_gym.world.car.lanes import LEAD
+from dorothie_gym.world.car.lanes import LEAD, Lanes
 from dorothie_gym.world.car.planner import BRAKING, U_TURN_SPEED, LocalPlanner
 from dorothie_gym.world.config import FRAME_RATE
 from dorothie_gym.world.network.network import TownNetwork
@@ -65,14 +65,15 @@ def _next(town: Town, planner: LocalPlanner, goal: Site, speed: float) -> Instru
     if planner.held or town.lanes[planner.lane].in_junction:
         return None
     left = goal.station - planner.station
-    if planner.lane == goal.lane and not planner.in_manoeuvre and -1.0 < left <= 0.56 * speed + speed**2 / 6.0 + 0.3:
+    turning_round = planner.in_manoeuvre and planner.manoeuvre[0] is PhysicalAction.U_TURN
+    if planner.lane == goal.lane and not turning_round and -1.0 < left <= 0.56 * speed + speed**2 / 6.0 + 0.3:
         return PhysicalAction.STOP, 0
     route = router(town).route((planner.lane, planner.station), (goal.lane, goal.station))
     assert route is not None, (planner.lane, planner.station, goal)
     for before, leg in zip(route.legs, route.legs[1:], strict=False):
         if leg.entry is not Entry.FOLLOW:
             return _aside(planner, before, leg, speed)
-        if town.lanes[leg.lane].in_junction and len(town.exits(before.lane)) > 1:
+        if town.lanes[leg.lane].in_junction and Lanes(town).offers_turns(before.lane):
             (angle,) = (way.angle for way in town.exits(before.lane) if way.connector == leg.lane)
             return None if planner.turn_ahead == angle else (PhysicalAction.J_TURN, angle)
     return None

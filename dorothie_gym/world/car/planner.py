@@ -286,7 +286,8 @@ class LocalPlanner:
         return oncoming, min(begin, lane.length)
 
     def _turn(self, angle: int, speed: float) -> str | None:
-        found = self._lanes.find_turn(self._lanes.through_junction(self.lane), self.station, angle)
+        _, free = self._under_way()  # lanes can be changed again from where a manoeuvre under way ends
+        found = self._lanes.find_turn(self._lanes.through_junction(self.lane), free, angle)
         if found is None:
             return "there is no junction with a choice ahead"
         steps, way = found
@@ -332,7 +333,9 @@ class LocalPlanner:
         )
         if len(piece.points) < 2:
             return [], self.station
-        return [piece], float(self.path.stations[end - 1])
+        # the lane goes on where it did before: a little behind the end of a U-turn, lest the path turn back on itself
+        landing = end if end < len(self.path.s) and int(self.path.lanes[end]) == self.lane else end - 1
+        return [piece], float(self.path.stations[landing])
 
     def _lay_u_turn(self, oncoming: Oncoming, begin: float) -> None:
         lane, target = self._town.lanes[self.lane], self._town.lanes[oncoming.lane]

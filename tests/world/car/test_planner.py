@@ -181,3 +181,43 @@ def test_turn_changes_lanes_before_the_junction_only_where_another_lane_fits_muc
             changed += 1
     if not changed:
         pytest.skip("no lane of this map has another one beside it that leads elsewhere")
+
+
+@pytest.mark.parametrize("name", ["brookside", "midtown"])
+@pytest.mark.parametrize("begun", [2.0, 6.0, 12.0])
+def test_a_turn_that_is_asked_for_during_a_u_turn_does_not_disturb_it(name: str, begun: float) -> None:
+    roads = network(name)
+    town, tried = roads.town, 0
+    for lane in town.lanes:
+        if lane.in_junction or lane.length < 60.0 or tried == 12:
+            continue
+        car, driver = on_lane(roads, lane.id, 30.0)
+        planner = driver.planner
+        if planner.command(PhysicalAction.U_TURN, 0, 0.0) is not None:
+            continue
+        assert drive(car, driver, lambda p=planner: p.in_manoeuvre and p.s > begun).arrived
+        ways = town.exits(planner.lane)
+        if len(ways) < 2 or planner.command(PhysicalAction.J_TURN, ways[0].angle, float(car.speed)) is not None:
+            continue
+        trip = drive(car, driver, lambda p=planner, w=ways[0]: p.lane == w.lane, 60.0)
+        assert trip.arrived and trip.worst < 0.3, (lane.id, trip.worst)
+        tried += 1
+    assert tried > 5
+
+
+def test_a_turn_that_is_asked_for_during_a_lane_switch_does_not_disturb_it() -> None:
+    roads = network("midtown")
+    town, tried = roads.town, 0
+    for lane in town.lanes:
+        beside = town.neighbour(lane.id, LEFT)
+        if beside is None or town.predecessors(beside):
+            continue  # not beside a turn lane
+        car, driver = on_lane(roads, lane.id, 0.0)
+        planner = driver.planner
+        assert planner.command(PhysicalAction.LANE_SWITCH, 90, 10.0) is None
+        assert drive(car, driver, lambda p=planner: p.in_manoeuvre and p.s > 8.0).arrived
+        planner.command(PhysicalAction.J_TURN, 0, float(car.speed))
+        trip = drive(car, driver, lambda p=planner: town.lanes[p.lane].in_junction, 60.0)
+        assert trip.worst < 0.3, (lane.id, trip.worst)
+        tried += 1
+    assert tried > 5
