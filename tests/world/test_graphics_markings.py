@@ -216,9 +216,109 @@ def test_a_road_deep_under_a_street_is_a_tunnel() -> None:
     plan = Plan(town)
     assert [(part.level, part.lane) for part in plan.stretches] == [(-1, 1)]
     painter = MapPainter(town, size=(900, 900))
-    assert colour_at(painter, (60.0, 7.0)) == palette.TUNNEL
+    assert colour_at(painter, (60.0, 4.0)) == palette.TUNNEL
     assert colour_at(painter, (60.0, 1.0)) == palette.ROAD, "the street goes on above it"
-    assert colour_at(painter, (60.0, -5.0)) == palette.TUNNEL
+    assert colour_at(painter, (60.0, -4.0)) == palette.TUNNEL
+    assert colour_at(painter, (60.0, 20.0)) == palette.ROAD, "nothing covers the road there"
+
+
+def dual_carriageway_under_a_street(angle: float = 0.0) -> Town:
+    """A street along the x axis, turned by an angle [rad]; under it two lanes to the south and two to the north."""
+    way = np.array([np.cos(angle), np.sin(angle)])
+    lanes = [road(0, [tuple(-80.0 * way), tuple(80.0 * way)], number=-1)]
+    for k, x in enumerate((-7.5, -4.0, 4.0, 7.5)):
+        ends = [(x, 100.0), (x, -100.0)] if x > 0 else [(x, -100.0), (x, 100.0)]
+        lanes.append(road(k + 1, ends, z=-6.0, number=1 if x < 0 else -1))
+    return town_of(*lanes)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5, -0.8])
+def test_a_tunnel_is_as_long_as_what_covers_it(angle: float) -> None:
+    """The street is 3.5 m wide; its pavements add some metres, and crossing at an angle makes the way longer."""
+    town = dual_carriageway_under_a_street(angle)
+    parts = Plan(town).stretches
+    assert {part.lane for part in parts} == {1, 2, 3, 4}
+    for part in parts:
+        lane = town.lanes[part.lane]
+        a, b = lane.position(part.start), lane.position(part.end)
+        assert abs(b[1] - a[1]) < 3.5 / np.cos(angle) + 10.0
+        middle = (a + b) / 2.0
+        assert middle[1] == pytest.approx(middle[0] * np.tan(angle), abs=0.3), "in the middle under the street"
+
+
+def test_grass_in_a_cutting_ends_before_the_tunnel_and_never_lies_on_the_street_above() -> None:
+    painter = MapPainter(dual_carriageway_under_a_street(), size=(900, 900))
+    assert colour_at(painter, (0.0, 40.0)) in (palette.MEDIAN, palette.MEDIAN_TREE)
+    assert colour_at(painter, (0.0, 0.0)) == palette.ROAD
+    assert colour_at(painter, (0.0, 4.0)) == palette.TUNNEL
+
+
+def test_slopes_lie_beside_an_open_cutting_and_nowhere_else() -> None:
+    painter = MapPainter(dual_carriageway_under_a_street(), size=(900, 900))
+    slope = {palette.CUTTING, palette.CUTTING_EDGE}
+    assert colour_at(painter, (11.6, 30.0)) in slope and colour_at(painter, (-11.6, 30.0)) in slope
+    level = town_of(road(0, [(0.0, 0.0), (120.0, 0.0)]), road(1, [(60.0, -60.0), (60.0, 60.0)], z=6.0))
+    assert not slope & {shape.colour for shape in Plan(level).shapes}
+
+
+def avenue_with_turn_lanes() -> Town:
+    """Two turn lanes, back to back in the median of an avenue of 120 m with two lanes each way."""
+    lanes = [
+        road(0, [(0.0, 3.75), (62.0, 3.75)], number=-1),
+        road(1, [(0.0, 7.25), (62.0, 7.25)], number=-2),
+        road(2, [(62.0, 0.25), (120.0, 0.25)], number=-1),
+        road(3, [(62.0, 3.75), (120.0, 3.75)], number=-2),
+        road(4, [(62.0, 7.25), (120.0, 7.25)], number=-3),
+        road(5, [(120.0, -3.75), (58.0, -3.75)], number=1),
+        road(6, [(120.0, -7.25), (58.0, -7.25)], number=2),
+        road(7, [(58.0, -0.25), (0.0, -0.25)], number=1),
+        road(8, [(58.0, -3.75), (0.0, -3.75)], number=2),
+        road(9, [(58.0, -7.25), (0.0, -7.25)], number=3),
+    ]
+    pairs = [(0, 3), (1, 4), (5, 8), (6, 9)]
+    return town_of(*lanes, links=[LaneLink(a, b, LinkType.STRAIGHT) for a, b in pairs])
+
+
+def test_turn_lanes_that_open_back_to_back_share_a_hatched_island() -> None:
+    town = avenue_with_turn_lanes()
+    assert [(pocket.lane, pocket.back) for pocket in Plan(town).pockets] == [(2, 2.0), (7, 2.0)]
+    hatching = painted(town, palette.HATCHING)
+    low = np.min([shape.points.min(axis=0) for shape in hatching], axis=0)
+    high = np.max([shape.points.max(axis=0) for shape in hatching], axis=0)
+    assert low[0] == pytest.approx(120.0 - high[0]) and 45.0 < low[0] < 57.0
+    assert low[1] > -2.3 and high[1] < 2.3, "between the through lanes"
+
+
+def test_no_kerb_is_seen_where_turn_lanes_open() -> None:
+    painter = MapPainter(avenue_with_turn_lanes(), size=(1800, 500), street_names=[""])
+    picture = pygame.surfarray.array3d(painter.surface())
+    (x0, y0), (x1, y1) = np.round(painter.to_pixel([(20.0, -5.0), (100.0, 5.0)])).astype(int).tolist()
+    seen = {tuple(colour) for colour in picture[x0:x1, y0:y1].reshape(-1, 3).tolist()}
+    assert palette.ROAD in seen and not seen & {palette.KERB, palette.BLOCK, palette.PARK, palette.COUNTRY}
+
+
+def test_a_lane_that_grows_from_nothing_has_no_island() -> None:
+    town = avenue_with_turn_lanes()
+    wide = [
+        lane if lane.id != 2 else road(2, [(62.0, 2.0), (70.0, 0.25), (120.0, 0.25)], widths=(0.1, 3.5, 3.5))
+        for lane in town.lanes
+    ]
+    assert 2 not in [pocket.lane for pocket in Plan(town_of(*wide, links=town.links)).pockets]
+
+
+def test_the_pavement_goes_on_around_a_roundabout() -> None:
+    """Only the arms have pavements in a map; ring and arms are of one paved square for those who walk."""
+    angles = np.radians([[60.0, -60.0], [-120.0, -240.0]])
+    arcs = [np.linspace(a, b, 40) for a, b in angles]
+    rings = [road(k, [(30.0 * np.cos(t), 30.0 * np.sin(t)) for t in arc]) for k, arc in enumerate(arcs)]
+    walks = [
+        Sidewalk(id=k, points=np.array([[x, 33.0 * y, 0.0], [x, 60.0 * y, 0.0]]), width=2.0)
+        for k, (x, y) in enumerate([(10.0, 1.0), (-10.0, 1.0), (10.0, -1.0), (-10.0, -1.0)])
+    ]
+    outside = (33.0, 0.0)
+    for paved in (walks, walks[:1]):
+        painter = MapPainter(town_of(*rings, sidewalks=paved), size=(700, 700))
+        assert (colour_at(painter, outside) == palette.SIDEWALK) == (paved is walks)
 
 
 def test_a_pavement_of_the_map_is_painted_up_to_the_kerb() -> None:

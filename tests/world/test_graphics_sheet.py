@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import itertools
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pygame
 import pytest
 
 from dorothie_gym.world.graphics import MapPainter, palette, town_picture
@@ -13,8 +15,9 @@ from dorothie_gym.world.graphics.ground import town_bounds
 from dorothie_gym.world.graphics.icons import pin_icon
 from dorothie_gym.world.graphics.legend import Legend
 from dorothie_gym.world.graphics.plan import Plan
-from dorothie_gym.world.graphics.sheet import sheet_size
-from dorothie_gym.world.town import Lane, Street, Town, load_town
+from dorothie_gym.world.graphics.roadways import roadways
+from dorothie_gym.world.graphics.sheet import sheet_painter, sheet_size
+from dorothie_gym.world.town import Lane, Street, Town, load_town, town_names
 
 MAPS = Path(__file__).parents[2] / "../shared/maps"
 TOWNS = ["brookside", "Town01", "Town05"]
@@ -105,12 +108,110 @@ def test_long_streets_are_named_again() -> None:
     assert min(b - a for a, b in itertools.pairwise(places)) >= 600.0
 
 
-def test_a_name_without_any_room_is_reported() -> None:
+@pytest.mark.parametrize("name", [*town_names(), "Town01", "Town02", "Town05"])
+def test_every_street_of_every_town_carries_its_name(name: str) -> None:
+    painter = sheet_painter(town_named(name))
+    assert painter.missing == ()
+    assert {label.text for label in painter.labels} == {street.name for street in painter.town.streets}
+
+
+@pytest.mark.parametrize("name", ["midtown", "northgate"])
+def test_names_of_broad_roads_are_not_the_smallest(name: str) -> None:
+    painter = sheet_painter(town_named(name))
+    smallest = min(label.size for label in painter.labels)
+    broad = {way.street for way in roadways(painter.plan.borders) if np.median(way.width) > 16.0}
+    assert broad
+    for street in broad:
+        assert max(label.size for label in painter.labels if label.street == street) > smallest
+
+
+def painter_of(lanes: list[Lane], names: list[str], **options: Any) -> MapPainter:
+    streets = [
+        Street(id=k, name=name, lanes=tuple(lane.id for lane in lanes if lane.street == k))
+        for k, name in enumerate(names)
+    ]
+    return MapPainter(Town(name="test", lanes=lanes, links=[], junctions=[], streets=streets), **options)
+
+
+def test_a_name_longer_than_its_street_stands_beside_it() -> None:
     lanes = [straight(0, 200.0), straight(1, 6.0, y=60.0, street=1)]
-    streets = [Street(id=0, name="Elm Street", lanes=(0,)), Street(id=1, name="Very Narrow Passage", lanes=(1,))]
-    painter = MapPainter(Town(name="two", lanes=lanes, links=[], junctions=[], streets=streets), size=(900, 400))
-    assert painter.missing == ("Very Narrow Passage",)
-    assert [label.text for label in painter.labels] == ["Elm Street"]
+    painter = painter_of(lanes, ["Elm Street", "Very Narrow Passage"], size=(900, 400))
+    assert painter.missing == ()
+    assert {label.text: label.beside for label in painter.labels} == {"Elm Street": False, "Very Narrow Passage": True}
+    (beside,) = (label for label in painter.labels if label.beside)
+    away = np.abs(beside.path[:, 1] - painter.to_pixel((3.0, 60.0))[1])
+    assert (away > 1.75 * painter.scale + 0.5 * beside.size).all(), "no letter is on the road"
+    (x0, y), (x1, _) = np.round(beside.path[[0, -1]]).astype(int)
+    letters = pygame.surfarray.array3d(painter.surface())[x0:x1, y - 9 : y + 9].astype(int)
+    assert (np.abs(letters - palette.INK).max(axis=-1) < 40).any(), "dark type on the ground"
+
+
+def test_a_street_nobody_can_see_is_reported() -> None:
+    """All there is of it lies inside a junction."""
+    inner = Lane(
+        id=1,
+        road_id=1,
+        lane_id=-1,
+        junction_id=3,
+        points=np.array([[60.0, 40.0, 0.0], [80.0, 40.0, 0.0]]),
+        widths=np.full(2, 3.5),
+        speed_limit=10.0,
+        street=1,
+    )
+    painter = painter_of([straight(0, 200.0), inner], ["Elm Street", "Nowhere"], size=(900, 400))
+    assert painter.missing == ("Nowhere",)
+
+
+def test_a_name_too_long_for_a_broad_block_is_broken_into_two_rows() -> None:
+    lanes = [straight(k, 60.0, y=3.5 * k) for k in range(5)]
+    painter = painter_of(lanes, ["Parliament Avenue"], size=(760, 320), type_sizes=(60, 50))
+    (label,) = painter.labels
+    assert label.rows == ("Parliament", "Avenue") and not label.beside
+    first, second = (row.mean(axis=0) for row in label.row_paths())
+    assert first[1] < second[1], "the first row is above the second"
+    middle = painter.to_pixel((30.0, 7.0))
+    assert np.allclose((first + second) / 2.0, middle, atol=30.0)
+    edges = painter.to_pixel([(0.0, -1.75), (0.0, 15.75)])[:, 1]
+    assert edges[0] < first[1] - label.size / 2.0 and second[1] + label.size / 2.0 < edges[1]
+
+
+def test_a_name_with_too_short_blocks_goes_on_across_the_junction() -> None:
+    lanes = [straight(0, 30.0)]
+    beyond = np.array([[44.0, 0.0, 0.0], [74.0, 0.0, 0.0]])
+    lanes.append(Lane(id=1, road_id=1, lane_id=-1, points=beyond, widths=np.full(2, 3.5), speed_limit=9.0, street=0))
+    painter = painter_of(lanes, ["Long Street"], size=(500, 200), type_sizes=(40, 40))
+    (label,) = painter.labels
+    x = label.path[:, 0] / painter.scale + painter.origin[0]
+    assert x.min() < 30.0 and x.max() > 44.0 and not label.beside
+
+
+def test_the_middle_of_a_road_is_where_its_edges_are_equally_far() -> None:
+    """Two lanes one way, one the other: the line between the directions is not in the middle."""
+    lanes = [
+        straight(0, 120.0, y=1.75),
+        straight(1, 120.0, y=5.25),
+        Lane(
+            id=2,
+            road_id=2,
+            lane_id=1,
+            points=np.array([[120.0, -1.75, 0.0], [0.0, -1.75, 0.0]]),
+            widths=np.full(2, 3.5),
+            speed_limit=9.0,
+            street=0,
+        ),
+    ]
+    town = Town(
+        name="uneven", lanes=lanes, links=[], junctions=[], streets=[Street(id=0, name="Elm Street", lanes=(0, 1, 2))]
+    )
+    (way,) = roadways(Plan(town).borders)
+    assert np.allclose(way.width, 10.5, atol=0.2) and np.allclose(way.line[:, 1], 1.75, atol=0.2)
+
+
+def test_names_are_known_before_anything_is_painted() -> None:
+    painter = sheet_painter(load_town("brookside"))
+    assert painter.labels and "_surface" not in vars(painter)
+    painter.surface()
+    assert "_surface" in vars(painter)
 
 
 def test_sheets_are_the_same_byte_for_byte(tmp_path: Path) -> None:

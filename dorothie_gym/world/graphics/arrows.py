@@ -115,10 +115,9 @@ def _back_from(town: Town, lane: int, stop: float) -> tuple[int, float] | None:
 
 def one_way_places(town: Town, borders: Borders) -> Iterator[tuple[int, float]]:
     """Lanes and stations [m] of the arrows along streets that have no oncoming traffic beside them."""
-    left = {right: k for k, right in borders.right_neighbour.items()}
     for lane in town.lanes:
         innermost, seen = lane.id, {lane.id}
-        while (beside := left.get(innermost, innermost)) not in seen:
+        while (beside := borders.left_neighbour.get(innermost, innermost)) not in seen:
             seen.add(beside)
             innermost = beside
         if lane.in_junction or innermost in borders.divided or lane.length < _ONE_WAY_SHORTEST:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -68,6 +69,12 @@ class Border:
         shift = np.broadcast_to(np.asarray(-self.sign * np.asarray(inwards)), self.heading.shape)
         return np.asarray(self.points[:, :2] + shift[:, None] * right_of(self.heading))
 
+    def part(self, run: NDArray[np.int64]) -> Border:
+        """Some of its places, by their indices."""
+        return replace(
+            self, points=self.points[run], heading=self.heading[run], gap=self.gap[run], width=self.width[run]
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Borders:
@@ -82,6 +89,19 @@ class Borders:
     lines: tuple[Border, ...]
     right_neighbour: dict[int, int]
     divided: frozenset[int]
+
+    @cached_property
+    def left_neighbour(self) -> dict[int, int]:
+        """By lane, the lane in the same direction on its left, where there is one."""
+        return {right: lane for lane, right in self.right_neighbour.items()}
+
+    def abreast(self, lane: int) -> int:
+        """Lanes of the carriageway from this one to its left edge."""
+        seen = {lane}
+        while (beside := self.left_neighbour.get(lane, lane)) not in seen:
+            seen.add(beside)
+            lane = beside
+        return len(seen)
 
     def rightmost(self, lane: int) -> int:
         """The lane at the kerb of the carriageway that a lane belongs to."""

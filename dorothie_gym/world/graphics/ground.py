@@ -71,14 +71,12 @@ def _free(outlines: Sequence[Array], scale: float, border: float) -> list[_Piece
     surface, low = _painted(outlines, scale, border)
     free = pygame.mask.from_surface(surface)
     free.invert()
-    width, height = surface.get_size()
-    pieces = []
-    for mask in free.connected_components(minimum=1):
-        rectangles: list[Any] = mask.get_bounding_rects()
-        box = rectangles[0].unionall(rectangles[1:])
-        outside = box.left == 0 or box.top == 0 or box.right == width or box.bottom == height
-        pieces.append(_Piece(mask, low, scale, outside))
-    return pieces
+    frame = pygame.mask.Mask(surface.get_size(), fill=True)
+    frame.erase(pygame.mask.Mask(np.maximum(np.array(surface.get_size()) - 2, 0).tolist(), fill=True), (1, 1))
+    return [
+        _Piece(mask, low, scale, mask.overlap(frame, (0, 0)) is not None)
+        for mask in free.connected_components(minimum=1)
+    ]
 
 
 def junction_areas(town: Town) -> list[Array]:
@@ -199,10 +197,7 @@ def landscape(town: Town, border: float) -> list[Shape]:
 
 def _trees(town: Town, piece: _Piece, rng: np.random.Generator, share: float, colour: Colour) -> Iterator[Shape]:
     """Trees on a jittered grid inside a piece of ground, well away from its edge and from landmark sites."""
-    import pygame
-
     size = np.array(piece.mask.get_size())
-    free = pygame.surfarray.array_red(piece.mask.to_surface()) > 0  # (width, height)
     grid = np.stack(np.meshgrid(*(np.arange(0.0, n / piece.scale, _TREE_SPACING) for n in size)), axis=-1).reshape(
         -1, 2
     )
@@ -212,8 +207,9 @@ def _trees(town: Town, piece: _Piece, rng: np.random.Generator, share: float, co
     rings = centres[:, None] + (radii[:, None, None] + 5.0) * disc((0.0, 0.0), 1.0, 12)  # (n, 12, 2)
     pixels = ((rings - piece.low) * piece.scale).astype(int)
     inside = ((pixels >= 0) & (pixels < size)).all(axis=(1, 2))
-    pixels = np.clip(pixels, 0, size - 1)
-    wanted &= inside & free[pixels[..., 0], pixels[..., 1]].all(axis=1)
+    wanted &= inside
+    for k in np.flatnonzero(wanted).tolist():
+        wanted[k] = all(piece.mask.get_at(pixel) for pixel in pixels[k].tolist())
     for site in town.sites:
         wanted &= np.hypot(*(centres - np.array(site.position)).T) > radii + 6.0
     for k in np.flatnonzero(wanted).tolist():

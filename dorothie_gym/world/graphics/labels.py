@@ -10,19 +10,47 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from dorothie_gym.world.graphics.axes import Axis, street_axes
+from dorothie_gym.world.graphics.axes import Axis, across_junctions, beside_axes, street_axes
+from dorothie_gym.world.graphics.borders import Border
 from dorothie_gym.world.graphics.fonts import font
-from dorothie_gym.world.graphics.obstacles import LEVELS, Obstacles
+from dorothie_gym.world.graphics.obstacles import Level, Obstacles
 from dorothie_gym.world.graphics.plan import Plan
 from dorothie_gym.world.town.model import Array
 
-_MOST_BENT = 0.9  # [rad] that the line under a name may turn
 _TIGHTEST = 2.2  # sizes of type: the smallest radius that letters still stand well on
-_ROOM = 0.72  # of the road's width that type may take
+_ROOM = 0.72  # of the road's width that a row of type may take
+_ROOM_OF_ROWS = 0.9  # and that two of them may take
+ROW_HEIGHT = 1.0
+"""From row to row, times the size of the type."""
+
 _HALF = 0.62  # of a name's height that is kept free on either side of its line
 _LONGER = 1.08  # times a name's length of road is taken
 _POINTS = 24
+_SHARES = (1.0, 0.85, 0.72, 0.6, 0.5, 0.42)  # of the largest type
 _REPEATED = 0.8  # times its size a name may be set again where there is less room
+_TINY = 0.8  # times the smallest type, rather than no name
+_ASIDE = 3.0  # [m] between the road's edge and a name beside it: the pavement
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Manner:
+    """How a name may be set.
+
+    Attributes:
+        size: of the type [px].
+        level: what it keeps clear of.
+        forced: whether it may be higher than the road is broad.
+        across: whether it may go across a junction.
+        bent: how much its line may turn [rad].
+        rows: that the name is broken into.
+    """
+
+    size: int
+    level: Level
+    forced: bool = False
+    across: bool = False
+    bent: float = 0.9
+    rows: int = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +62,28 @@ class Label:
         street: index of the street.
         size: height of the type [px].
         path: points (n, 2) [px] along which it is set, from its first letter to its last.
+        beside: whether it stands on the ground beside the road, there being no room on it.
+        rows: the name as it is broken into rows, their middle being on the path.
     """
 
     text: str
     street: int
     size: int
     path: Array
+    beside: bool
+    rows: tuple[str, ...]
+
+    @property
+    def half(self) -> float:
+        """What is kept free on either side of the path [px]."""
+        return _half(self.size, len(self.rows))
+
+    def row_paths(self) -> list[Array]:
+        """The path of each row (n, 2) [px]."""
+        steps = np.gradient(self.path, axis=0)
+        down = np.stack((-steps[:, 1], steps[:, 0]), axis=-1) / np.hypot(*steps.T)[:, None]
+        middle = (len(self.rows) - 1) / 2.0
+        return [self.path + (k - middle) * ROW_HEIGHT * self.size * down for k in range(len(self.rows))]
 
 
 @dataclass
@@ -47,14 +91,15 @@ class LabelPlacer:
     """Sets the names of a town's streets.
 
     Attributes:
-        names: by street index.
+        names: by street index; empty for streets that have none.
         scale: [px/m].
         origin: world position of pixel (0, 0) [m].
         frame: left, top, right and bottom [px] that names stay inside.
         sizes: largest and smallest type [px].
-        spacing: distance between two settings of the same name [px].
+        spacing: smallest distance between two settings of the same name [px].
+        farthest: distance beyond which a name is set again even over arrows [px].
         placed: the names set so far.
-        missing: names of streets on which there is no room at all.
+        missing: names of streets on and beside which there is no room at all.
     """
 
     names: Sequence[str]
@@ -63,79 +108,136 @@ class LabelPlacer:
     frame: tuple[int, int, int, int]
     sizes: tuple[int, int] = (20, 11)
     spacing: float = 420.0
+    farthest: float = 1400.0
     placed: list[Label] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
 
     def place(self, plan: Plan, fixed: Array) -> list[Label]:
         """Sets every name at least once where its street can be seen, and again where it is long.
 
-        Streets with the least room come first; a name is made smaller before it may touch a junction.
+        Streets with the least room come first. A name first gives way to all markings, then hides arrows, then gets
+        smaller, goes on across a junction and at last stands beside the road.
 
         Args:
             plan: what is painted.
             fixed: circles (n, 3) [px] that no name may touch: x, y, radius.
         """
-        obstacles = Obstacles.of(plan, self.scale, self.origin, fixed)
-        axes = street_axes(plan, self.scale, self.origin)
-        by_street: dict[int, list[Axis]] = {k: [] for k in range(len(self.names))}
-        for axis in axes:
-            if axis.street in by_street:
-                by_street[axis.street].append(axis)
-        for row in by_street.values():
-            row.sort(key=lambda axis: -axis.length)
-            for axis in row:
-                axis.clear = obstacles.clearances(axis)
-        order = sorted(by_street, key=lambda k: (sum(axis.length for axis in by_street[k]), k))
+        lines = plan.borders.lines
+        self._obstacles = Obstacles(plan, self.scale, self.origin, fixed)
+        self._axes = street_axes(plan.borders, self.scale, self.origin)
+        self._own: dict[int, list[Axis]] = {k: [] for k, name in enumerate(self.names) if name}
+        for axis in self._axes:
+            if axis.street in self._own:
+                self._own[axis.street].append(axis)
+        order = sorted(self._own, key=lambda k: (sum(axis.length for axis in self._own[k]), k))
         self.placed, self.missing = [], []
         for street in order:
-            if not self._place_first(street, by_street[street], axes):
+            if not self._set_first(street) and not self._set_beside(street, lines):
                 self.missing.append(self.names[street])
         for street in order:
-            first = next((label for label in self.placed if label.street == street), None)
-            if first is None:
-                continue
-            forced = first.size == self.sizes[1]
-            for size in dict.fromkeys((first.size, max(self.sizes[1], round(_REPEATED * first.size)))):
-                while self._try(street, by_street[street], axes, size, 0, forced):
-                    pass
+            self._repeat(street)
         return self.placed
 
-    def _place_first(self, street: int, own: list[Axis], axes: list[Axis]) -> bool:
+    def _set_first(self, street: int) -> bool:
         large, small = self.sizes
+        tiny = round(_TINY * small)
+        sizes = list(dict.fromkeys(max(small, round(share * large)) for share in _SHARES))
         # Broad streets have large names; each size is tried on the road's free stretches, then over its arrows.
-        shares = (1.0, 0.85, 0.72, 0.6, 0.5, 0.42)
-        sizes = list(dict.fromkeys(max(small, round(share * large)) for share in shares))
-        tries = [(size, freedom, False) for part in (sizes[:4], sizes[4:]) for freedom in (0, 1) for size in part]
-        tries += [(sizes[len(sizes) // 2], 2, False), (small, 2, False)]
-        # Rather beyond the road's edges, or on a junction, than not at all.
-        tries += [(small, freedom, True) for freedom in range(LEVELS)]
-        return any(self._try(street, own, axes, *attempt) for attempt in tries)
+        manners = [
+            _Manner(size=size, level=level)
+            for part in (sizes[:2], sizes[2:4], sizes[4:])
+            for level in (Level.ALL, Level.ARROWS_HIDDEN)
+            for size in part
+        ]
+        manners += [
+            _Manner(size=size, level=level, rows=2, bent=0.3)
+            for size in sizes
+            for level in (Level.ALL, Level.ARROWS_HIDDEN)
+        ]
+        manners += [
+            _Manner(size=size, level=level, forced=True, bent=bent)
+            for size, bent in ((small, 0.9), (small, 1.8), (tiny, 1.8))
+            for level in (Level.ALL, Level.ARROWS_HIDDEN)
+        ]
+        manners += [
+            _Manner(size=small, level=Level.JUNCTIONS_TOUCHED, forced=True, bent=1.2),
+            _Manner(size=small, level=Level.JUNCTIONS_CROSSED, forced=True, across=True, bent=0.3),
+            _Manner(size=tiny, level=Level.JUNCTIONS_TOUCHED, forced=True, bent=1.8),
+        ]
+        return any(self._set(street, manner) for manner in manners)
 
-    def _try(
-        self, street: int, own: list[Axis], axes: list[Axis], size: int, freedom: int, force: bool = False
-    ) -> bool:
-        text = self.names[street]
-        width = font(size, bold=True).size(text)[0] * _LONGER
-        for axis in own:
-            path = self._window(axis, street, width, size, freedom, force)
+    def _set(self, street: int, manner: _Manner, spacing: float = 0.0) -> bool:
+        axes: Iterable[Axis] = self._own[street]
+        if manner.across:
+            # Names set before are not known to axes made just now.
+            axes = sorted(across_junctions(self._own[street], self.scale), key=lambda axis: -axis.length)
+            self._tell(axes)
+        return self._set_on(axes, manner, spacing)
+
+    def _set_beside(self, street: int, lines: Sequence[Border]) -> bool:
+        small = self.sizes[1]
+        for size, level in (
+            (small, Level.OFF_ROAD),
+            (round(_TINY * small), Level.OFF_ROAD),
+            (small, Level.FIXED_ALONE),
+        ):
+            more = font(size, bold=True).size(self.names[street])[0] * _LONGER / 2.0
+            axes = list(beside_axes(lines, street, self.scale, self.origin, _ASIDE * self.scale + _HALF * size, more))
+            self._tell(axes)
+            if self._set_on(axes, _Manner(size=size, level=level, forced=True), 0.0):
+                return True
+        return False
+
+    def _repeat(self, street: int) -> None:
+        first = next((label for label in self.placed if label.street == street), None)
+        if first is None or first.beside:
+            return
+        large, small = first.size, max(self.sizes[1], round(_REPEATED * first.size))
+        forced, rows = first.size <= self.sizes[1] and len(first.rows) == 1, len(first.rows)
+        for size in dict.fromkeys((large, small)):
+            while self._set(street, _Manner(size=size, level=Level.ALL, forced=forced, rows=rows), self.spacing):
+                pass
+        farthest = max(self.farthest, self.spacing)
+        for size in dict.fromkeys((large, small, self.sizes[1])):
+            while self._set(street, _Manner(size=size, level=Level.ARROWS_HIDDEN, forced=forced, rows=rows), farthest):
+                pass
+
+    def _tell(self, axes: Iterable[Axis]) -> None:
+        """Tells axes of the names set so far."""
+        for label in self.placed:
+            places = cKDTree(label.path)
+            for axis in axes:
+                axis.keep_off(places, label.half)
+
+    def _set_on(self, axes: Iterable[Axis], manner: _Manner, spacing: float) -> bool:
+        """Sets a name on the first of some axes on which there is room for it; tells whether there is one."""
+        for axis in axes:
+            text = self.names[axis.street]
+            rows = _broken(text, manner)
+            if len(rows) != manner.rows:
+                return False
+            width = max(font(manner.size, bold=True).size(row)[0] for row in rows) * _LONGER
+            path = self._window(axis, width, manner, spacing)
             if path is None:
                 continue
-            label = Label(text, street, size, _upright(path))
+            label = Label(text, axis.street, manner.size, _upright(path), axis.beside, rows)
             self.placed.append(label)
-            tree = cKDTree(label.path)
-            for other in axes:
-                other.keep_off(tree, _HALF * size)
+            places = cKDTree(label.path)
+            for other in self._axes:
+                other.keep_off(places, label.half)
             return True
         return False
 
-    def _window(self, axis: Axis, street: int, width: float, size: int, freedom: int, force: bool) -> Array | None:
+    def _window(self, axis: Axis, width: float, manner: _Manner, spacing: float) -> Array | None:
         """The best place on an axis: straight, and near the middle of the stretch that is free."""
         count = int(np.ceil(width / axis.step)) + 1
         if count > len(axis.line):
             return None
-        ok = np.minimum(axis.clear[freedom], axis.taken) >= _HALF * size
-        if not force:
-            ok &= axis.room * _ROOM >= size
+        size = manner.size
+        ok = np.minimum(self._obstacles.clearance(axis, manner.level), axis.taken) >= _half(size, manner.rows)
+        if not manner.forced:
+            room = _ROOM if manner.rows == 1 else _ROOM_OF_ROWS / (1.0 + ROW_HEIGHT)
+            ok &= axis.room * room >= size
         left, top, right, bottom = self.frame
         inside = (axis.line > np.array([left, top]) + size) & (axis.line < np.array([right, bottom]) - size)
         ok &= inside.all(axis=1)
@@ -146,16 +248,32 @@ class LabelPlacer:
         turned = sliding_window_view(axis.heading, count)[starts]
         bent = turned.max(axis=1) - turned.min(axis=1)
         middle = axis.line[starts + count // 2]
-        good = bent <= _MOST_BENT
-        same = np.array([label.path.mean(axis=0) for label in self.placed if label.street == street]).reshape(-1, 2)
-        if len(same):
-            good &= np.hypot(*(middle[:, None] - same).transpose(2, 0, 1)).min(axis=1) >= self.spacing
+        good = bent <= manner.bent
+        same = np.array([label.path.mean(axis=0) for label in self.placed if label.street == axis.street]).reshape(
+            -1, 2
+        )
+        if len(same) and spacing:
+            good &= np.hypot(*(middle[:, None] - same).transpose(2, 0, 1)).min(axis=1) >= spacing
         if not good.any():
             return None
         centred = np.abs(starts - _middle_of_run(starts)) * axis.step
         cost = np.where(good, centred / self.spacing + 1.2 * bent, np.inf)
         first = int(starts[int(np.argmin(cost))])
         return axis.along(first * axis.step + 0.5 * (width - width / _LONGER), width / _LONGER, _POINTS)
+
+
+def _half(size: int, rows: int) -> float:
+    return size * (_HALF + (rows - 1) * ROW_HEIGHT / 2.0)
+
+
+def _broken(text: str, manner: _Manner) -> tuple[str, ...]:
+    """A name in one row, or broken between two words so that the longer row is as short as may be."""
+    parts = text.split()
+    if manner.rows == 1 or len(parts) < 2:
+        return (text,)
+    choices = [(" ".join(parts[:k]), " ".join(parts[k:])) for k in range(1, len(parts))]
+    face = font(manner.size, bold=True)
+    return min(choices, key=lambda rows: max(face.size(row)[0] for row in rows))
 
 
 def _middle_of_run(starts: NDArray[np.int64]) -> Array:
@@ -175,4 +293,4 @@ def covering(labels: Iterable[Label]) -> Iterator[tuple[float, float, float]]:
     """Circles (x, y, radius) [px] that cover names."""
     for label in labels:
         for x, y in label.path.tolist():
-            yield x, y, _HALF * label.size
+            yield x, y, label.half

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from dorothie_gym.world.graphics.samples import Samples
+from dorothie_gym.world.graphics.shapes import right_of
 from dorothie_gym.world.town.model import Array, Town
 
 CLEARANCE = 3.0
@@ -18,16 +19,21 @@ CLEARANCE = 3.0
 _NEAR = 6.0  # [m] within which samples of two lanes that cross are found
 _REACH = 12.0  # [m] of road drawn as a bridge before and after a crossing, at least
 _FARTHEST = 60.0  # [m] of it at most, as long as it stays that high
+_COVER = 4.5  # [m] that goes on beyond the edges of a street over a tunnel: its pavements
+_SKEWEST = 0.3  # sine of the smallest angle at which roads are taken to cross
+_CUTTING = -1.0  # [m] a road deeper than this lies in a cutting
+_LONGEST_CUTTING = 200.0  # [m] on either side
 _TUNNEL_DEPTH = -2.0  # [m] a road deeper than this under a street on the ground is a tunnel
 _ON_GROUND = 3.0  # [m] a street below this is on the ground
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """A part of a lane that is not on the ground.
+    """A part of a lane that is not on the level of the ground.
 
     Attributes:
-        level: 1 and more for bridges, a bridge over a bridge being higher; -1 for tunnels.
+        level: 1 and more for bridges, a bridge over a bridge being higher; -1 for tunnels, which are what a street
+            on the ground covers; 0 for the open cuttings that lead there.
         lane: index of the lane.
         start, end: stations [m].
     """
@@ -44,9 +50,18 @@ def stretches(town: Town, samples: Samples) -> list[Stretch]:
     z = samples.centre[:, 2]
     deep = (z[lower] < _TUNNEL_DEPTH) & (z[upper] < _ON_GROUND)
     found = _raised(town, samples, lower[~deep], upper[~deep])
-    for lane, start, end in _merged(_grown(town, samples, lower[deep], z[upper[deep]] - CLEARANCE, -1.0)):
+    for lane, start, end in _merged(_covered(town, samples, lower[deep], upper[deep])):
         found.append(Stretch(-1, lane, start, end))
     return sorted(found, key=lambda row: (row.level, row.lane, row.start))
+
+
+def cuttings(town: Town, tunnels: Iterable[Stretch]) -> list[Stretch]:
+    """Stretches of lanes in open cuttings: where a road comes down to a tunnel and where it goes up again."""
+    pieces: list[tuple[int, float, float]] = []
+    for part in tunnels:
+        for station, direction in ((part.start, -1.0), (part.end, 1.0)):
+            pieces += _walk(town, part.lane, station, direction, _CUTTING, -1.0)
+    return [Stretch(0, *piece) for piece in _merged(pieces)]
 
 
 def _crossings(samples: Samples) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -68,38 +83,58 @@ def _raised(town: Town, samples: Samples, lower: NDArray[np.int64], upper: NDArr
     found = []
     for height in np.unique(level[level > 0]).tolist():
         own = level[upper] == height
-        for lane, start, end in _merged(_grown(town, samples, upper[own], z[lower[own]] + CLEARANCE, 1.0)):
+        for lane, start, end in _merged(_grown(town, samples, upper[own], z[lower[own]] + CLEARANCE)):
             found.append(Stretch(height, lane, start, end))
     return found
 
 
-def _grown(
-    town: Town, samples: Samples, at: NDArray[np.int64], limit: Array, sign: float
+def _covered(
+    town: Town, samples: Samples, lower: NDArray[np.int64], upper: NDArray[np.int64]
 ) -> Iterator[tuple[int, float, float]]:
-    """The samples of crossings as (lane, start, end), grown along the road while it stays above or below a limit."""
+    """What lies under streets as (lane, start, end): exact for straight roads, whatever the places of the samples."""
+    offset = samples.centre[lower, :2] - samples.centre[upper, :2]
+    aside = (offset * right_of(samples.heading[upper])).sum(axis=1)
+    slope = np.sin(samples.heading[lower] - samples.heading[upper])  # how fast one gets aside
+    slope = np.where(slope < 0.0, -1.0, 1.0) * np.maximum(np.abs(slope), _SKEWEST)
+    middle = samples.station[lower] - aside / slope
+    reach = samples.half_width[upper] / np.abs(slope) + _COVER
+    for lane, start, end in zip(samples.lane[lower].tolist(), middle - reach, middle + reach, strict=True):
+        length = town.lanes[lane].length
+        yield lane, max(0.0, float(start)), min(length, float(end))
+        if start < 0.0:
+            for before in town.predecessors(lane):
+                yield before, max(0.0, town.lanes[before].length + float(start)), town.lanes[before].length
+        if end > length:
+            for link in town.successors(lane):
+                yield link.target, 0.0, min(town.lanes[link.target].length, float(end) - length)
+
+
+def _grown(town: Town, samples: Samples, at: NDArray[np.int64], limit: Array) -> Iterator[tuple[int, float, float]]:
+    """The samples of crossings as (lane, start, end), grown along the road while it stays above a limit."""
     for lane in np.unique(samples.lane[at]).tolist():
         own = samples.lane[at] == lane
         stations = samples.station[at[own]]
-        bound = float(limit[own].max() if sign > 0 else limit[own].min())
+        bound = float(limit[own].max())
         for run in np.split(np.sort(stations), np.flatnonzero(np.diff(np.sort(stations)) > 2.5 * _REACH) + 1):
-            yield from _walk(town, lane, float(run[0]), -1.0, bound, sign)
-            yield from _walk(town, lane, float(run[-1]), 1.0, bound, sign)
+            yield from _walk(town, lane, float(run[0]), -1.0, bound, 1.0)
+            yield from _walk(town, lane, float(run[-1]), 1.0, bound, 1.0)
             yield lane, float(run[0]), float(run[-1])
 
 
 def _walk(
     town: Town, lane_id: int, station: float, direction: float, bound: float, sign: float
 ) -> Iterator[tuple[int, float, float]]:
-    """Goes along the road from a place, over the ends of lanes too, until it comes down again."""
+    """Goes along the road from a place, over the ends of lanes too, until it comes down to a bound; up if sign < 0."""
+    farthest = _FARTHEST if sign > 0 else _LONGEST_CUTTING
     todo, seen = [(lane_id, station, 0.0)], {lane_id}
     while todo:
         number, begin, gone = todo.pop()
         lane = town.lanes[number]
         room = lane.length - begin if direction > 0 else begin
-        steps = np.arange(0.0, min(room, _FARTHEST - gone), 1.0)
+        steps = np.arange(0.0, min(room, farthest - gone), 1.0)
         heights = np.interp(begin + direction * steps, lane.stations, lane.points[:, 2])
-        stop = (sign * (heights - bound) < 0.0) & (gone + steps > _REACH)
-        far = float(steps[int(np.argmax(stop))]) if stop.any() else min(room, _FARTHEST - gone)
+        stop = (sign * (heights - bound) < 0.0) & (gone + steps > (_REACH if sign > 0 else 0.0))
+        far = float(steps[int(np.argmax(stop))]) if stop.any() else min(room, farthest - gone)
         end = begin + direction * far
         yield number, min(begin, end), max(begin, end)
         if stop.any() or far < room:

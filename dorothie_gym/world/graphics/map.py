@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from dorothie_gym.world.graphics.icons import lamp_colour, pin_icon, sign_icon, 
 from dorothie_gym.world.graphics.labels import Label, LabelPlacer, covering
 from dorothie_gym.world.graphics.markings import stop_bar
 from dorothie_gym.world.graphics.plan import Plan
+from dorothie_gym.world.graphics.pockets import FACING, pocket_places
 from dorothie_gym.world.graphics.shapes import Shape, longer, strokes
 from dorothie_gym.world.graphics.text import set_along, words
 from dorothie_gym.world.town.model import Array, Lane, SignalKind, Town
@@ -28,11 +30,12 @@ _TILE = 1024  # [px]: what is painted at a time, so that large maps need little 
 _BAR_LENGTHS = (10, 20, 50, 100, 200, 500, 1000, 2000)
 _SIGN = (4.2, 54)  # height of signs [m], but not larger than this [px]
 _PIN = (2.9, 34)  # radius of pins, likewise
-_NAME_GROUND = (1.16, 0.25)  # times the size of type: height, and what it is longer, of the bare road under a name
+_NAME_GROUND = (0.25, 1.04)  # times the size of type: what the bare road under a name is longer, and its height
+_HALO = 0.09  # times the size of type
 
 
 class MapPainter:
-    """Paints a town once; `surface()` hands out copies to draw on.
+    """Works out the map of a town, and paints it once when it is first asked for; `surface()` hands out copies.
 
     Attributes:
         town: what is painted.
@@ -54,6 +57,7 @@ class MapPainter:
         margin: int | tuple[int, int, int, int] = 24,
         type_sizes: tuple[int, int] = (20, 11),
         label_spacing: float = 380.0,
+        label_distance: float = 375.0,
         border: float | None = None,
         numbered: bool = False,
         smallest_sign: int = 12,
@@ -66,7 +70,8 @@ class MapPainter:
             street_names: names by street index; the town's own where absent.
             margin: pixels free of roads, all around or (left, top, right, bottom).
             type_sizes: largest and smallest type of street names [px].
-            label_spacing: distance between two settings of one name [px].
+            label_spacing: smallest distance between two settings of one name [px].
+            label_distance: distance beyond which a name is set again even where arrows are in the way [m].
             border: how far trees stand beyond the roads [m]; to the edge of the picture where absent.
             numbered: whether the sites of landmarks have pins with their numbers.
             smallest_sign: height of lights and signs, however small the scale [px].
@@ -99,10 +104,10 @@ class MapPainter:
             frame=(0, 0, *size),
             sizes=type_sizes,
             spacing=label_spacing,
+            farthest=label_distance * self.scale,
         )
         self.labels: tuple[Label, ...] = tuple(placer.place(self.plan, self._fixed()))
         self.missing: tuple[str, ...] = tuple(placer.missing)
-        self._surface = self._paint()
 
     @classmethod
     def at_scale(cls, town: Town, scale: float, **options: Any) -> MapPainter:
@@ -180,20 +185,38 @@ class MapPainter:
         return np.array(rows, dtype=float).reshape(-1, 3)
 
     def _uncovered(self) -> Iterator[Shape]:
-        """The shapes of the plan without the turn arrows that a name would cover in part."""
-        arrows, lanes = self.plan.arrows, self.town.lanes
-        names = np.array([*covering(self.labels)]).reshape(-1, 3)
-        if not arrows or not len(names):
-            yield from self.plan.shapes
-            return
+        """The shapes of the plan without the arrows, hatchings and dashes that a name would cover in part."""
+        lanes, plan = self.town.lanes, self.plan
         along = np.array([0.0, 0.5, 1.0]) * ARROW_LENGTH
-        places = np.array([[lanes[a.lane].position(a.station + s) for s in along] for a in arrows])  # (n, 3, 2)
-        gap = np.hypot(*(self.to_pixel(places)[:, :, None] - names[:, :2]).transpose(3, 0, 1, 2)) - names[:, 2]
-        covered = (gap < 0.0).any(axis=(1, 2))
-        tree = cKDTree(places[:, 1])
-        for shape in self.plan.shapes:
-            if shape.colour != palette.ARROW or not covered[tree.query(shape.points.mean(axis=0))[1]]:
+        arrows = [[lanes[a.lane].position(a.station + s) for s in along] for a in plan.arrows]
+        places = {
+            palette.ARROW: np.array(arrows).reshape(-1, 3, 2),
+            palette.HATCHING: pocket_places(self.town, plan.pockets),
+        }
+        covered = {colour: self._covered(at) for colour, at in places.items()}
+        # Two turn lanes back to back have one island.
+        islands = places[palette.HATCHING][:, 1]
+        away = np.hypot(*(islands[:, None] - islands).transpose(2, 0, 1))
+        covered[palette.HATCHING] = ((away < FACING) & covered[palette.HATCHING]).any(axis=1)
+        trees = {colour: cKDTree(at.mean(axis=1)) for colour, at in places.items() if len(at)}
+        dashes = [shape for shape in plan.shapes if shape.colour == palette.LANE_LINE]
+        ends = [[shape.points.min(axis=0), shape.points.max(axis=0)] for shape in dashes]
+        hidden = self._covered(np.array(ends).reshape(-1, 2, 2))
+        gone = {id(shape) for shape, under in zip(dashes, hidden.tolist(), strict=True) if under}
+        for shape in plan.shapes:
+            if shape.colour in trees and covered[shape.colour][trees[shape.colour].query(shape.points.mean(axis=0))[1]]:
+                continue
+            if id(shape) not in gone:
                 yield shape
+
+    def _covered(self, places: Array) -> NDArray[np.bool_]:
+        """Which of some things a name would touch (n,), from places on each of them (n, k, 2) [m]."""
+        pixels = self.to_pixel(places).reshape(-1, 2)
+        found = np.zeros(len(places), dtype=bool)
+        for label in self.labels:
+            near = np.asarray(cKDTree(label.path).query(pixels)[0])
+            found |= (near.reshape(places.shape[:2]) < label.half).any(axis=1)
+        return found
 
     def _one_way_arrows(self) -> Iterator[Shape]:
         """Arrows along one-way streets, where neither a name nor a turn arrow is in the way."""
@@ -221,7 +244,8 @@ class MapPainter:
             x, y = self.to_pixel(self.town.lanes[arrow.lane].position(arrow.station + 3.0)).tolist()
             yield x, y, 3.5 * self.scale
 
-    def _paint(self) -> Any:
+    @cached_property
+    def _surface(self) -> Any:
         import pygame
 
         shapes = [*self._uncovered(), *self._one_way_arrows()]
@@ -254,14 +278,30 @@ class MapPainter:
             pygame.draw.polygon(tile, shapes[k].colour, points.tolist())
         for label in self.labels:
             path = label.path - corner
-            if (path < -2.0 * label.size).all(axis=0).any() or (path > np.array(size) + 2.0 * label.size).all(
-                axis=0
-            ).any():
+            beyond = (path < -3.0 * label.size) | (path > np.array(size) + 3.0 * label.size)
+            if beyond.all(axis=0).any():
                 continue
-            for piece in strokes(longer(path, _NAME_GROUND[1] * label.size), _NAME_GROUND[0] * label.size, 12):
-                pygame.draw.polygon(tile, palette.ROAD, (piece * factor).tolist())
-            set_along(tile, label.text, path * factor, label.size * factor, palette.STREET_NAME)
+            _draw_name(tile, label, corner)
         return pygame.transform.smoothscale(tile, size)
+
+
+def _draw_name(tile: Any, label: Label, corner: Array) -> None:
+    """Draws a name on a tile with its corner at a pixel: light on bare road, or dark with a halo beside it."""
+    import pygame
+
+    size = label.size * SUPERSAMPLING
+    for text, row in zip(label.rows, label.row_paths(), strict=True):
+        line = (row - corner) * SUPERSAMPLING
+        if label.beside:
+            for turn in np.arange(0.0, 2.0 * np.pi, np.pi / 6.0):
+                aside = _HALO * size * np.array([np.cos(turn), np.sin(turn)])
+                set_along(tile, text, line + aside, size, palette.SHEET)
+            set_along(tile, text, line, size, palette.INK)
+            continue
+        length, height = (share * size for share in _NAME_GROUND)
+        for piece in strokes(longer(line, length), height, 12):
+            pygame.draw.polygon(tile, palette.ROAD, piece.tolist())
+        set_along(tile, text, line, size, palette.STREET_NAME)
 
 
 def _sized(rule: tuple[float, int], scale: float, smallest: float) -> int:

@@ -94,21 +94,21 @@ def ruled_lanes(town: Town) -> dict[int, SignalKind]:
 def stop_stations(town: Town) -> dict[int, float]:
     """By lane that leads to a junction, where its stop line is or would be [m]: before a crossing if there is one."""
     outlines = [crossing.outline for crossing in town.crosswalks]
+    low = np.array([outline.min(axis=0) for outline in outlines]).reshape(-1, 2) - _LOOK_BACK
+    high = np.array([outline.max(axis=0) for outline in outlines]).reshape(-1, 2) + _LOOK_BACK
     found = {}
     for lane in town.lanes:
         if lane.in_junction or not any(e.junction_id >= 0 for e in town.exits(lane.id)):
             continue
         station = lane.length - min(_BACK, lane.length / 4.0)
-        found[lane.id] = min([station, *(_before(lane, outline) for outline in outlines)])
+        end = lane.points[-1, :2]
+        near = np.flatnonzero(((end >= low) & (end <= high)).all(axis=1)).tolist()
+        found[lane.id] = min([station, *(_before(lane, outlines[k]) for k in near)])
     return found
 
 
 def _before(lane: Lane, outline: Array) -> float:
     """Where to stop before a crossing that lies over the lane's last metres [m]; infinite where none does."""
-    low, high = outline.min(axis=0) - _LOOK_BACK, outline.max(axis=0) + _LOOK_BACK
-    end = lane.points[-1, :2]
-    if (end < low).any() or (end > high).any():
-        return math.inf
     for s in np.arange(max(0.0, lane.length - _LOOK_BACK), lane.length, 0.5).tolist():
         if _inside(lane.position(s), outline):
             return max(1.0, float(s) - _BEFORE_CROSSING)

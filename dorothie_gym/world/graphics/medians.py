@@ -13,9 +13,10 @@ from dorothie_gym.world.graphics.levels import Places
 from dorothie_gym.world.graphics.shapes import Shape, disc, longer
 from dorothie_gym.world.town.model import Array
 
+SHORTEST_MEDIAN = 8.0
+"""What is no longer than this between the two directions is not planted [m]."""
+
 _KERB = 0.3  # [m]
-_SHORTEST = 8.0  # [m]
-_FURTHER = 3.0  # [m] of asphalt beyond a median's ends
 _TREE_SPACING = 11.0  # [m]
 _TREE_ROOM = 2.2  # [m] of median that a tree needs
 
@@ -27,7 +28,7 @@ def medians(lines: Iterable[Border], bridges: Places) -> Iterator[Shape]:
         if line.kind is not BorderKind.MEDIAN:
             continue
         for run in held(line, bridges, wanted=False):
-            if np.ptp(line.points[run, :2], axis=0).max() > _SHORTEST:
+            if np.ptp(line.points[run, :2], axis=0).max() > SHORTEST_MEDIAN:
                 strips.append((line, run))
     for line, run in strips:
         # Asphalt around the round ends.
@@ -35,9 +36,13 @@ def medians(lines: Iterable[Border], bridges: Places) -> Iterator[Shape]:
     for inset, colour in ((0.0, palette.MEDIAN_KERB), (_KERB, palette.MEDIAN)):
         for line, run in strips:
             yield from (Shape(quad, colour) for quad in _half_strip(line, run, inset))
+    planted: list[Array] = []
     for line, run in strips:
-        if line.lanes[0] % 2 == 0:
-            yield from _median_trees(line, run)
+        # Each strip is found from both sides.
+        for centre, radius in _median_trees(line, run):
+            if not planted or np.hypot(*(np.array(planted) - centre).T).min() > 0.6 * _TREE_SPACING:
+                planted.append(centre)
+                yield Shape(disc(centre, radius, 16), palette.MEDIAN_TREE)
 
 
 def held(line: Border, places: Places, wanted: bool = True) -> Iterator[NDArray[np.int64]]:
@@ -48,9 +53,11 @@ def held(line: Border, places: Places, wanted: bool = True) -> Iterator[NDArray[
             yield run
 
 
-def flat_strip(line: Border, run: NDArray[np.int64]) -> Iterator[Array]:
-    """Polygons (n, 2) [m] from the edge to a little beyond the middle of a median, longer than it by some metres."""
-    edge, inner = longer(line.points[run, :2], _FURTHER), longer(line.shifted(-line.gap / 2.0 - 0.1)[run], _FURTHER)
+def flat_strip(line: Border, run: NDArray[np.int64], further: float = 3.0) -> Iterator[Array]:
+    """Polygons (n, 2) [m] from the edge to a little beyond the middle of a median, and `further` [m] at its ends."""
+    edge, inner = line.points[run, :2], line.shifted(-line.gap / 2.0 - 0.1)[run]
+    if further:
+        edge, inner = longer(edge, further), longer(inner, further)
     for k in range(0, len(edge) - 1, 8):
         yield np.concatenate((edge[k : k + 9], inner[k : k + 9][::-1]))
 
@@ -82,11 +89,12 @@ def _nose(end: int, length: float) -> Array:
     return length - near if end else near
 
 
-def _median_trees(line: Border, run: NDArray[np.int64]) -> Iterator[Shape]:
+def _median_trees(line: Border, run: NDArray[np.int64]) -> Iterator[tuple[Array, float]]:
+    """Where trees may stand and how large they are [m]."""
     middle = line.shifted(-line.gap / 2.0)[run]
     s = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(middle, axis=0).T))))
     for at in np.arange(_TREE_SPACING / 2.0, s[-1] - _TREE_SPACING / 2.0, _TREE_SPACING):
         room = float(np.interp(at, s, line.gap[run])) - 2.0 * _KERB
         if room >= _TREE_ROOM:
             centre = np.array([np.interp(at, s, middle[:, 0]), np.interp(at, s, middle[:, 1])])
-            yield Shape(disc(centre, min(1.5, 0.4 * room), 16), palette.MEDIAN_TREE)
+            yield centre, min(1.5, 0.4 * room)

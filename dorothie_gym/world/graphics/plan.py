@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 
 from dorothie_gym.world.graphics import markings
 from dorothie_gym.world.graphics.arrows import lane_arrows
-from dorothie_gym.world.graphics.borders import find_borders
+from dorothie_gym.world.graphics.borders import Border, find_borders
 from dorothie_gym.world.graphics.furniture import posts
 from dorothie_gym.world.graphics.ground import landscape
 from dorothie_gym.world.graphics.levels import Places, stretches
+from dorothie_gym.world.graphics.medians import held
+from dorothie_gym.world.graphics.pockets import find_pockets, pocket_paint
 from dorothie_gym.world.graphics.samples import Samples
 from dorothie_gym.world.graphics.shapes import Shape
 from dorothie_gym.world.graphics.surfaces import deck, streets
@@ -26,11 +29,11 @@ class Plan:
     Attributes:
         town: what is painted.
         detail: what is worth drawing.
-        shapes: polygons, in the order of painting.
         borders: what lies beside the lanes; names are set along it.
         stretches: parts of lanes that are bridges or tunnels.
         raised: the places on these.
         arrows: the turn arrows before junctions.
+        pockets: the beginnings of turn lanes.
         ruled: by lane, what a driver must heed at its end.
         stops: by lane, where its stop line lies or would lie [m].
         posts: the lights and signs.
@@ -46,7 +49,8 @@ class Plan:
         """
         self.town = town
         self.detail = markings.Detail.at(scale)
-        samples = Samples.of(town)
+        self._border = border
+        self._samples = samples = Samples.of(town)
         self.borders = borders = find_borders(town, samples)
         self.stretches = stretches(town, samples)
         self.raised = Places(samples, self.stretches)
@@ -54,21 +58,34 @@ class Plan:
         self.ruled = markings.ruled_lanes(town)
         shared = {*borders.right_neighbour, *borders.right_neighbour.values()}
         self.arrows = tuple(lane_arrows(town, shared, self.stops))
+        self.pockets = find_pockets(town, borders)
         self.posts = posts(town, borders, self.stops)
-        paint = list(self._paint())
-        self.shapes = [*landscape(town, border), *streets(town, samples, borders.lines, self.stretches)]
-        self.shapes += self._layers(samples, paint)
+
+    @cached_property
+    def shapes(self) -> list[Shape]:
+        """Polygons, in the order of painting."""
+        ground = streets(self.town, self._samples, self.borders.lines, self.stretches, self.pockets)
+        return [*landscape(self.town, self._border), *ground, *self._layers(list(self._paint()))]
 
     def _paint(self) -> Iterator[Shape]:
         pen = self.detail.pen
-        yield from markings.lines(self.borders.lines, self.detail)
+        yield from markings.lines(self._open_lines(), self.detail)
+        yield from pocket_paint(self.town, self.pockets, pen, self.detail.fine)
         yield from markings.approaches(self.town, self.ruled, self.stops, pen)
         yield from markings.crossings(self.town)
         if self.detail.arrows:
             yield from markings.painted_arrows(self.town, self.arrows, pen)
 
-    def _layers(self, samples: Samples, paint: list[Shape]) -> Iterator[Shape]:
+    def _open_lines(self) -> Iterator[Border]:
+        """The lines beside lanes where no street covers them."""
+        tunnels = [part for part in self.stretches if part.level < 0]
+        covered = Places(self._samples, tunnels)
+        for line in self.borders.lines:
+            yield from (line.part(run) for run in held(line, covered, wanted=False))
+
+    def _layers(self, paint: list[Shape]) -> Iterator[Shape]:
         """Paint on the ground, then bridge after bridge with the paint that lies on it."""
+        samples = self._samples
         if not paint:
             places = np.zeros((0, 3))
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -79,15 +80,29 @@ def disc(centre: Sequence[float] | Array, radius: float, corners: int = 20) -> A
 def stroke(line: Array, width: float) -> Array:
     """Outline of a line (n, 2) [m] drawn with a pen of a width [m] and butt ends."""
     steps = np.diff(line, axis=0)
+    if len(steps) == 1:  # most strokes are straight
+        (along, aside), length = steps[0], math.hypot(*steps[0])
+        side = np.array([-aside, along]) * (width / 2.0 / length if length > 0.0 else 0.0)
+        return np.stack((line[0] + side, line[1] + side, line[1] - side, line[0] - side))
     angle = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
     headings = np.concatenate((angle[:1], (angle[:-1] + angle[1:]) / 2.0, angle[-1:]))
     side = right_of(headings) * width / 2.0
     return np.concatenate((line + side, (line - side)[::-1]))
 
 
+def polyline_stations(line: Array) -> Array:
+    """Distances (n,) [m] from the start of a line (n, k) to its points, in the plane."""
+    return np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))))
+
+
+def polyline_length(line: Array) -> float:
+    """Length [m] of a line (n, k) in the plane."""
+    return float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum())
+
+
 def cut(line: Array, pieces: Sequence[tuple[float, float]], step: float = 2.0) -> list[Array]:
     """Parts (n, k) of a line (m, k) in space or in the plane, given by where they start and end along it [m]."""
-    stations = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))))
+    stations = polyline_stations(line)
     parts = []
     for start, end in pieces:
         s = np.linspace(start, end, max(2, int(np.ceil((end - start) / step)) + 1))

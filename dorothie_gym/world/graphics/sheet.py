@@ -22,6 +22,7 @@ _SMALLEST = 1400  # [px] on the long side
 _NAME_HEIGHT = 7.0  # [m] of type on the broadest roads
 _NAME_SPACING = 120.0  # [m]
 _SMALLEST_TYPE = 0.0068  # of the long side: still read where the whole sheet is seen
+_LARGE_TYPE = 0.0105  # of the long side: seen at first sight, on roads that are broad enough for it
 _BAR_LENGTHS = (10, 20, 50, 100, 200, 500, 1000, 2000)
 
 
@@ -37,6 +38,39 @@ def sheet_size(town: Town) -> tuple[int, int]:
     whole = np.array([width + 4.0 * unit, height + 2.0 * unit + _strip(unit)])
     whole *= min(1.0, _LARGEST / whole.max())
     return round(float(whole[0])), round(float(whole[1]))
+
+
+def sheet_painter(
+    town: Town, size: tuple[int, int] | None = None, street_names: Sequence[str] | None = None
+) -> MapPainter:
+    """What paints the map of a sheet: it knows where the names stand, and has painted nothing yet.
+
+    Args:
+        town: what to paint.
+        size: width and height of the sheet [px]; as large as the town needs to be read where absent (`sheet_size`).
+        street_names: names by street index; the town's own where absent.
+
+    Raises:
+        ValueError: the size is too small for a title and a map.
+    """
+    size = sheet_size(town) if size is None else size
+    _, edge, strip = _measures(size[0])
+    if size[1] < 3 * strip:
+        raise ValueError(f"size: {size} is too small for a title and a map")
+    x0, y0, x1, y1 = town_bounds(town, GROUND)
+    inner = np.array([size[0] - 2 * edge, size[1] - edge - strip], dtype=float)
+    scale = float((inner / np.array([x1 - x0, y1 - y0])).min())
+    small = max(10, round(_SMALLEST_TYPE * max(size)))
+    return MapPainter(
+        town,
+        size=size,
+        street_names=street_names,
+        margin=(edge, edge, edge, strip),
+        type_sizes=(max(small, round(_NAME_HEIGHT * scale), round(_LARGE_TYPE * max(size))), small),
+        label_spacing=max(0.15 * max(size), _NAME_SPACING * scale),
+        numbered=True,
+        smallest_sign=max(12, small),
+    )
 
 
 def town_picture(
@@ -70,30 +104,17 @@ def town_picture(
     target = Path(path)
     if not target.parent.is_dir():
         raise FileNotFoundError(f"{target}: the folder {target.parent} does not exist; make it first")
-    size = sheet_size(town) if size is None else size
-    unit = _unit(size[0])
-    edge, strip = round(2.0 * unit), round(_strip(unit))
-    if size[1] < 3 * strip:
-        raise ValueError(f"size: {size} is too small for a title and a map")
-    x0, y0, x1, y1 = town_bounds(town, GROUND)
-    inner = np.array([size[0] - 2 * edge, size[1] - edge - strip], dtype=float)
-    scale = float((inner / np.array([x1 - x0, y1 - y0])).min())
-    small = max(10, round(_SMALLEST_TYPE * max(size)))
-    large = max(small, round(_NAME_HEIGHT * scale))
-    painter = MapPainter(
-        town,
-        size=size,
-        street_names=street_names,
-        margin=(edge, edge, edge, strip),
-        type_sizes=(large, small),
-        label_spacing=max(0.15 * max(size), _NAME_SPACING * scale),
-        numbered=True,
-        smallest_sign=max(12, small),
-    )
+    painter = sheet_painter(town, size, street_names)
     surface = painter.surface(time)
-    _draw_sheet(surface, painter, unit, edge, strip, fold)
+    _draw_sheet(surface, painter, fold)
     pygame.image.save(surface, str(target), ".png")
     return painter
+
+
+def _measures(width: int) -> tuple[float, int, int]:
+    """The unit, the edge around the map and the strip below it [px] of a sheet of a width [px]."""
+    unit = _unit(width)
+    return unit, round(2.0 * unit), round(_strip(unit))
 
 
 def _unit(width: float) -> float:
@@ -106,10 +127,11 @@ def _strip(unit: float) -> float:
     return 11.0 * unit
 
 
-def _draw_sheet(surface: Any, painter: MapPainter, unit: float, edge: int, strip: int, fold: str | None) -> None:
+def _draw_sheet(surface: Any, painter: MapPainter, fold: str | None) -> None:
     import pygame
 
     width, height = painter.size
+    unit, edge, strip = _measures(width)
     inner = pygame.Rect(edge, edge, width - 2 * edge, height - edge - strip)
     for box in ((0, 0, width, edge), (0, 0, edge, height), (width - edge, 0, edge, height)):
         surface.fill(palette.SHEET, box)

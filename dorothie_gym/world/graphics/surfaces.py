@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -11,12 +12,14 @@ from scipy.spatial import cKDTree
 from dorothie_gym.world.graphics import palette
 from dorothie_gym.world.graphics.borders import Border, BorderKind
 from dorothie_gym.world.graphics.ground import junction_areas
-from dorothie_gym.world.graphics.levels import Places, Stretch
+from dorothie_gym.world.graphics.levels import Places, Stretch, cuttings
 from dorothie_gym.world.graphics.medians import flat_strip, held, medians
 from dorothie_gym.world.graphics.palette import Colour
 from dorothie_gym.world.graphics.pavements import rim, sidewalks, verges
+from dorothie_gym.world.graphics.pockets import Pocket, pocket_grounds
 from dorothie_gym.world.graphics.samples import Samples
-from dorothie_gym.world.graphics.shapes import Shape, cut, dash_pattern, disc, ribbon, side_line, strokes
+from dorothie_gym.world.graphics.shapes import Shape, disc, ribbon, side_line, strokes
+from dorothie_gym.world.graphics.tunnels import portals, tunnel_floors, walls
 from dorothie_gym.world.town.model import Array, Lane, Site, Town
 
 _KERB = 0.45  # [m]
@@ -25,17 +28,30 @@ _JOINT = 0.05  # [m]
 _BAY_DEPTH = 2.3  # [m]
 _BAY_LENGTH = 6.0  # [m] without its tapered ends
 _BAY_TAPER = 2.2  # [m]
+_BEFORE_PORTAL = 4.0  # [m] of asphalt between a median and the mouth of a tunnel
 _FURTHER = 6.0  # [m] of asphalt beyond a bridge: lanes side by side do not start theirs at the same place
 
 
-def streets(town: Town, samples: Samples, lines: Sequence[Border], parts: Sequence[Stretch]) -> Iterator[Shape]:
-    """Everything on the ground, from the pavements to the medians; what lies in tunnels comes first."""
+def streets(
+    town: Town, samples: Samples, lines: Sequence[Border], parts: Sequence[Stretch], turn_lanes: Sequence[Pocket]
+) -> Iterator[Shape]:
+    """Everything on the ground, from the pavements to the medians; what lies in tunnels comes first.
+
+    Args:
+        town: whose streets.
+        samples: of its lanes.
+        lines: what lies beside them.
+        parts: bridges and tunnels.
+        turn_lanes: the beginnings of turn lanes.
+    """
     tunnels = [part for part in parts if part.level < 0]
-    yield from _tunnels(town, tunnels)
+    covered = Places(samples, tunnels)
+    yield from walls(lines, Places(samples, cuttings(town, tunnels)), covered)
+    yield from tunnel_floors(town, tunnels, lines, covered)
     pieces = list(_open_pieces(town, tunnels))
     areas = junction_areas(town)
     if town.sidewalks:
-        yield from sidewalks(town, areas)
+        yield from sidewalks(town, areas, lines)
         yield from verges(town, lines)
     else:
         yield from _layer(town, pieces, areas, _VERGE, palette.SIDEWALK)
@@ -47,9 +63,19 @@ def streets(town: Town, samples: Samples, lines: Sequence[Border], parts: Sequen
     for line in lines:
         if line.kind in (BorderKind.LANE, BorderKind.CENTRE):
             # Lanes side by side may lie a little apart.
-            yield from (Shape(piece, palette.ROAD) for piece in strokes(line.shifted(-line.gap / 2.0), 1.0))
+            middle = line.shifted(-line.gap / 2.0)
+            for run in held(line, covered, wanted=False):
+                yield from (Shape(piece, palette.ROAD) for piece in strokes(middle[run], 1.0))
+    yield from pocket_grounds(town, turn_lanes)
     # Grass goes on below the ends of bridges: those of lanes side by side are not at the same place.
-    yield from medians(lines, Places(samples, [part for part in parts if part.level > 0], -_FURTHER))
+    shorter = [_longer(part, -_FURTHER) for part in parts if part.level > 0]
+    yield from medians(lines, Places(samples, [*shorter, *(_longer(part, _BEFORE_PORTAL) for part in tunnels)]))
+    yield from portals(town, tunnels)
+
+
+def _longer(part: Stretch, more: float) -> Stretch:
+    """A stretch that begins and ends so much further out [m]."""
+    return replace(part, start=part.start - more, end=part.end + more)
 
 
 def deck(town: Town, parts: Sequence[Stretch], lines: Iterable[Border], places: Places) -> Iterator[Shape]:
@@ -102,27 +128,12 @@ def _layer(
     for lane, start, end in pieces:
         wider = _JOINT if lane.in_junction and not margin else 0.0
         yield Shape(ribbon(lane, margin + wider, start, end), colour)
-        for s in (start, end):  # rounded joints
+        for s in {start, end} & {0.0, lane.length}:  # rounded joints, but none at the mouths of tunnels
             yield Shape(disc(lane.position(s), lane.width_at(s) / 2.0 + margin), colour)
     for outline in areas:
         yield Shape(outline, colour)
         if margin:
             yield from rim(np.concatenate((outline, outline[:1])), margin, colour)
-
-
-def _tunnels(town: Town, parts: Sequence[Stretch]) -> Iterator[Shape]:
-    """Light asphalt with a broken edge: what is seen of a road that runs under the ground."""
-    for part in parts:
-        lane = town.lanes[part.lane]
-        for side in (-1.0, 1.0):
-            s = np.linspace(part.start, part.end, max(2, int((part.end - part.start) / 2.0)))
-            half = np.interp(s, lane.stations, lane.widths) / 2.0
-            edge = side_line(lane, s, side * half)
-            total = float(np.hypot(*np.diff(edge, axis=0).T).sum())
-            for piece in cut(edge, dash_pattern(total, 2.2, 1.8)):
-                yield from (Shape(outline, palette.TUNNEL_EDGE) for outline in strokes(piece, 1.0))
-    for part in parts:
-        yield Shape(ribbon(town.lanes[part.lane], 0.02, part.start, part.end), palette.TUNNEL)
 
 
 def _bays(town: Town, samples: Samples) -> Iterator[Shape]:
