@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ from dorothie_gym.world.town.model import (
 )
 
 from .opendrive_text import shared_map
+from .yaml_plans import TIGHT_RAMPS, compiled, star
 
 LEFT, RIGHT, STRAIGHT, U_TURN = LinkType.LEFT, LinkType.RIGHT, LinkType.STRAIGHT, LinkType.U_TURN
 
@@ -321,6 +323,29 @@ class TestKerbs:
         # The arm that goes off is on the side of the middle, so the other side of this lane is a kerb.
         (fault,) = only(check_town(with_lane(town, pushed(straight, bulge(3.0)))), FaultKind.KERB)
         assert fault.lanes == (straight.id,) and "ground" in fault.message
+
+    @pytest.mark.parametrize(
+        "text",
+        [
+            star({0: "lanes: 3, median: 8", 45: "", 90: "", 180: ""}),
+            star({0: "lanes: 3", 90: "lanes: 2, median: 4", 180: "", 270: "", 315: "lanes: 2, median: 4"}),
+            star({45: "", 90: "lanes: 3", 135: "", 225: "", 315: "lanes: 2"}),
+            TIGHT_RAMPS,
+        ],
+        ids=["mouth far behind its neighbours", "mouth far before its neighbour", "both", "ramps"],
+    )
+    def test_mouths_of_one_junction_may_lie_at_very_different_distances(self, tmp_path: Path, text: str) -> None:
+        assert check_town(compiled(tmp_path, text)) == ()
+
+    def test_a_turn_that_cuts_the_corner_of_a_junction_with_five_arms(self, tmp_path: Path) -> None:
+        town = compiled(tmp_path, star({0: "lanes: 2, median: 4", 72: "", 144: "lanes: 2", 216: "", 288: "lanes: 2"}))
+        junction = max(town.junctions, key=lambda junction: len(junction.connectors))
+        ways = [town.lanes[k] for k in junction.connectors]
+        turns = [way for way in ways if math.radians(100.0) < way.headings[-1] - way.headings[0] < math.radians(115.0)]
+        assert len(turns) == 5
+        for turn in turns:
+            (fault,) = only(check_town(with_lane(town, pushed(turn, bulge(2.0)))), FaultKind.KERB)
+            assert fault.lanes == (turn.id,) and "corner" in fault.message
 
     @pytest.mark.parametrize(("offset", "faulty"), [(1.75 + 1.0, False), (1.5, True)])
     def test_a_lane_that_runs_over_a_pavement(self, offset: float, faulty: bool) -> None:

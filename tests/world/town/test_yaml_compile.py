@@ -6,6 +6,7 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from dorothie_gym.world.town.check import check_town
 from dorothie_gym.world.town.lights import LightColour
 from dorothie_gym.world.town.model import LinkType, SignalKind, Town, TownError, wrap_degrees
 from tests.world.town.yaml_plans import AVENUES, CIRCUS, INTERCHANGE, PAIR, compiled, street_of, ways
@@ -243,6 +244,33 @@ def test_pavements_run_beside_the_outermost_lanes_of_their_stretch(towns: dict[s
     assert first.points[:, 1] == pytest.approx(12.5 + 1.0) and second.points[:, 1] == pytest.approx(-12.5 - 1.0)
     assert first.points[:, 0].max() <= -13.0  # not into the junction
     assert not [s for s in towns["interchange"].sidewalks if s.street == 0]
+
+
+def test_a_pavement_runs_around_a_roundabout_between_its_streets(tmp_path: Path) -> None:
+    wide = CIRCUS.replace("Lane: {through: [n, circus, s]}", "Lane: {through: [n, circus, s], sidewalk: 3}")
+    town = compiled(tmp_path, wide)
+    street = next(street.id for street in town.streets if street.name == "circus")
+    around = [walk for walk in town.sidewalks if walk.street == street]
+    assert len(around) == 4 and {walk.width for walk in around} == {3.0}
+    outer_edge = 30.0 + 3.5
+    for walk in around:
+        assert np.hypot(*walk.points[:, :2].T) == pytest.approx(outer_edge + 1.5)
+        assert np.abs(walk.points[:, :2]).min() > 5.0  # the streets lie on the axes
+    quarters = {(x > 0.0, y > 0.0) for x, y in (walk.points[len(walk.points) // 2, :2] for walk in around)}
+    assert len(quarters) == 4
+    assert check_town(town) == ()
+
+
+def test_a_roundabout_of_streets_without_pavements_has_none(tmp_path: Path) -> None:
+    assert compiled(tmp_path, "sidewalk: 0\n" + CIRCUS).sidewalks == ()
+
+
+def test_a_pavement_around_a_roundabout_takes_no_room_from_its_streets(tmp_path: Path) -> None:
+    def lengths(town: Town) -> list[float]:
+        return [lane.length for lane in town.lanes if not lane.in_junction and street_of(town, lane.id) == "Avenue"]
+
+    wide = CIRCUS.replace("Lane: {through: [n, circus, s]}", "Lane: {through: [n, circus, s], sidewalk: 6}")
+    assert lengths(compiled(tmp_path, CIRCUS)) == pytest.approx(lengths(compiled(tmp_path, wide)), abs=1e-6)
 
 
 def test_written_sites_are_reached_from_the_kerb_beside_them(towns: dict[str, Town]) -> None:

@@ -78,6 +78,14 @@ def test_a_connection_is_smooth_from_end_to_end(x: float, y: float, turn: float)
         assert wrap(after.heading - there[2]) == pytest.approx(0.0, abs=1e-6)
 
 
+@given(before=st.floats(0.5, 60.0), after=st.floats(0.5, 60.0), turn=st.floats(-2.2, 2.2))
+def test_a_connection_between_lines_that_meet_does_not_swing_out(before: float, after: float, turn: float) -> None:
+    assume(abs(turn) > 0.01)
+    path = connect((0.0, 0.0, 0.0), (before + after * math.cos(turn), after * math.sin(turn), turn))
+    assert all(piece.curvature * turn >= 0.0 for piece in path.pieces)
+    assert path.smallest_radius == pytest.approx(min(before, after) / math.tan(abs(turn) / 2.0))
+
+
 @given(radius=st.floats(5.5, 500.0), angle=st.floats(0.1, 3.0))
 def test_chords_stay_within_a_centimetre_of_their_arc(radius: float, angle: float) -> None:
     points, _ = Path((Piece(0.0, 0.0, 0.0, radius * angle, 1.0 / radius),)).sample()

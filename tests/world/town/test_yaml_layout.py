@@ -9,7 +9,7 @@ from dorothie_gym.world.town.yaml_town.arms import POCKET
 from dorothie_gym.world.town.yaml_town.courses import SMALLEST_RADIUS
 from dorothie_gym.world.town.yaml_town.movements import kinds_of
 from dorothie_gym.world.town.yaml_town.room import BEND_RADIUS, CORNER_RADIUS, SLIP_RADIUS, SMALLEST_TRIM
-from tests.world.town.yaml_plans import AVENUES, CIRCUS, INTERCHANGE, PAIR, laid_out
+from tests.world.town.yaml_plans import AVENUES, CIRCUS, INTERCHANGE, PAIR, laid_out, star
 
 PLANS = {"avenues": AVENUES, "circus": CIRCUS, "pair": PAIR, "interchange": INTERCHANGE}
 
@@ -24,6 +24,16 @@ def test_ways_through_junctions_are_wide_enough(tmp_path: Path, text: str) -> No
             if not movement.slip and not movement.source.on_ring and abs(movement.turn) < math.radians(35.0):
                 least = BEND_RADIUS
             assert way.path.smallest_radius >= least - 1e-6
+
+
+@pytest.mark.parametrize("arms", [{0: "lanes: 3, median: 8", 135: ""}, {0: "", 140: "lanes: 3, median: 8"}])
+def test_ways_round_a_bend_do_not_swing_out_where_the_street_gets_narrower(
+    tmp_path: Path, arms: dict[int, str]
+) -> None:
+    for way in laid_out(tmp_path, star(arms)).ways[0]:
+        bends = [piece.curvature for piece in way.path.pieces if piece.curvature]
+        assert min(bends) * max(bends) > 0.0  # to one side only
+        assert way.path.smallest_radius >= CORNER_RADIUS - 1e-6
 
 
 @pytest.mark.parametrize("text", PLANS.values(), ids=PLANS.keys())

@@ -1,5 +1,7 @@
 """Town files for tests of the layout and of the towns that come of it."""
 
+import math
+from collections.abc import Mapping
 from pathlib import Path
 
 from dorothie_gym.world.town.model import LinkType, Town
@@ -59,6 +61,41 @@ streets:
   Ring: {through: [west, [-700, 0], [-700, 400], [700, 400], [700, 0], east], radius: 40}
 """
 """A diamond interchange: ramps from a highway up to a bridge over it."""
+
+TIGHT_RAMPS = """\
+junctions: {west: [-250, 0], node: [0, 0], east: [250, 0], on: [-200, 210], off: [200, 210]}
+streets:
+  Highway: {through: [west, node, east], lanes: 2, median: 4, sidewalk: 0}
+  Off: {through: [node, [120, 115], off], ramp: true}
+  On: {through: [on, [-120, 115], node], ramp: true}
+  Loop: {through: [west, [-250, -200], [250, -200], east, [250, 210], off, on, [-250, 210], west]}
+"""
+"""A highway with an off-ramp and an on-ramp at one node, both at 44 degrees."""
+
+
+def star(arms: Mapping[int, str], radius: float = 200.0) -> str:
+    """A town file with one junction, "hub", in the middle of a loop.
+
+    Args:
+        arms: what is said of each street, by its direction clockwise from east [degrees], in order.
+        radius: of the loop [m].
+    """
+
+    def place(direction: float) -> str:
+        angle = math.radians(direction)
+        return f"[{radius * math.cos(angle):.2f}, {radius * math.sin(angle):.2f}]"
+
+    streets, loop, directions = [], [], list(arms)
+    for here, after in zip(directions, [*directions[1:], directions[0] + 360], strict=True):
+        said = f", {arms[here]}" if arms[here] else ""
+        streets.append(f"  Arm {here}: {{through: [hub, t{here}]{said}}}")
+        bends = math.ceil((after - here) / 60.0)
+        loop += [f"t{here}", *(place(here + (after - here) * k / bends) for k in range(1, bends))]
+    tips = [f"  t{direction}: {place(direction)}" for direction in directions]
+    loop.append(loop[0])
+    return "\n".join(
+        ["junctions:", "  hub: [0, 0]", *tips, "streets:", *streets, f"  Loop: {{through: [{', '.join(loop)}]}}", ""]
+    )
 
 
 def laid_out(folder: Path, text: str) -> Layout:

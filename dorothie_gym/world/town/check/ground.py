@@ -3,8 +3,9 @@
 Towns have no kerbs as such. In the mouths of the lanes that lead into a junction the road is as wide as the lanes.
 Between the mouths all within their convex hull is paved, and what a curve needs that bulges out of it between the
 straights of its two ends; but not the corners: where a turn from kerb to kerb has one on its inner side, the kerb is
-rounded between the edges of the two mouths by the largest arc that fits. Of a loop, which turns by more than a half
-circle, the mouths tell nothing.
+rounded between the edges of the two mouths by the largest arc that fits. Where one mouth lies further from the corner,
+the arc may be drawn out towards it for ways that pass by, which nobody can tell. Of a loop, which turns by more than a
+half circle, the mouths tell nothing.
 """
 
 from __future__ import annotations
@@ -22,6 +23,16 @@ CORNER_TURNS = np.radians([20.0, 160.0])
 
 FURTHEST_CORNER = 3.0
 """The straights of a connector's ends meet no further away than this many times the distance between the ends."""
+
+SHORTEST_EDGE = 0.1
+"""The edges beside a corner are taken to be this long at least [m], so that there is a kerb to be rounded."""
+
+DRAWN_OUT = 2.0
+"""An arc is drawn out to at most this many times its length; what is left beside the further mouth is straight. With 2
+sound crossings of five and more arms have no faults, with 1.5 some do."""
+
+THIRD_MOUTH = 0.5
+"""A mouth that lies this far to the right of both streets of a right turn is that of a third one between them [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,28 +58,51 @@ class Pose:
 class Corner:
     """The rounded kerb on the inner side of a right turn."""
 
-    def __init__(self, start: Pose, end: Pose, corner: Array, turn: float) -> None:
+    def __init__(self, connector: int, start: Pose, end: Pose, corner: Array, turn: float) -> None:
         """Round off a corner.
 
         Args:
+            connector: the turn around it.
             start: where the turn begins.
             end: where it ends.
             corner: where the right edges of the two would meet (2,) [m].
             turn: change of direction [rad], positive.
         """
+        self.connector = connector
         self._start, self._end = start, end
         self._kerbs = start.edges[1], end.edges[1]
-        tangent = min(float(np.hypot(*(corner - kerb))) for kerb in self._kerbs)
-        self._radius = tangent / np.tan(0.5 * turn)
-        self._middle = corner - tangent * start.along + self._radius * start.right
+        self._corner = corner
+        self._radius = 1.0 / np.tan(0.5 * turn)
+        self._middle = self._radius * start.right - start.along
 
-    def depth(self, places: Array) -> Array:
-        """How far places (n, 2) lie behind the kerb, 0 before it (n,) [m]."""
+    def _drawing(self, drawn_out: float) -> Array:
+        """Matrix (2, 2) to draw the rounded part of both edges, seen from the corner, to length 1: the kerb is an arc.
+
+        Args:
+            drawn_out: the longer part is at most this many times as long as the shorter one.
+        """
+        edges = np.column_stack((-self._start.along, self._end.along))
+        length = np.maximum([float(np.hypot(*(self._corner - kerb))) for kerb in self._kerbs], SHORTEST_EDGE)
+        length = np.minimum(length, drawn_out * length.min())
+        drawing: Array = edges @ np.diag(1.0 / length) @ np.linalg.inv(edges)
+        return drawing
+
+    def beyond(self, places: Array) -> Array:
+        """How far places (n, 2) lie to the right of both streets, however far away (n,) [m]."""
         (kerb, kerb_behind), start, end = self._kerbs, self._start, self._end
-        from_middle = places - self._middle
-        straight = np.minimum((places - kerb) @ start.right, (places - kerb_behind) @ end.right)
+        beyond: Array = np.minimum((places - kerb) @ start.right, (places - kerb_behind) @ end.right)
+        return beyond
+
+    def depth(self, places: Array, connector: int) -> Array:
+        """How far places (n, 2) on a connector lie behind the kerb, 0 before it (n,) [m]."""
+        (kerb, kerb_behind), start, end = self._kerbs, self._start, self._end
+        drawing = self._drawing(1.0 if connector == self.connector else DRAWN_OUT)
+        from_middle = (places - self._corner) @ drawing.T - self._middle
+        distance = np.maximum(np.hypot(*from_middle.T), 1e-9)
+        scale = np.hypot(*((from_middle / distance[:, None]) @ drawing).T)  # drawn length of a metre outwards
         rounded = (from_middle @ start.along > 0.0) & (from_middle @ end.along < 0.0)
-        depth = np.where(rounded, np.minimum(straight, self._radius - np.hypot(*from_middle.T)), straight)
+        depth = self.beyond(places)
+        depth = np.where(rounded, np.minimum(depth, (self._radius - distance) / scale), depth)
         # The kerb ends where the mouths are: what lies behind them is another street.
         between = ((places - kerb) @ start.along > 0.0) & ((places - kerb_behind) @ end.along < 0.0)
         result: Array = np.where(between, np.maximum(depth, 0.0), 0.0)
@@ -116,8 +150,8 @@ def corners(town: Town, connectors: Iterable[int], kerb_lanes: frozenset[int], e
         meeting = _meeting(*shifted)
         if meeting is None or not CORNER_TURNS[0] <= turn <= CORNER_TURNS[1]:
             continue
-        corner = Corner(start, end, meeting, turn)
-        if float(np.max(corner.depth(edges))) < 0.5:
+        corner = Corner(number, start, end, meeting, turn)
+        if float(np.max(corner.beyond(edges))) < THIRD_MOUTH:
             found.append(corner)
     return found
 

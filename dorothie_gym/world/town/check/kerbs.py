@@ -65,7 +65,7 @@ def _junction_faults(
         if off.max() > KERB_SLACK:
             yield _fault(samples, rows, off, "the edge of the junction's ground")
             continue
-        over = np.max([np.zeros(len(sides)), *(kerb.depth(sides) for kerb in kerbs)], axis=0)
+        over = np.max([np.zeros(len(sides)), *(kerb.depth(sides, number) for kerb in kerbs)], axis=0)
         if over.max() > KERB_SLACK:
             yield _fault(samples, rows, over, "the kerb of a corner")
 

@@ -33,7 +33,7 @@ class Arm:
         leg: first piece of the stretch, outwards from the centre of the crossing.
         street: the street it belongs to.
         incoming, outgoing: its lanes, from the kerb inwards.
-        right, left: distance from the line to the edges of the road, pavements included [m].
+        right, left: distance from the line to the edges of the road, pavements included but for those of rings [m].
         on_ring: whether it is a part of a roundabout's ring.
     """
 
@@ -115,8 +115,9 @@ def _arm(place: int, k: int, at_start: bool, stretch: Stretch) -> Arm:
         street=stretch.street,
         incoming=backward if at_start else forward,
         outgoing=forward if at_start else backward,
-        right=section.side(at_start),
-        left=section.side(not at_start),
+        # The pavement around a ring ends where the corners of the streets that meet it begin, and takes no room there.
+        right=section.side(at_start) if stretch.arc is None else section.edge(at_start),
+        left=section.side(not at_start) if stretch.arc is None else section.edge(not at_start),
         on_ring=stretch.arc is not None,
     )
 

@@ -45,12 +45,16 @@ class CrossSection:
         """Offset of the left-turn lane that opens in the median for the lanes along the course [m]."""
         return (self.street.median - self.street.width) / 2.0
 
+    def edge(self, to_the_right: bool) -> float:
+        """Distance from the line to the edge of the road on one side [m]."""
+        return self.right if to_the_right else self.left
+
     def side(self, to_the_right: bool) -> float:
         """Distance from the line to the outer end of the pavement on one side [m]."""
-        return (self.right if to_the_right else self.left) + self.street.sidewalk
+        return self.edge(to_the_right) + self.street.sidewalk
 
     def tightest(self, to_the_right: bool, lane_radius: float) -> float:
         """Radius that the line needs in a bend to one side so that the lane inside still has `lane_radius` [m]."""
-        edge = self.right if to_the_right else self.left
+        edge = self.edge(to_the_right)
         # The pavement needs a little radius of its own, too.
         return max(lane_radius + edge - self.street.width / 2.0, edge + max(self.street.sidewalk, 0.5) + 0.5)

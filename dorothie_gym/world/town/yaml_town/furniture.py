@@ -50,12 +50,16 @@ def _outline(approach: Approach) -> Array:
 
 
 def sidewalks(layout: Layout) -> tuple[Sidewalk, ...]:
-    """Pavements on both sides of every stretch whose street has them, right of its course first."""
+    """Pavements beside every stretch whose street has them: right of its course, then left of it.
+
+    A ring has one on its outer side only, which is the right one; nobody walks on its island.
+    """
     found: list[Sidewalk] = []
     for stretch, course in zip(layout.stretches, layout.courses, strict=True):
         street, width = stretch.street, stretch.street.sidewalk
         if width > 0.0:
-            for offset in (stretch.section.right + width / 2.0, -stretch.section.left - width / 2.0):
+            right, left = stretch.section.right + width / 2.0, -stretch.section.left - width / 2.0
+            for offset in (right, left) if stretch.arc is None else (right,):
                 points = course.beside(offset)
                 found.append(Sidewalk(id=len(found), points=points, width=width, street=layout.numbers[street.id]))
     return tuple(found)

@@ -213,9 +213,12 @@ def bend_stations(points: Sequence[Point], radii: Sequence[float]) -> list[float
 
 
 def connect(entry: Pose, exit_: Pose) -> Path:
-    """The gentler of the two smooth ways from one pose to another: line-arc-line where it exists, or two arcs."""
-    ways = [way for way in (_fillet(entry, exit_), _biarc(entry, exit_)) if way is not None]
-    return max(ways, key=lambda way: way.smallest_radius)
+    """A smooth way from one pose to another: line-arc-line where it exists, else two arcs.
+
+    No way that turns to one side only is gentler than the one with a single arc; two arcs may be, but where there is
+    one they swing out to the other side first.
+    """
+    return _fillet(entry, exit_) or _biarc(entry, exit_)
 
 
 def _fillet(entry: Pose, exit_: Pose) -> Path | None:

@@ -20,7 +20,8 @@ class Ring:
     """A roundabout, laid out.
 
     Attributes:
-        street: its own street, named as the junction; its lanes are as wide as the widest of those that meet it.
+        street: its own street, named as the junction; its lanes and the pavement around it are as wide as the widest of
+            those that meet it.
         crossings: one for each end of a run that meets it, clockwise.
         ends: for each crossing the run that meets it there, and whether that one starts there.
         stretches: between the crossings.
@@ -61,7 +62,7 @@ def lay_ring(junction: JunctionPlan, runs: Sequence[Run], *, street_id: int, cro
         backward=0,
         speed=plan.speed,
         width=max(runs[k].street.width for k, _ in ends),
-        sidewalk=0.0,
+        sidewalk=max(runs[k].street.sidewalk for k, _ in ends),
         entry=junction.entry,
     )
     inner = plan.radius - (plan.lanes - 1) * street.width / 2.0
