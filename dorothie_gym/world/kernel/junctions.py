@@ -1,0 +1,276 @@
+"""Who may enter a junction: the rules of `world.junctions`, on arrays.
+
+Lights and signs come first, then priority, then whoever came first. Those whose paths cross are never let in together:
+who is on its way across clears the junction first.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from dorothie_gym.world.junctions import (
+    AT_LINE,
+    COMFORTABLE_BRAKING,
+    CRITICAL_GAP,
+    GIVING_WAY_PATIENCE,
+    HARDEST_BRAKING,
+    LAPSE,
+    OVER_LINE,
+    SNEAKING,
+    STANDING,
+    START,
+    UNUSED,
+)
+from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.kernel.lights import light
+from dorothie_gym.world.kernel.parameters import AFTER_END
+from dorothie_gym.world.kernel.records import NOBODY, Colour, Control, Kind, Records, Relation, Wait
+from dorothie_gym.world.traffic import ROOM_BEHIND, ROOM_EACH, ROOM_SIGHT, SLOW
+
+if TYPE_CHECKING:
+    from dorothie_gym.world.kernel.town_arrays import TownArrays
+    from dorothie_gym.world.kernel.world_arrays import WorldArrays
+
+CLEAR = 0.5
+"""A vehicle has left a junction when its rear is this far behind it [m]."""
+
+
+@inlined
+def announce(vehicle: Records, lane: int, connector: int, distance: float, now: float) -> None:
+    """Tells that a vehicle comes along a lane to a connector, its front `distance` [m] before it."""
+    if vehicle.approach != connector or vehicle.approach_lane != lane:
+        if vehicle.approach < 0 or vehicle.approach_lane != lane:
+            vehicle.stood = False
+        vehicle.approach, vehicle.approach_lane = connector, lane
+        vehicle.since, vehicle.asked, vehicle.wait = math.inf, -math.inf, Wait.NOT
+    vehicle.distance, vehicle.seen = distance, now
+    if vehicle.speed < STANDING and distance < AT_LINE:
+        vehicle.stood = True
+
+
+@inlined
+def forget(vehicle: Records) -> None:
+    """The vehicle comes to no junction any more."""
+    vehicle.approach, vehicle.approach_lane, vehicle.stood, vehicle.wait = NOBODY, NOBODY, False, Wait.NOT
+
+
+@compiled
+def request(town: TownArrays, world: WorldArrays, i: int, k: int) -> int:
+    """Asks to enter the connector that was announced, the `k`-th lane of the plan; repeated until it is entered.
+
+    Returns:
+        `Wait`: why it has to wait, or `Wait.NOT`; then nobody is let in whose path crosses its own until it has
+        crossed, loses its green light, or does not use the permission.
+    """
+    vehicle = world.vehicles[i]
+    now = world.clock[0].time
+    if vehicle.inside == vehicle.approach:
+        return Wait.NOT
+    if now - vehicle.asked > LAPSE:
+        vehicle.since = math.inf
+    if vehicle.claim >= 0:
+        if vehicle.claim != vehicle.approach or _light_stops(town, world, vehicle, now, True):
+            vehicle.claim = NOBODY
+        else:
+            vehicle.claim_asked = vehicle.asked = now
+            vehicle.wait = Wait.NOT
+            return Wait.NOT
+    wait = _reason_to_wait(town, world, i, k, now)
+    vehicle.wait, vehicle.asked = wait, now
+    if wait == Wait.NOT:
+        vehicle.claim, vehicle.claim_since, vehicle.claim_asked = vehicle.approach, now, now
+    return wait
+
+
+@inlined
+def note(town: TownArrays, vehicle: Records, now: float) -> None:
+    """Takes note of where a vehicle is: enters or leaves its connector, or does not use what it was granted."""
+    followed = vehicle.plan[0]
+    if vehicle.claim >= 0:
+        if followed == vehicle.claim:
+            vehicle.inside, vehicle.claim = followed, NOBODY
+            forget(vehicle)
+        else:
+            if vehicle.speed > STANDING:
+                vehicle.claim_since = now
+            if now - vehicle.claim_since > UNUSED or now - vehicle.claim_asked > LAPSE:
+                vehicle.claim = NOBODY
+    if vehicle.inside >= 0 and town.lanes[followed].junction != town.lanes[vehicle.inside].junction:
+        if vehicle.station > 0.5 * vehicle.length + CLEAR:
+            vehicle.inside = NOBODY
+
+
+@compiled
+def _reason_to_wait(town: TownArrays, world: WorldArrays, i: int, k: int, now: float) -> int:
+    own = world.vehicles[i]
+    if _light_stops(town, world, own, now, False):
+        if own.since < math.inf:
+            own.since += max(now - own.asked, 0.0)
+        return Wait.LIGHT
+    if _has_to_stop(town, own):
+        return Wait.STOP_SIGN
+    if not has_room(town, world, i, k):
+        own.since = math.inf  # whoever cannot leave the junction keeps nobody waiting
+        return Wait.NO_ROOM
+    own.since = min(own.since, now)
+    return _others(town, world, i, now)
+
+
+@compiled
+def _others(town: TownArrays, world: WorldArrays, i: int, now: float) -> int:
+    """Whether others let a vehicle enter: those on its way, those who waited for longer, those with priority."""
+    own = world.vehicles[i]
+    connector = town.lanes[own.approach]
+    patient = now - own.since > GIVING_WAY_PATIENCE
+    turn, giving = False, False
+    for j in range(len(world.vehicles)):
+        other = world.vehicles[j]
+        if j == i or other.kind == Kind.EMPTY:
+            continue
+        if relation(town, connector, other.claim) > 0 or relation(town, connector, other.inside) > 0:
+            return Wait.OCCUPIED
+        meeting = relation(town, connector, other.approach)
+        if meeting == Relation.APART or now - other.seen >= LAPSE:
+            continue
+        if not turn and _comes_first(town, other, own, meeting, now):
+            turn = True
+        if meeting == Relation.WAITS and not patient and not giving and _is_coming(town, world, j, now):
+            giving = True
+    if turn:
+        return Wait.TURN
+    return Wait.GIVING_WAY if giving else Wait.NOT
+
+
+@inlined
+def relation(town: TownArrays, connector: Records, other: int) -> int:
+    """`Relation` of a connector to another lane (or -1, for none)."""
+    if other < 0 or town.lanes[other].junction != connector.junction:
+        return 0  # Relation.APART
+    return int(town.relations[connector.relation + town.lanes[other].place])
+
+
+@compiled
+def _light_stops(town: TownArrays, world: WorldArrays, vehicle: Records, now: float, let_in: bool) -> bool:
+    """Whether a vehicle has to stop for its light, and can; `let_in` if it was about to enter."""
+    if town.lanes[vehicle.approach_lane].programme < 0 or vehicle.distance < -OVER_LINE:
+        return False
+    colour = light(town, world, vehicle.approach_lane, now)
+    if colour == Colour.GREEN:
+        return False
+    braking = vehicle.speed * vehicle.speed / (2.0 * max(vehicle.distance, 0.1))
+    if colour == Colour.RED or vehicle.wait == Wait.LIGHT:
+        return bool(braking <= HARDEST_BRAKING)
+    return bool(braking <= COMFORTABLE_BRAKING) and not _may_sneak(town, world, vehicle, now, let_in)
+
+
+@compiled
+def _may_sneak(town: TownArrays, world: WorldArrays, vehicle: Records, now: float, let_in: bool) -> bool:
+    """Whether who gave way at the line all the green time may use the yellow: it must not last into the red."""
+    if now - vehicle.since <= SNEAKING or vehicle.distance >= AT_LINE:
+        return False
+    if let_in:
+        return True
+    return bool(light(town, world, vehicle.approach_lane, now + START) == Colour.YELLOW)
+
+
+@compiled
+def _has_to_stop(town: TownArrays, vehicle: Records) -> bool:
+    return bool(not vehicle.stood and town.lanes[vehicle.approach_lane].control == Control.STOP)
+
+
+@compiled
+def _comes_first(town: TownArrays, other: Records, own: Records, meeting: int, now: float) -> bool:
+    """Whether one who waits goes before another by the time of waiting; priority is none of it, but patience is."""
+    if other.since >= own.since or now - other.asked >= LAPSE:
+        return False
+    if other.wait == Wait.LIGHT or other.wait == Wait.STOP_SIGN or other.wait == Wait.NO_ROOM:
+        return False
+    if now - other.since > GIVING_WAY_PATIENCE:
+        return True
+    if other.wait == Wait.GIVING_WAY or meeting == Relation.WAITS:
+        return False
+    return bool(relation(town, town.lanes[other.approach], own.approach) != Relation.WAITS)
+
+
+@compiled
+def _is_coming(town: TownArrays, world: WorldArrays, j: int, now: float) -> bool:
+    """Whether one who has priority would be in the junction within the critical gap."""
+    other = world.vehicles[j]
+    if _light_stops(town, world, other, now, False) or _has_to_stop(town, other):
+        return False
+    if other.wait == Wait.GIVING_WAY or other.wait == Wait.TURN:
+        return False  # it waits for others itself
+    if other.wait == Wait.CLOSED or other.wait == Wait.NO_ROOM:
+        return False
+    if other.speed < STANDING:  # about to start, unless somebody is in its way
+        return bool(other.distance < AT_LINE) and not _is_occupied(town, world, j)
+    return bool(other.distance < CRITICAL_GAP * other.speed)
+
+
+@compiled
+def _is_occupied(town: TownArrays, world: WorldArrays, i: int) -> bool:
+    connector = town.lanes[world.vehicles[i].approach]
+    for j in range(len(world.vehicles)):
+        other = world.vehicles[j]
+        if j != i and other.kind != Kind.EMPTY:
+            if relation(town, connector, other.claim) > 0 or relation(town, connector, other.inside) > 0:
+                return True
+    return False
+
+
+@compiled
+def has_room(town: TownArrays, world: WorldArrays, i: int, k: int) -> bool:
+    """Whether there is room behind a junction for a vehicle and all who are on their way there.
+
+    It has to fit behind the first that is slow, with all those between; and before the next junction, with all those
+    who are on the way there.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world.
+        i: the vehicle.
+        k: which lane of its plan is the connector.
+    """
+    own = world.vehicles[i]
+    while k < own.planned and town.lanes[own.plan[k]].junction >= 0:
+        k += 1
+    if k == own.planned:
+        return True
+    before = _heading_to(town, world, i, own.plan[k])
+    start, slow, closed = 0.0, math.inf, False
+    while k < own.planned and start < ROOM_SIGHT and slow == math.inf:
+        lane = town.lanes[own.plan[k]]
+        if lane.junction >= 0:
+            closed = True
+            break
+        n = world.heads[own.plan[k]]
+        while n >= 0:
+            node = world.nodes[n]
+            if node.body != i and node.station > -AFTER_END:
+                if node.speed <= SLOW:
+                    slow = start + node.station - node.half_length
+                    break
+                before += 1
+            n = node.next
+        start += lane.length
+        k += 1
+    if slow < ROOM_BEHIND + ROOM_EACH * before:
+        return False
+    return before == 0 or not closed or start > ROOM_EACH * (before + 0.5)
+
+
+@compiled
+def _heading_to(town: TownArrays, world: WorldArrays, i: int, exit: int) -> int:
+    """How many others were let into the junction who will leave it on a lane."""
+    count = 0
+    for j in range(len(world.vehicles)):
+        other = world.vehicles[j]
+        if j == i or other.kind == Kind.EMPTY:
+            continue
+        if other.claim >= 0 and town.lanes[other.claim].exit == exit:
+            count += 1
+        # who has left it is on the lane already
+        if other.inside >= 0 and town.lanes[other.inside].exit == exit and other.plan[0] != exit:
+            count += 1
+    return count

@@ -1,0 +1,57 @@
+"""The lanes that a vehicle is going to drive: followed, and drawn at random from the vehicle's own numbers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.kernel.lanes import project
+from dorothie_gym.world.kernel.parameters import AFTER_END, PLANNED
+from dorothie_gym.world.kernel.randomness import choose
+from dorothie_gym.world.kernel.records import Records
+from dorothie_gym.world.network.ahead import HORIZON
+
+if TYPE_CHECKING:
+    from dorothie_gym.world.kernel.town_arrays import TownArrays
+
+
+@inlined
+def follow_road(town: TownArrays, vehicle: Records) -> None:
+    """Goes on to the next planned lane at the end of the present one, and plans on."""
+    while vehicle.planned > 1 and vehicle.station > town.lanes[vehicle.plan[0]].length - AFTER_END:
+        for k in range(1, vehicle.planned):
+            vehicle.plan[k - 1] = vehicle.plan[k]
+        vehicle.planned -= 1
+        locate(town, vehicle)
+        extend(town, vehicle)
+
+
+@inlined
+def locate(town: TownArrays, vehicle: Records) -> None:
+    """Finds the place of a vehicle on the lane that it follows."""
+    vehicle.station, vehicle.lateral, vehicle.segment = project(town, vehicle.plan[0], vehicle.x, vehicle.y)
+
+
+@compiled
+def take(town: TownArrays, vehicle: Records, lane: int) -> None:
+    """Follows a lane and plans on from there."""
+    vehicle.plan[0], vehicle.planned = lane, 1
+    locate(town, vehicle)
+    extend(town, vehicle)
+
+
+@compiled
+def extend(town: TownArrays, vehicle: Records) -> None:
+    """Draws lanes until the plan reaches `HORIZON` beyond the lane that the vehicle follows."""
+    ahead = 0.0
+    for k in range(1, vehicle.planned):
+        ahead += town.lanes[vehicle.plan[k]].length
+    while ahead < HORIZON and vehicle.planned < PLANNED:
+        last = town.lanes[vehicle.plan[vehicle.planned - 1]]
+        if last.successors == 0:
+            return
+        way = choose(vehicle, last.successors) if last.successors > 1 else 0
+        lane = town.neighbours[last.successor + way]
+        vehicle.plan[vehicle.planned] = lane
+        vehicle.planned += 1
+        ahead += town.lanes[lane].length

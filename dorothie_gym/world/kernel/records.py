@@ -1,0 +1,217 @@
+"""The records that the compiled loops work on, field by field.
+
+Records are read and written by attribute (`vehicle.speed`), compiled and in plain Python alike.
+"""
+
+from __future__ import annotations
+
+import enum
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from dorothie_gym.world.kernel.parameters import PLANNED
+
+Records: TypeAlias = Any
+"""An array of records; mypy knows no types of their fields."""
+
+NOBODY: Any = np.int64(-1)
+"""No lane, node or body. For a plain number numba would compile its readers twice: for this value, and for others."""
+
+
+class Kind(enum.IntEnum):
+    """What a vehicle is."""
+
+    EMPTY = 0
+    CAR = 1
+    CYCLIST = 2
+    EGO = 3
+
+
+class Control(enum.IntEnum):
+    """What has to be heeded at the end of a lane."""
+
+    NONE = 0
+    LIGHT = 1
+    STOP = 2
+    YIELD = 3
+
+
+class Colour(enum.IntEnum):
+    """What a light shows."""
+
+    GREEN = 0
+    YELLOW = 1
+    RED = 2
+
+
+class Relation(enum.IntEnum):
+    """Of one connector to another one of its junction."""
+
+    APART = 0
+    FOE = 1
+    WAITS = 2
+
+
+class Wait(enum.IntEnum):
+    """Why a vehicle may not enter a junction; `world.junctions.Wait` explains them."""
+
+    NOT = 0
+    LIGHT = 1
+    STOP_SIGN = 2
+    GIVING_WAY = 3
+    TURN = 4
+    OCCUPIED = 5
+    CLOSED = 6
+    NO_ROOM = 7
+
+
+class Walk(enum.IntEnum):
+    """What a pedestrian does."""
+
+    EMPTY = 0
+    WALKING = 1
+    WAITING = 2
+    CROSSING = 3
+
+
+LANE = np.dtype(
+    [
+        ("length", "f8"),  # [m]
+        ("limit", "f8"),  # speed limit [m/s]
+        ("curve_speed", "f8"),  # at which its tightest bend is driven [m/s]
+        ("half_width", "f8"),  # [m]
+        ("cos_first", "f8"), ("sin_first", "f8"), ("cos_last", "f8"), ("sin_last", "f8"),  # directions of its ends
+        ("left_edge", "f8"), ("low_edge", "f8"), ("right_edge", "f8"), ("high_edge", "f8"),  # bounding box [m]
+        ("first", "i4"), ("last", "i4"),  # first and last row of its points
+        ("rank", "i4"),  # place in the order of the network's lanes: settles ties
+        ("successor", "i4"), ("successors", "i4"),  # where its list begins in `neighbours`, and how many there are
+        ("predecessor", "i4"), ("predecessors", "i4"),
+        ("left", "i4"), ("right", "i4"),  # lanes that one may change to, or -1
+        ("junction", "i4"),  # number of the junction that it crosses, or -1
+        ("exit", "i4"),  # of a connector: the first lane behind the junction, or -1
+        ("place", "i4"),  # of a connector: its place among those of its junction
+        ("relation", "i4"),  # of a connector: where its row of `relations` begins
+        ("control", "i4"),  # `Control`
+        ("programme", "i4"), ("slot", "i4"),  # light programme, and the place of its light in it
+        ("sibling", "i4"), ("siblings", "i4"),  # rows of `siblings`
+        ("passage", "i4"), ("passages", "i4"),  # rows of `passages`
+    ],
+    align=True,
+)  # fmt: skip
+"""A lane of a town."""
+
+ENTRY = np.dtype(
+    [
+        ("cos", "f8"), ("sin", "f8"),  # mean direction of the lane near the cell
+        ("limit", "f8"),  # headings whose cosine to that is less are off by more than `cells.TURNED`
+        ("along_low", "f8"), ("along_high", "f8"),  # box around those segments: along that direction [m]
+        ("across_low", "f8"), ("across_high", "f8"),  # and across it [m]
+        ("lane", "i4"),
+        ("first", "i4"), ("last", "i4"),  # its segments that can be the closest ones from within the cell
+    ],
+    align=True,
+)  # fmt: skip
+"""A lane in the list of a cell."""
+
+SIBLING = np.dtype([("until", "f8"), ("lane", "i4")], align=True)
+"""A lane that begins where another one begins: who is on it before `until` [m] is in the way on the other one, too."""
+
+PASSAGE = np.dtype([("start", "f8"), ("stop", "f8"), ("across", "f8"), ("crossing", "i4")], align=True)
+"""A lane's way over a crosswalk: its stations there, and how far along the crosswalk it is met [m]."""
+
+PROGRAMME = np.dtype(
+    [("offset", "f8"), ("cycle", "f8"), ("phase", "i4"), ("phases", "i4"), ("colour", "i4"), ("slots", "i4")],
+    align=True,
+)
+"""A light programme: its phases' ends are `phase_ends[phase : phase + phases]`, and `colours` begin at `colour`."""
+
+WALKWAY = np.dtype(
+    [("length", "f8"), ("first", "i4"), ("last", "i4"), ("mouth", "i4"), ("mouths", "i4"), ("half_width", "f8"),
+     ("next_walk", "i4", (2,)), ("next_end", "i4", (2,))],
+    align=True,
+)  # fmt: skip
+"""A pavement: its points, the mouths of crosswalks along it, and where one walks on beyond its two ends, or -1."""
+
+CROSSING = np.dtype(
+    [("x", "f8", (2,)), ("y", "f8", (2,)), ("cos", "f8"), ("sin", "f8"), ("length", "f8"), ("height", "f8"),
+     ("walk", "i4", (2,)), ("station", "f8", (2,))],
+    align=True,
+)  # fmt: skip
+"""A crosswalk: its two ends, its direction from the first to the second, and the pavements that it joins."""
+
+MOUTH = np.dtype([("station", "f8"), ("crossing", "i4"), ("end", "i4")], align=True)
+"""Where a crosswalk leaves a pavement."""
+
+VEHICLE = np.dtype(
+    [
+        ("x", "f8"), ("y", "f8"),  # position of its middle [m]
+        ("heading", "f8"), ("cos", "f8"), ("sin", "f8"),  # [rad]
+        ("speed", "f8"),  # [m/s]
+        ("height", "f8"),  # of the road under it [m]
+        ("acceleration", "f8"), ("slip", "f8"),  # what it does: [m/s^2], and sine of the slip angle
+        ("desired", "f8"),  # speed that it likes [m/s]
+        ("length", "f8"), ("width", "f8"), ("radius", "f8"),  # [m]; half its diagonal
+        ("to_right", "f8"),  # where it keeps in its lane [m]
+        ("station", "f8"), ("lateral", "f8"),  # on the lane that it follows [m]
+        ("own_station", "f8"), ("own_lateral", "f8"),  # on the lane that is closest [m]
+        ("timer", "f8"),  # since it thought of changing lanes [s]
+        ("standing", "f8"),  # for how long it has been standing, its light not being red [s]
+        ("crash_age", "f8"),  # since it crashed [s]
+        ("odometer", "f8"),  # way driven [m]
+        ("distance", "f8"),  # from its front to the line before the next junction [m]
+        ("seen", "f8"), ("asked", "f8"), ("since", "f8"),  # when it came near, asked, began to wait [s]
+        ("claim_since", "f8"), ("claim_asked", "f8"),  # [s]
+        ("rerouted", "f8"),  # when it chose another way last, for want of room on the one it planned [s]
+        ("random", "i8"),
+        ("lane", "i4"), ("segment", "i4"),  # the closest lane; the closest segment of the lane that it follows
+        ("planned", "i4"), ("plan", "i4", (PLANNED,)),  # lanes ahead; the first is the one that it follows
+        ("approach", "i4"), ("approach_lane", "i4"),  # connector that it announced, and where it comes from
+        ("claim", "i4"), ("inside", "i4"),  # connector that it was let into, and that it is on
+        ("kind", "i4"), ("wait", "i4"),
+        ("stood", "b1"), ("crashed", "b1"),
+        ("blocked", "b1"),  # whether a prop is next ahead
+    ],
+    align=True,
+)  # fmt: skip
+"""A car or cyclist; a place that is empty has the kind `Kind.EMPTY`."""
+
+PEDESTRIAN = np.dtype(
+    [
+        ("x", "f8"), ("y", "f8"), ("heading", "f8"), ("cos", "f8"), ("sin", "f8"), ("speed", "f8"), ("height", "f8"),
+        ("station", "f8"), ("direction", "f8"),  # along the pavement or crosswalk [m], and 1 or -1
+        ("pace", "f8"),  # speed that it likes [m/s]
+        ("aside", "f8"),  # how far to the right of the middle it keeps [m]
+        ("waited", "f8"), ("odometer", "f8"),
+        ("random", "i8"),
+        ("walk", "i4"), ("segment", "i4"), ("crossing", "i4"), ("mouth", "i4"), ("state", "i4"), ("crashed", "b1"),
+    ],
+    align=True,
+)  # fmt: skip
+"""Somebody on foot."""
+
+PROP = np.dtype(
+    [
+        ("x", "f8"), ("y", "f8"), ("heading", "f8"), ("cos", "f8"), ("sin", "f8"), ("height", "f8"),
+        ("length", "f8"), ("width", "f8"), ("radius", "f8"),
+        ("station", "f8", (4,)), ("lane", "i4", (4,)), ("present", "b1"),
+    ],
+    align=True,
+)  # fmt: skip
+"""A thing on the road, and the lanes that it reaches into."""
+
+NODE = np.dtype(
+    [("station", "f8"), ("speed", "f8"), ("cos", "f8"), ("sin", "f8"), ("half_length", "f8"),
+     ("lane", "i4"), ("next", "i4"), ("before", "i4"), ("body", "i4")],
+    align=True,
+)  # fmt: skip
+"""A body in the list of a lane, ordered by station."""
+
+CLOCK = np.dtype(
+    [("time", "f8"), ("frame", "i8"), ("collisions", "i8"), ("run_over", "i8"), ("random", "i8"), ("towed", "i8")],
+    align=True,
+)
+"""What a world counts: simulated time [s], substeps, collisions of vehicles, pedestrians touched, vehicles towed."""
+
+LAMP = np.dtype([("until", "f8"), ("phase", "i4")], align=True)
+"""The phase of a light programme now, which holds until a time [s]."""

@@ -1,0 +1,51 @@
+"""A crowd for ten minutes: nobody gets lost, stuck, or runs into anybody."""
+
+import numpy as np
+import pytest
+
+from dorothie_gym.world.kernel import Kind, Walk, empty_world, populate, step, town_arrays
+from dorothie_gym.world.network.network import TownNetwork
+from dorothie_gym.world.town import LightColour
+from tests.world.kernel.states import DT
+from tests.world.network.towns import find_town
+
+OFF = 2.5
+"""Farther from the middle of the closest lane than this a vehicle has left the road [m]."""
+
+
+def soak(name, *, minutes, seed, vehicles=60, pedestrians=40):
+    network = TownNetwork(find_town(name))
+    town, lights = town_arrays(network), network.town.light
+    world = empty_world(town, vehicles=vehicles, pedestrians=pedestrians, seed=seed)
+    populate(network, town, world, seed=seed, vehicles=vehicles, pedestrians=pedestrians)
+    there = world.vehicles.kind != Kind.EMPTY
+    assert there.sum() > 0.7 * vehicles
+    fleet, lengths, lit = world.vehicles, town.lanes.length, town.lanes.programme >= 0
+    before, runs, farthest = np.zeros(vehicles, dtype=bool), 0, 0.0
+    for _ in range(round(minutes * 60 / DT)):
+        step(town, world, 1, DT)
+        over = there & lit[fleet.lane] & (fleet.own_station + 0.5 * fleet.length > lengths[fleet.lane])
+        for i in np.flatnonzero(over & ~before & ~fleet.crashed):
+            runs += lights(int(fleet.lane[i]), float(world.clock[0].time)) is LightColour.RED
+        before = over
+        farthest = max(farthest, float(np.abs(fleet.own_lateral[there]).max()))
+    assert np.isfinite(fleet.x).all() and np.isfinite(fleet.speed).all()
+    assert farthest < OFF
+    assert fleet.odometer[there].min() >= 50.0
+    walkers = world.pedestrians[world.pedestrians.state != Walk.EMPTY]
+    assert len(walkers) == 0 or walkers.odometer.min() > 50.0
+    assert runs == 0
+    return int(world.clock[0].collisions), int(world.clock[0].run_over)
+
+
+@pytest.mark.parametrize("name", ["brookside", "millbrook"])
+def test_nobody_gets_stuck_or_crashes_in_two_minutes(name):
+    assert soak(name, minutes=2, seed=6, vehicles=40) == (0, 0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("name", ["brookside", "millbrook", "Town01.xodr", "Town02.xodr", "Town05.xodr"])
+def test_a_crowd_drives_for_ten_minutes(name, seed):
+    collisions, run_over = soak(name, minutes=10, seed=seed)
+    assert collisions <= 1 and run_over <= 1
