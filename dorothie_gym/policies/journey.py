@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -19,14 +20,11 @@ PASSED = 3.0
 SWITCH_ROOM = 16.0
 """Least room for a lane switch [m]."""
 
+END_ROOM = 6.0
+"""Who is nearer to the end of a lane than this waits there and does not turn round any more [m]."""
+
 LATE = 18.0
 """A lane change or U-turn that is this overdue will not come any more [m]."""
-
-ROOM_BEFORE_OBSTACLE = 12.0
-"""Room that turning round takes before an obstacle [m]."""
-
-TIGHT = 40.0
-"""A goal or lane change this close behind a U-turn is easily missed: plans are made in cells [m]."""
 
 BRAKING = 3.0
 """Deceleration of the car's Stop [m/s^2]."""
@@ -219,8 +217,10 @@ class Journey:
             return station > self.goal[1] + PASSED
         if legs[1].entry is Entry.FOLLOW:
             return False
-        no_room = legs[1].entry is not Entry.U_TURN and town.lanes[legs[0].lane].length - station < SWITCH_ROOM
-        return no_room or station > legs[0].end + LATE
+        room = town.lanes[legs[0].lane].length - station
+        if legs[1].entry is Entry.U_TURN:
+            return station > legs[0].end + (LATE if room > END_ROOM else 0.0)
+        return room < SWITCH_ROOM or station > legs[0].end + LATE
 
     def left(self, station: float) -> float:
         """How far the goal is along the route [m]; negative when it has just been passed."""
@@ -253,30 +253,12 @@ class Journey:
             distance += max(leg.end - (station if k == 0 else leg.start), 0.0)
         return None
 
-    def turning_room(self, town: Town, lane: int) -> float | None:
-        """How far beyond its planned place the next U-turn can be made, and should be if something is close behind.
-
-        A U-turn that is made later comes out further from the goal, or from the lane change that follows it.
-
-        Args:
-            town: the map.
-            lane: that the car is on.
-
-        Returns:
-            0 if the U-turn may as well be made now; else the room on its lane [m]; None before the car is on it.
-        """
-        for k, leg in enumerate(self.legs[1:], start=1):
-            if leg.entry is not Entry.U_TURN:
-                continue
-            before = self.legs[k - 1]
-            if before.lane != lane:
-                return None
-            followed = k == len(self.legs) - 1 or self.legs[k + 1].entry is not Entry.FOLLOW
-            tight = followed and leg.end - leg.start < TIGHT
-            ends = [place[1] - ROOM_BEFORE_OBSTACLE for place in self.blocked if place[0] == lane]
-            end = min([*ends, town.lanes[lane].length])
-            return max(end - before.end, 0.0) if tight else 0.0
-        return None
+    def turns_round_on(self, lane: int) -> bool:
+        """Whether the next U-turn of the route begins on a lane."""
+        for before, leg in itertools.pairwise(self.legs):
+            if leg.entry is Entry.U_TURN:
+                return before.lane == lane
+        return False
 
     def needs_switch(self, town: Town, lane: int, station: float, crossing: Crossing) -> bool:
         """Whether a lane change before a junction has to be made on its own, not on the way into the turn.

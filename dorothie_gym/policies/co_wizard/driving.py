@@ -34,9 +34,6 @@ PATIENCE = 2.0
 SAME_WAY = 25.0
 """An exit of the own lane this close in angle is taken instead of that of a lane beside [degrees]."""
 
-U_TURN_MARGIN = 14.0
-"""So far beyond a place on the other side the car turns round for it [m]."""
-
 
 def drive(mind: CoWizardMind, view: View) -> Physical | None:
     """Chooses the physical action of this decision; None leaves the car to what it is doing."""
@@ -148,12 +145,11 @@ def _manoeuvre(mind: CoWizardMind, view: View) -> Physical | None:
         return None
     if entry is Entry.U_TURN:
         reach = max(view.speed**2 - U_TURN_SPEED_SQUARED, 0.0) / (2 * BRAKING)
-        room = mind.journey.turning_room(mind.town, view.lane)
-        if room is None:
+        if not mind.journey.turns_round_on(view.lane):
             return None
-        beyond = min(U_TURN_MARGIN, room - 6.0) if room > 0.0 else -2.0
         held_up = view.standing and view.motion is Motion.HAZARD and view.hazard is ObjectClass.STATIC
-        return turn_round(mind, view) if distance <= reach - beyond or held_up else None
+        # never before the planned place, lest the car come out behind its goal
+        return turn_round(mind, view) if distance <= reach or held_up else None
     if not _needs_switch(mind, view, crossing):
         return None
     return _switch(mind, view, LinkType.LANE_CHANGE_LEFT if entry is Entry.CHANGE_LEFT else LinkType.LANE_CHANGE_RIGHT)

@@ -49,9 +49,6 @@ SLOW_WITHIN = 20.0
 SLOW_SPEED = 5.0
 """A car that is this slow need not be told to come up slowly [m/s]."""
 
-ROOM_TO_STOP = 28.0
-"""Turning round for a place on the other side is done this far beyond it, so that there is time to say stop [m]."""
-
 WITHIN = 1.9
 """A car that stands this close to the place has arrived [m]."""
 
@@ -106,7 +103,7 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
         return
     near = distance < (_turning_distance(mind, view) if key[0] == "round" else TELL_DISTANCE)
     waited = view.time - max(mind.guided_at, mind.heard_at)
-    on_its_lane = key[0] == "round" and mind.journey.turning_room(mind.town, view.lane) is not None
+    on_its_lane = key[0] == "round" and mind.journey.turns_round_on(view.lane)
     if on_its_lane and mind.standing_since is not None and view.time - mind.standing_since > 4.0:
         near = True
     stuck = view.standing and waited > AGAIN and view.time > mind.excused_until
@@ -139,14 +136,12 @@ def _ease(mind: ParticipantMind, view: View) -> bool:
 
 
 def _turning_distance(mind: ParticipantMind, view: View) -> float:
-    """How far ahead turning round is told, so that the car turns where it is planned or a little later."""
+    """How far ahead turning round is told, so that the car turns about where it is planned."""
     assert mind.journey is not None
-    room = mind.journey.turning_room(mind.town, view.lane)
-    if room is None:
+    if not mind.journey.turns_round_on(view.lane):
         return 1.5 * view.speed
     # what the car drives while it is being told, and while it slows down
-    on_the_way = 1.5 * view.speed + max(view.speed**2 - U_TURN_SPEED_SQUARED, 0.0) / (2 * BRAKING) + 2.0
-    return on_the_way - (min(ROOM_TO_STOP, room - 12.0) if room > 0.0 else 0.0)
+    return 1.5 * view.speed + max(view.speed**2 - U_TURN_SPEED_SQUARED, 0.0) / (2 * BRAKING)
 
 
 def note_told(mind: ParticipantMind, view: View, key: tuple[str, int, int]) -> None:
