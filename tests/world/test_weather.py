@@ -133,7 +133,7 @@ def test_water_takes_grip_and_lengthens_braking(
     assert wetter.braking_distance(10.0, MAX_BRAKING) >= drier.braking_distance(10.0, MAX_BRAKING)
 
 
-@pytest.mark.parametrize("parameter", set(P) - set(WETTING))
+@pytest.mark.parametrize("parameter", [parameter for parameter in P if parameter not in WETTING])
 def test_what_is_not_water_takes_no_grip(parameter: WeatherParameter) -> None:
     for share in (0.0, 1.0):
         assert weather_of({parameter: share}).friction == 1.0

@@ -52,8 +52,8 @@ def path_offsets(intensity: float) -> np.ndarray:
     world.weather.set(WeatherParameter.WIND_INTENSITY, intensity)
     world.wind.heading = float(world.car.heading) + math.pi / 2  # blows to the right
     offsets = []
-    for _ in range(200):
-        world.step(1)
+    for _ in range(40):
+        world.step(5)
         offsets.append(world.planner.offset)
     return np.array(offsets)
 
