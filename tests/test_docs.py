@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dorothie_gym.ontology import WeatherParameter
 from dorothie_gym.tasks import bind, load_template
 from dorothie_gym.world.town import describe, load_town
+from dorothie_gym.world.weather import Weather
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -46,3 +48,14 @@ def test_pages_have_a_title_and_no_dead_links(page: str) -> None:
 
 def test_the_storyboard_of_its_page_is_strict_json() -> None:
     assert json.loads(example("storyboards.md", "json"))
+
+
+def test_the_world_page_tells_the_sight_that_the_weather_leaves() -> None:
+    text = (DOCS / "world.md").read_text(encoding="utf-8")
+    fog, rain, night = Weather(), Weather(), Weather()
+    fog.set(WeatherParameter.FOG_DENSITY, 100.0)
+    rain.set(WeatherParameter.PRECIPITATION, 100.0)
+    night.set(WeatherParameter.SUN_ALTITUDE_ANGLE, -90.0)
+    assert f"35 / {fog.sight(lights=False):.0f} m | the same" in text
+    assert f"67 / {rain.sight(lights=False):.0f} m | the same" in text
+    assert f"| night | {night.sight(lights=False):.0f} m | {night.sight(lights=True):.0f} m |" in text

@@ -186,7 +186,7 @@ class Adversary:
         return None
 
     def _stopping_distance(self) -> float:
-        return float(self._world.car.speed) ** 2 / (2 * BRAKING)
+        return self._world.weather.braking_distance(float(self._world.car.speed), BRAKING)
 
     def _unsafe(self, action: AdWizardAction, *, without: Prop | None) -> str | None:
         """Why a prop must not stand at a place.

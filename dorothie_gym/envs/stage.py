@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dorothie_gym.dialogue import Conversation, ExchangeTracker, Span, Utterance, word_act
+from dorothie_gym.dialogue import Conversation, ExchangeTracker, Span, Utterance, guess_spans, word_act
 from dorothie_gym.envs.adversary import Adversary
 from dorothie_gym.envs.beliefs import Beliefs
 from dorothie_gym.envs.config import EnvConfig
@@ -18,6 +18,7 @@ from dorothie_gym.envs.views import Moment, Views
 from dorothie_gym.ontology import (
     ARRIVAL_DISTANCE,
     NAVIGATION_ACTIONS,
+    DialogueAct,
     ExceptionKind,
     LandmarkName,
     MentalAction,
@@ -79,7 +80,7 @@ class Stage:
         world_seed, word_seed = np.random.SeedSequence([scenario.seed, 1]).spawn(2)
         self.world = World(town, config.world, seed=world_seed, departure=scenario.departure, network=network)
         self.task = TaskState(scenario.storyboard)
-        self.beliefs = Beliefs(town)
+        self.beliefs = Beliefs(town, scenario)
         self._adversary = Adversary(self.world, self.task, limits.props)
         self._conversation = Conversation(config.words_per_second, limits.spans)
         self._exchanges = ExchangeTracker()
@@ -209,7 +210,8 @@ class Stage:
             if lane >= len(town.lanes) or metres > town.lanes[lane].length + 1.0:
                 self._refuse(Role.CO_WIZARD, mental.action.label, "the guessed place is not on a lane of the town")
                 return
-            self.beliefs.guess(mental.landmark, lane, metres)
+            pose, covariance = self.world.localizer.pose, self.world.localizer.covariance
+            self.beliefs.guess(mental.landmark, lane, metres, pose=pose, covariance=covariance, sight=self.world.sight)
             x, y = town.lanes[lane].position(metres)
             data.update(landmark=mental.landmark.label, x=round(float(x), 3), y=round(float(y), 3))
         self.world.driver.set_goals(self.beliefs.goal_places(self._known_places()))
@@ -252,11 +254,18 @@ class Stage:
             exchanges = self._exchanges.update(utterance)
             heard[utterance.speaker] = utterance
             self.said.append(utterance)
+            self.beliefs.hear(utterance.speaker, self._understood(utterance))
             self._log_utterance(utterance, exchanges)
         now = self.world.time
         self._exchanges.tick(now)
         speaking = {role: self._conversation.speaking(role, now) for role in ROLES}
         return Moment(heard=heard, message=message, speaking=speaking)
+
+    def _understood(self, utterance: Utterance) -> tuple[DialogueAct, ...]:
+        """What the Co-Wizard may take from an utterance: its acts, or where they do not show, what words sound like."""
+        if self.config.observe_acts:
+            return utterance.acts
+        return tuple(span.act for span in guess_spans(utterance.text))
 
     def _log_utterance(self, utterance: Utterance, exchanges: tuple[int, ...]) -> None:
         number = self.counts["utterances"]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.dialogue import Utterance
+from dorothie_gym.envs.bearings import Bearings
 from dorothie_gym.envs.beliefs import Beliefs
 from dorothie_gym.envs.scenario import Scenario
 from dorothie_gym.ontology import LABELS, GoalStatus, LandmarkName, Role, Sensor, WeatherParameter, encode_slots
@@ -113,7 +114,8 @@ class Views:
 
     def _co_wizard(self, moment: Moment) -> Observation:
         world = self._world
-        pose = world.localizer.pose
+        bearings = Bearings(world)
+        pose = bearings.pose
         network = world.network
         index = network.get_closest_lane_index(pose[:2], float(pose[2]), height=float(world.car.height))
         lane = network.get_lane(index)
@@ -133,9 +135,9 @@ class Views:
             "hazard_distance": np.array([max(hazard.gap, 0.0) if hazard is not None else 0.0], dtype=np.float64),
             "manoeuvre": np.int64(manoeuvre or 0),
             "manoeuvre_angle": np.array([float(angle)]),
-            "waypoints": self._waypoints(),
-            "exits": self._exits(),
-            "objects": self._objects(),
+            "waypoints": bearings.waypoints(self._limits.waypoints, WAYPOINT_SPACING),
+            "exits": self._exits(bearings),
+            "objects": self._objects(bearings),
             "guesses": self._guesses(),
             "speaking": np.array([moment.speaking[Role.CO_WIZARD]]),
             **self._heard(Role.PARTICIPANT, moment),
@@ -216,16 +218,18 @@ class Views:
                 row[SubgoalColumn.CAN_CHANGE] = i in changes
         return table
 
-    def _objects(self) -> Table:
+    def _objects(self, bearings: Bearings | None = None) -> Table:
+        """Bodies that are perceived; where `bearings` are given, around the estimated pose and not the true one."""
         car = self._world.car
         table = np.zeros((self._limits.objects, len(ObjectColumn)))
         for row, body in zip(table, self._world.perceived(), strict=False):
             dx, dy = body.x - float(car.position[0]), body.y - float(car.position[1])
             bearing = math.atan2(dy, dx) - float(car.heading)
+            x, y = bearings.seen(body.x, body.y) if bearings is not None else (body.x, body.y)
             row[:] = (
                 body.kind.value,
-                body.x,
-                body.y,
+                x,
+                y,
                 math.hypot(dx, dy),
                 (bearing + math.pi) % (2 * math.pi) - math.pi,
                 body.length,
@@ -241,9 +245,10 @@ class Views:
             row[:] = planner.path.position_at(min(planner.s + (k + 1) * WAYPOINT_SPACING, planner.path.length))
         return table
 
-    def _exits(self) -> Table:
+    def _exits(self, bearings: Bearings) -> Table:
         town = self._world.town
         exits, distance = self._world.planner.exits()
+        distance = bearings.way_left(distance)
         table = np.zeros((self._limits.exits, len(ExitColumn)))
         numbers = {junction.id: k for k, junction in enumerate(town.junctions)}
         for row, way in zip(table, exits, strict=False):
@@ -252,8 +257,9 @@ class Views:
 
     def _guesses(self) -> Table:
         table = np.zeros((len(LandmarkName), len(GuessColumn)))
-        for name, guess in self._beliefs.guesses.items():
-            table[name.value] = (1.0, *guess.mean, *guess.variance)
+        for name, guess in self._beliefs.places.items():
+            (xx, xy), (_, yy) = guess.covariance
+            table[name.value] = (1.0, *guess.mean, xx, yy, xy)
         return table
 
     def _props(self) -> Table:

@@ -101,13 +101,17 @@ class ExitColumn(enum.IntEnum):
 
 
 class GuessColumn(enum.IntEnum):
-    """Columns of `guesses`, one row a `LandmarkName`: where a hidden landmark is believed to be, and how surely."""
+    """Columns of `guesses`, one row a `LandmarkName`: where a hidden landmark is believed to be, and how surely.
+
+    Mean and covariance of the estimate that what was said and what was marked add up to [m, m^2].
+    """
 
     PRESENT = 0
     X = 1
     Y = 2
     VARIANCE_X = 3
     VARIANCE_Y = 4
+    COVARIANCE_XY = 5
 
 
 class PropColumn(enum.IntEnum):
@@ -143,7 +147,8 @@ def observation_space(role: Role, limits: SpaceLimits, observe_acts: bool = True
     Co-Wizard: `pose` as estimated and its `pose_covariance` (of x, y, heading), `lane` and `station` matched to the
     estimate, `cruise_speed` [km/h], `lights`, `motion`, `hazard` (an `ObjectClass` id) and `hazard_distance`,
     `manoeuvre` in preparation and its `manoeuvre_angle`, planned `waypoints`, `exits`, `objects` perceived, the
-    `landmarks` that are not hidden, `guesses` of hidden ones.
+    `landmarks` that are not hidden, `guesses` of hidden ones. Distances of exits, the first of the waypoints and the
+    places of objects follow from the estimated pose; distances and bearings of objects are as they are seen.
     Ad-Wizard: everything: true pose, `landmarks` and which are `hidden`, `subgoals`, the car's `waypoints` and
     `path_lanes` (lane id + 1), `props`, `sensors` that are faulty.
     """

@@ -1,63 +1,132 @@
-"""Weather and light, as far as this world has what they act on: sight and grip."""
+"""Weather and light: the ten parameters, and what they do to grip, sight and the air's push.
+
+Cloudiness and the sun's altitude dim the light, fog and precipitation dim the air (`visibility`), water on the road
+takes grip, wind pushes the car (`wind`). The sun's azimuth only turns shadows. On a clear noon nothing has any effect.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from types import MappingProxyType
 
 from dorothie_gym.ontology import WeatherParameter
+from dorothie_gym.world.visibility import (
+    CLOUDBURST,
+    HEAD_LIGHTS,
+    STREET_LIGHT,
+    Visibility,
+    daylight,
+    fog_extinction,
+    rain_extinction,
+)
 
-CLEAR_SIGHT = 80.0
-"""How far bodies are perceived on a clear day [m]."""
+WET_LOSS = 0.3
+"""Share of the dry road's grip that a wet road lacks: measured coefficients are 0.8 to 1.0 dry and 0.7 to 0.8 wet
+(Wallman and Astrom, VTI meddelande 911A, 2001), and thin films take up to 30 or 40 % (Do et al. 2014). No term for
+speed: below 90 km/h a car does not yet hydroplane (Horne and Dreher, NASA TN D-2056, 1963)."""
 
-SHORTEST_SIGHT = 16.0
-"""How far they are perceived at worst [m]: enough to stop from 40 km/h on a dry road."""
+FILM_SCALE = 0.1
+"""Film of water that takes 1 - 1/e of that [mm]: most of it is lost between 0.025 and 0.23 mm (Kulakowski and Harwood,
+ASTM STP 1031, 1990)."""
 
-FOG_FREE = 2.0
-"""Fog density that CARLA's clear noon has [%]."""
+WET_FILM = 0.5
+"""Film of water on a road of wetness 100 % [mm]."""
+
+PUDDLES = 5.0
+"""Depth of the puddles of precipitation deposits 100 % [mm]."""
+
+_TEXTURE, _DRAINAGE, _SLOPE = 0.5, 5.0, 0.02
+"""Depth of the road's texture [mm], way of the water to the kerb [m] and crossfall, for the film that rain makes."""
 
 
 class Weather:
     """The ten weather parameters and what they do."""
 
     def __init__(self) -> None:
-        self.values: dict[WeatherParameter, float] = {p: float(p.clear_noon) for p in WeatherParameter}
+        self._values: dict[WeatherParameter, float] = {p: float(p.clear_noon) for p in WeatherParameter}
+        self._views: dict[tuple[bool, float], Visibility] = {}
+
+    @property
+    def values(self) -> Mapping[WeatherParameter, float]:
+        """The ten values, for reading."""
+        return MappingProxyType(self._values)
+
+    def set(self, parameter: WeatherParameter, value: float) -> None:
+        """Sets a parameter.
+
+        Raises:
+            OntologyError: the value is out of the parameter's range.
+        """
+        parameter.check(value)
+        self._values[parameter] = value
+        self._views.clear()
 
     def set_share(self, parameter: WeatherParameter, share: float) -> float:
         """Sets a parameter to a share of its range; returns its value."""
         value = parameter.low + share * (parameter.high - parameter.low)
-        self.values[parameter] = value
+        self.set(parameter, value)
         return value
 
-    def state(self) -> Mapping[WeatherParameter, float]:
-        """The ten values."""
-        return self.values
+    # --- sight ------------------------------------------------------------------------------------------------------
 
-    @property
-    def is_dark(self) -> bool:
-        """Whether the sun is below the horizon."""
-        return self.values[WeatherParameter.SUN_ALTITUDE_ANGLE] < 0.0
+    def visibility(self, *, lights: bool, clarity: float = 1.0) -> Visibility:
+        """What is between things and whoever looks at them.
 
-    @property
-    def is_foggy(self) -> bool:
-        """Whether fog takes more than a third of the sight."""
-        return self.values[WeatherParameter.FOG_DENSITY] > 30.0
+        Args:
+            lights: whether the car's head lights are on.
+            clarity: share of the signal that the view itself leaves.
+        """
+        found = self._views.get((lights, clarity))
+        if found is None:
+            found = self._views[(lights, clarity)] = self._visibility(lights, clarity)
+        return found
 
     def sight(self, *, lights: bool) -> float:
-        """How far bodies are perceived [m]; shorter with fog, rain and darkness, longer in the dark with lights on.
+        """How far bodies are perceived [m]; shorter with fog, rain and darkness, longer in the dark with lights on."""
+        return self.visibility(lights=lights).sight
 
-        Fog scales sight by exp(-2 density) (Koschmieder 1924: contrast falls off exponentially), rain takes up to a
-        quarter, darkness a half, or a quarter with lights on.
-        """
-        fog = max(self.values[WeatherParameter.FOG_DENSITY] - FOG_FREE, 0.0) / 100.0
-        rain = self.values[WeatherParameter.PRECIPITATION] / 100.0
-        dark = 0.0
-        if self.is_dark:
-            dark = 0.25 if lights else 0.5
-        return max(CLEAR_SIGHT * math.exp(-2.0 * fog) * (1.0 - 0.25 * rain) * (1.0 - dark), SHORTEST_SIGHT)
+    def _visibility(self, lights: bool, clarity: float) -> Visibility:
+        value = self._values
+        altitude = value[WeatherParameter.SUN_ALTITUDE_ANGLE]
+        return Visibility(
+            fog=fog_extinction(self.above_clear(WeatherParameter.FOG_DENSITY), value[WeatherParameter.FOG_FALLOFF]),
+            fog_start=value[WeatherParameter.FOG_DISTANCE],
+            rain=rain_extinction(CLOUDBURST * self.above_clear(WeatherParameter.PRECIPITATION)),
+            light=STREET_LIGHT + daylight(altitude, value[WeatherParameter.CLOUDINESS] / 100.0),
+            lamps=HEAD_LIGHTS if lights else 0.0,
+            clarity=clarity,
+        )
+
+    def above_clear(self, parameter: WeatherParameter) -> float:
+        """How far a parameter lies above a clear noon's value, as a share of the way to its highest, in [0, 1]."""
+        clear = parameter.clear_noon
+        return max(self._values[parameter] - clear, 0.0) / (parameter.high - clear)
+
+    # --- grip -------------------------------------------------------------------------------------------------------
+
+    @property
+    def water_film(self) -> float:
+        """Water on the road [mm]: what it is wet with, puddles, and what falls faster than it runs off."""
+        wet = self.above_clear(WeatherParameter.WETNESS)
+        puddles = self.above_clear(WeatherParameter.PRECIPITATION_DEPOSITS)
+        rain = CLOUDBURST * self.above_clear(WeatherParameter.PRECIPITATION)
+        return WET_FILM * wet + PUDDLES * puddles + _running_film(rain)
 
     @property
     def friction(self) -> float:
-        """Share of the dry road's grip: a wet road has about seven tenths of it (Wong, Theory of Ground Vehicles)."""
-        wet = max(self.values[WeatherParameter.WETNESS], self.values[WeatherParameter.PRECIPITATION_DEPOSITS])
-        return 1.0 - 0.3 * wet / 100.0
+        """Share of the dry road's grip, in (1 - WET_LOSS, 1]: 1 - WET_LOSS (1 - exp(-film / FILM_SCALE))."""
+        return 1.0 + WET_LOSS * math.expm1(-self.water_film / FILM_SCALE)
+
+    def braking_distance(self, speed: float, deceleration: float) -> float:
+        """Way to a stand [m] from a speed [m/s] with brakes that give `deceleration` on a dry road [m/s^2]."""
+        return speed**2 / (2 * deceleration * self.friction)
+
+
+def _running_film(rate: float) -> float:
+    """Water that runs off the road in rain of a rate [mm/h], above the road's texture [mm].
+
+    Gallaway et al. (FHWA-RD-79-31, 1979): 0.01485 t^0.11 L^0.43 i^0.59 / S^0.42 - t.
+    """
+    depth = 0.01485 * _TEXTURE**0.11 * _DRAINAGE**0.43 * rate**0.59 / _SLOPE**0.42
+    return float(max(depth - _TEXTURE, 0.0))

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from dorothie_gym.ontology import ObjectClass, PhysicalAction, Sensor
+from dorothie_gym.ontology import ObjectClass, PhysicalAction, Sensor, WeatherParameter
 from dorothie_gym.world.actors import Actors
 from dorothie_gym.world.car.driver import Driver
 from dorothie_gym.world.car.hazards import HEIGHT_MARGIN, Body, Hazard, bodies_ahead
@@ -20,12 +20,15 @@ from dorothie_gym.world.car.planner import BEGUN, BRAKING, LocalPlanner
 from dorothie_gym.world.car.vehicle import Car
 from dorothie_gym.world.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
 from dorothie_gym.world.junctions import CRITICAL_GAP, JunctionControl, Wait
-from dorothie_gym.world.localizer import Localizer
+from dorothie_gym.world.localizer import FIX_EVERY, Localizer
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.network.road import TownRoad
+from dorothie_gym.world.perception import Perception
 from dorothie_gym.world.town.model import Array, Town
 from dorothie_gym.world.traffic import room_at_start
+from dorothie_gym.world.visibility import CLEAR_SIGHT, Visibility
 from dorothie_gym.world.weather import Weather
+from dorothie_gym.world.wind import Wind
 
 CAR = 0
 """Key of the car among bodies and at junctions."""
@@ -33,8 +36,8 @@ CAR = 0
 FAULT_SECONDS = 30.0
 """A sensor fault ends by itself after this long [s] (design)."""
 
-BLUR = 0.5
-"""Share of the sight that is left when the view is blurred."""
+CLARITY = {Sensor.BLUR: 0.25, Sensor.VIEW: 0.0}
+"""Share of the signal that a fault of the view leaves: blur halves the sight."""
 
 TURN_ROUND_SPEED = 4.0
 """Whoever comes towards a car that turns round is taken to be at least this fast soon [m/s]."""
@@ -82,6 +85,7 @@ class World:
         driver: what drives it.
         actors: traffic, pedestrians and props.
         weather: weather and light.
+        wind: where the wind blows, and its gusts.
         lights: whether the car's head lights are on.
         faults: sensors that are faulty, and the frame at which each works again.
         hazard: what the car is braking or standing for, or None.
@@ -99,11 +103,11 @@ class World:
         Args:
             town: the map.
             config: settings.
-            seed: source of the generators of traffic, pedestrians and localisation, one each.
+            seed: source of the generators of traffic, pedestrians, localisation, perception and wind, one each.
             departure: lane and distance along it [m] where the car stands.
             network: the town's network, if there is one already: it is never changed.
         """
-        traffic_seed, walk_seed, locate_seed = seed.spawn(3)
+        traffic_seed, walk_seed, locate_seed, perceive_seed, wind_seed = seed.spawn(5)
         self.town, self.config = town, config
         self.network = network or TownNetwork(town)
         lane, station = departure
@@ -116,6 +120,8 @@ class World:
         self.junctions = JunctionControl(town)
         self._is_connector = np.array([lane.in_junction for lane in town.lanes])  # (lanes,)
         self.weather = Weather()
+        self.wind = Wind(np.random.default_rng(wind_seed))
+        self._perception = Perception(np.random.default_rng(perceive_seed))
         self.actors = Actors(
             self.road, self.junctions, self.car,
             traffic_rng=np.random.default_rng(traffic_seed), walk_rng=np.random.default_rng(walk_seed),
@@ -147,7 +153,7 @@ class World:
         """Lets the world run for a number of physics frames; returns what happened to the car."""
         self._events = []
         rows = np.empty((frames, len(FRAME_COLUMNS)))
-        before = (self.car.position.copy(), float(self.car.heading))
+        before = (float(self.car.position[0]), float(self.car.position[1]), float(self.car.heading))
         for k in range(frames):
             if k % EXTEND_EVERY == 0:
                 self.planner.extend(float(self.car.speed))
@@ -158,7 +164,7 @@ class World:
                 control.throttle, control.steer, control.brake, self.planner.lane,
             )  # fmt: skip
         self.frames = rows
-        self._localize(*before, frames / FRAME_RATE)
+        self._localize(np.vstack((before, rows[:, 1:4])))
         self.actors.tidy()
         self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
         return self._events
@@ -170,6 +176,10 @@ class World:
         hazard = self._look_ahead()
         friction = self.weather.friction
         car.friction, self.driver.sight = friction, self.sight
+        car.drift = self.wind.drift(
+            self.weather.above_clear(WeatherParameter.WIND_INTENSITY), self.time,
+            heading=float(car.heading), speed=float(car.speed),
+        )  # fmt: skip
         control = self.driver.control(
             float(car.position[0]), float(car.position[1]), float(car.heading), float(car.speed), hazard, dt, friction
         )
@@ -185,27 +195,39 @@ class World:
         if car.crashed:
             self._collide(speed_before)
 
-    def _localize(self, position: Array, heading: float, seconds: float) -> None:
-        moved = self.car.position - position
-        c, s = math.cos(heading), math.sin(heading)
-        ahead, right = float(moved @ (c, s)), float(moved @ (-s, c))
-        self.localizer.predict(ahead, right, float(self.car.heading) - heading, seconds)
-        if Sensor.GPS not in self.faults:
-            self.localizer.correct(float(self.car.position[0]), float(self.car.position[1]))
+    def _localize(self, track: Array) -> None:
+        """Takes in odometry of every frame, and a GPS fix of every so many.
+
+        Args:
+            track: poses (x, y, heading) before the frames and after each (frames + 1, 3).
+        """
+        began, first = 0, self.frame - len(track) + 1
+        for k in range(1, len(track)):
+            is_fix = (first + k) % FIX_EVERY == 0
+            if is_fix or k == len(track) - 1:
+                self.localizer.predict(track[began : k + 1], 1.0 / FRAME_RATE)
+                began = k
+            if is_fix and not self._is_faulty(Sensor.GPS, first + k):
+                self.localizer.correct(float(track[k, 0]), float(track[k, 1]))
 
     # --- perception -------------------------------------------------------------------------------------------------
 
     @property
+    def visibility(self) -> Visibility:
+        """How well the car sees now, by weather, light and faults of the view."""
+        clarity = min((CLARITY[sensor] for sensor in CLARITY if self._is_faulty(sensor, self.frame)), default=1.0)
+        return self.weather.visibility(lights=self.lights, clarity=clarity)
+
+    @property
     def sight(self) -> float:
-        """How far the car perceives bodies now [m]."""
-        if Sensor.VIEW in self.faults:
-            return 16.5  # bumper radar: enough to stop at walking pace, with room to turn round before a roadblock
-        sight = self.weather.sight(lights=self.lights)
-        return sight * BLUR if Sensor.BLUR in self.faults else sight
+        """How far the car perceives all bodies now [m]."""
+        return self.visibility.sight
 
     def perceived(self) -> list[Body]:
-        """Bodies that the car perceives, nearest first."""
-        return self.actors.bodies(self.car.position, self.sight)
+        """Bodies that the car perceives, where it takes them to be, nearest first."""
+        x, y = self.car.position
+        bodies = self.actors.bodies(self.car.position, CLEAR_SIGHT)
+        return self._perception.perceive(bodies, float(x), float(y), self.visibility, self.frame)
 
     def _look_ahead(self) -> Hazard | None:
         """The nearest thing on the path that the car has to brake for."""
@@ -386,6 +408,9 @@ class World:
         self._stopped_until = self.frame + round(self.config.collisions_stop * FRAME_RATE)
 
     # --- faults -----------------------------------------------------------------------------------------------------
+
+    def _is_faulty(self, sensor: Sensor, frame: int) -> bool:
+        return self.faults.get(sensor, frame) > frame
 
     def set_fault(self, sensor: Sensor, on: bool) -> str | None:
         """Switches a sensor fault on or off; returns the reason if nothing changes."""

@@ -141,7 +141,7 @@ def test_weather_changes_once() -> None:
     action = AdWizardAction(exception=ExceptionKind.WEATHER, weather=WeatherParameter.FOG_DENSITY, share=0.5)
     assert adversary.carry_out(action) == {"parameter": str(WeatherParameter.FOG_DENSITY), "value": 50.0}
     assert adversary.carry_out(action) == f"{WeatherParameter.FOG_DENSITY} is 50 already"
-    assert world.weather.is_foggy
+    assert world.weather.values[WeatherParameter.FOG_DENSITY] == 50.0
 
 
 def test_fault_ends_by_itself_after_half_a_minute() -> None:

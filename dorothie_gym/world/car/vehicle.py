@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
 from highway_env.vehicle.kinematics import Vehicle
 
 from dorothie_gym.world.car.control import MAX_BRAKING, Control
@@ -16,6 +19,7 @@ class Car(Vehicle):
         control: what the actuators were told last.
         height: of the road under it [m].
         friction: share of the dry road's grip.
+        drift: angle by which wind moves it beside its course, positive right [rad].
         sweep: places [m] that it has still to pass while it turns round, across lanes where others do not expect it.
     """
 
@@ -26,6 +30,7 @@ class Car(Vehicle):
         super().__init__(road, position, heading, 0.0)
         self.control = Control(throttle=0.0, steer=0.0, brake=0.0)
         self.friction = 1.0
+        self.drift = 0.0
         self.sweep: list[tuple[float, float]] = []
 
     def drive(self, control: Control, dt: float) -> None:
@@ -35,6 +40,13 @@ class Car(Vehicle):
         if acceleration < 0.0:
             acceleration = max(acceleration, -MAX_BRAKING * self.friction, -self.speed / dt)
         self.act({"acceleration": acceleration, "steering": control.steering_angle})
+
+    def step(self, dt: float) -> None:
+        """Moves on by `dt` [s], and with the wind."""
+        if self.drift:
+            aside = float(self.speed) * dt * math.tan(self.drift)
+            self.position += aside * np.array([-math.sin(self.heading), math.cos(self.heading)])
+        super().step(dt)
 
     def on_state_update(self) -> None:
         """Matches the car to the closest lane of its height."""

@@ -1,0 +1,145 @@
+"""How well the filter knows where the car is, over many drives by chance."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from dorothie_gym.world.config import FRAME_RATE
+from dorothie_gym.world.localizer import FIX_EVERY, Localizer
+from dorothie_gym.world.town.model import Array
+
+RUNS = 120
+SPEED = 30 / 3.6
+WARM, FAULT, AFTER = 45.0, 30.0, 5.0
+ELLIPSE_95 = 5.991
+"""95 % of chi-square with 2 degrees of freedom."""
+
+DT = 1.0 / FRAME_RATE
+
+
+def drive(seconds: float, rng: np.random.Generator, speed: float = SPEED) -> Array:
+    """Poses of every frame (n + 1, 3): straight blocks and turns of a quarter, as in a town."""
+    frames = round(seconds * FRAME_RATE)
+    rates = np.zeros(frames)
+    k = 0
+    while k < frames:
+        k += int(rng.uniform(4.0, 12.0) * FRAME_RATE)
+        turning = round(2.5 * FRAME_RATE)
+        rates[k : k + turning] = float(rng.choice([-1.0, 1.0])) * math.pi / 2 / 2.5
+        k += turning
+    headings = rng.uniform(-math.pi, math.pi) + np.concatenate(([0.0], np.cumsum(rates * DT)))
+    steps = speed * DT * np.column_stack((np.cos(headings[:-1]), np.sin(headings[:-1])))
+    return np.column_stack((np.concatenate((np.zeros((1, 2)), np.cumsum(steps, axis=0))), headings))
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A fix time of a drive: when [s], what the estimate is off by (3,), and its covariance (3, 3)."""
+
+    time: float
+    error: Array
+    covariance: Array
+
+    @property
+    def off(self) -> float:
+        """Distance of the estimate from the car [m]."""
+        return float(math.hypot(*self.error[:2]))
+
+    def squared(self, dimensions: int) -> float:
+        """Normalised squared error."""
+        e, p = self.error[:dimensions], self.covariance[:dimensions, :dimensions]
+        return float(e @ np.linalg.solve(p, e))
+
+
+@functools.lru_cache(maxsize=1)
+def drives() -> tuple[tuple[Moment, ...], ...]:
+    """RUNS drives with GPS, half a minute without, and GPS again."""
+    return tuple(one_drive(seed) for seed in range(RUNS))
+
+
+def one_drive(seed: int) -> tuple[Moment, ...]:
+    track = drive(WARM + FAULT + AFTER, np.random.default_rng([seed, 1]))
+    localizer = Localizer(*track[0], np.random.default_rng([seed, 2]))
+    moments = []
+    for k in range(FIX_EVERY, len(track), FIX_EVERY):
+        localizer.predict(track[k - FIX_EVERY : k + 1], DT)
+        time = k * DT
+        if not WARM < time <= WARM + FAULT:
+            localizer.correct(float(track[k, 0]), float(track[k, 1]))
+        moments.append(Moment(time, localizer.pose - track[k], localizer.covariance))
+    return tuple(moments)
+
+
+def at(moments: tuple[Moment, ...], time: float) -> Moment:
+    return min(moments, key=lambda moment: abs(moment.time - time))
+
+
+def test_with_gps_the_error_is_under_a_metre() -> None:
+    for moments in drives():
+        errors = [moment.off for moment in moments if moment.time <= WARM]
+        assert math.sqrt(np.mean(np.square(errors))) < 1.0
+
+
+def test_with_gps_the_filter_is_as_sure_as_it_may_be() -> None:
+    squared = [moment.squared(3) for moments in drives() for moment in moments if 5.0 < moment.time <= WARM]
+    # the mean of chi-square with 3 degrees of freedom is 3; errors half a second apart go together, runs do not
+    assert np.mean(squared) == pytest.approx(3.0, abs=3.0 * math.sqrt(6.0 / RUNS))
+    assert np.mean([value < 7.815 for value in squared]) == pytest.approx(0.95, abs=0.03)
+
+
+def test_without_gps_the_estimate_drifts_and_the_filter_knows() -> None:
+    def spread(moments: tuple[Moment, ...], since: float) -> float:
+        return float(np.trace(at(moments, WARM + since).covariance[:2, :2]))
+
+    mean = [np.mean([spread(moments, since) for moments in drives()]) for since in (0.0, 10.0, 20.0, 30.0)]
+    assert mean == sorted(mean)  # on its own a car that comes back the same way may get surer again
+    for moments in drives():
+        headings = [at(moments, WARM + since).covariance[2, 2] for since in (0.0, 10.0, 20.0, 30.0)]
+        assert headings == sorted(headings)
+        assert spread(moments, FAULT) > 2.0 * spread(moments, 0.0)
+    assert np.mean([at(moments, WARM + FAULT).off for moments in drives()]) > 1.0
+
+
+def test_after_half_a_minute_without_gps_the_car_is_within_the_ellipse() -> None:
+    inside = [at(moments, WARM + FAULT).squared(2) <= ELLIPSE_95 for moments in drives()]
+    assert np.mean(inside) >= 0.9
+
+
+def test_gps_brings_the_estimate_back_within_five_seconds() -> None:
+    assert all(at(moments, WARM + FAULT + AFTER).off < 1.0 for moments in drives())
+
+
+def test_a_standing_car_does_not_drift() -> None:
+    localizer = Localizer(3.0, 4.0, 0.5, np.random.default_rng(0))
+    before = localizer.pose
+    for _ in range(60):
+        localizer.predict(np.tile([3.0, 4.0, 0.5], (16, 1)), DT)
+    np.testing.assert_allclose(localizer.pose, before)
+
+
+def test_frames_may_be_bundled_in_any_way() -> None:
+    track = drive(20.0, np.random.default_rng(4))
+    poses = []
+    for bundle in (1, 15, 60):
+        localizer = Localizer(*track[0], np.random.default_rng(9))
+        for k in range(0, len(track) - 1, bundle):
+            localizer.predict(track[k : k + bundle + 1], DT)
+        poses.append(localizer.pose)
+    np.testing.assert_allclose(poses[1], poses[0], atol=1e-9)
+    np.testing.assert_allclose(poses[2], poses[0], atol=1e-9)
+
+
+def test_estimates_are_the_same_for_the_same_seed_only() -> None:
+    assert np.array_equal(one_drive(3)[-1].error, one_drive(3)[-1].error)
+    assert not np.array_equal(one_drive(3)[-1].error, one_drive(4)[-1].error)
+
+
+def test_covariance_stays_symmetric_and_positive() -> None:
+    for moment in one_drive(0):
+        np.testing.assert_allclose(moment.covariance, moment.covariance.T, atol=1e-9)
+        assert np.linalg.eigvalsh(moment.covariance)[0] > 0.0
