@@ -128,7 +128,7 @@ class Adversary:
             return reason
         row = self._world.actors.props.index(prop)
         self._world.actors.remove_prop(prop)
-        moved = self._world.actors.add_prop(prop.kind, action.place.lane, float(action.place.metres))
+        moved = self._world.actors.add_prop(prop.kind, action.place.lane, float(action.place.metres), key=prop.key)
         props = self._world.actors.props
         props.insert(row, props.pop())
         return {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -110,9 +111,16 @@ class Actors:
         self.pedestrians.append(pedestrian)
         return True
 
-    def add_prop(self, kind: PropKind, lane: int, station: float) -> Prop:
-        """Puts a prop on a lane; whether it may stand there is the caller's business."""
-        prop = Prop(self._road, kind, lane, station)
+    def add_prop(self, kind: PropKind, lane: int, station: float, *, key: int | None = None) -> Prop:
+        """Puts a prop on a lane; whether it may stand there is the caller's business.
+
+        Args:
+            kind: of prop.
+            lane: it stands on.
+            station: distance along the lane [m].
+            key: that of a prop that is moved; by default a new one.
+        """
+        prop = Prop(self._road, kind, lane, station, key=self._new_key() if key is None else key)
         self._road.objects.append(prop)
         self.props.append(prop)
         return prop
@@ -133,22 +141,19 @@ class Actors:
         self.pedestrians = [p for p in self.pedestrians if not p.crashed]
         self._road.objects = [o for o in self._road.objects if not (isinstance(o, Pedestrian) and o.crashed)]
 
-    def take_crashed(self, car: Car) -> list[tuple[ObjectClass, Any]]:
-        """Those that the car has just touched, with their class; all but props stay until they are towed away."""
+    def book(self, touched: Sequence[Any]) -> list[tuple[ObjectClass, Any]]:
+        """What the car has touched, with their classes; all but props stay until they are towed away."""
         hit: list[tuple[ObjectClass, Any]] = []
-        reach = car.LENGTH
-        for vehicle in self.vehicles:
-            if vehicle.crashed and _near(vehicle, car, reach + 1.5) and vehicle.collidable:
-                hit.append((ObjectClass.VEHICLES, vehicle))
-        for pedestrian in self.pedestrians:
-            if pedestrian.crashed and _near(pedestrian, car, reach) and pedestrian.collidable:
-                hit.append((ObjectClass.PEDESTRIAN, pedestrian))
-        for prop in list(self.props):
-            if prop.crashed and _near(prop, car, reach + 1.5):
-                hit.append((ObjectClass.STATIC, prop))
-                self.remove_prop(prop)
-        for _, other in hit:
-            other.collidable = False  # touched once: it does not count again until it is towed
+        for thing in touched:
+            thing.collidable = False  # touched once: it does not count again until it is towed
+            if isinstance(thing, Prop):
+                hit.append((ObjectClass.STATIC, thing))
+                self.remove_prop(thing)
+            elif isinstance(thing, Pedestrian):
+                hit.append((ObjectClass.PEDESTRIAN, thing))
+            else:
+                thing.speed = 0.0  # else it would go on through the car
+                hit.append((ObjectClass.VEHICLES, thing))
         return hit
 
     # --- moving and seeing ------------------------------------------------------------------------------------------
@@ -174,7 +179,7 @@ class Actors:
             for thing in group:
                 dx, dy = thing.position[0] - x, thing.position[1] - y
                 if dx * dx + dy * dy < sight * sight:
-                    found.append((dx * dx + dy * dy, getattr(thing, "key", -3), kind, thing))
+                    found.append((dx * dx + dy * dy, thing.key, kind, thing))
         found.sort(key=lambda row: row[:2])
         return [_body(kind, key, thing) for _, key, kind, thing in found]
 

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import enum
 import functools
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -23,6 +19,7 @@ from dorothie_gym.world.junctions import CRITICAL_GAP, JunctionControl, Wait
 from dorothie_gym.world.localizer import Localizer
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.network.road import TownRoad
+from dorothie_gym.world.reports import Pose, Reports, WorldEvent, WorldEventKind
 from dorothie_gym.world.town.model import Array, Town
 from dorothie_gym.world.traffic import room_at_start
 from dorothie_gym.world.weather import Weather
@@ -55,23 +52,6 @@ STANDING = 0.1
 """Slower than this the car stands [m/s]."""
 
 
-class WorldEventKind(enum.StrEnum):
-    """What the world reports of its own."""
-
-    HAZARD_STOP = "hazard_stop"
-    HAZARD_END = "hazard_end"
-    COLLISION = "collision"
-
-
-@dataclass(frozen=True, kw_only=True)
-class WorldEvent:
-    """Something that happened to the car, at a frame."""
-
-    frame: int
-    kind: WorldEventKind
-    data: Mapping[str, Any] = field(default_factory=dict)
-
-
 class World:
     """A town in which a car drives among others.
 
@@ -88,6 +68,7 @@ class World:
         frame: physics frames since the start.
         frames: trajectory of the last call of `step` (n, 9), see `FRAME_COLUMNS`.
         collisions: those of the car's own making.
+        reports: what has happened to the car, and how often it broke which rule.
     """
 
     def __init__(
@@ -134,7 +115,7 @@ class World:
         self.frame = 0
         self.frames: Array = np.zeros((0, len(FRAME_COLUMNS)))
         self.collisions = 0
-        self._events: list[WorldEvent] = []
+        self.reports = Reports(self.network, self._pose(), self.car.LENGTH)
 
     # --- time -------------------------------------------------------------------------------------------------------
 
@@ -145,8 +126,8 @@ class World:
 
     def step(self, frames: int) -> list[WorldEvent]:
         """Lets the world run for a number of physics frames; returns what happened to the car."""
-        self._events = []
         rows = np.empty((frames, len(FRAME_COLUMNS)))
+        poses: list[Pose] = []
         before = (self.car.position.copy(), float(self.car.heading))
         for k in range(frames):
             if k % EXTEND_EVERY == 0:
@@ -157,11 +138,12 @@ class World:
                 self.frame, self.car.position[0], self.car.position[1], self.car.heading, self.car.speed,
                 control.throttle, control.steer, control.brake, self.planner.lane,
             )  # fmt: skip
+            poses.append(self._pose())
         self.frames = rows
         self._localize(*before, frames / FRAME_RATE)
         self.actors.tidy()
         self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
-        return self._events
+        return self.reports.close(poses, self.frame)
 
     def _substep(self) -> None:
         dt = 1.0 / FRAME_RATE
@@ -357,33 +339,42 @@ class World:
             if hazard is not None and limiting and not self.planner.held:
                 if (speed < 1.0 and hazard.speed < 1.0) or brake * 8.0 > HARD:
                     self.hazard, self._hazard_since, self._hazard_seen = hazard, self.frame, self.frame
-                    self._log(
-                        WorldEventKind.HAZARD_STOP, reason=hazard.kind.label, distance=round(max(hazard.gap, 0.0), 2)
-                    )
+                    self.reports.add(
+                        WorldEventKind.HAZARD_STOP, self.frame,
+                        reason=hazard.kind.label, distance=round(max(hazard.gap, 0.0), 2),
+                    )  # fmt: skip
             return
         if limiting and hazard is not None:
             self.hazard, self._hazard_seen = hazard, self.frame
         if self.frame - self._hazard_seen > FRAME_RATE // 2:
             seconds = (self.frame - self._hazard_since) / FRAME_RATE
-            self._log(WorldEventKind.HAZARD_END, reason=self.hazard.kind.label, seconds=round(seconds, 2))
+            self.reports.add(
+                WorldEventKind.HAZARD_END, self.frame, reason=self.hazard.kind.label, seconds=round(seconds, 2)
+            )
             self.hazard = None
 
-    def _log(self, kind: WorldEventKind, **data: Any) -> None:
-        self._events.append(WorldEvent(frame=self.frame, kind=kind, data=data))
-
-    # --- collisions -------------------------------------------------------------------------------------------------
+    # --- infractions ------------------------------------------------------------------------------------------------
 
     def _collide(self, speed: float) -> None:
-        """Books a collision: whose fault it was, and who is towed away."""
+        """Books collisions: whose fault they were, and who is towed away."""
         car = self.car
-        for kind, other in self.actors.take_crashed(car):
+        for kind, other in self.actors.book(car.take_touched()):
             offset = np.asarray(other.position) - car.position
             forward = float(offset @ np.array([math.cos(car.heading), math.sin(car.heading)]))
             own = speed > 0.5 and forward > 0.0
             self.collisions += own
-            self._log(WorldEventKind.COLLISION, other=kind.label, own_fault=own, speed=round(speed, 2))
-        car.crashed, car.impact, car.speed = False, None, 0.0
+            self.reports.infraction(
+                WorldEventKind.COLLISION, self.frame, lane=self.planner.lane, station=self.planner.station,
+                x=car.position[0], y=car.position[1], key=other.key, other=kind,
+                own_fault=own, speed=round(speed, 2),
+            )  # fmt: skip
+        car.speed = 0.0
         self._stopped_until = self.frame + round(self.config.collisions_stop * FRAME_RATE)
+
+    def _pose(self) -> Pose:
+        turning = self.planner.manoeuvre[0] is PhysicalAction.U_TURN and self.planner.in_manoeuvre
+        x, y = self.car.position
+        return Pose(float(x), float(y), float(self.car.heading), float(self.car.speed), self.car.height, turning)
 
     # --- faults -----------------------------------------------------------------------------------------------------
 
