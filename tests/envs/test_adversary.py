@@ -34,7 +34,7 @@ def free_place(world: World, adversary: Adversary) -> AdWizardAction:
     for lane in world.town.lanes:
         for metres in range(30, int(lane.length) - 8, 5):
             action = place(lane.id, metres)
-            if not lane.in_junction and adversary._unsafe(action, without=None) is None:
+            if not lane.in_junction and adversary._unsafe(action, action.prop, without=None) is None:
                 return action
     raise AssertionError("no place for a prop")
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import breadth_first_order, dijkstra
+from scipy.sparse.csgraph import breadth_first_order, connected_components, dijkstra
 
 from dorothie_gym.world.town.cells import (
     CELL,
@@ -203,6 +203,32 @@ class Router:
         found[order] = True
         found[self.cell(*start)] = True
         return found[: self._graph.cells]
+
+    def onward(self, start: Place, blocked: Sequence[Place] = ()) -> NDArray[np.bool_]:
+        """For every node of the graph, whether a car comes to it that drives on from a place past the roadblocks.
+
+        The nodes are the starts of the cells, in their order, then the tails of the lanes (`cells`). The cell that the
+        start is in counts if the car can come back to its beginning.
+        """
+        moves = self._open(blocked, self._graph.departures(start, None, blocked))
+        order = breadth_first_order(self._matrix(moves), self._graph.start, directed=True, return_predecessors=False)
+        found = np.zeros(self._graph.nodes, dtype=np.bool_)
+        found[order] = True
+        found[self._graph.start] = False
+        return found
+
+    def safe(self, goals: Sequence[int], blocked: Sequence[Place] = ()) -> NDArray[np.bool_]:
+        """For every node, whether all of some cells can be reached from it past the roadblocks; see `onward`."""
+        matrix = self._matrix(self._open(blocked, Moves.make(0)))
+        _, group = connected_components(matrix, directed=True, connection="strong")
+        result = np.ones(self._graph.nodes, dtype=np.bool_)
+        # what leads to one node of a group leads to all of it, and in a town nearly everything is one group
+        for goal in {int(group[goal]): goal for goal in goals}.values():
+            order = breadth_first_order(matrix.T.tocsr(), goal, directed=True, return_predecessors=False)
+            leading = np.zeros(self._graph.nodes, dtype=np.bool_)
+            leading[order] = True
+            result &= leading
+        return result
 
     def distances_to(self, goal: Place, blocked: Sequence[Place] = ()) -> NDArray[np.float64]:
         """Cost of the way from the start of every cell to a goal [m at 40 km/h]; inf where there is none."""
