@@ -16,6 +16,7 @@ from dorothie_gym.world.car.hazards import HARD_BRAKING
 from dorothie_gym.world.car.planner import BRAKING
 from dorothie_gym.world.props import Prop
 from dorothie_gym.world.roadblocks import crowds, cuts_off
+from dorothie_gym.world.town.model import Array, LinkType
 from dorothie_gym.world.world import World
 
 FROM_START = 30.0
@@ -112,20 +113,22 @@ class Adversary:
         corners = (float(middle[0] - half), float(middle[0] + half), float(middle[1] - half), float(middle[1] + half))
         return {"asked": action.count, "count": done, **dict(zip(("x0", "x1", "y0", "y1"), corners, strict=True))}
 
-    def _places_within(self, middle: Any, half: float, *, driving: bool) -> list[tuple[int, float]]:
-        """Places on lanes in a square where somebody may appear: vehicles on no waypoint of any landmark."""
-        town = self._world.town
+    def _places_within(self, middle: Array, half: float, *, driving: bool) -> list[tuple[int, float]]:
+        """Places in a square where somebody may appear: on lanes but no landmark's waypoint, or at the right kerb."""
+        world, town = self._world, self._world.town
         places = []
         for lane in town.lanes:
             if lane.in_junction or lane.length < 12.0:
                 continue
+            if not driving and town.neighbour(lane.id, LinkType.LANE_CHANGE_RIGHT) is not None:
+                continue
             waypoints = [site.station for site in town.sites if site.lane == lane.id] if driving else []
-            for station in np.arange(6.0, lane.length - 5.0, SPAWN_STEP):
-                x, y = lane.position(float(station))
+            for station in np.arange(6.0, lane.length - 5.0, SPAWN_STEP).tolist():
+                x, y = lane.position(station) if driving else world.actors.kerb(lane.id, station)
                 if max(abs(x - middle[0]), abs(y - middle[1])) > half:
                     continue
                 if all(abs(waypoint - station) >= FROM_WAYPOINT for waypoint in waypoints):
-                    places.append((lane.id, float(station)))
+                    places.append((lane.id, station))
         return places
 
     def _place_prop(self, action: AdWizardAction) -> Outcome:

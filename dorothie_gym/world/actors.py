@@ -11,6 +11,8 @@ import numpy as np
 from dorothie_gym.ontology import ObjectClass, PropKind
 from dorothie_gym.world.car.hazards import Body
 from dorothie_gym.world.car.vehicle import Car
+from dorothie_gym.world.cyclists import SHARE, Cyclist, may_ride
+from dorothie_gym.world.cyclists import SPEEDS as CYCLING_SPEEDS
 from dorothie_gym.world.junctions import JunctionControl
 from dorothie_gym.world.network.road import TownRoad
 from dorothie_gym.world.pedestrians import KERB, Pedestrian, leftmost, rightmost, walkway
@@ -38,7 +40,19 @@ CLEAR_OF_CAR = 25.0
 """Nobody appears closer to the car than this [m]."""
 
 CLEAR_OF_OTHERS = 14.0
-"""Nobody appears closer to others than this [m]."""
+"""Nobody appears closer to others before or behind it than this [m], ..."""
+
+CLEAR_BESIDE = 2.5
+"""... who are no farther aside than this [m], ..."""
+
+CLEAR_OF_BODIES = 6.0
+"""... nor this close to the middle of any, half of it aside [m]."""
+
+DRIVING_SPEEDS = (6.5, 10.0)
+"""Least and greatest desired speed of traffic [m/s]."""
+
+CLEAR_OF_WALKER = 8.0
+"""No pedestrian appears closer to the car than this [m]."""
 
 OUT_OF_SIGHT = 60.0
 """A towed vehicle comes back no closer to the car than this [m]."""
@@ -48,7 +62,7 @@ class Actors:
     """Traffic, pedestrians and props of a road.
 
     Attributes:
-        vehicles: background traffic, in the order of their keys.
+        vehicles: background traffic, cyclists among it, in the order of their keys.
         pedestrians: people on foot.
         props: things placed by the Ad-Wizard.
     """
@@ -80,26 +94,36 @@ class Actors:
             self.add_pedestrian(lane, station)
 
     def add_vehicle(self, lane: int, station: float, *, distance: float) -> bool:
-        """Puts a vehicle on a lane if there is room and the car is farther than `distance` [m]."""
-        place = self._town.lanes[lane].position(station)
-        if not self._is_clear(place, distance):
+        """Puts a vehicle, or a cyclist, on a lane if there is room and the car is farther than `distance` [m]."""
+        town = self._town
+        if not self._is_clear(lane, station, distance):
             return False
-        vehicle = TrafficVehicle(
+        cycles = may_ride(town.lanes[lane]) and lane == rightmost(town, lane) and self._traffic_rng.random() < SHARE
+        kind, speeds = (Cyclist, CYCLING_SPEEDS) if cycles else (TrafficVehicle, DRIVING_SPEEDS)
+        vehicle = kind(
             self._road, lane, station, key=self._new_key(), speed=0.0,
-            desired_speed=float(self._traffic_rng.uniform(6.5, 10.0)),
+            desired_speed=float(self._traffic_rng.uniform(*speeds)),
             junctions=self._junctions, curve_speeds=self._curve_speeds, rng=self._traffic_rng,
         )  # fmt: skip
         self._road.vehicles.append(vehicle)
         self.vehicles.append(vehicle)
         return True
 
-    def add_pedestrian(self, lane: int, station: float) -> bool:
-        """Puts a pedestrian beside a lane if nobody is there."""
-        lane = rightmost(self._town, lane)
+    def kerb(self, lane: int, station: float) -> Array:
+        """Where a pedestrian stands beside a lane (2,) [m]; `lane` is the rightmost one of its direction."""
         town_lane = self._town.lanes[lane]
-        station = min(station, town_lane.length)
-        place = town_lane.position(station, town_lane.width_at(station) / 2 + KERB)
-        if math.hypot(*(place - self._car.position)) < 8.0:
+        place: Array = town_lane.position(station, town_lane.width_at(station) / 2 + KERB)
+        return place
+
+    def add_pedestrian(self, lane: int, station: float) -> bool:
+        """Puts a pedestrian beside a lane, or to the right of those beside it, if nobody is there.
+
+        Such pedestrians keep to the street where they are, and cross it anywhere.
+        """
+        lane = rightmost(self._town, lane)
+        station = min(station, self._town.lanes[lane].length)
+        place = self.kerb(lane, station)
+        if math.hypot(*(place - self._car.position)) < CLEAR_OF_WALKER:
             return False
         if any(math.hypot(*(place - p.position)) < 1.0 for p in self.pedestrians):
             return False
@@ -208,11 +232,20 @@ class Actors:
         car = self._car
         return bool(getattr(car, "sweep", None)) and car.speed < STANDING and _near(vehicle, car, 6.0)
 
-    def _is_clear(self, place: Array, distance: float) -> bool:
+    def _is_clear(self, lane: int, station: float, distance: float) -> bool:
+        """Whether a vehicle would have room: to the car, to whoever is on the lane, and to what is beside it."""
+        town_lane = self._town.lanes[lane]
+        place, heading = town_lane.position(station), town_lane.heading_at(station)
         if math.hypot(*(place - self._car.position)) < distance:
             return False
+        c, s = math.cos(heading), math.sin(heading)
         others: list[Any] = [*self.vehicles, *self.props]
-        return all(math.hypot(*(place - other.position)) >= CLEAR_OF_OTHERS for other in others)
+        for other in others:
+            dx, dy = other.position - place
+            along, across = abs(dx * c + dy * s), abs(dy * c - dx * s)
+            if along < CLEAR_OF_OTHERS and across < (CLEAR_BESIDE if along > CLEAR_OF_BODIES else CLEAR_OF_BODIES / 2):
+                return False
+        return True
 
     def _remove(self, vehicle: TrafficVehicle) -> None:
         self._junctions.release(vehicle.key)

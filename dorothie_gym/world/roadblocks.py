@@ -64,15 +64,20 @@ def cuts_off(town: Town, car: Place, standing: Sequence[Place], added: Place) ->
         from a place that the car can come to, or from where it would stand before one of the props.
     """
     search = router(town)
-    before = [spot for place in standing for spot in closed_by(place)]
-    after = [*before, *closed_by(added)]
-    on = search.onward(car, before)
-    goals = sorted({cell for site in town.sites if on[cell := search.cell(site.lane, site.station)]})
-    safe, still_safe = search.safe(goals, before), search.safe(goals, after)
-    lost = safe & ~still_safe
-    stands = [(lane, max(station - STANDS_BEFORE, 0.0)) for lane, station in [*standing, added]]
-    for start in [car, *stands]:
-        on = search.onward(start, after)
-        if not on[goals].all() or (on & lost).any():
-            return True
-    return False
+    props = [*standing, added]
+    closed = [spot for place in props for spot in closed_by(place)]
+    stands = [_stand(place) for place in props]
+    on = search.onward(car)
+    goals = [cell for site in town.sites if on[cell := search.cell(site.lane, site.station)]]
+    safe = search.safe(goals, closed, stands)
+    lost = search.safe(goals) & ~safe
+    near = [at for lane, at in props if lane == car[0] and 0.0 < at - car[1] < STANDS_BEFORE + 2 * CELL]
+    held = (car[0], max(min(near) - STANDS_BEFORE, car[1])) if near else None
+    on = search.onward(car, closed, stands, held)
+    if not on[goals].all() or (on & lost).any():
+        return True
+    return not all(search.leads_to(stand, safe, closed) for stand in stands)
+
+
+def _stand(place: Place) -> Place:
+    return place[0], max(place[1] - STANDS_BEFORE, 0.0)

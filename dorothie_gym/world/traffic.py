@@ -82,6 +82,7 @@ class TrafficVehicle(IDMVehicle):
         key: tells it apart; keys of bodies in the world are unique.
         height: of the road under it [m].
         crossing: the car while it turns round, across lanes where others do not expect it.
+        aside: how far to the right of its lane's middle it keeps [m].
         standing: how long it has been standing [s].
         stuck: the same less the time for which the next light was not green [s].
     """
@@ -111,6 +112,7 @@ class TrafficVehicle(IDMVehicle):
         self._front: Any | None = None
         self._front_gap = math.inf
         self.crossing: Any | None = None
+        self.aside = 0.0
         self.standing = self.stuck = 0.0
         self.crash_age = 0.0
         self._line_lane = -1  # at whose end the next junction begins
@@ -176,6 +178,7 @@ class TrafficVehicle(IDMVehicle):
         """Stock's steering angle towards a lane [rad], computed on plain numbers, which is several times faster."""
         lane = self._network.get_lane(target_lane_index)
         station, lateral = lane.local_coordinates(self.position)
+        lateral -= self.aside
         ahead = lane.heading_at(station + self.speed * self.TAU_PURSUIT)
         speed = not_zero(self.speed)
         back = math.asin(min(max(-self.KP_LATERAL * lateral / speed, -1.0), 1.0))
@@ -237,11 +240,16 @@ class TrafficVehicle(IDMVehicle):
     def _extend_route(self) -> None:
         length = sum(self._network.get_lane(index).length for index in self.route[1:])
         while length < ROUTE_AHEAD:
-            onward: list[LaneIndex] = self._network.successors(self.route[-1])
+            onward = self._onward(self.route[-1])
             if not onward:
                 return
             self.route.append(onward[int(self._rng.integers(len(onward)))] if len(onward) > 1 else onward[0])
             length += self._network.get_lane(self.route[-1]).length
+
+    def _onward(self, lane: LaneIndex) -> list[LaneIndex]:
+        """Ways on from a lane."""
+        found: list[LaneIndex] = self._network.successors(lane)
+        return found
 
     def _speed_ahead(self, station: float) -> float:
         """Desired speed, less where a bend ahead asks for it [m/s]."""

@@ -80,7 +80,7 @@ def play_standing(name: str, seed: int, actions: int) -> int:
             put += 1
             assert unreachable(world) == set(), f"{name}, seed {seed}: {action}"
             for lane, station in props(world):  # nor is it trapped where it would stand before a prop
-                stand = lane, max(station - 16.0, 0.0)
+                stand = lane, station - 16.0
                 assert len(brute_force(world.town).sites(stand, props(world))) == len(world.town.sites)
     return put
 
