@@ -11,15 +11,18 @@ import numpy as np
 from dorothie_gym.ontology import ObjectClass, PropKind
 from dorothie_gym.world.car.hazards import Body
 from dorothie_gym.world.car.vehicle import Car
+from dorothie_gym.world.crosswalks import Crosswalks
 from dorothie_gym.world.cyclists import SHARE, Cyclist, may_ride
 from dorothie_gym.world.cyclists import SPEEDS as CYCLING_SPEEDS
 from dorothie_gym.world.junctions import JunctionControl
 from dorothie_gym.world.network.road import TownRoad
 from dorothie_gym.world.pedestrians import KERB, Pedestrian, leftmost, rightmost, walkway
 from dorothie_gym.world.props import Prop
+from dorothie_gym.world.town.footways import WayKind, footways
 from dorothie_gym.world.town.model import Array
 from dorothie_gym.world.town.oncoming import oncoming_lanes
 from dorothie_gym.world.traffic import CurveSpeeds, TrafficVehicle, free_places
+from dorothie_gym.world.walkers import Walker
 
 TOW_CRASHED = 3.0
 """A crashed vehicle is towed away after this long [s]."""
@@ -64,30 +67,35 @@ class Actors:
     Attributes:
         vehicles: background traffic, cyclists among it, in the order of their keys.
         pedestrians: people on foot.
+        crosswalks: who is on them.
         props: things placed by the Ad-Wizard.
     """
 
     def __init__(
         self, road: TownRoad, junctions: JunctionControl, car: Car, *,
-        traffic_rng: np.random.Generator, walk_rng: np.random.Generator,
+        traffic_rng: np.random.Generator, walk_rng: np.random.Generator, crosswalks: Crosswalks | None = None,
     ) -> None:  # fmt: skip
         self._road, self._junctions, self._car = road, junctions, car
         self._traffic_rng, self._walk_rng = traffic_rng, walk_rng
         self._town = road.network.town
         self._curve_speeds = CurveSpeeds(self._town)
+        self.crosswalks = crosswalks if crosswalks is not None else Crosswalks(self._town)
         self._next_key = 1
         self.vehicles: list[TrafficVehicle] = []
-        self.pedestrians: list[Pedestrian] = []
+        self.pedestrians: list[Pedestrian | Walker] = []
         self.props: list[Prop] = []
 
     # --- coming and going -------------------------------------------------------------------------------------------
 
     def populate(self, *, vehicles: int, pedestrians: int) -> None:
-        """Brings traffic and pedestrians to random places, as many as fit."""
+        """Brings traffic and pedestrians to random places, as many as fit; these to pavements, if there are any."""
         for lane, station in free_places(self._town, self._traffic_rng, 12 * vehicles):
             if len(self.vehicles) == vehicles:
                 break
             self.add_vehicle(lane, station, distance=CLEAR_OF_CAR)
+        if self._town.sidewalks:
+            self._add_walkers(pedestrians)
+            return
         for lane, station in free_places(self._town, self._walk_rng, 12 * pedestrians):
             if len(self.pedestrians) == pedestrians:
                 break
@@ -103,11 +111,30 @@ class Actors:
         vehicle = kind(
             self._road, lane, station, key=self._new_key(), speed=0.0,
             desired_speed=float(self._traffic_rng.uniform(*speeds)),
-            junctions=self._junctions, curve_speeds=self._curve_speeds, rng=self._traffic_rng,
+            junctions=self._junctions, crosswalks=self.crosswalks, curve_speeds=self._curve_speeds,
+            rng=self._traffic_rng,
         )  # fmt: skip
         self._road.vehicles.append(vehicle)
         self.vehicles.append(vehicle)
         return True
+
+    def _add_walkers(self, count: int) -> None:
+        """Puts people on pavements, drawn evenly along them."""
+        ways = footways(self._town)
+        pavements = [k for k, way in enumerate(ways.ways) if way.kind is WayKind.PAVEMENT]
+        lengths = np.array([ways.ways[k].length for k in pavements])
+        for k in self._walk_rng.choice(pavements, size=12 * count, p=lengths / lengths.sum()):
+            if len(self.pedestrians) == count:
+                return
+            station = float(self._walk_rng.uniform(0.0, ways.ways[k].length))
+            place = np.array(ways.ways[k].place(station)[:2])
+            others = [(self._car, CLEAR_OF_WALKER), *((other, 1.5) for other in self.pedestrians)]
+            if all(math.hypot(*(place - other.position)) >= room for other, room in others):
+                walker = Walker(
+                    self._road, ways, self.crosswalks, int(k), station, key=self._new_key(), rng=self._walk_rng
+                )  # fmt: skip
+                self._road.objects.append(walker)
+                self.pedestrians.append(walker)
 
     def kerb(self, lane: int, station: float) -> Array:
         """Where a pedestrian stands beside a lane (2,) [m]; `lane` is the rightmost one of its direction."""
@@ -163,7 +190,7 @@ class Actors:
                 self._remove(vehicle)
                 self._replace()
         self.pedestrians = [p for p in self.pedestrians if not p.crashed]
-        self._road.objects = [o for o in self._road.objects if not (isinstance(o, Pedestrian) and o.crashed)]
+        self._road.objects = [o for o in self._road.objects if not (isinstance(o, Pedestrian | Walker) and o.crashed)]
 
     def book(self, touched: Sequence[Any]) -> list[tuple[ObjectClass, Any]]:
         """What the car has touched, with their classes; all but props stay until they are towed away."""
@@ -173,7 +200,7 @@ class Actors:
             if isinstance(thing, Prop):
                 hit.append((ObjectClass.STATIC, thing))
                 self.remove_prop(thing)
-            elif isinstance(thing, Pedestrian):
+            elif isinstance(thing, Pedestrian | Walker):
                 hit.append((ObjectClass.PEDESTRIAN, thing))
             else:
                 thing.speed = 0.0  # else it would go on through the car
@@ -185,11 +212,15 @@ class Actors:
     def act(self, dt: float) -> None:
         """Lets traffic decide and pedestrians walk for `dt` [s]; `road.step` then moves the traffic."""
         crossing = self._car if getattr(self._car, "sweep", None) else None
+        self.crosswalks.note(self.pedestrians)
         for vehicle in self.vehicles:
             vehicle.crossing = crossing
             vehicle.act()
         for pedestrian in self.pedestrians:
-            pedestrian.walk(dt, self._across)
+            if isinstance(pedestrian, Walker):
+                pedestrian.walk(dt)
+            else:
+                pedestrian.walk(dt, self._across)
 
     def bodies(self, position: Array, sight: float) -> list[Body]:
         """Bodies within sight of a position, nearest first."""

@@ -15,7 +15,7 @@ from dorothie_gym.world.car.path import U_TURN_REACH
 from dorothie_gym.world.car.planner import BEGUN, BRAKING, LocalPlanner
 from dorothie_gym.world.car.vehicle import Car
 from dorothie_gym.world.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
-from dorothie_gym.world.junctions import CRITICAL_GAP, JunctionControl, Wait
+from dorothie_gym.world.junctions import CRITICAL_GAP, HARDEST_BRAKING, JunctionControl, Wait
 from dorothie_gym.world.localizer import Localizer
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.network.road import TownRoad
@@ -203,8 +203,28 @@ class World:
         )
         blocked = found is not None and found.safe_speed() <= 0.0
         gap = self._gap_to_traffic(bodies, blocked=blocked)
-        hazards = [h for h in (found, self._junction_ahead(), gap) if h is not None]
+        crosswalk = self._crosswalk_ahead()
+        junction = None if crosswalk is not None and crosswalk.safe_speed() <= 0.0 else self._junction_ahead()
+        hazards = [h for h in (found, crosswalk, junction, gap) if h is not None]
         return min(hazards, key=Hazard.safe_speed, default=None)
+
+    def _crosswalk_ahead(self) -> Hazard | None:
+        """The next crosswalk on the path with people on it, whom the car sees and for whom it can still stop."""
+        path, planner, speed = self.planner.path, self.planner, float(self.car.speed)
+        reach = speed**2 / (2 * BRAKING) + ASKING + self.car.LENGTH / 2
+        first, last = path.index_at(planner.s), path.index_at(planner.s + reach)
+        for k in range(first, last + 1):
+            lane = int(path.lanes[k])
+            if path.manoeuvre[k] or (k > first and path.lanes[k - 1] == lane):
+                continue
+            for span in self.actors.crosswalks.spans(lane):
+                gap = float(path.s[k]) + span.start - float(path.stations[k]) - planner.s - self.car.LENGTH / 2
+                if gap < 0.0 or gap > reach or speed**2 > 2 * HARDEST_BRAKING * max(gap, 0.1):
+                    continue
+                walker = self.actors.crosswalks.holds(span)
+                if walker is not None and math.hypot(*(walker.position - self.car.position)) < self.sight:
+                    return Hazard(kind=ObjectClass.PEDESTRIAN, gap=gap, key=walker.key, line=True)
+        return None
 
     def _junction_ahead(self) -> Hazard | None:
         """The line before a junction that the car may not enter yet."""

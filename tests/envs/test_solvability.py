@@ -81,6 +81,8 @@ def play_standing(name: str, seed: int, actions: int) -> int:
             assert unreachable(world) == set(), f"{name}, seed {seed}: {action}"
             for lane, station in props(world):  # nor is it trapped where it would stand before a prop
                 stand = lane, station - 16.0
+                if any(other == lane and stand[1] - 16.0 < at < station for other, at in props(world)):
+                    continue  # nobody comes to stand there
                 assert len(brute_force(world.town).sites(stand, props(world))) == len(world.town.sites)
     return put
 
