@@ -102,6 +102,10 @@ def _collision(data: Mapping[str, Any]) -> tuple[str, str]:
     return f"collides at {data['speed'] * 3.6:.0f} km/h: {data['other']} ({fault})", "bold red"
 
 
+def _breach(text: str) -> Callable[[Mapping[str, Any]], tuple[str, str]]:
+    return lambda data: (text, "bold red")
+
+
 def _subgoal(data: Mapping[str, Any], task: str) -> tuple[str, str]:
     status = data["status"]
     if status == "Complete":
@@ -115,4 +119,8 @@ _DESCRIBED: Mapping[EventType, Callable[[Mapping[str, Any]], tuple[str, str]]] =
     EventType.EXCEPTION: _exception,
     EventType.HAZARD_STOP: _hazard,
     EventType.COLLISION: _collision,
+    EventType.RED_LIGHT: _breach("runs a red light"),
+    EventType.STOP_SIGN: _breach("passes a stop sign without standing"),
+    EventType.OFF_ROAD: _breach("leaves the road"),
+    EventType.WRONG_WAY: _breach("drives against the traffic"),
 }

@@ -8,13 +8,14 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from dorothie_gym.ontology import ExceptionKind, GoalStatus
+from dorothie_gym.ontology import ExceptionKind, GoalStatus, PropKind
 from dorothie_gym.spaces import AdWizardAction
 from dorothie_gym.tasks import StoryboardError, TaskState
+from dorothie_gym.world.boxes import Box, boxes_touch
 from dorothie_gym.world.car.planner import BRAKING
 from dorothie_gym.world.props import Prop
-from dorothie_gym.world.town import Town
-from dorothie_gym.world.town.routing import CELL, router
+from dorothie_gym.world.roadblocks import crowds, cuts_off
+from dorothie_gym.world.town.model import Array, LinkType
 from dorothie_gym.world.world import World
 
 FROM_START = 30.0
@@ -29,8 +30,17 @@ FROM_SITE = 25.0
 FROM_CAR = 25.0
 """Nothing appears closer to the car than this [m], nor than it can stop, and turn round, before."""
 
-STANDS_BEFORE = 17.0
-"""The middle of a car that stops for a prop stands about this far before the prop's [m]."""
+FROM_VEHICLE = 6.0
+"""A prop appears no closer to a vehicle's middle than this [m]."""
+
+FROM_PROP = 0.5
+"""And leaves this much room around it to other props [m]."""
+
+FROM_WAYPOINT = 8.0
+"""No vehicle appears closer along the lane to a landmark's waypoint than this [m]."""
+
+SPAWN_STEP = 3.5
+"""Places for newcomers are looked for at this distance along the lanes [m]."""
 
 MOST = 30
 """Vehicles, and pedestrians, that spawning fills a town up to."""
@@ -83,7 +93,8 @@ class Adversary:
             return f"there are {MOST} of them in the town already"
         middle = world.town.lanes[action.place.lane].position(action.place.metres)
         half = max(float(action.extent), 5.0)
-        candidates = self._places_within(middle, half)
+        driving = action.exception is ExceptionKind.SPAWN_VEHICLES
+        candidates = self._places_within(middle, half, driving=driving)
         order = np.random.default_rng([world.frame, action.place.lane, action.place.metres]).permutation(
             len(candidates)
         )
@@ -92,8 +103,8 @@ class Adversary:
             if done == action.count or len(crowd) >= MOST:
                 break
             lane, station = candidates[int(k)]
-            if action.exception is ExceptionKind.SPAWN_VEHICLES:
-                done += world.actors.add_vehicle(lane, station, distance=max(FROM_CAR, self._stopping_distance()))
+            if driving:
+                done += world.actors.add_vehicle(lane, station, distance=FROM_CAR + self._stopping_distance())
             else:
                 done += world.actors.add_pedestrian(lane, station)
         if done == 0:
@@ -101,21 +112,28 @@ class Adversary:
         corners = (float(middle[0] - half), float(middle[0] + half), float(middle[1] - half), float(middle[1] + half))
         return {"asked": action.count, "count": done, **dict(zip(("x0", "x1", "y0", "y1"), corners, strict=True))}
 
-    def _places_within(self, middle: Any, half: float) -> list[tuple[int, float]]:
+    def _places_within(self, middle: Array, half: float, *, driving: bool) -> list[tuple[int, float]]:
+        """Places in a square where somebody may appear: on lanes but no landmark's waypoint, or at the right kerb."""
+        world, town = self._world, self._world.town
         places = []
-        for lane in self._world.town.lanes:
+        for lane in town.lanes:
             if lane.in_junction or lane.length < 12.0:
                 continue
-            for station in np.arange(6.0, lane.length - 5.0, 7.0):
-                x, y = lane.position(float(station))
-                if abs(x - middle[0]) <= half and abs(y - middle[1]) <= half:
-                    places.append((lane.id, float(station)))
+            if not driving and town.neighbour(lane.id, LinkType.LANE_CHANGE_RIGHT) is not None:
+                continue
+            waypoints = [site.station for site in town.sites if site.lane == lane.id] if driving else []
+            for station in np.arange(6.0, lane.length - 5.0, SPAWN_STEP).tolist():
+                x, y = lane.position(station) if driving else world.actors.kerb(lane.id, station)
+                if max(abs(x - middle[0]), abs(y - middle[1])) > half:
+                    continue
+                if all(abs(waypoint - station) >= FROM_WAYPOINT for waypoint in waypoints):
+                    places.append((lane.id, station))
         return places
 
     def _place_prop(self, action: AdWizardAction) -> Outcome:
         if len(self._world.actors.props) >= self._max_props:
             return f"there are {self._max_props} props already"
-        if (reason := self._no_such_place(action) or self._unsafe(action, without=None)) is not None:
+        if (reason := self._no_such_place(action) or self._unsafe(action, action.prop, without=None)) is not None:
             return reason
         prop = self._world.actors.add_prop(action.prop, action.place.lane, float(action.place.metres))
         return {"prop": str(prop.kind), "lane": prop.lane_id, "station": prop.station, **_xy(prop)}
@@ -124,11 +142,11 @@ class Adversary:
         prop = self._prop(action.item)
         if prop is None:
             return f"there is no prop {action.item}"
-        if (reason := self._no_such_place(action) or self._unsafe(action, without=prop)) is not None:
+        if (reason := self._no_such_place(action) or self._unsafe(action, prop.kind, without=prop)) is not None:
             return reason
         row = self._world.actors.props.index(prop)
         self._world.actors.remove_prop(prop)
-        moved = self._world.actors.add_prop(prop.kind, action.place.lane, float(action.place.metres))
+        moved = self._world.actors.add_prop(prop.kind, action.place.lane, float(action.place.metres), key=prop.key)
         props = self._world.actors.props
         props.insert(row, props.pop())
         return {
@@ -186,9 +204,10 @@ class Adversary:
         return None
 
     def _stopping_distance(self) -> float:
+        """Way in which the car stops, on the road as wet as it is [m]."""
         return self._world.weather.braking_distance(float(self._world.car.speed), BRAKING)
 
-    def _unsafe(self, action: AdWizardAction, *, without: Prop | None) -> str | None:
+    def _unsafe(self, action: AdWizardAction, kind: PropKind, *, without: Prop | None) -> str | None:
         """Why a prop must not stand at a place.
 
         The checks are about every site of the town and not about those of the live subgoals only: otherwise a refusal
@@ -207,32 +226,20 @@ class Adversary:
         for site in town.sites:
             if site.lane == lane.id and abs(site.station - station) < FROM_SITE:
                 return "it would stand where a landmark is reached"
-        others: list[Any] = [*world.actors.vehicles, *(p for p in world.actors.props if p is not without)]
-        if any(math.hypot(*(place - other.position)) < 6.0 for other in others):
+        props = [prop for prop in world.actors.props if prop is not without]
+        box = Box(
+            float(place[0]), float(place[1]), lane.heading_at(station), kind.length + FROM_PROP, kind.width + FROM_PROP
+        )
+        if any(math.hypot(*(place - other.position)) < FROM_VEHICLE for other in world.actors.vehicles) or any(
+            boxes_touch(box, Box.of(prop)) for prop in props
+        ):
             return "there is something in that place already"
-        return self._cuts_off(town, (lane.id, station), without)
-
-    def _cuts_off(self, town: Town, place: tuple[int, float], without: Prop | None) -> str | None:
-        search = router(town)
-        start = (self._world.planner.lane, self._world.planner.station)
-        others = [p for p in self._world.actors.props if p is not without]
-        standing = [spot for p in others for spot in _closed_by((p.lane_id, p.station))]
-        closed = [*standing, *_closed_by(place)]
-        now = search.reachable(start, standing)
-        then = search.reachable(start, closed)
-        # and from where the car would stand before it, should it come there: it must not be trapped
-        trapped = search.reachable((place[0], place[1] - STANDS_BEFORE), closed)
-        for site in town.sites:
-            cell = search.cell(site.lane, site.station)
-            if now[cell] and not (then[cell] and trapped[cell]):
-                return "it would cut every way to a place where a landmark may be"
+        standing = [(prop.lane_id, prop.station) for prop in props]
+        if crowds(town, (lane.id, station), standing):
+            return "there would be no room to turn round before it and the prop beside it"
+        if cuts_off(town, (world.planner.lane, world.planner.station), standing, (lane.id, station)):
+            return "it would cut every way to a place where a landmark may be"
         return None
-
-
-def _closed_by(place: tuple[int, float]) -> list[tuple[int, float]]:
-    """Places that no car can stand in because of a prop: the prop's own and those right before it."""
-    lane, station = place
-    return [(lane, station - float(back)) for back in np.arange(0.0, STANDS_BEFORE, CELL / 2)]
 
 
 def _xy(prop: Prop) -> dict[str, float]:

@@ -49,7 +49,7 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
     ## Rewards
     Weighted terms (`RewardWeights`): subgoals reached, success, collisions of the car's own making, time, and each
     role's own talk and refusals. The Ad-Wizard gets the opposite of the shared terms. The terms are in
-    `info["reward_terms"]`.
+    `info["reward_terms"]`. `info["infractions"]` counts which rules of the road the car has broken so far.
 
     ## Episode End
     Terminates when the destination, the last live subgoal, is reached: the car stands within 2 m of the waypoint of
@@ -260,6 +260,7 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
             "action_mask": self._masks.mask(role),
             "reward_terms": dict(terms),
             "refused": list(self.stage.refused[role]),
+            "infractions": self.stage.infractions,
         }
 
 

@@ -42,8 +42,9 @@ from dorothie_gym.spaces.limits import UTTERANCE_LENGTH
 from dorothie_gym.tasks import TaskState
 from dorothie_gym.world.car.driver import GoalAhead
 from dorothie_gym.world.network.network import TownNetwork
+from dorothie_gym.world.reports import INFRACTION_KINDS, WorldEventKind
 from dorothie_gym.world.town import Town
-from dorothie_gym.world.world import World, WorldEventKind
+from dorothie_gym.world.world import World
 
 ROLES = (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD)
 """The agents, in the order in which they are listed."""
@@ -55,6 +56,10 @@ _WORLD_EVENTS = {
     WorldEventKind.HAZARD_STOP: EventType.HAZARD_STOP,
     WorldEventKind.HAZARD_END: EventType.HAZARD_END,
     WorldEventKind.COLLISION: EventType.COLLISION,
+    WorldEventKind.RED_LIGHT: EventType.RED_LIGHT,
+    WorldEventKind.STOP_SIGN: EventType.STOP_SIGN,
+    WorldEventKind.OFF_ROAD: EventType.OFF_ROAD,
+    WorldEventKind.WRONG_WAY: EventType.WRONG_WAY,
 }
 
 
@@ -126,6 +131,11 @@ class Stage:
     def success(self) -> bool:
         """Whether every live subgoal was reached, the destination last, without a collision of the car's own making."""
         return self.task.done and self.task.success and self.world.collisions == 0
+
+    @property
+    def infractions(self) -> dict[str, int]:
+        """How often each rule of the road was broken so far, collisions of whosever making among them."""
+        return {kind.value: self.world.reports.infractions[kind] for kind in INFRACTION_KINDS}
 
     # --- what the roles do ------------------------------------------------------------------------------------------
 
@@ -364,6 +374,7 @@ class Stage:
             "arrived": self.task.done,
             "subgoals": {"live": len(self.task.live), "reached": self._reached()},
             "collisions": self.world.collisions,
+            "infractions": self.infractions,
             "seconds": round(self.world.time, 3),
             **self.counts,
             **(self._outcome or {}),

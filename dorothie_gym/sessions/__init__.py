@@ -2,7 +2,7 @@
 
 from dorothie_gym.sessions.corpus import load_readable, load_sessions, session_folders, split_by_name
 from dorothie_gym.sessions.errors import SessionError
-from dorothie_gym.sessions.events import Event, EventType
+from dorothie_gym.sessions.events import INFRACTIONS, Event, EventType
 from dorothie_gym.sessions.header import FORMAT_VERSION, LandmarkRow, SessionHeader, SubgoalRow
 from dorothie_gym.sessions.points import (
     CarState,
@@ -18,7 +18,7 @@ from dorothie_gym.sessions.points import (
     task_points,
     ufn_points,
 )
-from dorothie_gym.sessions.records import ActionRecord, MoveRecord, UtteranceRecord
+from dorothie_gym.sessions.records import ActionRecord, InfractionRecord, MoveRecord, UtteranceRecord
 from dorothie_gym.sessions.session import Session
 from dorothie_gym.sessions.trajectory import TRAJECTORY_COLUMNS, TRAJECTORY_DTYPE, Trajectory, trajectory_of
 from dorothie_gym.sessions.writer import SessionWriter
@@ -32,7 +32,9 @@ __all__ = [
     "EventType",
     "FORMAT_VERSION",
     "FRAME_RATE",
+    "INFRACTIONS",
     "InferencePoint",
+    "InfractionRecord",
     "LandmarkRow",
     "MoveRecord",
     "Point",

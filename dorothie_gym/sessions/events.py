@@ -35,9 +35,26 @@ class EventType(enum.StrEnum):
     SUBGOAL = "Subgoal"
     """A subgoal changes: subgoal (number), landmark (label), status (label), and cause (arrival, trigger, ...)."""
     COLLISION = "Collision"
-    """The car touches something: other (class label), own_fault (bool), speed [m/s]."""
+    """The car touches something: other (class label), key (number of what is touched; a thing keeps it while it is
+    there), lane, station [m], x, y [m] (where the car is), own_fault (bool), speed [m/s]. Older recordings lack place
+    and key."""
+    RED_LIGHT = "RedLight"
+    """The car passes a red light: lane (that it leaves), station, x, y [m], key (id of the signal), other (class label
+    of the signal)."""
+    STOP_SIGN = "StopSign"
+    """The car passes a stop sign without standing before it: as RED_LIGHT."""
+    OFF_ROAD = "OffRoad"
+    """The car leaves the road: lane (the nearest), station, x, y [m]; key and other are null."""
+    WRONG_WAY = "WrongWay"
+    """The car drives against the traffic: lane (that it is on), station, x, y [m]; key and other are null."""
     END = "End"
     """The session is over: success (bool), reason."""
+
+
+INFRACTIONS = (
+    EventType.COLLISION, EventType.RED_LIGHT, EventType.STOP_SIGN, EventType.OFF_ROAD, EventType.WRONG_WAY,
+)  # fmt: skip
+"""Events that tell of a breach of the rules of the road."""
 
 
 @dataclass(frozen=True, kw_only=True)

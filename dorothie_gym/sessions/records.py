@@ -6,10 +6,21 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from dorothie_gym.ontology import DialogueAct, OntologyError, PhysicalAction, Role, parse_act, parse_physical_action
+from dorothie_gym.ontology import (
+    DialogueAct,
+    ObjectClass,
+    OntologyError,
+    PhysicalAction,
+    Role,
+    parse_act,
+    parse_physical_action,
+)
 from dorothie_gym.sessions.errors import SessionError
-from dorothie_gym.sessions.events import Event, EventType
+from dorothie_gym.sessions.events import INFRACTIONS, Event, EventType
 from dorothie_gym.sessions.fields import Fields
+
+_OBJECT_CLASSES = {kind.label: kind for kind in ObjectClass}
+_PLACE_FIELDS = ("lane", "station", "x", "y", "key", "other")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +77,34 @@ class ActionRecord:
 
 
 @dataclass(frozen=True, kw_only=True)
+class InfractionRecord:
+    """One breach of the rules of the road.
+
+    Attributes:
+        index: number of its event in the session.
+        frame: when it happened.
+        type: which rule: one of `events.INFRACTIONS`.
+        lane: where it happened, None where the recording does not know it; `station` likewise.
+        station: distance along the lane [m].
+        x: of the car [m], or None; `y` likewise.
+        key: number of the counterpart (of a body, or of a light or sign), None where there is none.
+        other: class of the counterpart, None where there is none.
+        own_fault: of a collision: whether the car ran into it; True for the others.
+    """
+
+    index: int
+    frame: int
+    type: EventType
+    lane: int | None
+    station: float | None
+    x: float | None
+    y: float | None
+    key: int | None
+    other: ObjectClass | None
+    own_fault: bool
+
+
+@dataclass(frozen=True, kw_only=True)
 class UtteranceRecord:
     """The moves of one utterance, in order of their spans."""
 
@@ -113,6 +152,29 @@ def action_record(event: Event, index: int, where: str = "event") -> ActionRecor
     )
 
 
+def infraction_record(event: Event, index: int, where: str = "event") -> InfractionRecord:
+    """Returns the breach that an event of `INFRACTIONS` tells of; raises `SessionError` naming the field."""
+    data = Fields({**dict.fromkeys(_PLACE_FIELDS), **event.data}, f"{where}, data")
+    other = data.optional("other", data.text)
+    if other is not None and other not in _OBJECT_CLASSES:
+        raise data.error("other", "the label of an object class")
+    collision = event.type is EventType.COLLISION
+    place = data.integer if not collision else lambda name: data.optional(name, data.integer)
+    number = data.number if not collision else lambda name: data.optional(name, data.number)
+    return InfractionRecord(
+        index=index,
+        frame=event.frame,
+        type=event.type,
+        lane=place("lane"),
+        station=number("station"),
+        x=number("x"),
+        y=number("y"),
+        key=data.optional("key", data.integer),
+        other=None if other is None else _OBJECT_CLASSES[other],
+        own_fault=data.flag("own_fault") if collision else True,
+    )
+
+
 def utterance_records(moves: Iterable[MoveRecord]) -> tuple[UtteranceRecord, ...]:
     """Returns the utterances that the moves belong to, in order of their first move."""
     groups: dict[tuple[Role, int], list[MoveRecord]] = {}
@@ -137,6 +199,8 @@ def check_event(event: Event, where: str = "event") -> None:
         move_record(event, 0, where)
     elif event.type is EventType.PHYSICAL_ACTION:
         action_record(event, 0, where)
+    elif event.type in INFRACTIONS:
+        infraction_record(event, 0, where)
 
 
 def _act(data: Fields) -> DialogueAct:

@@ -14,15 +14,17 @@ from dorothie_gym.ontology import Role
 from dorothie_gym.sessions.encoding import from_line
 from dorothie_gym.sessions.errors import SessionError
 from dorothie_gym.sessions.event_lines import decode_event
-from dorothie_gym.sessions.events import Event, EventType
+from dorothie_gym.sessions.events import INFRACTIONS, Event, EventType
 from dorothie_gym.sessions.fields import Fields
 from dorothie_gym.sessions.header import SessionHeader
 from dorothie_gym.sessions.layout import EVENTS_FILE, HEADER_FILE, SUMMARY_FILE, TRAJECTORY_FILE
 from dorothie_gym.sessions.records import (
     ActionRecord,
+    InfractionRecord,
     MoveRecord,
     UtteranceRecord,
     action_record,
+    infraction_record,
     move_record,
     utterance_records,
 )
@@ -115,6 +117,15 @@ class Session:
             action_record(event, index, f"session {self.name}, event {index}")
             for index, event in enumerate(self.events)
             if event.type is EventType.PHYSICAL_ACTION
+        )
+
+    @cached_property
+    def infractions(self) -> tuple[InfractionRecord, ...]:
+        """Breaches of the rules of the road, collisions among them."""
+        return tuple(
+            infraction_record(event, index, f"session {self.name}, event {index}")
+            for index, event in enumerate(self.events)
+            if event.type in INFRACTIONS
         )
 
     def of_type(self, *types: EventType) -> tuple[Event, ...]:

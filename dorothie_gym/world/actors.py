@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,13 +11,18 @@ import numpy as np
 from dorothie_gym.ontology import ObjectClass, PropKind
 from dorothie_gym.world.car.hazards import Body
 from dorothie_gym.world.car.vehicle import Car
+from dorothie_gym.world.crosswalks import Crosswalks
+from dorothie_gym.world.cyclists import SHARE, Cyclist, may_ride
+from dorothie_gym.world.cyclists import SPEEDS as CYCLING_SPEEDS
 from dorothie_gym.world.junctions import JunctionControl
 from dorothie_gym.world.network.road import TownRoad
 from dorothie_gym.world.pedestrians import KERB, Pedestrian, leftmost, rightmost, walkway
 from dorothie_gym.world.props import Prop
+from dorothie_gym.world.town.footways import WayKind, footways
 from dorothie_gym.world.town.model import Array
 from dorothie_gym.world.town.oncoming import oncoming_lanes
 from dorothie_gym.world.traffic import CurveSpeeds, TrafficVehicle, free_places
+from dorothie_gym.world.walkers import Walker
 
 TOW_CRASHED = 3.0
 """A crashed vehicle is towed away after this long [s]."""
@@ -37,7 +43,19 @@ CLEAR_OF_CAR = 25.0
 """Nobody appears closer to the car than this [m]."""
 
 CLEAR_OF_OTHERS = 14.0
-"""Nobody appears closer to others than this [m]."""
+"""Nobody appears closer to others before or behind it than this [m], ..."""
+
+CLEAR_BESIDE = 2.5
+"""... who are no farther aside than this [m], ..."""
+
+CLEAR_OF_BODIES = 6.0
+"""... nor this close to the middle of any, half of it aside [m]."""
+
+DRIVING_SPEEDS = (6.5, 10.0)
+"""Least and greatest desired speed of traffic [m/s]."""
+
+CLEAR_OF_WALKER = 8.0
+"""No pedestrian appears closer to the car than this [m]."""
 
 OUT_OF_SIGHT = 60.0
 """A towed vehicle comes back no closer to the car than this [m]."""
@@ -47,58 +65,92 @@ class Actors:
     """Traffic, pedestrians and props of a road.
 
     Attributes:
-        vehicles: background traffic, in the order of their keys.
+        vehicles: background traffic, cyclists among it, in the order of their keys.
         pedestrians: people on foot.
+        crosswalks: who is on them.
         props: things placed by the Ad-Wizard.
     """
 
     def __init__(
         self, road: TownRoad, junctions: JunctionControl, car: Car, *,
-        traffic_rng: np.random.Generator, walk_rng: np.random.Generator,
+        traffic_rng: np.random.Generator, walk_rng: np.random.Generator, crosswalks: Crosswalks | None = None,
     ) -> None:  # fmt: skip
         self._road, self._junctions, self._car = road, junctions, car
         self._traffic_rng, self._walk_rng = traffic_rng, walk_rng
         self._town = road.network.town
         self._curve_speeds = CurveSpeeds(self._town)
+        self.crosswalks = crosswalks if crosswalks is not None else Crosswalks(self._town)
         self._next_key = 1
         self.vehicles: list[TrafficVehicle] = []
-        self.pedestrians: list[Pedestrian] = []
+        self.pedestrians: list[Pedestrian | Walker] = []
         self.props: list[Prop] = []
 
     # --- coming and going -------------------------------------------------------------------------------------------
 
     def populate(self, *, vehicles: int, pedestrians: int) -> None:
-        """Brings traffic and pedestrians to random places, as many as fit."""
+        """Brings traffic and pedestrians to random places, as many as fit; these to pavements, if there are any."""
         for lane, station in free_places(self._town, self._traffic_rng, 12 * vehicles):
             if len(self.vehicles) == vehicles:
                 break
             self.add_vehicle(lane, station, distance=CLEAR_OF_CAR)
+        if self._town.sidewalks:
+            self._add_walkers(pedestrians)
+            return
         for lane, station in free_places(self._town, self._walk_rng, 12 * pedestrians):
             if len(self.pedestrians) == pedestrians:
                 break
             self.add_pedestrian(lane, station)
 
     def add_vehicle(self, lane: int, station: float, *, distance: float) -> bool:
-        """Puts a vehicle on a lane if there is room and the car is farther than `distance` [m]."""
-        place = self._town.lanes[lane].position(station)
-        if not self._is_clear(place, distance):
+        """Puts a vehicle, or a cyclist, on a lane if there is room and the car is farther than `distance` [m]."""
+        town = self._town
+        if not self._is_clear(lane, station, distance):
             return False
-        vehicle = TrafficVehicle(
+        cycles = may_ride(town.lanes[lane]) and lane == rightmost(town, lane) and self._traffic_rng.random() < SHARE
+        kind, speeds = (Cyclist, CYCLING_SPEEDS) if cycles else (TrafficVehicle, DRIVING_SPEEDS)
+        vehicle = kind(
             self._road, lane, station, key=self._new_key(), speed=0.0,
-            desired_speed=float(self._traffic_rng.uniform(6.5, 10.0)),
-            junctions=self._junctions, curve_speeds=self._curve_speeds, rng=self._traffic_rng,
+            desired_speed=float(self._traffic_rng.uniform(*speeds)),
+            junctions=self._junctions, crosswalks=self.crosswalks, curve_speeds=self._curve_speeds,
+            rng=self._traffic_rng,
         )  # fmt: skip
         self._road.vehicles.append(vehicle)
         self.vehicles.append(vehicle)
         return True
 
-    def add_pedestrian(self, lane: int, station: float) -> bool:
-        """Puts a pedestrian beside a lane if nobody is there."""
-        lane = rightmost(self._town, lane)
+    def _add_walkers(self, count: int) -> None:
+        """Puts people on pavements, drawn evenly along them."""
+        ways = footways(self._town)
+        pavements = [k for k, way in enumerate(ways.ways) if way.kind is WayKind.PAVEMENT]
+        lengths = np.array([ways.ways[k].length for k in pavements])
+        for k in self._walk_rng.choice(pavements, size=12 * count, p=lengths / lengths.sum()):
+            if len(self.pedestrians) == count:
+                return
+            station = float(self._walk_rng.uniform(0.0, ways.ways[k].length))
+            place = np.array(ways.ways[k].place(station)[:2])
+            others = [(self._car, CLEAR_OF_WALKER), *((other, 1.5) for other in self.pedestrians)]
+            if all(math.hypot(*(place - other.position)) >= room for other, room in others):
+                walker = Walker(
+                    self._road, ways, self.crosswalks, int(k), station, key=self._new_key(), rng=self._walk_rng
+                )  # fmt: skip
+                self._road.objects.append(walker)
+                self.pedestrians.append(walker)
+
+    def kerb(self, lane: int, station: float) -> Array:
+        """Where a pedestrian stands beside a lane (2,) [m]; `lane` is the rightmost one of its direction."""
         town_lane = self._town.lanes[lane]
-        station = min(station, town_lane.length)
-        place = town_lane.position(station, town_lane.width_at(station) / 2 + KERB)
-        if math.hypot(*(place - self._car.position)) < 8.0:
+        place: Array = town_lane.position(station, town_lane.width_at(station) / 2 + KERB)
+        return place
+
+    def add_pedestrian(self, lane: int, station: float) -> bool:
+        """Puts a pedestrian beside a lane, or to the right of those beside it, if nobody is there.
+
+        Such pedestrians keep to the street where they are, and cross it anywhere.
+        """
+        lane = rightmost(self._town, lane)
+        station = min(station, self._town.lanes[lane].length)
+        place = self.kerb(lane, station)
+        if math.hypot(*(place - self._car.position)) < CLEAR_OF_WALKER:
             return False
         if any(math.hypot(*(place - p.position)) < 1.0 for p in self.pedestrians):
             return False
@@ -110,9 +162,16 @@ class Actors:
         self.pedestrians.append(pedestrian)
         return True
 
-    def add_prop(self, kind: PropKind, lane: int, station: float) -> Prop:
-        """Puts a prop on a lane; whether it may stand there is the caller's business."""
-        prop = Prop(self._road, kind, lane, station)
+    def add_prop(self, kind: PropKind, lane: int, station: float, *, key: int | None = None) -> Prop:
+        """Puts a prop on a lane; whether it may stand there is the caller's business.
+
+        Args:
+            kind: of prop.
+            lane: it stands on.
+            station: distance along the lane [m].
+            key: that of a prop that is moved; by default a new one.
+        """
+        prop = Prop(self._road, kind, lane, station, key=self._new_key() if key is None else key)
         self._road.objects.append(prop)
         self.props.append(prop)
         return prop
@@ -131,24 +190,21 @@ class Actors:
                 self._remove(vehicle)
                 self._replace()
         self.pedestrians = [p for p in self.pedestrians if not p.crashed]
-        self._road.objects = [o for o in self._road.objects if not (isinstance(o, Pedestrian) and o.crashed)]
+        self._road.objects = [o for o in self._road.objects if not (isinstance(o, Pedestrian | Walker) and o.crashed)]
 
-    def take_crashed(self, car: Car) -> list[tuple[ObjectClass, Any]]:
-        """Those that the car has just touched, with their class; all but props stay until they are towed away."""
+    def book(self, touched: Sequence[Any]) -> list[tuple[ObjectClass, Any]]:
+        """What the car has touched, with their classes; all but props stay until they are towed away."""
         hit: list[tuple[ObjectClass, Any]] = []
-        reach = car.LENGTH
-        for vehicle in self.vehicles:
-            if vehicle.crashed and _near(vehicle, car, reach + 1.5) and vehicle.collidable:
-                hit.append((ObjectClass.VEHICLES, vehicle))
-        for pedestrian in self.pedestrians:
-            if pedestrian.crashed and _near(pedestrian, car, reach) and pedestrian.collidable:
-                hit.append((ObjectClass.PEDESTRIAN, pedestrian))
-        for prop in list(self.props):
-            if prop.crashed and _near(prop, car, reach + 1.5):
-                hit.append((ObjectClass.STATIC, prop))
-                self.remove_prop(prop)
-        for _, other in hit:
-            other.collidable = False  # touched once: it does not count again until it is towed
+        for thing in touched:
+            thing.collidable = False  # touched once: it does not count again until it is towed
+            if isinstance(thing, Prop):
+                hit.append((ObjectClass.STATIC, thing))
+                self.remove_prop(thing)
+            elif isinstance(thing, Pedestrian | Walker):
+                hit.append((ObjectClass.PEDESTRIAN, thing))
+            else:
+                thing.speed = 0.0  # else it would go on through the car
+                hit.append((ObjectClass.VEHICLES, thing))
         return hit
 
     # --- moving and seeing ------------------------------------------------------------------------------------------
@@ -156,11 +212,15 @@ class Actors:
     def act(self, dt: float) -> None:
         """Lets traffic decide and pedestrians walk for `dt` [s]; `road.step` then moves the traffic."""
         crossing = self._car if getattr(self._car, "sweep", None) else None
+        self.crosswalks.note(self.pedestrians)
         for vehicle in self.vehicles:
             vehicle.crossing = crossing
             vehicle.act()
         for pedestrian in self.pedestrians:
-            pedestrian.walk(dt, self._across)
+            if isinstance(pedestrian, Walker):
+                pedestrian.walk(dt)
+            else:
+                pedestrian.walk(dt, self._across)
 
     def bodies(self, position: Array, sight: float) -> list[Body]:
         """Bodies within sight of a position, nearest first."""
@@ -174,7 +234,7 @@ class Actors:
             for thing in group:
                 dx, dy = thing.position[0] - x, thing.position[1] - y
                 if dx * dx + dy * dy < sight * sight:
-                    found.append((dx * dx + dy * dy, getattr(thing, "key", -3), kind, thing))
+                    found.append((dx * dx + dy * dy, thing.key, kind, thing))
         found.sort(key=lambda row: row[:2])
         return [_body(kind, key, thing) for _, key, kind, thing in found]
 
@@ -203,11 +263,20 @@ class Actors:
         car = self._car
         return bool(getattr(car, "sweep", None)) and car.speed < STANDING and _near(vehicle, car, 6.0)
 
-    def _is_clear(self, place: Array, distance: float) -> bool:
+    def _is_clear(self, lane: int, station: float, distance: float) -> bool:
+        """Whether a vehicle would have room: to the car, to whoever is on the lane, and to what is beside it."""
+        town_lane = self._town.lanes[lane]
+        place, heading = town_lane.position(station), town_lane.heading_at(station)
         if math.hypot(*(place - self._car.position)) < distance:
             return False
+        c, s = math.cos(heading), math.sin(heading)
         others: list[Any] = [*self.vehicles, *self.props]
-        return all(math.hypot(*(place - other.position)) >= CLEAR_OF_OTHERS for other in others)
+        for other in others:
+            dx, dy = other.position - place
+            along, across = abs(dx * c + dy * s), abs(dy * c - dx * s)
+            if along < CLEAR_OF_OTHERS and across < (CLEAR_BESIDE if along > CLEAR_OF_BODIES else CLEAR_OF_BODIES / 2):
+                return False
+        return True
 
     def _remove(self, vehicle: TrafficVehicle) -> None:
         self._junctions.release(vehicle.key)

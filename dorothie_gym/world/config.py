@@ -16,7 +16,7 @@ class WorldConfig:
     """What the world is made of.
 
     Attributes:
-        vehicles: background vehicles, as many as fit.
+        vehicles: background vehicles, about one in eight a cyclist, as many as fit.
         pedestrians: people on foot, as many as fit.
         cruise_speed: of the car at the start [km/h], a multiple of 5 in 5..90.
         collisions_stop: how long the car stands after a collision [s].

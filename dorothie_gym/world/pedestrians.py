@@ -38,10 +38,10 @@ PERSONAL_SPACE = 0.7
 """How close to a vehicle they step [m]."""
 
 PATIENCE = 2.0
-"""How long they wait for it to go on before they turn back [s]."""
+"""How long they stand before a vehicle, a prop or somebody else that does not move before they turn back [s]."""
 
-PATIENCE = 2.0
-"""How long they stand before a vehicle that does not move before they turn back [s]."""
+ELBOW_ROOM = 0.3
+"""How close to a prop or to somebody else they step [m]."""
 
 SAFE_TIME = 5.0
 """Time gap to vehicles that they want before stepping out [s]."""
@@ -131,7 +131,7 @@ class Pedestrian(RoadObject):
             self.speed = 0.0
             return
         crossing = abs(self._target - self._lateral) > 0.05
-        if self._would_touch_vehicle(dt):
+        if self._is_stopped(dt):
             self.speed = 0.0
             self._waited += dt
             if self._waited > PATIENCE:
@@ -154,18 +154,11 @@ class Pedestrian(RoadObject):
                 self._target = self._far if near else self._home
         self._place()
 
-    def _would_touch_vehicle(self, dt: float) -> bool:
-        """Whether the next step leads closer to a vehicle that is close: nobody walks into the side of a car."""
+    def _is_stopped(self, dt: float) -> bool:
+        """Whether the next step leads closer to something that is close."""
         step = WALKING_SPEED * max(dt, 0.2)
         now = (float(self.position[0]), float(self.position[1]))
-        then = (now[0] + step * math.cos(self.heading), now[1] + step * math.sin(self.heading))
-        for vehicle in self.road.vehicles:
-            if abs(now[0] - vehicle.position[0]) > 6.0 or abs(now[1] - vehicle.position[1]) > 6.0:
-                continue
-            room = _room_beside(vehicle, *then)
-            if room < PERSONAL_SPACE and room < _room_beside(vehicle, *now):
-                return True  # who is close already may step away
-        return False
+        return would_touch(self, now, (now[0] + step * math.cos(self.heading), now[1] + step * math.sin(self.heading)))
 
     def _turn_back(self, crossing: bool) -> None:
         self._waited = 0.0
@@ -195,8 +188,29 @@ class Pedestrian(RoadObject):
         self.height = self._lane.height_at(self._station)
 
 
+def would_touch(walker: Any, now: tuple[float, float], then: tuple[float, float]) -> bool:
+    """Whether a step leads closer to a vehicle that is close, a prop or somebody: nobody walks into their sides.
+
+    Who is close already may step away.
+
+    Args:
+        walker: who walks; it stands on a road.
+        now: where it is [m].
+        then: where it would be [m].
+    """
+    road = walker.road
+    for things, space in ((road.vehicles, PERSONAL_SPACE), (road.objects, ELBOW_ROOM)):
+        for thing in things:
+            if thing is walker or abs(now[0] - thing.position[0]) > 6.0 or abs(now[1] - thing.position[1]) > 6.0:
+                continue
+            room = _room_beside(thing, *then)
+            if room < space and room < _room_beside(thing, *now):
+                return True
+    return False
+
+
 def _room_beside(vehicle: Any, x: float, y: float) -> float:
-    """How far outside of a vehicle's outline a place is, along its length or its width [m]; negative inside."""
+    """How far outside of a thing's outline a place is, along its length or its width [m]; negative inside."""
     dx, dy = x - vehicle.position[0], y - vehicle.position[1]
     c, s = math.cos(vehicle.heading), math.sin(vehicle.heading)
     return float(max(abs(dx * c + dy * s) - vehicle.LENGTH / 2, abs(dy * c - dx * s) - vehicle.WIDTH / 2))

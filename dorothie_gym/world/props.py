@@ -16,13 +16,14 @@ class Prop(Obstacle):
 
     Attributes:
         kind: what it is.
+        key: tells it apart from other bodies; a prop that is moved keeps it.
         lane_id: lane it stands on; `station` [m] how far along it.
         height: of the road under it [m].
     """
 
-    def __init__(self, road: TownRoad, kind: PropKind, lane_id: int, station: float) -> None:
+    def __init__(self, road: TownRoad, kind: PropKind, lane_id: int, station: float, *, key: int) -> None:
         lane = road.network.town.lanes[lane_id]
-        self.kind, self.lane_id, self.station = kind, lane_id, station
+        self.kind, self.lane_id, self.station, self.key = kind, lane_id, station, key
         self.height = lane.height_at(station)
         self.LENGTH, self.WIDTH = kind.length, kind.width
         super().__init__(road, lane.position(station), lane.heading_at(station))

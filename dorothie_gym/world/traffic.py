@@ -11,7 +11,8 @@ from highway_env.utils import not_zero
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
-from dorothie_gym.world.junctions import CRITICAL_GAP, JunctionControl
+from dorothie_gym.world.crosswalks import Crosswalks
+from dorothie_gym.world.junctions import CRITICAL_GAP, HARDEST_BRAKING, JunctionControl
 from dorothie_gym.world.network.ahead import LEVEL
 from dorothie_gym.world.network.network import LaneIndex
 from dorothie_gym.world.network.road import TownRoad
@@ -82,6 +83,7 @@ class TrafficVehicle(IDMVehicle):
         key: tells it apart; keys of bodies in the world are unique.
         height: of the road under it [m].
         crossing: the car while it turns round, across lanes where others do not expect it.
+        aside: how far to the right of its lane's middle it keeps [m].
         standing: how long it has been standing [s].
         stuck: the same less the time for which the next light was not green [s].
     """
@@ -100,6 +102,7 @@ class TrafficVehicle(IDMVehicle):
         speed: float,
         desired_speed: float,
         junctions: JunctionControl,
+        crosswalks: Crosswalks | None = None,
         curve_speeds: CurveSpeeds,
         rng: np.random.Generator,
     ) -> None:
@@ -107,10 +110,12 @@ class TrafficVehicle(IDMVehicle):
         self.height = lane.height_at(station)
         self.key = key
         self._network, self._junctions, self._curve_speeds, self._rng = road.network, junctions, curve_speeds, rng
+        self._crosswalks = crosswalks or Crosswalks(road.network.town)
         self._desired = desired_speed
         self._front: Any | None = None
         self._front_gap = math.inf
         self.crossing: Any | None = None
+        self.aside = 0.0
         self.standing = self.stuck = 0.0
         self.crash_age = 0.0
         self._line_lane = -1  # at whose end the next junction begins
@@ -161,7 +166,10 @@ class TrafficVehicle(IDMVehicle):
             (self._front, self._front_gap), _ = self.road.neighbours(self, self.target_lane_index)
             acceleration = min(acceleration, self.acceleration(self, self._front))
         self._front = None
-        acceleration = min(acceleration, self._junction_acceleration(station))
+        crosswalk = self._crosswalk_gap(station)
+        if crosswalk < math.inf:
+            acceleration = min(acceleration, self._brake_to(crosswalk))
+        acceleration = min(acceleration, self._junction_acceleration(station, waits=crosswalk < math.inf))
         if self.crossing is not None:
             acceleration = min(acceleration, self._crossing_acceleration(self.crossing))
         Vehicle.act(
@@ -176,6 +184,7 @@ class TrafficVehicle(IDMVehicle):
         """Stock's steering angle towards a lane [rad], computed on plain numbers, which is several times faster."""
         lane = self._network.get_lane(target_lane_index)
         station, lateral = lane.local_coordinates(self.position)
+        lateral -= self.aside
         ahead = lane.heading_at(station + self.speed * self.TAU_PURSUIT)
         speed = not_zero(self.speed)
         back = math.asin(min(max(-self.KP_LATERAL * lateral / speed, -1.0), 1.0))
@@ -237,11 +246,16 @@ class TrafficVehicle(IDMVehicle):
     def _extend_route(self) -> None:
         length = sum(self._network.get_lane(index).length for index in self.route[1:])
         while length < ROUTE_AHEAD:
-            onward: list[LaneIndex] = self._network.successors(self.route[-1])
+            onward = self._onward(self.route[-1])
             if not onward:
                 return
             self.route.append(onward[int(self._rng.integers(len(onward)))] if len(onward) > 1 else onward[0])
             length += self._network.get_lane(self.route[-1]).length
+
+    def _onward(self, lane: LaneIndex) -> list[LaneIndex]:
+        """Ways on from a lane."""
+        found: list[LaneIndex] = self._network.successors(lane)
+        return found
 
     def _speed_ahead(self, station: float) -> float:
         """Desired speed, less where a bend ahead asks for it [m/s]."""
@@ -255,8 +269,30 @@ class TrafficVehicle(IDMVehicle):
                 break
         return max(speed, 0.5)
 
-    def _junction_acceleration(self, station: float) -> float:
-        """Acceleration that stops the vehicle before a junction it may not enter [m/s^2]; inf where it may."""
+    def _crosswalk_gap(self, station: float) -> float:
+        """Way to the next crosswalk with people on it, for whom the vehicle can still stop [m]; inf without."""
+        distance = -station - self.LENGTH / 2  # from its front
+        reach = self.speed**2 / (2 * STOP_BRAKING) + ASKING
+        for index in self.route:
+            if distance > reach:
+                break
+            lane = self._network.get_lane(index).town_lane
+            for span in self._crosswalks.spans(lane.id):
+                gap = distance + span.start - LINE_GAP
+                if gap < -LINE_GAP or gap > reach or self.speed**2 > 2 * HARDEST_BRAKING * max(gap, 0.1):
+                    continue  # it is on it already, or cannot stop any more: people do not step out before such
+                if self._crosswalks.holds(span) is not None:
+                    return float(gap)
+            distance += lane.length
+        return math.inf
+
+    def _junction_acceleration(self, station: float, *, waits: bool) -> float:
+        """Acceleration that stops the vehicle before a junction it may not enter [m/s^2]; inf where it may.
+
+        Args:
+            station: where it is on its lane [m].
+            waits: whether it gives way to people; then it does not ask to be let into a junction yet.
+        """
         now = self.road.time
         self._junctions.note(self.key, self.lane_id, self.speed, now)
         self._line_lane = -1
@@ -270,7 +306,7 @@ class TrafficVehicle(IDMVehicle):
                 if distance > max(stopping, CRITICAL_GAP * self.speed):
                     return math.inf
                 self._junctions.announce(self.key, before, lane.id, now, distance=distance, speed=self.speed)
-                if distance > stopping:
+                if distance > stopping or (waits and distance > 0.0):
                     return math.inf
                 wait = self._junctions.request(self.key, now, room=functools.partial(self._room_after, k))
                 return math.inf if wait is None else self._brake_to(distance - LINE_GAP)

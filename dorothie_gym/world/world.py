@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import enum
 import functools
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -19,11 +15,12 @@ from dorothie_gym.world.car.path import U_TURN_REACH
 from dorothie_gym.world.car.planner import BEGUN, BRAKING, LocalPlanner
 from dorothie_gym.world.car.vehicle import Car
 from dorothie_gym.world.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
-from dorothie_gym.world.junctions import CRITICAL_GAP, JunctionControl, Wait
+from dorothie_gym.world.junctions import CRITICAL_GAP, HARDEST_BRAKING, JunctionControl, Wait
 from dorothie_gym.world.localizer import FIX_EVERY, Localizer
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.network.road import TownRoad
 from dorothie_gym.world.perception import Perception
+from dorothie_gym.world.reports import Pose, Reports, WorldEvent, WorldEventKind
 from dorothie_gym.world.town.model import Array, Town
 from dorothie_gym.world.traffic import room_at_start
 from dorothie_gym.world.visibility import CLEAR_SIGHT, Visibility
@@ -58,23 +55,6 @@ STANDING = 0.1
 """Slower than this the car stands [m/s]."""
 
 
-class WorldEventKind(enum.StrEnum):
-    """What the world reports of its own."""
-
-    HAZARD_STOP = "hazard_stop"
-    HAZARD_END = "hazard_end"
-    COLLISION = "collision"
-
-
-@dataclass(frozen=True, kw_only=True)
-class WorldEvent:
-    """Something that happened to the car, at a frame."""
-
-    frame: int
-    kind: WorldEventKind
-    data: Mapping[str, Any] = field(default_factory=dict)
-
-
 class World:
     """A town in which a car drives among others.
 
@@ -92,6 +72,7 @@ class World:
         frame: physics frames since the start.
         frames: trajectory of the last call of `step` (n, 9), see `FRAME_COLUMNS`.
         collisions: those of the car's own making.
+        reports: what has happened to the car, and how often it broke which rule.
     """
 
     def __init__(
@@ -140,7 +121,7 @@ class World:
         self.frame = 0
         self.frames: Array = np.zeros((0, len(FRAME_COLUMNS)))
         self.collisions = 0
-        self._events: list[WorldEvent] = []
+        self.reports = Reports(self.network, self._pose(), self.car.LENGTH)
 
     # --- time -------------------------------------------------------------------------------------------------------
 
@@ -151,8 +132,8 @@ class World:
 
     def step(self, frames: int) -> list[WorldEvent]:
         """Lets the world run for a number of physics frames; returns what happened to the car."""
-        self._events = []
         rows = np.empty((frames, len(FRAME_COLUMNS)))
+        poses: list[Pose] = []
         before = (float(self.car.position[0]), float(self.car.position[1]), float(self.car.heading))
         for k in range(frames):
             if k % EXTEND_EVERY == 0:
@@ -163,11 +144,12 @@ class World:
                 self.frame, self.car.position[0], self.car.position[1], self.car.heading, self.car.speed,
                 control.throttle, control.steer, control.brake, self.planner.lane,
             )  # fmt: skip
+            poses.append(self._pose())
         self.frames = rows
         self._localize(np.vstack((before, rows[:, 1:4])))
         self.actors.tidy()
         self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
-        return self._events
+        return self.reports.close(poses, self.frame)
 
     def _substep(self) -> None:
         dt = 1.0 / FRAME_RATE
@@ -243,8 +225,28 @@ class World:
         )
         blocked = found is not None and found.safe_speed() <= 0.0
         gap = self._gap_to_traffic(bodies, blocked=blocked)
-        hazards = [h for h in (found, self._junction_ahead(), gap) if h is not None]
+        crosswalk = self._crosswalk_ahead()
+        junction = None if crosswalk is not None and crosswalk.safe_speed() <= 0.0 else self._junction_ahead()
+        hazards = [h for h in (found, crosswalk, junction, gap) if h is not None]
         return min(hazards, key=Hazard.safe_speed, default=None)
+
+    def _crosswalk_ahead(self) -> Hazard | None:
+        """The next crosswalk on the path with people on it, whom the car sees and for whom it can still stop."""
+        path, planner, speed = self.planner.path, self.planner, float(self.car.speed)
+        reach = speed**2 / (2 * BRAKING) + ASKING + self.car.LENGTH / 2
+        first, last = path.index_at(planner.s), path.index_at(planner.s + reach)
+        for k in range(first, last + 1):
+            lane = int(path.lanes[k])
+            if path.manoeuvre[k] or (k > first and path.lanes[k - 1] == lane):
+                continue
+            for span in self.actors.crosswalks.spans(lane):
+                gap = float(path.s[k]) + span.start - float(path.stations[k]) - planner.s - self.car.LENGTH / 2
+                if gap < 0.0 or gap > reach or speed**2 > 2 * HARDEST_BRAKING * max(gap, 0.1):
+                    continue
+                walker = self.actors.crosswalks.holds(span)
+                if walker is not None and math.hypot(*(walker.position - self.car.position)) < self.sight:
+                    return Hazard(kind=ObjectClass.PEDESTRIAN, gap=gap, key=walker.key, line=True)
+        return None
 
     def _junction_ahead(self) -> Hazard | None:
         """The line before a junction that the car may not enter yet."""
@@ -379,33 +381,42 @@ class World:
             if hazard is not None and limiting and not self.planner.held:
                 if (speed < 1.0 and hazard.speed < 1.0) or brake * 8.0 > HARD:
                     self.hazard, self._hazard_since, self._hazard_seen = hazard, self.frame, self.frame
-                    self._log(
-                        WorldEventKind.HAZARD_STOP, reason=hazard.kind.label, distance=round(max(hazard.gap, 0.0), 2)
-                    )
+                    self.reports.add(
+                        WorldEventKind.HAZARD_STOP, self.frame,
+                        reason=hazard.kind.label, distance=round(max(hazard.gap, 0.0), 2),
+                    )  # fmt: skip
             return
         if limiting and hazard is not None:
             self.hazard, self._hazard_seen = hazard, self.frame
         if self.frame - self._hazard_seen > FRAME_RATE // 2:
             seconds = (self.frame - self._hazard_since) / FRAME_RATE
-            self._log(WorldEventKind.HAZARD_END, reason=self.hazard.kind.label, seconds=round(seconds, 2))
+            self.reports.add(
+                WorldEventKind.HAZARD_END, self.frame, reason=self.hazard.kind.label, seconds=round(seconds, 2)
+            )
             self.hazard = None
 
-    def _log(self, kind: WorldEventKind, **data: Any) -> None:
-        self._events.append(WorldEvent(frame=self.frame, kind=kind, data=data))
-
-    # --- collisions -------------------------------------------------------------------------------------------------
+    # --- infractions ------------------------------------------------------------------------------------------------
 
     def _collide(self, speed: float) -> None:
-        """Books a collision: whose fault it was, and who is towed away."""
+        """Books collisions: whose fault they were, and who is towed away."""
         car = self.car
-        for kind, other in self.actors.take_crashed(car):
+        for kind, other in self.actors.book(car.take_touched()):
             offset = np.asarray(other.position) - car.position
             forward = float(offset @ np.array([math.cos(car.heading), math.sin(car.heading)]))
             own = speed > 0.5 and forward > 0.0
             self.collisions += own
-            self._log(WorldEventKind.COLLISION, other=kind.label, own_fault=own, speed=round(speed, 2))
-        car.crashed, car.impact, car.speed = False, None, 0.0
+            self.reports.infraction(
+                WorldEventKind.COLLISION, self.frame, lane=self.planner.lane, station=self.planner.station,
+                x=car.position[0], y=car.position[1], key=other.key, other=kind,
+                own_fault=own, speed=round(speed, 2),
+            )  # fmt: skip
+        car.speed = 0.0
         self._stopped_until = self.frame + round(self.config.collisions_stop * FRAME_RATE)
+
+    def _pose(self) -> Pose:
+        turning = self.planner.manoeuvre[0] is PhysicalAction.U_TURN and self.planner.in_manoeuvre
+        x, y = self.car.position
+        return Pose(float(x), float(y), float(self.car.heading), float(self.car.speed), self.car.height, turning)
 
     # --- faults -----------------------------------------------------------------------------------------------------
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 from collections import deque
 from typing import Any
 
@@ -12,6 +13,7 @@ from dorothie_gym.ontology import ExceptionKind, PropKind, Sensor, WeatherParame
 from dorothie_gym.spaces import AdWizardAction
 from dorothie_gym.spaces.actions import Place
 from dorothie_gym.tasks import TaskState
+from dorothie_gym.world.boxes import Box, boxes_touch
 from dorothie_gym.world.config import WorldConfig
 from dorothie_gym.world.town import LinkType, Town
 from dorothie_gym.world.town.oncoming import oncoming_lanes
@@ -34,7 +36,7 @@ def free_place(world: World, adversary: Adversary) -> AdWizardAction:
     for lane in world.town.lanes:
         for metres in range(30, int(lane.length) - 8, 5):
             action = place(lane.id, metres)
-            if not lane.in_junction and adversary._unsafe(action, without=None) is None:
+            if not lane.in_junction and adversary._unsafe(action, action.prop, without=None) is None:
                 return action
     raise AssertionError("no place for a prop")
 
@@ -167,7 +169,66 @@ def test_spawning_tells_how_many_came_and_keeps_away_from_the_car(kind: Exceptio
     assert 0 < outcome["count"] == len(crowd) <= 8
     least = FROM_CAR if kind is ExceptionKind.SPAWN_VEHICLES else 7.0
     assert min(np.hypot(*(one.position - world.car.position)) for one in crowd) >= least
-    assert all(outcome["x0"] - 9 <= one.position[0] <= outcome["x1"] + 9 for one in crowd)
+    for one in crowd:
+        assert outcome["x0"] <= one.position[0] <= outcome["x1"]
+        assert outcome["y0"] <= one.position[1] <= outcome["y1"]
+
+
+@pytest.mark.parametrize("extent", [5, 15, 40])
+@pytest.mark.parametrize("kind", [ExceptionKind.SPAWN_VEHICLES, ExceptionKind.SPAWN_PEDESTRIANS])
+def test_as_many_are_spawned_as_fit_and_then_nobody(kind: ExceptionKind, extent: int) -> None:
+    world, adversary = adversary_in("midtown")
+    crowd = world.actors.vehicles if kind is ExceptionKind.SPAWN_VEHICLES else world.actors.pedestrians
+    far = [lane for lane in world.town.lanes if np.hypot(*(lane.position(40.0) - world.car.position)) > 120.0]
+    lane = max((lane for lane in far if not lane.in_junction), key=lambda lane: lane.length)
+    counts, outcome = [], adversary.carry_out(place(lane.id, lane.length / 2, kind, count=16, extent=extent))
+    while isinstance(outcome, dict):
+        counts.append(outcome["count"])
+        outcome = adversary.carry_out(place(lane.id, lane.length / 2, kind, count=16, extent=extent))
+    assert outcome in ("there is no room for anybody in the rectangle", "there are 30 of them in the town already")
+    assert sum(counts) == len(crowd)
+    assert len(crowd) >= {5: 1, 15: 2, 40: 6}[extent]
+    for one, other in itertools.combinations(crowd, 2):  # some stand in the tunnel, others above it
+        assert abs(one.height - other.height) > 2.5 or not boxes_touch(Box.of(one), Box.of(other))
+
+
+def test_no_vehicle_is_spawned_on_a_waypoint() -> None:
+    world, adversary = adversary_in()
+    site = max(world.town.sites, key=lambda site: np.hypot(*(np.array(site.waypoint) - world.car.position)))
+    action = place(site.lane, site.station, ExceptionKind.SPAWN_VEHICLES, count=16, extent=60)
+    assert isinstance(adversary.carry_out(action), dict)
+    for vehicle in world.actors.vehicles:
+        for site in world.town.sites:
+            assert vehicle.lane_id != site.lane or np.hypot(*(vehicle.position - np.array(site.waypoint))) >= 7.5
+
+
+def test_vehicles_are_spawned_farther_off_the_faster_the_car_is_and_the_wetter_the_road() -> None:
+    world, adversary = adversary_in()
+    least = []
+    for speed, wet in ((0.0, 0.0), (15.0, 0.0), (15.0, 1.0)):
+        world.car.speed = speed
+        world.weather.set_share(WeatherParameter.WETNESS, wet)
+        least.append(adversary._stopping_distance())
+    assert least[0] == 0.0
+    assert least[1] == pytest.approx(37.5)
+    assert least[2] > least[1]
+
+
+def test_two_props_block_all_lanes_of_a_direction_where_there_is_room_to_turn_round_before_each() -> None:
+    world, adversary = adversary_in("northgate")
+    town, put = world.town, 0
+    for lane in town.lanes:
+        beside = town.neighbour(lane.id, LinkType.LANE_CHANGE_LEFT)
+        if lane.in_junction or beside is None or lane.length < 90.0:
+            continue
+        # the car comes to the one, changes lanes, and comes to the other
+        if not isinstance(adversary.carry_out(place(lane.id, 40.0)), dict):
+            continue
+        across = town.lanes[beside].project(lane.position(40.0))[0]
+        for staggered in (-18.0, 12.0):
+            assert isinstance(adversary.carry_out(place(beside, across + staggered)), str)
+        put += isinstance(adversary.carry_out(place(beside, across + 28.0)), dict)
+    assert put >= 1
 
 
 def test_prop_kinds_stand_as_they_are() -> None:

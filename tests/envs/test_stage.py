@@ -7,7 +7,8 @@ import pytest
 
 from dorothie_gym.envs.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.ontology import DialogueAct, DialogueMove, ExceptionKind, PhysicalAction, Role
+from dorothie_gym.ontology import DialogueAct, DialogueMove, ExceptionKind, PhysicalAction, PropKind, Role
+from dorothie_gym.sessions import INFRACTIONS, EventType
 from dorothie_gym.spaces import (
     NO_MOVE,
     AdWizardAction,
@@ -116,3 +117,22 @@ def test_observations_fit_their_spaces_throughout(env: DuoWizardEnv) -> None:
             assert env.observation_space(agent).contains(observation)
         actions = {agent: env.action_space(agent).sample(mask=infos[agent]["action_mask"]) for agent in env.agents}
         observations, *_, infos = env.step(actions)
+
+
+def test_infractions_are_events_and_counted_in_info_and_summary(env: DuoWizardEnv) -> None:
+    *_, infos = step(env)
+    assert set(infos["participant"]["infractions"].values()) == {0}
+    world = env.stage.world
+    world._look_ahead = lambda: None  # type: ignore[method-assign]
+    lane = world.town.lanes[world.planner.lane]
+    prop = world.actors.add_prop(PropKind.STREET_BARRIER, lane.id, min(world.planner.station + 8.0, lane.length - 1.0))
+    events = []
+    for _ in range(20):
+        *_, infos = step(env)
+        events += [event for event in env.last_events if event.type in INFRACTIONS]
+    (event,) = events
+    assert event.type is EventType.COLLISION
+    assert event.data["key"] == prop.key
+    assert infos["ad_wizard"]["infractions"] == env.summary()["infractions"]
+    assert env.summary()["infractions"]["collision"] == 1
+    assert env.summary()["collisions"] == 1

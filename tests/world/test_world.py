@@ -8,8 +8,10 @@ import pytest
 from dorothie_gym.ontology import ObjectClass, PhysicalAction, PropKind, Sensor, WeatherParameter
 from dorothie_gym.world.config import WorldConfig
 from dorothie_gym.world.pedestrians import Pedestrian
+from dorothie_gym.world.reports import WorldEventKind
 from dorothie_gym.world.town import LinkType
-from dorothie_gym.world.world import World, WorldEventKind
+from dorothie_gym.world.traffic import free_places
+from dorothie_gym.world.world import World
 from tests.world.driving import PROPS, long_lane, network, run, world_at
 
 
@@ -100,12 +102,20 @@ def test_car_stops_for_a_crossing_pedestrian() -> None:
     assert not any(event.kind is WorldEventKind.COLLISION for event in events)
 
 
+def beside_lanes(world: World, count: int) -> None:
+    """People as the Ad-Wizard brings them: beside the lanes, and they cross anywhere."""
+    for lane, station in free_places(world.town, np.random.default_rng(1), 20 * count):
+        if len(world.actors.pedestrians) < count:
+            world.actors.add_pedestrian(lane, station)
+    assert len(world.actors.pedestrians) == count
+
+
 def test_pedestrians_walk_on_no_lane() -> None:
     for name in ("brookside", "Town05"):
         roads = network(name)
         site = roads.town.sites[0]
-        world = world_at(name, site.lane, site.station, WorldConfig(vehicles=0, pedestrians=12))
-        assert len(world.actors.pedestrians) == 12
+        world = world_at(name, site.lane, site.station, WorldConfig(vehicles=0, pedestrians=0))
+        beside_lanes(world, 12)
         for _ in range(60):
             world.step(15)
             for walker in world.actors.pedestrians:
@@ -135,7 +145,8 @@ def test_pedestrian_does_not_walk_into_a_car() -> None:
 def test_who_crosses_a_road_comes_to_its_far_kerb(name: str) -> None:
     roads = network(name)
     site = roads.town.sites[0]
-    world = world_at(name, site.lane, site.station, WorldConfig(vehicles=0, pedestrians=40))
+    world = world_at(name, site.lane, site.station, WorldConfig(vehicles=0, pedestrians=0))
+    beside_lanes(world, 40)
     for walker in world.actors.pedestrians:
         walker._lateral = walker._target = walker._home - world.actors._across(walker)
         walker._place()

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from highway_env.vehicle.kinematics import Vehicle
 
+from dorothie_gym.world.boxes import Box, boxes_touch
 from dorothie_gym.world.car.control import MAX_BRAKING, Control
 from dorothie_gym.world.network.road import TownRoad
 from dorothie_gym.world.town.model import Array
@@ -21,6 +23,7 @@ class Car(Vehicle):
         friction: share of the dry road's grip.
         drift: angle by which wind moves it beside its course, positive right [rad].
         sweep: places [m] that it has still to pass while it turns round, across lanes where others do not expect it.
+        touched: what it has touched since that was last asked for (`take_touched`).
     """
 
     MAX_SPEED = 40.0
@@ -32,6 +35,7 @@ class Car(Vehicle):
         self.friction = 1.0
         self.drift = 0.0
         self.sweep: list[tuple[float, float]] = []
+        self.touched: list[Any] = []
 
     def drive(self, control: Control, dt: float) -> None:
         """Sets the controls for the next substep of `dt` seconds; brakes stop the car, they do not reverse it."""
@@ -53,3 +57,18 @@ class Car(Vehicle):
         network = self.road.network
         self.lane_index = network.get_closest_lane_index(self.position, self.heading, height=self.height)
         self.lane = network.get_lane(self.lane_index)
+
+    def handle_collisions(self, other: Any, dt: float = 0.0) -> None:
+        """Takes note of what the car touches; `dt` is part of highway-env's interface.
+
+        Stock highway-env flags those that will have met by the next frame, pushes them apart, and tells nobody whom
+        they met. Here a collision is that the two outlines have a point in common, and both come to a stand.
+        """
+        if other.solid and other.collidable and boxes_touch(Box.of(self), Box.of(other)):
+            self.crashed = other.crashed = True
+            self.touched.append(other)
+
+    def take_touched(self) -> list[Any]:
+        """What the car has touched since this was asked last; it drives on as if nothing had happened."""
+        touched, self.touched, self.crashed = self.touched, [], False
+        return touched

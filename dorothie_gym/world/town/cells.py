@@ -307,6 +307,26 @@ class CellGraph:
         # what stands in the own cell was looked at already, place by place
         return replace(moves, source=np.full(len(moves), self.start), first=np.full(len(moves), cell + 1))
 
+    def stand(self, place: Place, source: int | None = None) -> Moves:
+        """What a car can do that stands before a roadblock: the shortest lane change, and a U-turn on the spot.
+
+        Args:
+            place: where it stands. It has the room on its own lane that it stopped with; only that on the other counts.
+            source: node that the moves begin at; by default the cell before the one that it stands in, whose end is
+                closed like all of the road up to the roadblock. None if there is no such cell on the lane.
+        """
+        lane = place[0]
+        cell = self.cell(*place)
+        source = cell - 1 if source is None else source
+        if source < self.first[lane]:
+            return _NONE
+        switches = self.departures(place, None, ())
+        kind, shortest = switches.entry, switches.driven < SHORT_CHANGE
+        switches = switches.take(shortest & (kind != ENTRIES.index(Entry.FOLLOW)) & (kind != _U_TURN))
+        moves = Moves.join([switches, self.departures(place, None, [place])])
+        count = len(moves)
+        return replace(moves, source=np.full(count, source), first=np.zeros(count, int), last=np.full(count, -1))
+
     def _crossings_from(self, lane: Lane, station: float, nearest: float) -> Moves:
         """Lane changes and U-turns from a place on, up to an obstacle [m]."""
         if lane.in_junction:
@@ -338,6 +358,7 @@ class CellGraph:
 
 
 _NONE = Moves.make(0)
+_U_TURN = ENTRIES.index(Entry.U_TURN)
 
 
 def _project(lane: Lane, positions: Array) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import breadth_first_order, dijkstra
+from scipy.sparse.csgraph import breadth_first_order, connected_components, dijkstra
 
 from dorothie_gym.world.town.cells import (
     CELL,
@@ -204,6 +204,58 @@ class Router:
         found[self.cell(*start)] = True
         return found[: self._graph.cells]
 
+    def onward(self, start: Place, blocked: Sequence[Place] = (), stands: Sequence[Place] = (),
+               held: Place | None = None) -> NDArray[np.bool_]:  # fmt: skip
+        """For every node of the graph, whether a car comes to it that drives on from a place past the roadblocks.
+
+        The nodes are the starts of the cells, in their order, then the tails of the lanes (`cells`). The cell that the
+        start is in counts if the car can come back to its beginning.
+
+        Args:
+            start: where the car is.
+            blocked: places that cannot be passed, see `route`.
+            stands: where cars stand before the roadblocks, at the beginnings of the blocked stretches.
+            held: where the car itself has to stand before the next roadblock, if that is near.
+        """
+        graph = self._graph
+        extra = [graph.departures(start, None, blocked)]
+        if held is not None:
+            extra.append(graph.stand(held, graph.start))
+        order = breadth_first_order(
+            self._passable(blocked, stands, extra), graph.start, directed=True, return_predecessors=False
+        )
+        found = np.zeros(graph.nodes, dtype=np.bool_)
+        found[order] = True
+        found[graph.start] = False
+        return found
+
+    def safe(
+        self, goals: Sequence[int], blocked: Sequence[Place] = (), stands: Sequence[Place] = ()
+    ) -> NDArray[np.bool_]:
+        """For every node, whether all of some cells can be reached from it past the roadblocks; see `onward`."""
+        matrix = self._passable(blocked, stands, [])
+        _, group = connected_components(matrix, directed=True, connection="strong")
+        reverse = matrix.T.tocsr()
+        result = np.ones(self._graph.nodes, dtype=np.bool_)
+        # what leads to one node of a group leads to all of it, and in a town nearly everything is one group
+        for goal in {int(group[goal]): goal for goal in goals}.values():
+            order = breadth_first_order(reverse, goal, directed=True, return_predecessors=False)
+            leading = np.zeros(self._graph.nodes, dtype=np.bool_)
+            leading[order] = True
+            result &= leading
+        return result
+
+    def leads_to(self, stand: Place, nodes: NDArray[np.bool_], blocked: Sequence[Place]) -> bool:
+        """Whether a car that stands before a roadblock can go from there straight to one of some nodes."""
+        moves = self._clear(self._graph.stand(stand, self._graph.start), blocked)
+        return bool(nodes[moves.target].any())
+
+    def _passable(
+        self, blocked: Sequence[Place], stands: Sequence[Place], extra: Sequence[Moves]
+    ) -> csr_matrix[np.float64]:
+        joined = Moves.join([Moves.make(0), *extra, *(self._graph.stand(place) for place in stands)])
+        return self._matrix(self._open(blocked, joined))
+
     def distances_to(self, goal: Place, blocked: Sequence[Place] = ()) -> NDArray[np.float64]:
         """Cost of the way from the start of every cell to a goal [m at 40 km/h]; inf where there is none."""
         moves = self._open(blocked, self._graph.arrivals(goal))
@@ -213,11 +265,16 @@ class Router:
     def _open(self, blocked: Sequence[Place], extra: Moves) -> Moves:
         """The town's moves and some more, without those that roadblocks prevent; ordered, each pair of nodes once."""
         moves = Moves.join([self._graph.moves, extra.cheapest(self._graph.nodes)])
-        if blocked:
-            closed = np.zeros(self._graph.nodes, dtype=np.bool_)
-            closed[sorted(self.cells_of(blocked))] = True
-            moves = moves.take(moves.clear_of(closed))
+        moves = self._clear(moves, blocked).cheapest(self._graph.nodes)
         return moves.take(np.argsort(moves.source * self._graph.nodes + moves.target, kind="stable"))
+
+    def _clear(self, moves: Moves, blocked: Sequence[Place]) -> Moves:
+        """Those moves that no roadblock prevents."""
+        if not blocked:
+            return moves
+        closed = np.zeros(self._graph.nodes, dtype=np.bool_)
+        closed[sorted(self.cells_of(blocked))] = True
+        return moves.take(moves.clear_of(closed))
 
     def _matrix(self, moves: Moves) -> csr_matrix[np.float64]:
         """Moves in their order as a matrix of costs."""
