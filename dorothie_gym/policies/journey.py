@@ -23,6 +23,12 @@ SWITCH_ROOM = 16.0
 END_ROOM = 6.0
 """Who is nearer to the end of a lane than this waits there and does not turn round any more [m]."""
 
+SAME_WAY = 25.0
+"""An exit of the own lane this close in angle is taken instead of that of a lane beside [degrees]."""
+
+RIGHT_BEHIND = 70.0
+"""There may be no room to change lanes between a junction and a goal that is no further behind it [m]."""
+
 LATE = 18.0
 """A lane change or U-turn that is this overdue will not come any more [m]."""
 
@@ -263,11 +269,20 @@ class Journey:
     def needs_switch(self, town: Town, lane: int, station: float, crossing: Crossing) -> bool:
         """Whether a lane change before a junction has to be made on its own, not on the way into the turn.
 
-        By default the car would go on to another junction, or run into what blocks its lane.
+        By default the car would go on to another junction, run into what blocks its lane, or cross the junction in its
+        own lane and come out beside a goal that is right behind it.
         """
         choice = next_choice(town, lane, station)
         obstructed = any(place[0] == lane and place[1] > station for place in self.blocked)
-        return obstructed or choice is None or choice.junction != crossing.exit.junction_id
+        if obstructed or choice is None or choice.junction != crossing.exit.junction_id:
+            return True
+        if self.left(station) - crossing.distance > RIGHT_BEHIND:
+            return False
+        wanted = crossing.exit
+        return any(
+            way.connector != wanted.connector and abs(wrap_degrees(way.angle - wanted.angle)) <= SAME_WAY
+            for way in choice.exits
+        )
 
     def changes_before(self, crossing: Crossing | None) -> bool:
         """Whether the route turns round before the given junction (or before the goal, where None)."""

@@ -1,6 +1,6 @@
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.policies.journey import Journey, find_exit, is_choice, light_ahead, next_choice, stopping_distance
-from dorothie_gym.world.town import load_town
+from dorothie_gym.world.town import LinkType, load_town
 from dorothie_gym.world.town.lights import LightColour
 
 TOWN = load_town("brookside")
@@ -67,3 +67,23 @@ def test_only_a_traffic_light_in_sight_is_seen():
     assert light_ahead(TOWN, lane.id, lane.length - 70.0, 0.0) is None
     dark = next(lane for lane in TOWN.lanes if lane.id in CHOICES and TOWN.light(lane.id, 0.0) is None)
     assert light_ahead(TOWN, dark.id, dark.length - 5.0, 0.0) is None
+
+
+def test_a_goal_right_behind_a_junction_needs_its_lane_before_it() -> None:
+    town = load_town("northgate")
+    tried = 0
+    for site in town.sites:
+        lane = town.lanes[site.lane]
+        before = [k for k in range(len(town.lanes)) if any(way.lane == lane.id for way in town.exits(k))]
+        for source in before:
+            beside = town.neighbour(source, LinkType.LANE_CHANGE_LEFT)
+            straight = beside is not None and any(abs(way.angle) < 20 for way in town.exits(beside))
+            if not straight or site.station > 20.0 or town.lanes[source].length < 55.0:
+                continue
+            assert beside is not None
+            journey = Journey.plan(town, (beside, 1.0), (site.lane, site.station))
+            crossing = journey.next_crossing(town, 1.0)
+            if crossing is not None and crossing.lane == source and crossing.exit.lane == lane.id:
+                assert journey.needs_switch(town, beside, 1.0, crossing)
+                tried += 1
+    assert tried

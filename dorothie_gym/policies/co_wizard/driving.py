@@ -8,6 +8,7 @@ from dorothie_gym.ontology import LandmarkName, ObjectClass, PhysicalAction
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View, Wish
 from dorothie_gym.policies.journey import (
     BRAKING,
+    SAME_WAY,
     SWITCH_ROOM,
     U_TURN_SPEED_SQUARED,
     Crossing,
@@ -30,9 +31,6 @@ TURN_LEAD = 85.0
 
 PATIENCE = 2.0
 """A command that has shown no effect is given again after this time [s]."""
-
-SAME_WAY = 25.0
-"""An exit of the own lane this close in angle is taken instead of that of a lane beside [degrees]."""
 
 
 def drive(mind: CoWizardMind, view: View) -> Physical | None:
