@@ -24,6 +24,9 @@ from dorothie_gym.world.town.oncoming import oncoming_lanes
 from dorothie_gym.world.traffic import CurveSpeeds, TrafficVehicle, free_places
 from dorothie_gym.world.walkers import Walker
 
+GOES_HOME = 45.0
+"""A walker who has not got on for this long goes home [s]; longer than one waits at a crosswalk."""
+
 TOW_CRASHED = 3.0
 """A crashed vehicle is towed away after this long [s]."""
 
@@ -182,15 +185,22 @@ class Actors:
         self.props.remove(prop)
 
     def tidy(self) -> None:
-        """Tows crashed and stuck vehicles away and brings others in; to be called once a decision."""
+        """Tows crashed and stuck vehicles away and brings others in; to be called once a decision.
+
+        Walkers who do not get on, as between the end of a pavement and a car that waits for them, go home; others come.
+        """
         for vehicle in list(self.vehicles):
             blocked = vehicle.stuck > TOW_BLOCKED and self._before_prop(vehicle)
             blocked |= vehicle.stuck > TOW_FACING and self._faces_turning_car(vehicle)
             if vehicle.crash_age > TOW_CRASHED or vehicle.stuck > TOW_STUCK or blocked:
                 self._remove(vehicle)
                 self._replace()
-        self.pedestrians = [p for p in self.pedestrians if not p.crashed]
-        self._road.objects = [o for o in self._road.objects if not (isinstance(o, Pedestrian | Walker) and o.crashed)]
+        home = [p for p in self.pedestrians if isinstance(p, Walker) and p.staying > GOES_HOME]
+        gone = [p for p in self.pedestrians if p.crashed or p in home]
+        self.pedestrians = [p for p in self.pedestrians if p not in gone]
+        self._road.objects = [o for o in self._road.objects if o not in gone]
+        if home:
+            self._add_walkers(len(self.pedestrians) + len(home))
 
     def book(self, touched: Sequence[Any]) -> list[tuple[ObjectClass, Any]]:
         """What the car has touched, with their classes; all but props stay until they are towed away."""

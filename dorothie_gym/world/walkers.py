@@ -39,6 +39,9 @@ GIVES_UP = 40.0
 BLOCKED = 3.0
 """Who has not got on for this long turns round [s]."""
 
+PLACE = 3.0
+"""Who stays within this distance does not get on [m]."""
+
 OVER = 0.1
 """Who is this close to the end of a crosswalk has left it [m]."""
 
@@ -55,6 +58,7 @@ class Walker(RoadObject):
         crosswalk: id of the crosswalk that it is on, or -1.
         across: how far along that it is [m].
         onward: 1 or -1, the direction in which it walks along that.
+        staying: for how long it has not got on [s].
     """
 
     LENGTH, WIDTH = 0.5, 0.5
@@ -76,9 +80,14 @@ class Walker(RoadObject):
         self._crossing: Way | None = None
         x, y, self.height = self._target()
         super().__init__(road, np.array([x, y]), self._heading(), self._speed)
+        self._left = (x, y)
+        self.staying = 0.0
 
     def walk(self, dt: float) -> None:
         """Walks on for `dt` [s], or waits for a gap at the kerb."""
+        self.staying += dt
+        if math.hypot(self.position[0] - self._left[0], self.position[1] - self._left[1]) > PLACE:
+            self._left, self.staying = (float(self.position[0]), float(self.position[1])), 0.0
         if self.crashed or self._waits(dt):
             self.speed = 0.0
             return

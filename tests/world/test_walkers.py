@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.ontology import ObjectClass, PhysicalAction, PropKind
+from dorothie_gym.world.actors import GOES_HOME
 from dorothie_gym.world.boxes import Box, boxes_touch
 from dorothie_gym.world.config import WorldConfig
 from dorothie_gym.world.crosswalks import layout
@@ -334,3 +335,16 @@ def test_car_stays_behind_a_cyclist_where_there_is_one_lane() -> None:
     assert 4.0 < gap < 20.0
     assert float(world.car.speed) < SPEEDS[1] + 1.0
     assert world.collisions == 0
+
+
+def test_walkers_who_do_not_get_on_go_home_and_others_come() -> None:
+    world = town_with_people("brookside", 6)
+    held = world.actors.pedestrians[0]
+    before = list(world.actors.pedestrians)
+    assert isinstance(held, Walker)
+    held._speed = 0.0  # as between a wall and a car
+    run(world, GOES_HOME - 2.0)
+    assert held in world.actors.pedestrians
+    run(world, 4.0)
+    assert held not in world.actors.pedestrians and held not in world.road.objects
+    assert len(world.actors.pedestrians) == len(before)
