@@ -17,11 +17,12 @@ from dorothie_gym.world.cyclists import SPEEDS as CYCLING_SPEEDS
 from dorothie_gym.world.junctions import JunctionControl
 from dorothie_gym.world.network.road import TownRoad
 from dorothie_gym.world.pedestrians import KERB, Pedestrian, leftmost, rightmost, walkway
+from dorothie_gym.world.places import free_places
 from dorothie_gym.world.props import Prop
 from dorothie_gym.world.town.footways import WayKind, footways
 from dorothie_gym.world.town.model import Array
 from dorothie_gym.world.town.oncoming import oncoming_lanes
-from dorothie_gym.world.traffic import CurveSpeeds, TrafficVehicle, free_places
+from dorothie_gym.world.traffic import CurveSpeeds, TrafficVehicle
 from dorothie_gym.world.walkers import Walker
 
 GOES_HOME = 45.0

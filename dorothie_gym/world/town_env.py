@@ -14,8 +14,8 @@ from dorothie_gym.world.actors import Actors
 from dorothie_gym.world.junctions import JunctionControl
 from dorothie_gym.world.network.network import FARTHEST, TownNetwork
 from dorothie_gym.world.network.road import TownRoad
+from dorothie_gym.world.places import free_places
 from dorothie_gym.world.town import load_town
-from dorothie_gym.world.traffic import free_places
 
 
 class TownEnv(AbstractEnv):

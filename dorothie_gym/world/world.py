@@ -2,33 +2,28 @@
 
 from __future__ import annotations
 
-import functools
 import math
 
 import numpy as np
 
-from dorothie_gym.ontology import ObjectClass, PhysicalAction, Sensor, WeatherParameter
+from dorothie_gym.ontology import PhysicalAction, Sensor, WeatherParameter
 from dorothie_gym.world.actors import Actors
 from dorothie_gym.world.car.driver import Driver
-from dorothie_gym.world.car.hazards import HEIGHT_MARGIN, Body, Hazard, bodies_ahead
-from dorothie_gym.world.car.path import U_TURN_REACH
-from dorothie_gym.world.car.planner import BEGUN, BRAKING, LocalPlanner
+from dorothie_gym.world.car.hazards import Body, Hazard
+from dorothie_gym.world.car.planner import LocalPlanner
 from dorothie_gym.world.car.vehicle import Car
 from dorothie_gym.world.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
-from dorothie_gym.world.junctions import CRITICAL_GAP, HARDEST_BRAKING, JunctionControl, Wait
+from dorothie_gym.world.junctions import JunctionControl
 from dorothie_gym.world.localizer import FIX_EVERY, Localizer
+from dorothie_gym.world.lookout import CAR, Lookout
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.network.road import TownRoad
 from dorothie_gym.world.perception import Perception
 from dorothie_gym.world.reports import Pose, Reports, WorldEvent, WorldEventKind
 from dorothie_gym.world.town.model import Array, Town
-from dorothie_gym.world.traffic import room_at_start
 from dorothie_gym.world.visibility import CLEAR_SIGHT, Visibility
 from dorothie_gym.world.weather import Weather
 from dorothie_gym.world.wind import Wind
-
-CAR = 0
-"""Key of the car among bodies and at junctions."""
 
 FAULT_SECONDS = 30.0
 """A sensor fault ends by itself after this long [s] (design)."""
@@ -36,23 +31,11 @@ FAULT_SECONDS = 30.0
 CLARITY = {Sensor.BLUR: 0.25, Sensor.VIEW: 0.0}
 """Share of the signal that a fault of the view leaves: blur halves the sight."""
 
-TURN_ROUND_SPEED = 4.0
-"""Whoever comes towards a car that turns round is taken to be at least this fast soon [m/s]."""
-
-ASKING = 11.5
-"""The car asks for a junction this far before it would have to brake for it [m]."""
-
-UPSTREAM = 50.0
-"""How far before a lane's start vehicles that come towards it are looked for [m]."""
-
 EXTEND_EVERY = 15
 """The path is lengthened this often [frames]."""
 
 HARD = 3.5
 """Braking harder than this for something ahead is a hazard stop [m/s^2]."""
-
-STANDING = 0.1
-"""Slower than this the car stands [m/s]."""
 
 
 class World:
@@ -99,7 +82,6 @@ class World:
         self.planner = LocalPlanner(town, lane, station)
         self.driver = Driver(self.planner, length=self.car.LENGTH, cruise=config.cruise_speed)
         self.junctions = JunctionControl(town)
-        self._is_connector = np.array([lane.in_junction for lane in town.lanes])  # (lanes,)
         self.weather = Weather()
         self.wind = Wind(np.random.default_rng(wind_seed))
         self._perception = Perception(np.random.default_rng(perceive_seed))
@@ -107,6 +89,7 @@ class World:
             self.road, self.junctions, self.car,
             traffic_rng=np.random.default_rng(traffic_seed), walk_rng=np.random.default_rng(walk_seed),
         )  # fmt: skip
+        self._lookout = Lookout(self.road, self.car, self.planner, self.junctions, self.actors)
         self.actors.populate(vehicles=config.vehicles, pedestrians=config.pedestrians)
         self.localizer = Localizer(
             float(self.car.position[0]), float(self.car.position[1]), float(self.car.heading),
@@ -155,7 +138,7 @@ class World:
         dt = 1.0 / FRAME_RATE
         car = self.car
         self.junctions.note(CAR, self.planner.lane, float(car.speed), self.time)
-        hazard = self._look_ahead()
+        hazard = self._lookout.look(self.perceived(), self.sight, self.time)
         friction = self.weather.friction
         car.friction, self.driver.sight = friction, self.sight
         car.drift = self.wind.drift(
@@ -210,167 +193,6 @@ class World:
         x, y = self.car.position
         bodies = self.actors.bodies(self.car.position, CLEAR_SIGHT)
         return self._perception.perceive(bodies, float(x), float(y), self.visibility, self.frame)
-
-    def _look_ahead(self) -> Hazard | None:
-        """The nearest thing on the path that the car has to brake for."""
-        planner, car = self.planner, self.car
-        bodies = self.perceived()
-        block = bodies_ahead(
-            planner.path, planner.s, [body for body in bodies if body.kind is ObjectClass.STATIC],
-            length=car.LENGTH, width=car.WIDTH,
-        )  # fmt: skip
-        planner.roadblock = block.gap + car.LENGTH / 2 if block is not None else math.inf
-        found = bodies_ahead(
-            planner.path, planner.s, bodies, length=car.LENGTH, width=car.WIDTH, speed=float(car.speed)
-        )
-        blocked = found is not None and found.safe_speed() <= 0.0
-        gap = self._gap_to_traffic(bodies, blocked=blocked)
-        crosswalk = self._crosswalk_ahead()
-        junction = None if crosswalk is not None and crosswalk.safe_speed() <= 0.0 else self._junction_ahead()
-        hazards = [h for h in (found, crosswalk, junction, gap) if h is not None]
-        return min(hazards, key=Hazard.safe_speed, default=None)
-
-    def _crosswalk_ahead(self) -> Hazard | None:
-        """The next crosswalk on the path with people on it, whom the car sees and for whom it can still stop."""
-        path, planner, speed = self.planner.path, self.planner, float(self.car.speed)
-        reach = speed**2 / (2 * BRAKING) + ASKING + self.car.LENGTH / 2
-        first, last = path.index_at(planner.s), path.index_at(planner.s + reach)
-        for k in range(first, last + 1):
-            lane = int(path.lanes[k])
-            if path.manoeuvre[k] or (k > first and path.lanes[k - 1] == lane):
-                continue
-            for span in self.actors.crosswalks.spans(lane):
-                gap = float(path.s[k]) + span.start - float(path.stations[k]) - planner.s - self.car.LENGTH / 2
-                if gap < 0.0 or gap > reach or speed**2 > 2 * HARDEST_BRAKING * max(gap, 0.1):
-                    continue
-                walker = self.actors.crosswalks.holds(span)
-                if walker is not None and math.hypot(*(walker.position - self.car.position)) < self.sight:
-                    return Hazard(kind=ObjectClass.PEDESTRIAN, gap=gap, key=walker.key, line=True)
-        return None
-
-    def _junction_ahead(self) -> Hazard | None:
-        """The line before a junction that the car may not enter yet."""
-        path, planner, speed = self.planner.path, self.planner, float(self.car.speed)
-        if planner.held and speed < STANDING:
-            return None  # asks for nothing that it does not use
-        asking = speed**2 / (2 * BRAKING) + ASKING
-        first = path.index_at(planner.s)
-        lanes = path.lanes[
-            first : path.index_at(planner.s + max(asking, CRITICAL_GAP * speed) + self.car.LENGTH / 2) + 1
-        ]
-        entries = np.flatnonzero((lanes[1:] != lanes[:-1]) & self._is_connector[lanes[1:]])
-        if not len(entries):
-            return None
-        k = int(entries[0])
-        entered = first + k + 1  # the first point of the path that is on the connector, not quite at its start
-        line = float(path.s[entered] - path.stations[entered]) - planner.s - self.car.LENGTH / 2
-        if line < -self.car.LENGTH / 2:
-            return None  # over the line already
-        lane, connector = int(lanes[k]), int(lanes[k + 1])
-        self.junctions.announce(CAR, lane, connector, self.time, distance=line, speed=speed)
-        if line > asking:
-            return None
-        wait = self.junctions.request(CAR, self.time, room=self._has_room)
-        return None if wait is None else Hazard(kind=self._holder(wait, lane), gap=line, key=-2, line=True)
-
-    def _has_room(self, others: int) -> bool:
-        """Whether there is room behind the junction ahead for the car and so many others."""
-        after = next((lane for lane in self.planner.lanes_ahead[1:] if not self.town.lanes[lane].in_junction), None)
-        if after is None:
-            return True
-        return room_at_start(self.road, self.network.lane_of(after), exclude=self.car, others=others)
-
-    def _holder(self, wait: Wait, lane: int) -> ObjectClass:
-        """What holds the car before a junction, as a driver would say."""
-        if wait is Wait.LIGHT:
-            return ObjectClass.TRAFFIC_LIGHT
-        if self.junctions.obeys_sign(lane) and wait not in (Wait.NO_ROOM, Wait.CLOSED):
-            return ObjectClass.TRAFFIC_SIGN
-        return ObjectClass.VEHICLES
-
-    def _gap_to_traffic(self, bodies: list[Body], *, blocked: bool) -> Hazard | None:
-        """Before a lane switch or U-turn: the place where it begins, while others are in its way.
-
-        Args:
-            bodies: all that is perceived.
-            blocked: whether the car stands behind something: it may be waiting for the junction, which stays open then.
-        """
-        planner, path = self.planner, self.planner.path
-        action, _ = planner.manoeuvre
-        k = path.index_at(planner.s)
-        turning = action is PhysicalAction.U_TURN
-        if path.manoeuvre[k] and (planner.s > BEGUN or float(self.car.speed) > STANDING):
-            if turning and not blocked:
-                self._close_junction(path.points[k])
-            return None
-        if not path.manoeuvre[k:].any():
-            return None
-        start = k + int(np.argmax(path.manoeuvre[k:]))
-        ahead = float(path.s[start]) - planner.s
-        if ahead > 15.0:
-            return None
-        target = int(path.lanes[start])
-        meeting, _ = self.town.lanes[target].project(np.asarray(path.points[start]))
-        for body in bodies:
-            if body.kind is not ObjectClass.VEHICLES:
-                continue
-            station = self._place_towards(target, body)
-            if station is None:
-                continue
-            if turning:  # it takes the car's length of time to get round, in which who stands now may have come up
-                behind = 8.0 + 5.0 * max(body.speed, TURN_ROUND_SPEED)
-            else:
-                behind = 8.0 + 3.0 * max(body.speed - float(self.car.speed), 0.0)
-            if -behind < station - meeting < 9.0:
-                return Hazard(kind=ObjectClass.VEHICLES, gap=max(ahead, 0.0) + 2.0, key=body.key)
-        # asked for last: those who wait before the junction have to go first
-        if turning and not blocked and not self._close_junction(path.points[start]):
-            return Hazard(kind=ObjectClass.VEHICLES, gap=max(ahead, 0.0) + 2.0, key=-2)
-        return None
-
-    def _close_junction(self, start: Array) -> bool:
-        """Keeps others out of junctions into which a U-turn reaches that begins at a place [m]; tells if it is free."""
-        free = True
-        for junction, (x, y), radius in self._mouths:
-            if math.hypot(x - start[0], y - start[1]) < radius + U_TURN_REACH:
-                free &= self.junctions.close(CAR, junction, self.time)
-        return free
-
-    @functools.cached_property
-    def _mouths(self) -> list[tuple[int, tuple[float, float], float]]:
-        """Junctions: id, a middle [m], and the radius in which their connectors lie [m]."""
-        found = []
-        for junction in self.town.junctions:
-            points = np.concatenate([self.town.lanes[lane].points[:, :2] for lane in junction.connectors])
-            middle = (points.min(axis=0) + points.max(axis=0)) / 2
-            radius = float(np.hypot(*(points - middle).T).max())
-            found.append((junction.id, (float(middle[0]), float(middle[1])), radius))
-        return found
-
-    def _place_towards(self, target: int, body: Body) -> float | None:
-        """Where a body is along a lane, negative where it comes towards its start, or None if it does not [m]."""
-        position = np.array([body.x, body.y])
-        for lane_id, offset in self._upstream(target):
-            lane = self.town.lanes[lane_id]
-            station, lateral = lane.project(position)
-            if abs(lateral) > 2.0 or abs(lane.height_at(station) - body.height) > HEIGHT_MARGIN:
-                continue
-            if math.cos(lane.heading_at(station) - body.heading) < 0.5:
-                continue
-            if not lane.in_junction or self.junctions.holds(body.key) == lane_id:
-                return station + offset
-        return None
-
-    @functools.lru_cache(maxsize=256)  # noqa: B019 - a world lives as long as its session
-    def _upstream(self, target: int) -> tuple[tuple[int, float], ...]:
-        """A lane, and those that lead to it within sight of a turning car, with where they begin [m]."""
-        found = [(target, 0.0)]
-        for lane, offset in found:
-            for before in self.town.predecessors(lane):
-                start = offset - self.town.lanes[before].length
-                if offset > -UPSTREAM and all(before != known for known, _ in found):
-                    found.append((before, start))
-        return tuple(found)
 
     def _note_hazard(self, hazard: Hazard | None, brake: float) -> None:
         """Logs when the car begins to stop for something, and when it goes on."""

@@ -123,7 +123,7 @@ def test_infractions_are_events_and_counted_in_info_and_summary(env: DuoWizardEn
     *_, infos = step(env)
     assert set(infos["participant"]["infractions"].values()) == {0}
     world = env.stage.world
-    world._look_ahead = lambda: None  # type: ignore[method-assign]
+    world._lookout.look = lambda *_: None  # type: ignore[method-assign]
     lane = world.town.lanes[world.planner.lane]
     prop = world.actors.add_prop(PropKind.STREET_BARRIER, lane.id, min(world.planner.station + 8.0, lane.length - 1.0))
     events = []

@@ -39,7 +39,7 @@ def drive_by_hand(world: World, hand: Hand) -> None:
 
 def blind(world: World) -> None:
     """From now on the car brakes for nobody."""
-    world._look_ahead = lambda: None  # type: ignore[method-assign]
+    world._lookout.look = lambda *_: None  # type: ignore[method-assign]
 
 
 def lawless(world: World, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,9 +8,9 @@ import pytest
 from dorothie_gym.ontology import ObjectClass, PhysicalAction, PropKind, Sensor, WeatherParameter
 from dorothie_gym.world.config import WorldConfig
 from dorothie_gym.world.pedestrians import Pedestrian
+from dorothie_gym.world.places import free_places
 from dorothie_gym.world.reports import WorldEventKind
 from dorothie_gym.world.town import LinkType
-from dorothie_gym.world.traffic import free_places
 from dorothie_gym.world.world import World
 from tests.world.driving import PROPS, long_lane, network, run, world_at
 

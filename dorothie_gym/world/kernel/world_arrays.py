@@ -34,8 +34,8 @@ from dorothie_gym.world.kernel.towing import is_free, put_on_lane
 from dorothie_gym.world.kernel.town_arrays import TownArrays
 from dorothie_gym.world.kernel.walking import place_walker
 from dorothie_gym.world.network.network import TownNetwork
+from dorothie_gym.world.places import free_places
 from dorothie_gym.world.town.model import Array
-from dorothie_gym.world.traffic import free_places
 
 PROPS = 16
 """Most props in a world."""

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dorothie_gym.world.town import LinkType
+from dorothie_gym.world.town import LinkType, TownError
 from dorothie_gym.world.town.model import wrap_degrees
 from tests.world.driving import network
 
@@ -45,3 +47,9 @@ def test_left_is_a_positive_angle() -> None:
         for way in town.exits(lane.id):
             if way.type in types and not lane.in_junction:
                 assert np.sign(way.angle) == types[way.type]
+
+
+def test_a_copied_error_keeps_its_message() -> None:
+    error = copy.copy(TownError("town.yaml", "line 3, street 'High Street'", "it runs nowhere"))
+    assert str(error) == "town.yaml: line 3, street 'High Street': it runs nowhere"
+    assert error.element == "line 3, street 'High Street'"
