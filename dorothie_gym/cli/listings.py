@@ -11,7 +11,7 @@ import typer
 from rich.table import Table
 
 from dorothie_gym.cli.optional import OWN_NAME
-from dorothie_gym.cli.output import check_picture, fail, print_json, stdout, told_plainly
+from dorothie_gym.cli.output import check_picture, fail, print_json, stderr, stdout, told_plainly
 
 if TYPE_CHECKING:
     from dorothie_gym.world.town.check import Fault
@@ -51,7 +51,8 @@ def towns(
         if picture is not None:
             from dorothie_gym.world.graphics import town_picture
 
-            town_picture(loaded, picture, fold=fold_of(loaded.name))
+            with stderr().status(f"drawing {loaded.name}, a few seconds"):
+                town_picture(loaded, picture, fold=fold_of(loaded.name))
     if as_json:
         print_json({"town": loaded.name, "faults": [_fault_row(fault) for fault in faults]} if check else facts)
     else:
