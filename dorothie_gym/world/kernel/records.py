@@ -26,6 +26,7 @@ class Kind(enum.IntEnum):
     CAR = 1
     CYCLIST = 2
     EGO = 3
+    DRIVEN = 4
 
 
 class Control(enum.IntEnum):
@@ -169,8 +170,10 @@ VEHICLE = np.dtype(
         ("approach", "i4"), ("approach_lane", "i4"),  # connector that it announced, and where it comes from
         ("claim", "i4"), ("inside", "i4"),  # connector that it was let into, and that it is on
         ("kind", "i4"), ("wait", "i4"),
+        ("key", "i4"),  # tells it apart from other bodies; who comes back after towing has a new one
         ("stood", "b1"), ("crashed", "b1"),
         ("blocked", "b1"),  # whether a prop is next ahead
+        ("touched", "b1"),  # whether the car has touched it
     ],
     align=True,
 )  # fmt: skip
@@ -184,7 +187,8 @@ PEDESTRIAN = np.dtype(
         ("aside", "f8"),  # how far to the right of the middle it keeps [m]
         ("waited", "f8"), ("odometer", "f8"),
         ("random", "i8"),
-        ("walk", "i4"), ("segment", "i4"), ("crossing", "i4"), ("mouth", "i4"), ("state", "i4"), ("crashed", "b1"),
+        ("walk", "i4"), ("segment", "i4"), ("crossing", "i4"), ("mouth", "i4"), ("state", "i4"), ("key", "i4"),
+        ("crashed", "b1"),
     ],
     align=True,
 )  # fmt: skip
@@ -194,7 +198,7 @@ PROP = np.dtype(
     [
         ("x", "f8"), ("y", "f8"), ("heading", "f8"), ("cos", "f8"), ("sin", "f8"), ("height", "f8"),
         ("length", "f8"), ("width", "f8"), ("radius", "f8"),
-        ("station", "f8", (4,)), ("lane", "i4", (4,)), ("present", "b1"),
+        ("station", "f8", (4,)), ("lane", "i4", (4,)), ("key", "i4"), ("present", "b1"),
     ],
     align=True,
 )  # fmt: skip
@@ -208,10 +212,11 @@ NODE = np.dtype(
 """A body in the list of a lane, ordered by station."""
 
 CLOCK = np.dtype(
-    [("time", "f8"), ("frame", "i8"), ("collisions", "i8"), ("run_over", "i8"), ("random", "i8"), ("towed", "i8")],
+    [("time", "f8"), ("frame", "i8"), ("collisions", "i8"), ("run_over", "i8"), ("random", "i8"), ("towed", "i8"),
+     ("keys", "i8")],
     align=True,
 )
-"""What a world counts: simulated time [s], substeps, collisions of vehicles, pedestrians touched, vehicles towed."""
+"""What a world counts: time [s], substeps, collisions of vehicles, pedestrians touched, vehicles towed, keys given."""
 
 LAMP = np.dtype([("until", "f8"), ("phase", "i4")], align=True)
 """The phase of a light programme now, which holds until a time [s]."""

@@ -43,6 +43,7 @@ def tow(town: TownArrays, world: WorldArrays, dt: float) -> None:
         if walker.crashed and walker.state != Walk.EMPTY:
             walker.walk = choose(walker, len(town.walks))
             walker.station = draw(walker) * town.walks[walker.walk].length
+            walker.key = new_key(world)
             place_walker(town, walker)
 
 
@@ -58,7 +59,15 @@ def _bring_back(town: TownArrays, world: WorldArrays, i: int) -> None:
     y = value_near(town.points, lane, lane.first, 1, station)
     if is_free(world, x, y, i):
         put_on_lane(town, vehicle, number, station)
+        vehicle.key, vehicle.touched = new_key(world), False
         world.clock[0].towed += 1
+
+
+@compiled
+def new_key(world: WorldArrays) -> int:
+    """A key that no body of the world has had."""
+    world.clock[0].keys += 1
+    return int(world.clock[0].keys)
 
 
 @compiled

@@ -30,7 +30,7 @@ from dorothie_gym.world.kernel.records import (
     Records,
     Walk,
 )
-from dorothie_gym.world.kernel.towing import is_free, put_on_lane
+from dorothie_gym.world.kernel.towing import is_free, new_key, put_on_lane
 from dorothie_gym.world.kernel.town_arrays import TownArrays
 from dorothie_gym.world.kernel.walking import place_walker
 from dorothie_gym.world.network.network import TownNetwork
@@ -162,7 +162,7 @@ def add_vehicle(
         raise ValueError(f"the world has room for {len(world.vehicles)} vehicles, and all are there")
     number = int(empty[0])
     vehicle = world.vehicles[number]
-    vehicle.kind = kind
+    vehicle.kind, vehicle.key, vehicle.touched = kind, new_key(world), False
     vehicle.length, vehicle.width, vehicle.desired, vehicle.to_right = CAR_LENGTH, CAR_WIDTH, desired, 0.0
     if kind is Kind.CYCLIST:
         vehicle.length, vehicle.width = CYCLIST_LENGTH, CYCLIST_WIDTH
@@ -197,7 +197,7 @@ def add_pedestrian(town: TownArrays, world: WorldArrays, walk: int, station: flo
         raise ValueError(f"there is no pavement {walk} in this town")
     number = int(empty[0])
     walker = world.pedestrians[number]
-    walker.walk, walker.station, walker.pace = walk, station, pace
+    walker.walk, walker.station, walker.pace, walker.key = walk, station, pace, new_key(world)
     walker.direction = 1.0 if walker.random & 2 else -1.0
     walker.aside = ASIDE * float(town.walks[walk].half_width)
     place_walker(town, walker)
@@ -233,7 +233,7 @@ def add_prop(
     prop.cos, prop.sin = math.cos(prop.heading), math.sin(prop.heading)
     prop.length, prop.width = kind.length, kind.width
     prop.radius = 0.5 * math.hypot(kind.length, kind.width)
-    prop.lane, prop.present = NOBODY, True
+    prop.lane, prop.present, prop.key = NOBODY, True, new_key(world)
     for k, (reached, at) in enumerate(_reached(network, prop)[:4]):
         prop.lane[k], prop.station[k] = reached, at
     rebuild(town, world)
