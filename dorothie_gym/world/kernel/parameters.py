@@ -65,6 +65,21 @@ AFTER_END = CAR_LENGTH / 2
 PLANNED = 24
 """Most lanes that a vehicle plans ahead, its own one included."""
 
+GOALS = 16
+"""Most places on the car's path that it comes up to slowly."""
+
+CLOSED = 4
+"""Most junctions that a car turns round in at once."""
+
+POINTS = 256
+"""Most points of the car's path that the loops look at: 1 m apart, half a metre in U-turns."""
+
+EVENTS = 64
+"""Most things that happen to the car within a call."""
+
+FRAMES = 15
+"""Most substeps within a call of a world with a driven car: its path is lengthened in between."""
+
 STOPPED = 0.05
 """Who brakes at less than this stands [m/s]."""
 

@@ -32,7 +32,7 @@ def tow(town: TownArrays, world: WorldArrays, dt: float) -> None:
     """
     for i in range(len(world.vehicles)):
         vehicle = world.vehicles[i]
-        if vehicle.kind == Kind.EMPTY or vehicle.kind == Kind.EGO:
+        if vehicle.kind == Kind.EMPTY or vehicle.kind == Kind.EGO or vehicle.kind == Kind.DRIVEN:
             continue
         if vehicle.crashed:
             vehicle.crash_age += dt

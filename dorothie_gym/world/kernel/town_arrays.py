@@ -54,6 +54,7 @@ class TownArrays(NamedTuple):
         mouths: `records.MOUTH`, those of a pavement in the order of their stations.
         crossings: `records.CROSSING`.
         passages: `records.PASSAGE`, those of a lane in the order of their stations.
+        junctions: (j, 3) middle [m] of each junction's connectors, and the radius in which they lie [m].
         flat: whether all lanes are so level that heights need not be looked at.
     """
 
@@ -73,6 +74,7 @@ class TownArrays(NamedTuple):
     mouths: Records
     crossings: Records
     passages: Records
+    junctions: Array
     flat: bool
 
     @property
@@ -107,7 +109,7 @@ def _build(network: TownNetwork) -> TownArrays:
     return TownArrays(
         network.table.points, lanes, neighbours, relations, siblings, programmes, phase_ends, colours,
         cells.origin, cells.bounds, cells.entries,
-        walkways.points, walkways.walks, walkways.mouths, walkways.crossings, walkways.passages,
+        walkways.points, walkways.walks, walkways.mouths, walkways.crossings, walkways.passages, _mouths(town, lanes),
         bool(high - low < LEVEL_TOWN),
     )  # fmt: skip
 
@@ -162,6 +164,17 @@ def _relate(town: Town, lanes: Records, rules: RightOfWay) -> NDArray[np.uint8]:
             rows.append(row)
             begin += len(row)
     return np.concatenate(rows) if rows else np.zeros(1, dtype=np.uint8)
+
+
+def _mouths(town: Town, lanes: Records) -> Array:
+    found = np.zeros((max(int(lanes.junction.max()) + 1, 1), 3))
+    for number in range(len(found)):
+        points = [lane.points[:, :2] for lane in town.lanes if lanes[lane.id].junction == number]
+        if points:
+            every = np.concatenate(points)
+            middle = (every.min(axis=0) + every.max(axis=0)) / 2
+            found[number] = *middle, float(np.sqrt(((every - middle) ** 2).sum(axis=1)).max())
+    return found
 
 
 def _exit(town: Town, connector: int) -> int:

@@ -17,14 +17,23 @@ from dorothie_gym.world.kernel.parameters import (
     CYCLIST_LENGTH,
     CYCLIST_SPEED,
     CYCLIST_WIDTH,
+    EVENTS,
+    FRAMES,
+    POINTS,
 )
 from dorothie_gym.world.kernel.records import (
+    CAR,
     CLOCK,
+    EVENT,
+    EYE,
     LAMP,
     NOBODY,
     NODE,
     PEDESTRIAN,
+    POINT,
     PROP,
+    SEEN,
+    TRACE,
     VEHICLE,
     Kind,
     Records,
@@ -39,6 +48,9 @@ from dorothie_gym.world.town.model import Array
 
 PROPS = 16
 """Most props in a world."""
+
+CAR_KEY = 0
+"""Key of the session's car."""
 
 STACK = 32
 """Most lanes that a search along lanes keeps in mind."""
@@ -72,6 +84,12 @@ class WorldArrays(NamedTuple):
         stack: int32 scratch of searches along lanes, with `starts` [m].
         starts: see there.
         clock: one `records.CLOCK`.
+        car: one `records.CAR`: what drives the session's car, if vehicle 0 is of the kind `Kind.DRIVEN`.
+        path: `records.POINT`: the way that it follows.
+        eye: one `records.EYE`: how well it sees.
+        seen: `records.SEEN`: what it sees, nearest first.
+        trace: (f, 11) its way in the last call of `step`, see `records.TRACE`.
+        events: `records.EVENT`: what happened to it then.
     """
 
     vehicles: Records
@@ -86,6 +104,12 @@ class WorldArrays(NamedTuple):
     stack: NDArray[np.int32]
     starts: Array
     clock: Records
+    car: Records
+    path: Records
+    eye: Records
+    seen: Records
+    trace: Array
+    events: Records
 
     @property
     def nbytes(self) -> int:
@@ -107,7 +131,10 @@ def _same(array: Any) -> Any:
     return copied.view(np.recarray) if isinstance(array, np.recarray) else copied
 
 
-def empty_world(town: TownArrays, *, vehicles: int, pedestrians: int, props: int = PROPS, seed: int = 0) -> WorldArrays:
+def empty_world(
+    town: TownArrays, *, vehicles: int, pedestrians: int, props: int = PROPS, seed: int | np.random.SeedSequence = 0,
+    driven: bool = False
+) -> WorldArrays:
     """A world with room for some bodies and nobody in it.
 
     Args:
@@ -116,6 +143,7 @@ def empty_world(town: TownArrays, *, vehicles: int, pedestrians: int, props: int
         pedestrians: most pedestrians.
         props: most props.
         seed: of all that is drawn at random in it.
+        driven: whether vehicle 0 will be a car that follows a path, `Kind.DRIVEN`.
     """
 
     def records(count: int, kind: np.dtype[np.void]) -> Records:
@@ -127,12 +155,20 @@ def empty_world(town: TownArrays, *, vehicles: int, pedestrians: int, props: int
         np.arange(vehicles + pedestrians + props, dtype=np.int32), np.zeros(vehicles + pedestrians + props),
         records(len(town.programmes), LAMP), np.zeros(len(town.crossings), dtype=np.int32),
         np.zeros(STACK, dtype=np.int32), np.zeros(STACK), records(1, CLOCK),
+        records(1, CAR), records(POINTS if driven else 1, POINT), records(1, EYE),
+        records(vehicles + pedestrians + props if driven else 1, SEEN),
+        np.zeros((FRAMES if driven else 1, len(TRACE))), records(EVENTS if driven else 1, EVENT),
     )  # fmt: skip
+    world.car.closed = NOBODY
+    world.car.closed_at = -math.inf
+    world.car.lateral_last = world.car.stop_at = world.car.roadblock = world.car.action_end = math.inf
+    world.car.hold_speed = -1.0
     world.nodes.lane = world.nodes.next = world.nodes.before = NOBODY
     world.lamps.until = -math.inf
     world.props.lane = NOBODY
     world.vehicles.lane = world.vehicles.approach = world.vehicles.claim = world.vehicles.inside = NOBODY
-    seeds = np.random.SeedSequence(seed).generate_state(vehicles + pedestrians + 1).astype(np.int64) | 1
+    source = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
+    seeds = source.generate_state(vehicles + pedestrians + 1).astype(np.int64) | 1
     world.vehicles.random, world.pedestrians.random = seeds[:vehicles], seeds[vehicles:-1]
     world.clock.random = seeds[-1:]
     return world
@@ -172,6 +208,19 @@ def add_vehicle(
     put_on_lane(town, vehicle, lane, float(station))
     rebuild(town, world)
     return number
+
+
+def add_car(town: TownArrays, world: WorldArrays, lane: int, station: float) -> None:
+    """Puts the session's car on a lane, as vehicle 0 of a world that was made for it (`driven`).
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world, with nobody in it yet.
+        lane: id of the lane.
+        station: along it [m].
+    """
+    add_vehicle(town, world, lane, station, kind=Kind.DRIVEN, desired=0.0)
+    world.vehicles[0].key = CAR_KEY
 
 
 def add_pedestrian(town: TownArrays, world: WorldArrays, walk: int, station: float, *, pace: float) -> int:
