@@ -54,6 +54,7 @@ class World:
         hazard: what the car is braking or standing for, or None.
         frame: physics frames since the start.
         frames: trajectory of the last call of `step` (n, 9), see `FRAME_COLUMNS`.
+        offsets: how far the car was to the right of its path at each of these frames (n,) [m].
         reports: what has happened to the car, and how often it broke which rule.
     """
 
@@ -101,6 +102,7 @@ class World:
         self.faults: dict[Sensor, int] = {}
         self.frame = 0
         self.frames: Array = np.zeros((0, len(FRAME_COLUMNS)))
+        self.offsets: Array = np.zeros(0)
         self.reports = Reports(self.network, self._pose(), self.car.LENGTH)
 
     # --- time -------------------------------------------------------------------------------------------------------
@@ -115,14 +117,14 @@ class World:
         before = (*self.car.position, self.car.heading)
         parts = [self._run(min(FRAMES, frames - first)) for first in range(0, frames, FRAMES)]
         trace = parts[0] if len(parts) == 1 else np.concatenate(parts)
-        self.frames = trace[:, : len(FRAME_COLUMNS)]
+        self.frames, self.offsets = trace[:, : len(FRAME_COLUMNS)], trace[:, -1]
         self._localize(np.vstack((before, trace[:, 1:4])))
         self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
         poses = [Pose(*(float(v) for v in (row[1], row[2], row[3], row[4], row[9])), bool(row[10])) for row in trace]
         return self.reports.close(poses, self.frame)
 
     def _run(self, frames: int) -> Array:
-        """Steps all bodies by no more than `FRAMES` substeps; returns the car's way (frames, 11)."""
+        """Steps all bodies by no more than `FRAMES` substeps; returns the car's way (frames, 12)."""
         arrays = self.actors.arrays
         self.planner.extend(self.car.speed)
         self.driver.brief(arrays)

@@ -78,6 +78,34 @@ def speed_profile(path: Path, stop_at: float | None) -> Array:
     return speeds
 
 
+def write_path(arrays: Any, path: Path, s: float, speeds: Array) -> float:
+    """Writes the stretch of a path around a place into the arrays of a world.
+
+    Args:
+        arrays: `kernel.WorldArrays` of a world with a driven car.
+        path: the path.
+        s: where the car is on it [m].
+        speeds: allowed at its points (n,) [m/s].
+
+    Returns:
+        Where the stretch ends [m].
+    """
+    car, table = arrays.car.view(np.ndarray)[0], arrays.path.view(np.ndarray)
+    first = path.index_at(s - BEHIND)
+    cut = slice(first, first + len(table))
+    lanes, headings = path.lanes[cut], path.headings[cut]
+    rows = table[: len(lanes)]
+    rows["s"], rows["x"], rows["y"] = path.s[cut], path.points[cut, 0], path.points[cut, 1]
+    rows["heading"], rows["cos"], rows["sin"] = headings, np.cos(headings), np.sin(headings)
+    rows["height"], rows["station"], rows["speed"] = path.heights[cut], path.stations[cut], speeds[cut]
+    rows["lane"], rows["manoeuvre"] = lanes, path.manoeuvre[cut]
+    starts = np.concatenate(([0], 1 + np.flatnonzero(lanes[1:] != lanes[:-1])))[: len(car["run_lane"])]
+    car["runs"], car["run"] = len(starts), -1
+    car["run_lane"][: len(starts)], car["run_first"][: len(starts)] = lanes[starts], starts
+    car["points"], car["at"], car["s"] = len(lanes), path.index_at(s) - first, s
+    return float(path.s[cut][-1])
+
+
 class Driver:
     """Lays the planner's path, the goals and the wishes of the Co-Wizard before the compiled world.
 
@@ -128,7 +156,7 @@ class Driver:
 
     def _tell(self, arrays: Any, car: Any, *, anew: bool) -> None:
         """Writes the stretch of path around the car; all else that follows from the path if that was laid anew."""
-        path, s, table = self.planner.path, self.planner.s, arrays.path.view(np.ndarray)
+        path, s = self.planner.path, self.planner.s
         if anew:
             stop_at = path.length - self._length / 2 - END_GAP if self.planner.waits_at_end else None
             self._speeds = speed_profile(path, stop_at)
@@ -136,22 +164,8 @@ class Driver:
             car["goals"], car["goal"][: len(goals)] = len(goals), goals
             car["stop_at"] = math.inf if stop_at is None else stop_at
             self._told = path
-        first = path.index_at(s - BEHIND)
-        cut = slice(first, first + len(table))
-        count = len(path.s[cut])
-        rows = table[:count]
-        rows["s"], rows["x"], rows["y"] = path.s[cut], path.points[cut, 0], path.points[cut, 1]
-        headings = path.headings[cut]
-        rows["heading"], rows["cos"], rows["sin"] = headings, np.cos(headings), np.sin(headings)
-        rows["height"], rows["station"], rows["speed"] = path.heights[cut], path.stations[cut], self._speeds[cut]
-        rows["lane"], rows["manoeuvre"] = path.lanes[cut], path.manoeuvre[cut]
-        lanes = path.lanes[cut]
-        starts = np.concatenate(([0], 1 + np.flatnonzero(lanes[1:] != lanes[:-1])))[: len(car["run_lane"])]
-        car["runs"], car["run"] = len(starts), -1
-        car["run_lane"][: len(starts)], car["run_first"][: len(starts)] = lanes[starts], starts
-        car["points"], car["at"] = count, path.index_at(s) - first
-        car["s"], car["offset"] = s, self.planner.offset
-        self._told_until = float(path.s[cut][-1])
+        car["offset"] = self.planner.offset
+        self._told_until = write_path(arrays, path, s, self._speeds)
 
     def _goals_on(self, path: Path) -> list[float]:
         """Places of the goals along a path [m], those of the lanes beside it among them."""

@@ -20,7 +20,7 @@ def trace(world: WorldArrays) -> None:
     rows[k, 0], rows[k, 1], rows[k, 2] = world.clock[0].frame, vehicle.x, vehicle.y
     rows[k, 3], rows[k, 4] = vehicle.heading, vehicle.speed
     rows[k, 5], rows[k, 6], rows[k, 7], rows[k, 8] = car.throttle, car.steer, car.brake, car.run_lane[car.run]
-    rows[k, 9] = vehicle.height
+    rows[k, 9], rows[k, 11] = vehicle.height, car.offset
     rows[k, 10] = 1.0 if car.action == U_TURN and world.path[car.at].manoeuvre else 0.0
 
 

@@ -300,7 +300,8 @@ EVENT = np.dtype(
 )  # fmt: skip
 """Something that happened to the car: an `EventCode`, with the class, key and number of the counterpart."""
 
-TRACE = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "brake", "lane", "height", "turning")
+TRACE = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "brake", "lane", "height", "turning",
+         "offset")
 """Columns of the way of the car."""
 
 CLOCK = np.dtype(

@@ -88,7 +88,7 @@ class WorldArrays(NamedTuple):
         path: `records.POINT`: the way that it follows.
         eye: one `records.EYE`: how well it sees.
         seen: `records.SEEN`: what it sees, nearest first.
-        trace: (f, 11) its way in the last call of `step`, see `records.TRACE`.
+        trace: (f, 12) its way in the last call of `step`, see `records.TRACE`.
         events: `records.EVENT`: what happened to it then.
     """
 
