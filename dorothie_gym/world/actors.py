@@ -61,7 +61,7 @@ class Actors:
         v = self.arrays.vehicles
         there = v.kind != 0
         d = np.hypot(v.x - x, v.y - y)[there]
-        if d[0] < distance or d.min() < 14.0:
+        if d[0] < distance or d.min() < 14.0 or there.all():
             return False
         add_vehicle(self._town_arrays, self.arrays, lane, station, desired=float(self._traffic_rng.uniform(*SPEEDS)))
         return True
@@ -72,3 +72,10 @@ class Actors:
 
     def remove_prop(self, prop) -> None:
         remove_prop(self._town_arrays, self.arrays, prop.row)
+
+    def kerb(self, lane, station):
+        l = self._town.lanes[lane]
+        return l.position(station, l.width_at(station) / 2 + KERB)
+
+    def add_pedestrian(self, lane, station):
+        return False

@@ -77,7 +77,7 @@ class World:
         self._arrays = town_arrays(self.network)
         lane, station = departure
         state = empty_world(
-            self._arrays, vehicles=1 + config.vehicles, pedestrians=config.pedestrians, seed=chance_seed, driven=True
+            self._arrays, vehicles=31 + config.vehicles, pedestrians=config.pedestrians, seed=chance_seed, driven=True
         )
         add_car(self._arrays, state, lane, station)
         state.car.collision_stop = round(config.collisions_stop * FRAME_RATE)
