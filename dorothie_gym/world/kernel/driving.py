@@ -14,9 +14,10 @@ from dorothie_gym.world.kernel.junctions import announce, forget, note, request
 from dorothie_gym.world.kernel.lanes import project
 from dorothie_gym.world.kernel.motion import slip_towards_lane
 from dorothie_gym.world.kernel.order import around, next_on_lane
-from dorothie_gym.world.kernel.parameters import ACC_MAX
+from dorothie_gym.world.kernel.parameters import ACC_MAX, CYCLIST_ACCELERATION
 from dorothie_gym.world.kernel.plan import extend, follow_road
 from dorothie_gym.world.kernel.records import NOBODY, Kind, Records, Wait, Walk
+from dorothie_gym.world.kernel.straying import give_way_to_strayers
 from dorothie_gym.world.network.ahead import HORIZON, LEVEL
 from dorothie_gym.world.traffic import ASKING, CROSSING_MARGIN, CROSSING_SIGHT, CURVE_BRAKING, LINE_GAP, STOP_BRAKING
 
@@ -52,7 +53,11 @@ def drive(town: TownArrays, world: WorldArrays, i: int) -> None:
     follow_road(town, vehicle)
     note(town, vehicle, world.clock[0].time)
     change_lanes(town, world, i)
-    vehicle.acceleration = min(max(_acceleration(town, world, i), -ACC_MAX), ACC_MAX)
+    most = CYCLIST_ACCELERATION if vehicle.kind == Kind.CYCLIST else ACC_MAX
+    wanted = _acceleration(town, world, i)
+    if world.clock[0].straying > 0:
+        wanted = min(wanted, give_way_to_strayers(town, world, i))
+    vehicle.acceleration = min(max(wanted, -ACC_MAX), most)
     vehicle.slip = slip_towards_lane(town.points, town.lanes[vehicle.plan[0]], vehicle)
 
 

@@ -76,12 +76,21 @@ class Wait(enum.IntEnum):
 
 
 class Walk(enum.IntEnum):
-    """What a pedestrian does."""
+    """What a pedestrian does; who strays crosses the road where there is no crosswalk."""
 
     EMPTY = 0
     WALKING = 1
     WAITING = 2
     CROSSING = 3
+    STRAYING = 4
+
+
+class Footway(enum.IntEnum):
+    """What a way is that people walk along."""
+
+    PAVEMENT = 0
+    CORNER = 1
+    STREET = 2
 
 
 LANE = np.dtype(
@@ -137,17 +146,19 @@ PROGRAMME = np.dtype(
 
 WALKWAY = np.dtype(
     [("length", "f8"), ("first", "i4"), ("last", "i4"), ("mouth", "i4"), ("mouths", "i4"), ("half_width", "f8"),
-     ("next_walk", "i4", (2,)), ("next_end", "i4", (2,))],
+     ("next_walk", "i4", (2,)), ("next_end", "i4", (2,)), ("kind", "i4"), ("lane", "i4")],
     align=True,
 )  # fmt: skip
-"""A pavement: its points, the mouths of crosswalks along it, and where one walks on beyond its two ends, or -1."""
+"""A way along which people walk: its points, the mouths of crosswalks along it, and where one walks on beyond its two
+ends, or -1; its kind (`Footway`), and of a street walk the lane that it is beside, else -1."""
 
 CROSSING = np.dtype(
     [("x", "f8", (2,)), ("y", "f8", (2,)), ("cos", "f8"), ("sin", "f8"), ("length", "f8"), ("height", "f8"),
-     ("walk", "i4", (2,)), ("station", "f8", (2,))],
+     ("walk", "i4", (2,)), ("station", "f8", (2,)), ("light", "i4"), ("lights", "i4")],
     align=True,
 )  # fmt: skip
-"""A crosswalk: its two ends, its direction from the first to the second, and the pavements that it joins."""
+"""A crosswalk: its two ends, its direction from the first to the second, the pavements that it joins, and where the
+lanes are in `neighbours` whose lights must be red while one crosses."""
 
 MOUTH = np.dtype([("station", "f8"), ("crossing", "i4"), ("end", "i4")], align=True)
 """Where a crosswalk leaves a pavement."""
@@ -166,6 +177,7 @@ VEHICLE = np.dtype(
         ("own_station", "f8"), ("own_lateral", "f8"),  # on the lane that is closest [m]
         ("timer", "f8"),  # since it thought of changing lanes [s]
         ("standing", "f8"),  # for how long it has been standing, its light not being red [s]
+        ("stuck", "f8"),  # the same less the time for which the light ahead was not green, also behind others [s]
         ("crash_age", "f8"),  # since it crashed [s]
         ("odometer", "f8"),  # way driven [m]
         ("distance", "f8"),  # from its front to the line before the next junction [m]
@@ -194,6 +206,9 @@ PEDESTRIAN = np.dtype(
         ("pace", "f8"),  # speed that it likes [m/s]
         ("aside", "f8"),  # how far to the right of the middle it keeps [m]
         ("waited", "f8"), ("odometer", "f8"),
+        ("far", "f8"),  # of who strays: to the other side of the road [m]
+        ("staying", "f8"), ("left_x", "f8"), ("left_y", "f8"),  # for how long it has not got on [s], and from where [m]
+        ("crash_age", "f8"),  # since it was touched [s]
         ("random", "i8"),
         ("walk", "i4"), ("segment", "i4"), ("crossing", "i4"), ("mouth", "i4"), ("state", "i4"), ("key", "i4"),
         ("crashed", "b1"),
@@ -306,10 +321,11 @@ TRACE = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "brake", "l
 
 CLOCK = np.dtype(
     [("time", "f8"), ("frame", "i8"), ("collisions", "i8"), ("run_over", "i8"), ("random", "i8"), ("towed", "i8"),
-     ("keys", "i8")],
+     ("keys", "i8"), ("straying", "i8")],
     align=True,
-)
-"""What a world counts: time [s], substeps, collisions of vehicles, pedestrians touched, vehicles towed, keys given."""
+)  # fmt: skip
+"""What a world counts: time [s], substeps, collisions of vehicles, pedestrians touched, vehicles towed, keys given, and
+how many stray over a road now; `random` is a number from which those of all bodies are drawn."""
 
 LAMP = np.dtype([("until", "f8"), ("phase", "i4")], align=True)
 """The phase of a light programme now, which holds until a time [s]."""

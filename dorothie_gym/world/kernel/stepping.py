@@ -55,7 +55,7 @@ def step(
             if vehicles[i].kind != Kind.EMPTY:
                 _go_on(town, vehicles[i], dt)
         collide(world)
-        tow(town, world, dt)
+        tow(town, world, dt, bool(world.car[0].sweeping))
         rebuild(town, world)
         clock.frame += 1
         clock.time = clock.frame * dt

@@ -40,7 +40,7 @@ class TownArrays(NamedTuple):
     Attributes:
         points: (p, 6) x, y, station, heading, height, width of all points of centre lines, the network's own table.
         lanes: `records.LANE`.
-        neighbours: int32 lists of lanes that follow and precede others.
+        neighbours: int32 lists of lanes that follow and precede others, and of those whose lights one heeds on foot.
         relations: uint8 rows of `records.Relation` of each connector to those of its junction.
         siblings: `records.SIBLING`.
         programmes: `records.PROGRAMME`.
@@ -49,8 +49,10 @@ class TownArrays(NamedTuple):
         origin: (2,) corner of the cells [m].
         cells: (rows, columns, 2) int32, see `cells.Cells`.
         entries: `records.ENTRY`.
-        walk_points: (q, 6) points of the pavements, as `points`.
-        walks: `records.WALKWAY`.
+        walk_points: (q, 6) points of the footways, as `points`; of those beside streets the last column tells how far
+            it is to the kerb across, 0 where nobody crosses [m].
+        walks: `records.WALKWAY`: the pavements with the town's own ids, the ways between their ends, the ways beside
+            the rightmost lanes.
         mouths: `records.MOUTH`, those of a pavement in the order of their stations.
         crossings: `records.CROSSING`.
         passages: `records.PASSAGE`, those of a lane in the order of their stations.
@@ -105,6 +107,8 @@ def _build(network: TownNetwork) -> TownArrays:
     programmes, phase_ends, colours = _lights(town, lanes)
     cells = build_cells(network.table.points, lanes)
     walkways = build_walkways(network, lanes)
+    walkways.crossings.light += len(neighbours)
+    neighbours = np.concatenate((neighbours, walkways.heeded))
     low, high = network.height_range
     return TownArrays(
         network.table.points, lanes, neighbours, relations, siblings, programmes, phase_ends, colours,
