@@ -15,7 +15,7 @@ from dorothie_gym.world.kernel import WorldArrays, empty_world, step, town_array
 from dorothie_gym.world.kernel.parameters import FRAMES
 from dorothie_gym.world.kernel.records import EventCode
 from dorothie_gym.world.kernel.seeing import see
-from dorothie_gym.world.kernel.world_arrays import add_car
+from dorothie_gym.world.kernel.editing import add_car
 from dorothie_gym.world.localizer import FIX_EVERY, Localizer
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.network.road import TownRoad
@@ -71,21 +71,18 @@ class World:
             departure: lane and distance along it [m] where the car stands.
             network: the town's network, if there is one already: it is never changed.
         """
-        traffic_seed, walk_seed, locate_seed, perceive_seed, wind_seed, chance_seed = seed.spawn(6)
+        chance_seed, crowd_seed, locate_seed, perceive_seed, wind_seed = seed.spawn(5)
         self.town, self.config = town, config
         self.network = network or TownNetwork(town)
         self._arrays = town_arrays(self.network)
         lane, station = departure
         state = empty_world(
-            self._arrays, vehicles=31 + config.vehicles, pedestrians=config.pedestrians, seed=chance_seed, driven=True
+            self._arrays, vehicles=1 + config.vehicles, pedestrians=config.pedestrians, seed=chance_seed, driven=True
         )
         add_car(self._arrays, state, lane, station)
         state.car.collision_stop = round(config.collisions_stop * FRAME_RATE)
-        self.road = TownRoad(self.network, np_random=np.random.default_rng(traffic_seed))
-        self.actors = Actors(
-            self.road, self._arrays, state,
-            traffic_rng=np.random.default_rng(traffic_seed), walk_rng=np.random.default_rng(walk_seed),
-        )  # fmt: skip
+        self.road = TownRoad(self.network, np_random=np.random.default_rng(crowd_seed))
+        self.actors = Actors(self.road, self._arrays, state, seed=crowd_seed)
         self.car = Car(self.road, self.actors)
         self.road.vehicles.append(self.car)
         self.planner = LocalPlanner(town, lane, station)
