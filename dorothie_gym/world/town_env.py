@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from highway_env.envs.common.abstract import AbstractEnv
 from highway_env.envs.common.graphics import EnvViewer
+from highway_env.vehicle.controller import ControlledVehicle
 from highway_env.vehicle.objects import Landmark
 from numpy.typing import NDArray
 
@@ -123,9 +124,15 @@ class TownEnv(AbstractEnv):
             network, arrays, np_random=self.np_random, record_history=self.config["show_trajectories"]
         )
         (lane, station), (goal, there) = free_places(town, self.np_random, 2)
-        self.vehicle = self.action_type.vehicle_class(
-            self.road, town.lanes[lane].position(station), heading=town.lanes[lane].heading_at(station), speed=0.0
+        start = town.lanes[lane]
+        vehicle = self.vehicle = self.action_type.vehicle_class(
+            self.road, start.position(station), heading=start.heading_at(station), speed=0.0
         )
+        vehicle.height = start.height_at(station)
+        vehicle.lane_index = network.index_of(lane)  # highway-env asks for the closest one, be it under a bridge
+        vehicle.lane = network.get_lane(vehicle.lane_index)
+        if isinstance(vehicle, ControlledVehicle):
+            vehicle.target_lane_index = vehicle.lane_index
         self.vehicle.goal = Landmark(self.road, town.lanes[goal].position(there), town.lanes[goal].heading_at(there))
         self.road.vehicles.append(self.vehicle)
         self.road.show()

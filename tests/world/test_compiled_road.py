@@ -19,7 +19,7 @@ from dorothie_gym.world.compiled_road import CompiledRoad
 from dorothie_gym.world.kernel import Kind, add_pedestrian, add_prop, add_vehicle, empty_world, populate, town_arrays
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.network.road import TownRoad
-from tests.world.network.towns import find_town, straight_town
+from tests.world.network.towns import find_town, lane, straight_town, town
 
 DT = 1.0 / 15.0
 
@@ -33,8 +33,8 @@ def empty_road(network: TownNetwork, *, vehicles: int = 4, pedestrians: int = 1)
     return CompiledRoad(network, empty_world(town_arrays(network), vehicles=vehicles, pedestrians=pedestrians, seed=3))
 
 
-def guest_on(road: TownRoad, lane: int, station: float, speed: float, kind: type[Vehicle] = Vehicle) -> Any:
-    way = road.network.lane_of(lane)
+def guest_on(road: TownRoad, number: int, station: float, speed: float, kind: type[Vehicle] = Vehicle) -> Any:
+    way = road.network.lane_of(number)
     guest = kind(road, way.position(station), way.heading_at(station), speed)
     road.vehicles.append(guest)
     return guest
@@ -154,7 +154,7 @@ def test_guests_find_room_where_there_is_none(brookside: TownNetwork) -> None:
     populate(brookside, road.town_arrays, road.arrays, seed=1, vehicles=2, pedestrians=0)
     road.show()
     views, before = list(road.vehicles), [vehicle.position.copy() for vehicle in road.vehicles]
-    guests = [guest_on(road, lane, 8.0, 0.0) for lane in (0, 4)]
+    guests = [guest_on(road, number, 8.0, 0.0) for number in (0, 4)]
     go(road, 3.0)
     assert len(road.arrays.vehicles) == 5
     assert (road.arrays.vehicles.kind == Kind.EGO).sum() == 2
@@ -181,6 +181,23 @@ def test_a_copy_goes_on_in_the_same_way_and_by_itself(brookside: TownNetwork) ->
     assert twin.vehicles[0].position is not road.vehicles[0].position
 
 
+@pytest.mark.parametrize("level", [0, 1])
+def test_guests_keep_to_the_level_on_which_they_are(level: int) -> None:
+    decks = [lane(number, [(0, 0, 6.0 * number), (300, 0, 6.0 * number)], road=number) for number in (0, 1)]
+    network = TownNetwork(town(decks))
+    road = empty_road(network)
+    guest = guest_on(road, level, 20.0, 10.0)
+    guest.height = 6.0 * level
+    road.act()
+    add_vehicle(road.town_arrays, road.arrays, 1 - level, 60.0, desired=4.0)
+    road.show()
+    go(road, 8.0)
+    assert guest.position[0] > road.vehicles[1].position[0] + 5.0
+    assert not guest.crashed
+    assert guest.height == 6.0 * level
+    assert guest.lane_index == network.index_of(level)
+
+
 TWO_SECONDS = """
 import hashlib
 from highway_env.vehicle.kinematics import Vehicle
@@ -191,8 +208,8 @@ from dorothie_gym.world.town import load_town
 network = TownNetwork(load_town("brookside"))
 arrays = empty_world(town_arrays(network), vehicles=7, pedestrians=4, seed=5)
 road = CompiledRoad(network, arrays)
-lane = network.lane_of(2)
-road.vehicles.append(Vehicle(road, lane.position(9.0), lane.heading_at(9.0), 4.0))
+start = network.lane_of(2)
+road.vehicles.append(Vehicle(road, start.position(9.0), start.heading_at(9.0), 4.0))
 road.show()
 populate(network, road.town_arrays, arrays, seed=5, vehicles=6, pedestrians=4)
 road.show()
