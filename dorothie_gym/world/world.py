@@ -14,12 +14,12 @@ from dorothie_gym.world.car.planner import LocalPlanner
 from dorothie_gym.world.car.vehicle import Car
 from dorothie_gym.world.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
 from dorothie_gym.world.junctions import JunctionControl
-from dorothie_gym.world.localizer import FIX_EVERY, Localizer
+from dorothie_gym.world.localizer import Localizer
 from dorothie_gym.world.lookout import CAR, Lookout
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.network.road import TownRoad
 from dorothie_gym.world.perception import Perception
-from dorothie_gym.world.reports import Pose, Reports, WorldEvent, WorldEventKind
+from dorothie_gym.world.reports import Reports, WorldEvent, WorldEventKind
 from dorothie_gym.world.town.model import Array, Town
 from dorothie_gym.world.visibility import CLEAR_SIGHT, Visibility
 from dorothie_gym.world.weather import Weather
@@ -104,7 +104,7 @@ class World:
         self.frame = 0
         self.frames: Array = np.zeros((0, len(FRAME_COLUMNS)))
         self.collisions = 0
-        self.reports = Reports(self.network, self._pose(), self.car.LENGTH)
+        self.reports = Reports(self.network, self.car.LENGTH)
 
     # --- time -------------------------------------------------------------------------------------------------------
 
@@ -116,8 +116,8 @@ class World:
     def step(self, frames: int) -> list[WorldEvent]:
         """Lets the world run for a number of physics frames; returns what happened to the car."""
         rows = np.empty((frames, len(FRAME_COLUMNS)))
-        poses: list[Pose] = []
-        before = (float(self.car.position[0]), float(self.car.position[1]), float(self.car.heading))
+        poses = np.empty((frames + 1, 6))
+        poses[0] = self._pose()
         for k in range(frames):
             if k % EXTEND_EVERY == 0:
                 self.planner.extend(float(self.car.speed))
@@ -127,9 +127,9 @@ class World:
                 self.frame, self.car.position[0], self.car.position[1], self.car.heading, self.car.speed,
                 control.throttle, control.steer, control.brake, self.planner.lane,
             )  # fmt: skip
-            poses.append(self._pose())
+            poses[k + 1] = self._pose()
         self.frames = rows
-        self._localize(np.vstack((before, rows[:, 1:4])))
+        self.localizer.localize(poses, self.frame - frames, gps_from=self.faults.get(Sensor.GPS, 0))
         self.actors.tidy()
         self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
         return self.reports.close(poses, self.frame)
@@ -159,21 +159,6 @@ class World:
         self.frame += 1
         if car.crashed:
             self._collide(speed_before)
-
-    def _localize(self, track: Array) -> None:
-        """Takes in odometry of every frame, and a GPS fix of every so many.
-
-        Args:
-            track: poses (x, y, heading) before the frames and after each (frames + 1, 3).
-        """
-        began, first = 0, self.frame - len(track) + 1
-        for k in range(1, len(track)):
-            is_fix = (first + k) % FIX_EVERY == 0
-            if is_fix or k == len(track) - 1:
-                self.localizer.predict(track[began : k + 1], 1.0 / FRAME_RATE)
-                began = k
-            if is_fix and not self._is_faulty(Sensor.GPS, first + k):
-                self.localizer.correct(float(track[k, 0]), float(track[k, 1]))
 
     # --- perception -------------------------------------------------------------------------------------------------
 
@@ -235,10 +220,11 @@ class World:
         car.speed = 0.0
         self._stopped_until = self.frame + round(self.config.collisions_stop * FRAME_RATE)
 
-    def _pose(self) -> Pose:
+    def _pose(self) -> tuple[float, float, float, float, float, bool]:
+        """Of the car, in the columns of `kernel.rules`."""
         turning = self.planner.manoeuvre[0] is PhysicalAction.U_TURN and self.planner.in_manoeuvre
         x, y = self.car.position
-        return Pose(float(x), float(y), float(self.car.heading), float(self.car.speed), self.car.height, turning)
+        return float(x), float(y), float(self.car.heading), float(self.car.speed), self.car.height, turning
 
     # --- faults -----------------------------------------------------------------------------------------------------
 
