@@ -29,7 +29,7 @@ def drifted_env(shift: tuple[float, float, float] = (0.0, 0.0, 0.0), vehicles: i
     x, y, heading = (float(v) for v in (*world.car.position, world.car.heading))
     ahead, right, turn = shift
     c, s = math.cos(heading), math.sin(heading)
-    world.localizer._filter.x[:3] = x + ahead * c - right * s, y + ahead * s + right * c, heading + turn
+    world.localizer._mean[:3] = x + ahead * c - right * s, y + ahead * s + right * c, heading + turn
     return env
 
 
@@ -92,7 +92,7 @@ def test_waypoints_go_on_straight_before_the_start_of_the_path() -> None:
     world = env.stage.world
     start = world.planner.path.position_at(0.0)
     heading = world.planner.path.heading_at(0.0)
-    world.localizer._filter.x[:2] = start[0] - 20 * math.cos(heading), start[1] - 20 * math.sin(heading)
+    world.localizer._mean[:2] = start[0] - 20 * math.cos(heading), start[1] - 20 * math.sin(heading)
     bearings = Bearings(world)
     assert bearings.progress == pytest.approx(-20.0, abs=0.2)
     first = bearings.waypoints(3, 5.0)[0]
