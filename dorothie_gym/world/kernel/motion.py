@@ -21,7 +21,7 @@ from dorothie_gym.world.kernel.parameters import (
     STOPPED,
     TAU_PURSUIT,
 )
-from dorothie_gym.world.kernel.records import Records
+from dorothie_gym.world.kernel.records import Kind, Records
 from dorothie_gym.world.town.model import Array
 
 STEEP = math.sin(LARGEST_HEADING)
@@ -30,9 +30,24 @@ STEEP = math.sin(LARGEST_HEADING)
 @inlined
 def slip_towards_lane(points: Array, lane: Records, vehicle: Records) -> float:
     """Sine of the slip angle that keeps a vehicle on the lane that it follows (where `station` and `lateral` are)."""
-    ahead = value_near(points, lane, vehicle.segment, 3, vehicle.station + vehicle.speed * TAU_PURSUIT)
+    return slip_towards(points, lane, vehicle, vehicle.segment, vehicle.station, vehicle.lateral - vehicle.to_right)
+
+
+@inlined
+def slip_towards(points: Array, lane: Records, vehicle: Records, segment: int, station: float, off: float) -> float:
+    """Sine of the slip angle that brings a vehicle to a lane.
+
+    Args:
+        points: of all lanes.
+        lane: the lane.
+        vehicle: the vehicle.
+        segment: of the lane that is closest to it.
+        station: of the vehicle along the lane [m].
+        off: how far to the right of its place across the lane it is [m].
+    """
+    ahead = value_near(points, lane, segment, 3, station + vehicle.speed * TAU_PURSUIT)
     speed = not_zero(vehicle.speed)
-    back = -KP_LATERAL * (vehicle.lateral - vehicle.to_right) / speed
+    back = -KP_LATERAL * off / speed
     if back >= STEEP:
         back = LARGEST_HEADING
     elif back <= -STEEP:
@@ -58,14 +73,14 @@ def slip_of(steering: float) -> float:
 
 @inlined
 def move(vehicle: Records, dt: float) -> None:
-    """Moves a vehicle on by `dt` [s] as highway-env's `Vehicle.step`; brakes stop it and do not reverse it."""
+    """Moves a vehicle on by `dt` [s] as highway-env's `Vehicle.step`; brakes stop it, and reverse `Kind.EGO` only."""
     speed, slip = vehicle.speed, vehicle.slip
     acceleration = vehicle.acceleration
     if vehicle.crashed:
         slip, acceleration = 0.0, -speed
     if speed > MAX_SPEED:
         acceleration = min(acceleration, MAX_SPEED - speed)
-    if acceleration < 0.0:
+    if acceleration < 0.0 and vehicle.kind != Kind.EGO:
         acceleration = max(acceleration, -speed / dt) if speed > STOPPED else -speed / dt
     if speed != 0.0:
         straight = math.sqrt(1.0 - slip * slip)
