@@ -2,46 +2,63 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
 from highway_env.envs.common.abstract import AbstractEnv
 from highway_env.envs.common.graphics import EnvViewer
+from highway_env.envs.common.observation import KinematicObservation
+from highway_env.vehicle.objects import Landmark
 from numpy.typing import NDArray
 
-from dorothie_gym.world.actors import Actors
-from dorothie_gym.world.junctions import JunctionControl
+from dorothie_gym.world.compiled_road import CompiledRoad
+from dorothie_gym.world.kernel import Kind, Walk, empty_world, populate, town_arrays
+from dorothie_gym.world.kinematics import Kinematics
 from dorothie_gym.world.network.network import FARTHEST, TownNetwork
-from dorothie_gym.world.network.road import TownRoad
 from dorothie_gym.world.places import free_places
 from dorothie_gym.world.town import load_town
+from dorothie_gym.world.town.model import Array
+
+CLEAR_OF_EGO = 25.0
+"""At the start nobody is closer to the vehicle than this [m]."""
+
+ROUNDS = 8
+"""So many times others are brought to places in lieu of those who were too close."""
 
 
 class TownEnv(AbstractEnv):
     """Drives through a town among other vehicles.
 
     ## Description
-    highway-env's own environment on a town's road network: its vehicles, observation and action types, its viewer.
-    Routes are drawn by chance at junctions; other vehicles drive as in `DuoWizardEnv`.
+    highway-env's own environment on a town's road network: its observation and action types, its viewer, and its
+    vehicle under the agent's control. Routes are drawn by chance at junctions. Traffic, cyclists among it, and
+    pedestrians live as in `DuoWizardEnv`: with lights, signs, priorities and crosswalks, in compiled loops
+    (`world.kernel`); `env.unwrapped.road.vehicles` and `.objects` show them as highway-env's objects.
 
     ## Observation Space
-    As `config["observation"]` says (highway-env's `Kinematics` by default), with finite bounds.
+    As `config["observation"]` says (highway-env's `Kinematics` by default), with finite bounds. All types work but
+    `ExitObservation`, which is written for one road of highway-env's. `KinematicsGoal` is given a place in the town as
+    its goal, and `AttributesObservation` may read `ego`.
 
     ## Action Space
-    As `config["action"]` says (highway-env's `DiscreteMetaAction` by default).
+    As `config["action"]` says (highway-env's `DiscreteMetaAction` by default); any type.
 
     ## Rewards
     Progress on the road: speed along the lane as a share of `config["reward_speed"]`, in [0, 1], and 0 off the road,
     plus `config["collision_reward"]` for a crash. The terms are in `info["rewards"]`.
 
     ## Episode End
-    Terminates when the vehicle crashes, truncates after `config["duration"]` seconds.
+    Terminates when the vehicle crashes, be it into a vehicle, a pedestrian or a prop; truncates after
+    `config["duration"]` seconds.
 
     ## Arguments
     `config`: highway-env's settings, and
     - `town`: name of a town, or path of an `.xodr` or `.yaml` file;
-    - `vehicles`: how many others, as many as fit;
+    - `vehicles`: how many others, as many as fit, nobody within 25 m of the start;
+    - `pedestrians`: how many people on the pavements; none in a town without them. By default there are none:
+      highway-env's `Kinematics` cannot tell them from vehicles, and those who pass by would fill its rows;
     - `duration` [s], `reward_speed` [m/s], `collision_reward`: see above.
 
     ## Version History
@@ -49,6 +66,10 @@ class TownEnv(AbstractEnv):
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 2}
+
+    # set by highway-env's methods, which carry no types
+    observation_type: Any
+    observation_space: Any
 
     def __init__(self, config: dict[str, Any] | None = None, render_mode: str | None = None) -> None:
         self._network: TownNetwork | None = None
@@ -62,6 +83,7 @@ class TownEnv(AbstractEnv):
         config.update(
             town="brookside",
             vehicles=10,
+            pedestrians=0,
             duration=60.0,
             reward_speed=9.0,
             collision_reward=-1.0,
@@ -73,34 +95,67 @@ class TownEnv(AbstractEnv):
         )
         return config
 
+    @property
+    def ego(self) -> Array:
+        """The vehicle under control: x, y [m], heading [rad], speed [m/s]."""
+        vehicle = self.vehicle
+        return np.array((*vehicle.position, vehicle.heading, vehicle.speed))
+
     def define_spaces(self) -> None:
         """Sets the spaces, with finite bounds: nothing in a town is beyond `FARTHEST`."""
         super().define_spaces()
-        space: spaces.Space[Any] = self.observation_type.space()
-        if isinstance(space, spaces.Box) and space.dtype != np.uint8:
-            low, high = np.clip(space.low, -FARTHEST, FARTHEST), np.clip(space.high, -FARTHEST, FARTHEST)
-            self.observation_space = spaces.Box(low, high, dtype=space.dtype)
+        if type(self.observation_type) is KinematicObservation:
+            self.observation_type = Kinematics(self, **self.config["observation"])
+        self.observation_space = _finite(self.observation_space)
+        for kind in _observation_types(self.observation_type):
+            viewer = getattr(kind, "viewer", None)
+            if viewer is not None:
+                viewer.enabled = True  # under SDL's dummy video driver it would show black
 
     def _reset(self) -> None:
         if self._network is None or self._network_of != self.config["town"]:
             self._network_of = self.config["town"]
             self._network = TownNetwork(load_town(self._network_of))
-        town = self._network.town
-        self.road = TownRoad(self._network, np_random=self.np_random, record_history=self.config["show_trajectories"])
-        lane, station = free_places(town, self.np_random, 1)[0]
-        start = town.lanes[lane]
+        network, town = self._network, self._network.town
+        vehicles, pedestrians = int(self.config["vehicles"]), int(self.config["pedestrians"])
+        arrays = empty_world(
+            town_arrays(network), vehicles=vehicles + 1, pedestrians=pedestrians, seed=self._draw_seed()
+        )  # fmt: skip
+        self.road = CompiledRoad(
+            network, arrays, np_random=self.np_random, record_history=self.config["show_trajectories"]
+        )
+        (lane, station), (goal, there) = free_places(town, self.np_random, 2)
         self.vehicle = self.action_type.vehicle_class(
-            self.road, start.position(station), heading=start.heading_at(station), speed=0.0
+            self.road, town.lanes[lane].position(station), heading=town.lanes[lane].heading_at(station), speed=0.0
         )
+        self.vehicle.goal = Landmark(self.road, town.lanes[goal].position(there), town.lanes[goal].heading_at(there))
         self.road.vehicles.append(self.vehicle)
-        self._actors = Actors(
-            self.road, JunctionControl(town), self.vehicle, traffic_rng=self.np_random, walk_rng=self.np_random
-        )
-        self._actors.populate(vehicles=self.config["vehicles"], pedestrians=0)
+        self.road.show()
+        self._populate(vehicles, pedestrians)
 
-    def _simulate(self, action: Any = None) -> None:
-        super()._simulate(action)
-        self._actors.tidy()
+    def _populate(self, vehicles: int, pedestrians: int) -> None:
+        """Brings others to random places, as many as fit and none close to the vehicle."""
+        road = self.road
+        arrays, (x, y) = road.arrays, self.vehicle.position
+        for _ in range(ROUNDS):
+            here = arrays.vehicles.kind != Kind.EMPTY
+            missing = vehicles + 1 - int(here.sum()), pedestrians - int((arrays.pedestrians.state != Walk.EMPTY).sum())
+            if not any(missing):
+                break
+            populate(
+                road.network, road.town_arrays, arrays, seed=self._draw_seed(),
+                vehicles=missing[0], pedestrians=missing[1],
+            )  # fmt: skip
+            for body in arrays.vehicles:
+                if body.kind != Kind.EGO and math.hypot(body.x - x, body.y - y) < CLEAR_OF_EGO:
+                    body.kind = Kind.EMPTY
+            for body in arrays.pedestrians:
+                if math.hypot(body.x - x, body.y - y) < CLEAR_OF_EGO:
+                    body.state = Walk.EMPTY
+        road.show()
+
+    def _draw_seed(self) -> int:
+        return int(self.np_random.integers(2**31))
 
     def _reward(self, action: Any) -> float:
         return float(sum(self._rewards(action).values()))
@@ -128,3 +183,21 @@ class TownEnv(AbstractEnv):
 
     def _is_truncated(self) -> bool:
         return bool(self.time >= self.config["duration"])
+
+
+def _finite(space: spaces.Space[Any]) -> spaces.Space[Any]:
+    """The same space with finite bounds; images have them."""
+    if isinstance(space, spaces.Dict):
+        return spaces.Dict({name: _finite(part) for name, part in space.items()})
+    if isinstance(space, spaces.Tuple):
+        return spaces.Tuple([_finite(part) for part in space])
+    if isinstance(space, spaces.Box) and space.dtype != np.uint8:
+        low, high = np.clip(space.low, -FARTHEST, FARTHEST), np.clip(space.high, -FARTHEST, FARTHEST)
+        return spaces.Box(low, high, dtype=space.dtype.type)
+    return space
+
+
+def _observation_types(kind: Any) -> list[Any]:
+    """A type of observation and those that it consists of."""
+    parts = [*getattr(kind, "observation_types", ()), *getattr(kind, "agents_observation_types", ())]
+    return [kind, *(found for part in parts for found in _observation_types(part))]

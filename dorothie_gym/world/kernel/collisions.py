@@ -141,6 +141,8 @@ def _meet(world: WorldArrays, one: int, other: int, vehicles: int, walkers: int)
         if not walker.crashed and _touch(vehicle, walker, WALKER_RADIUS, WALKER_SIZE, WALKER_SIZE):
             walker.crashed = True
             clock.run_over += 1
+            if vehicle.kind == Kind.EGO:
+                vehicle.crashed = True  # traffic drives on; who is driven from outside learns of it by this mark
     else:
         prop = world.props[other - vehicles - walkers]
         if _touch(vehicle, prop, prop.radius, prop.length, prop.width):

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from dorothie_gym.world.kernel.collisions import collide
 from dorothie_gym.world.kernel.compiling import compiled, inlined
@@ -15,6 +19,7 @@ from dorothie_gym.world.kernel.plan import locate
 from dorothie_gym.world.kernel.records import Kind, Records, Wait
 from dorothie_gym.world.kernel.towing import tow
 from dorothie_gym.world.kernel.walking import walk
+from dorothie_gym.world.town.model import Array
 
 if TYPE_CHECKING:
     from dorothie_gym.world.kernel.town_arrays import TownArrays
@@ -86,3 +91,41 @@ def find(town: TownArrays, vehicle: Records) -> None:
         locate(town, vehicle)
     if not town.flat:
         vehicle.height = value_near(town.points, town.lanes[lane], segment, 4, station)
+
+
+@compiled
+def step_around(town: TownArrays, world: WorldArrays, dt: float, rows: NDArray[np.int64], poses: Array) -> None:
+    """One substep in which vehicles of the kind `Kind.EGO` are moved by somebody else, not by these loops.
+
+    As in `step`, everybody decides on what was there before. Once one of them has crashed nobody is towed away, so that
+    those who were touched are found where it happened.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world, changed in place.
+        dt: time of the substep [s].
+        rows: (n,) rows of those vehicles.
+        poses: (n, 4) where they are at its end: x, y [m], heading [rad], and their speed [m/s].
+    """
+    vehicles, clock = world.vehicles, world.clock[0]
+    for i in range(len(vehicles)):
+        if vehicles[i].kind != Kind.EMPTY and vehicles[i].kind != Kind.EGO:
+            drive(town, world, i)
+    walk(town, world, dt)
+    for i in range(len(vehicles)):
+        if vehicles[i].kind != Kind.EMPTY and vehicles[i].kind != Kind.EGO:
+            _go_on(town, vehicles[i], dt)
+    for k in range(len(rows)):
+        vehicle = vehicles[rows[k]]
+        vehicle.x, vehicle.y, vehicle.heading, vehicle.speed = poses[k, 0], poses[k, 1], poses[k, 2], poses[k, 3]
+        vehicle.cos, vehicle.sin = math.cos(vehicle.heading), math.sin(vehicle.heading)
+        find(town, vehicle)
+    collide(world)
+    intact = True
+    for k in range(len(rows)):
+        intact = intact and not vehicles[rows[k]].crashed
+    if intact:
+        tow(town, world, dt)
+    rebuild(town, world)
+    clock.time += dt
+    clock.frame += 1

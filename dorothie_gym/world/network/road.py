@@ -14,6 +14,7 @@ from highway_env.vehicle.objects import Landmark
 
 from dorothie_gym.world.network.ahead import LEVEL, LaneChains, Neighbours, lane_zones, neighbours_on
 from dorothie_gym.world.network.network import LaneIndex, Route, TownNetwork
+from dorothie_gym.world.town.model import Array
 
 
 class TownRoad(Road):
@@ -53,8 +54,14 @@ class TownRoad(Road):
             neighbour_vehicles_connected_lanes=neighbour_vehicles_connected_lanes,
         )
         self.time = 0.0
-        self._chains = LaneChains(network)
-        self._zones = lane_zones(network.table)
+
+    @functools.cached_property
+    def _chains(self) -> LaneChains:
+        return LaneChains(self.network)
+
+    @functools.cached_property
+    def _zones(self) -> Array:
+        return lane_zones(self.network.table)
 
     def height_of(self, thing: Any) -> float:
         """Height of a vehicle or object [m]: its own `height` if it has one, else its lane's; NaN without a lane."""
@@ -97,6 +104,40 @@ class TownRoad(Road):
         # Negated, so that an undefined position is left to highway-env as before.
         near = np.triu(~(gaps > reach[:count, None] + reach[None, :]), k=1)
         return [(int(i), int(j)) for i, j in zip(*np.nonzero(near), strict=True)]
+
+    def close_objects_to(
+        self,
+        vehicle: Any,
+        distance: float,
+        count: int | None = None,
+        see_behind: bool = True,
+        sort: bool = True,
+        vehicles_only: bool = False,
+    ) -> list[Any]:
+        """Those close to a vehicle, as highway-env chooses them, with one call for all that has to be measured.
+
+        Args:
+            vehicle: who looks.
+            distance: nobody farther away is told of [m].
+            count: most that are told of; all by default.
+            see_behind: whether vehicles behind are seen; objects there never are.
+            sort: whether those come first who are near along the vehicle's lane, before and behind.
+            vehicles_only: whether objects are left out.
+        """
+        others = [other for other in self.vehicles if other is not vehicle]
+        things = others if vehicles_only else others + self.objects
+        if not things:
+            return []
+        places = np.array([thing.position for thing in things])  # (n, 2)
+        start, _ = vehicle.lane.local_coordinates(vehicle.position)
+        along = vehicle.lane.local_coordinates_many(places)[:, 0] - start  # (n,)
+        seen = along > -2 * vehicle.LENGTH
+        if see_behind:
+            seen[: len(others)] = True
+        chosen = np.flatnonzero(seen & (np.linalg.norm(places - vehicle.position, axis=1) < distance))
+        if sort:
+            chosen = chosen[np.argsort(np.abs(along[chosen]), kind="stable")]
+        return [things[k] for k in chosen[: count or None].tolist()]
 
     def neighbour_vehicles(self, vehicle: Any, lane_index: LaneIndex | None = None) -> tuple[Any | None, Any | None]:
         """Next thing ahead and behind of a vehicle; see `neighbours`.
