@@ -6,24 +6,21 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from gymnasium import spaces
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from dorothie_gym.world.kernel import Kind, WorldArrays, add_vehicle, empty_world, populate, town_arrays
+from dorothie_gym.world.kernel import Kind, WorldArrays, add_vehicle, empty_world, town_arrays
 from dorothie_gym.world.kernel.egos import OUTCOME, Egos, begin_one, play_share
 from dorothie_gym.world.kernel.meta import HELM, lanes_beside
-from dorothie_gym.world.network.network import FARTHEST, TownNetwork
+from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.places import free_places
+from dorothie_gym.world.surroundings import SEEDS, populate_around
 from dorothie_gym.world.town import load_town
-from dorothie_gym.world.town_env import TownEnv
+from dorothie_gym.world.town_env import TownEnv, finite
 from dorothie_gym.world.vector_config import Actions, Kinematics
 from dorothie_gym.world.vector_world import VectorWorld
-
-SEEDS = 2**31
-"""Seeds of worlds are less than this."""
 
 
 class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
@@ -78,7 +75,7 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         self.config = {**TownEnv.default_config(), **(config or {})}
         self._actions, self._kinematics = Actions(self.config["action"]), Kinematics(self.config["observation"])
         self.single_action_space = self._actions.space
-        self.single_observation_space = _bounded(self._kinematics.space)
+        self.single_observation_space = finite(self._kinematics.space)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self._network = TownNetwork(load_town(self.config["town"]))
@@ -96,6 +93,8 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         return Egos(
             lanes_beside(self._network),
             self._actions.speeds,
+            np.zeros(1, dtype=np.int64),
+            np.zeros((self.num_envs, 1, 4)),
             np.zeros(self.num_envs, dtype=HELM).view(np.recarray),
             np.zeros((self.num_envs, shape[2], 2)),
             np.zeros(shape[:2], dtype=np.int32),
@@ -234,11 +233,13 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         if seed is not None:
             self._generators[i], self._seeds[i] = seeding.np_random(seed)
         rng = self._generator(i)
-        lane, station = free_places(self._network.town, rng, 1)[0]
+        # in the order in which `TownEnv` draws, so that a seed is the same town there
         world = self._empty(int(rng.integers(SEEDS)))
+        lane, station = free_places(self._network.town, rng, 2)[0]
         add_vehicle(self._town, world, lane, station, kind=Kind.EGO, desired=0.0)
-        others = self.config["vehicles"]
-        populate(self._network, self._town, world, seed=int(rng.integers(SEEDS)), vehicles=others, pedestrians=0)
+        world.vehicles.key[0] = world.clock.keys[0] = 0
+        vehicles, pedestrians = int(self.config["vehicles"]), int(self.config["pedestrians"])
+        populate_around(self._network, world, rng, vehicles=vehicles, pedestrians=pedestrians)
         self._worlds.put(i, world)
         road = self._network.index_of(int(world.vehicles[0].lane))
         self._egos.ranges[i] = self._kinematics.ranges(len(self._network.all_side_lanes(road)))
@@ -247,7 +248,8 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         self._elapsed[i], self._over[i], self._begun[i] = 0.0, False, True
 
     def _empty(self, seed: int) -> WorldArrays:
-        return empty_world(self._town, vehicles=1 + self.config["vehicles"], pedestrians=0, props=0, seed=seed)
+        vehicles, pedestrians = int(self.config["vehicles"]), int(self.config["pedestrians"])
+        return empty_world(self._town, vehicles=1 + vehicles, pedestrians=pedestrians, props=0, seed=seed)
 
     def _generator(self, i: int) -> np.random.Generator:
         found = self._generators[i]
@@ -286,9 +288,3 @@ def _with_masks(values: dict[str, NDArray[Any]], mask: NDArray[np.bool_]) -> dic
         infos[name][mask] = value[mask]
         infos[f"_{name}"] = mask.copy()
     return infos
-
-
-def _bounded(space: spaces.Box) -> spaces.Box:
-    """The space with finite bounds: nothing in a town is beyond `FARTHEST`."""
-    low, high = np.clip(space.low, -FARTHEST, FARTHEST), np.clip(space.high, -FARTHEST, FARTHEST)
-    return spaces.Box(low, high, dtype=np.float32)

@@ -112,7 +112,12 @@ class Kinematics:
         self.shuffled = self._stock.order == "shuffled"
         codes = np.array([FEATURES[feature] for feature in self._stock.features], dtype=np.int32)
         self.view = View(
-            codes, bool(self._stock.absolute), not self.shuffled, bool(self._stock.see_behind), bool(self._stock.clip)
+            codes,
+            absolute=bool(self._stock.absolute),
+            ordered=not self.shuffled,
+            behind=bool(self._stock.see_behind),
+            clip=bool(self._stock.clip),
+            walkers=bool(self._stock.include_obstacles),
         )
 
     def ranges(self, lanes: int) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,27 +10,27 @@ from numpy.typing import NDArray
 from dorothie_gym.world.kernel.batch import world_of
 from dorothie_gym.world.kernel.compiling import compiled, concurrent
 from dorothie_gym.world.kernel.kinematics import View, observe
-from dorothie_gym.world.kernel.meta import NOTHING, control, decide, heed_limits, speed_along, take_helm
+from dorothie_gym.world.kernel.meta import NOTHING, control, decide, move, speed_along, take_helm
 from dorothie_gym.world.kernel.records import Records
-from dorothie_gym.world.kernel.stepping import find, step
+from dorothie_gym.world.kernel.stepping import find, step_around
 from dorothie_gym.world.town.model import Array
 
 if TYPE_CHECKING:
     from dorothie_gym.world.kernel.town_arrays import TownArrays
     from dorothie_gym.world.kernel.world_arrays import WorldArrays
 
-ONE_SUBSTEP: Any = np.int64(1)  # a plain number would make numba compile the kernel once more, for this value
-
 OUTCOME = np.dtype([("speed", "f8"), ("along", "f8"), ("crashed", "b1")], align=True)
 """How an ego fares: its speed, and that along its lane, 0 off the road [m/s]."""
 
 
 class Egos(NamedTuple):
-    """The egos of a batch of worlds; all but the first two have a row for each world.
+    """The egos of a batch of worlds; all but `beside`, `speeds` and `rows` have a row for each world.
 
     Attributes:
         beside: see `meta.lanes_beside`.
         speeds: that may be held [m/s]; empty for egos that are given acceleration and steering.
+        rows: int64 (1,) the row of an ego in its world.
+        poses: (worlds, 1, 4) scratch: where they will be.
         helms: `meta.HELM`.
         ranges: (worlds, f, 2) see `kinematics.observe`.
         nearest: int32 (worlds, n) scratch, with `distances`.
@@ -41,6 +41,8 @@ class Egos(NamedTuple):
 
     beside: NDArray[np.int32]
     speeds: Array
+    rows: NDArray[np.int64]
+    poses: Array
     helms: Records
     ranges: Array
     nearest: NDArray[np.int32]
@@ -88,7 +90,7 @@ def play_share(
     for number in range(begin, end):
         if not playing[number]:
             continue
-        world, helm = world_of(batch, number), egos.helms[number]
+        world, helm, poses = world_of(batch, number), egos.helms[number], egos.poses[number]
         vehicle = world.vehicles[0]
         meta = len(egos.speeds) > 0
         if meta and actions[number] != NOTHING:
@@ -96,8 +98,8 @@ def play_share(
         for _ in range(substeps):
             if meta:
                 control(town, vehicle, helm)
-            heed_limits(vehicle, helm)
-            step(town, world, ONE_SUBSTEP, dt, helm.acceleration, helm.steering)
+            move(vehicle, helm, poses[0], dt)
+            step_around(town, world, dt, egos.rows, poses)
         _report(number, town, batch, view, egos)
 
 

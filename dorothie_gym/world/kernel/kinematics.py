@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dorothie_gym.world.kernel.compiling import compiled, inlined
 from dorothie_gym.world.kernel.lanes import project
 from dorothie_gym.world.kernel.parameters import CAR_LENGTH, MAX_SPEED
-from dorothie_gym.world.kernel.records import Kind
+from dorothie_gym.world.kernel.records import Kind, Walk
 from dorothie_gym.world.town.model import Array
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ class View(NamedTuple):
         ordered: whether the closest ones along the lane come first; otherwise in the order of their numbers.
         behind: whether those far behind are seen.
         clip: whether normalised values are kept in [-1, 1].
+        walkers: whether pedestrians are seen, too.
     """
 
     features: NDArray[np.int32]
@@ -48,6 +49,7 @@ class View(NamedTuple):
     ordered: bool
     behind: bool
     clip: bool
+    walkers: bool
 
 
 @compiled
@@ -67,14 +69,18 @@ def observe(
         rows: float32 (n, f), written to.
     """
     count = _find_nearest(town, world, view, nearest, distances, len(rows) - 1)
+    vehicles = len(world.vehicles)
     for k in range(len(rows)):
+        body = 0 if k == 0 else nearest[k - 1]
         for f in range(len(view.features)):
-            value = 0.0
+            feature, value = view.features[f], 0.0
             if k <= count:
-                vehicle = world.vehicles[0 if k == 0 else nearest[k - 1]]
-                value = _feature(vehicle, view.features[f])
-                if k > 0 and not view.absolute and X <= view.features[f] <= VY:
-                    value -= _feature(world.vehicles[0], view.features[f])
+                if body < vehicles:
+                    value = _feature(world.vehicles[body], feature)
+                else:
+                    value = _feature(world.pedestrians[body - vehicles], feature)
+                if k > 0 and not view.absolute and X <= feature <= VY:
+                    value -= _feature(world.vehicles[0], feature)
                 low, high = ranges[f, 0], ranges[f, 1]
                 if not math.isnan(low):
                     value = -1.0 + (value - low) * 2.0 / (high - low)
@@ -82,31 +88,55 @@ def observe(
             rows[k, f] = value
 
 
-@inlined
+@compiled
 def _find_nearest(
     town: TownArrays, world: WorldArrays, view: View, nearest: NDArray[np.int32], distances: Array, room: int
 ) -> int:
-    """Lists whom the first vehicle observes, as many as there is room for; returns how many."""
-    vehicles = world.vehicles
-    observer, count = vehicles[0], 0
+    """Lists whom the first vehicle observes, as many as there is room for; returns how many.
+
+    `Road.close_objects_to`: vehicles before pedestrians where the order does not tell, and of these only those ahead.
+    """
+    vehicles, walkers = world.vehicles, world.pedestrians
+    count = 0
     for i in range(1, len(vehicles)):
-        other = vehicles[i]
-        dx, dy = other.x - observer.x, other.y - observer.y
-        if other.kind == Kind.EMPTY or dx * dx + dy * dy >= PERCEIVED * PERCEIVED:
-            continue
-        station, _, _ = project(town, observer.lane, other.x, other.y)
-        ahead = station - observer.own_station
-        if not view.behind and ahead <= -BEHIND:
-            continue
-        distance = abs(ahead) if view.ordered else 0.0
-        at = count
-        while at > 0 and distances[at - 1] > distance:
-            if at < room:
-                nearest[at], distances[at] = nearest[at - 1], distances[at - 1]
-            at -= 1
+        if vehicles[i].kind != Kind.EMPTY:
+            ahead = _ahead(town, vehicles[0], vehicles[i])
+            if view.behind or ahead > -BEHIND:
+                count = _list(view, i, ahead, nearest, distances, count, room)
+    for p in range(len(walkers) if view.walkers else 0):
+        if walkers[p].state != Walk.EMPTY:
+            ahead = _ahead(town, vehicles[0], walkers[p])
+            if ahead > -BEHIND:
+                count = _list(view, len(vehicles) + p, ahead, nearest, distances, count, room)
+    return count
+
+
+@inlined
+def _ahead(town: TownArrays, observer: Any, other: Any) -> float:
+    """How far along the observer's lane another body is ahead of it [m]; NaN for those too far away."""
+    dx, dy = other.x - observer.x, other.y - observer.y
+    if dx * dx + dy * dy >= PERCEIVED * PERCEIVED:
+        return math.nan
+    station, _, _ = project(town, observer.lane, other.x, other.y)
+    return float(station - observer.own_station)
+
+
+@inlined
+def _list(
+    view: View, body: int, ahead: float, nearest: NDArray[np.int32], distances: Array, count: int, room: int
+) -> int:
+    """Puts a body into the list, behind those that are as close; returns how many are in it."""
+    if math.isnan(ahead):
+        return count
+    distance = abs(ahead) if view.ordered else 0.0
+    at = count
+    while at > 0 and distances[at - 1] > distance:
         if at < room:
-            nearest[at], distances[at] = i, distance
-            count = min(count + 1, room)
+            nearest[at], distances[at] = nearest[at - 1], distances[at - 1]
+        at -= 1
+    if at < room:
+        nearest[at], distances[at] = body, distance
+        count = min(count + 1, room)
     return count
 
 

@@ -121,12 +121,20 @@ def control(town: TownArrays, vehicle: Records, helm: Records) -> None:
 
 
 @inlined
-def heed_limits(vehicle: Records, helm: Records) -> None:
-    """Keeps the acceleration from leaving the range of speeds: `Vehicle.clip_actions`."""
-    if vehicle.speed > helm.highest:
-        helm.acceleration = min(helm.acceleration, helm.highest - vehicle.speed)
-    elif vehicle.speed < helm.lowest:
-        helm.acceleration = max(helm.acceleration, helm.lowest - vehicle.speed)
+def move(vehicle: Records, helm: Records, pose: Array, dt: float) -> None:
+    """Writes where it is after a time [s], as `Vehicle.step`: x, y, heading and speed (4,)."""
+    speed, heading = vehicle.speed, vehicle.heading
+    if vehicle.crashed:
+        helm.acceleration, helm.steering = -speed, 0.0
+    if speed > helm.highest:
+        helm.acceleration = min(helm.acceleration, helm.highest - speed)
+    elif speed < helm.lowest:
+        helm.acceleration = max(helm.acceleration, helm.lowest - speed)
+    slip = math.atan(0.5 * math.tan(helm.steering))
+    pose[0] = vehicle.x + speed * math.cos(heading + slip) * dt
+    pose[1] = vehicle.y + speed * math.sin(heading + slip) * dt
+    pose[2] = heading + speed * math.sin(slip) / (CAR_LENGTH / 2.0) * dt
+    pose[3] = speed + helm.acceleration * dt
 
 
 @compiled

@@ -21,7 +21,7 @@ from dorothie_gym.world.kernel.parameters import (
     STOPPED,
     TAU_PURSUIT,
 )
-from dorothie_gym.world.kernel.records import Kind, Records
+from dorothie_gym.world.kernel.records import Records
 from dorothie_gym.world.town.model import Array
 
 STEEP = math.sin(LARGEST_HEADING)
@@ -73,14 +73,14 @@ def slip_of(steering: float) -> float:
 
 @inlined
 def move(vehicle: Records, dt: float) -> None:
-    """Moves a vehicle on by `dt` [s] as highway-env's `Vehicle.step`; brakes stop it, and reverse `Kind.EGO` only."""
+    """Moves a vehicle on by `dt` [s] as highway-env's `Vehicle.step`; brakes stop it and do not reverse it."""
     speed, slip = vehicle.speed, vehicle.slip
     acceleration = vehicle.acceleration
     if vehicle.crashed:
         slip, acceleration = 0.0, -speed
     if speed > MAX_SPEED:
         acceleration = min(acceleration, MAX_SPEED - speed)
-    if acceleration < 0.0 and vehicle.kind != Kind.EGO:
+    if acceleration < 0.0:
         acceleration = max(acceleration, -speed / dt) if speed > STOPPED else -speed / dt
     if speed != 0.0:
         straight = math.sqrt(1.0 - slip * slip)

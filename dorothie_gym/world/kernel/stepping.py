@@ -69,7 +69,7 @@ def _go_on(town: TownArrays, vehicle: Records, dt: float) -> None:
         vehicle.standing += dt if vehicle.wait != Wait.LIGHT else 0.0
     else:
         vehicle.standing = 0.0
-    if vehicle.speed == 0.0 and vehicle.acceleration <= 0.0 and vehicle.kind != Kind.EGO:
+    if vehicle.speed == 0.0 and vehicle.acceleration <= 0.0:
         return  # it stands, and stays where it was found
     move(vehicle, dt)
     find(town, vehicle)
