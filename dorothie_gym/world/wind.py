@@ -29,7 +29,7 @@ CORNERING_STIFFNESS = 1.2e5
 GUSTINESS = 0.25
 """Standard deviation of the wind over its mean: turbulence intensity of built-up country (EN 1991-1-4)."""
 
-_PERIODS = (3.1, 7.3, 17.9)
+PERIODS = (3.1, 7.3, 17.9)
 """Of the sines that make up gusts [s], in no simple ratio to each other."""
 
 
@@ -38,11 +38,12 @@ class Wind:
 
     Attributes:
         heading: where it blows to [rad].
+        phases: of the gusts [rad].
     """
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.heading = float(rng.uniform(-math.pi, math.pi))
-        self._phases = tuple(float(phase) for phase in rng.uniform(0.0, 2 * math.pi, len(_PERIODS)))
+        self.phases = tuple(float(phase) for phase in rng.uniform(0.0, 2 * math.pi, len(PERIODS)))
 
     def speed(self, strength: float, time: float) -> float:
         """Speed of the wind [m/s], never below 0.
@@ -54,9 +55,9 @@ class Wind:
         if strength <= 0.0:
             return 0.0
         swing = sum(
-            math.sin(2 * math.pi * time / period + phase) for period, phase in zip(_PERIODS, self._phases, strict=True)
+            math.sin(2 * math.pi * time / period + phase) for period, phase in zip(PERIODS, self.phases, strict=True)
         )
-        return GALE * strength * max(1.0 + GUSTINESS * math.sqrt(2.0 / len(_PERIODS)) * swing, 0.0)
+        return GALE * strength * max(1.0 + GUSTINESS * math.sqrt(2.0 / len(PERIODS)) * swing, 0.0)
 
     def drift(self, strength: float, time: float, *, heading: float, speed: float) -> float:
         """Angle by which a car's course lies beside its heading, positive right [rad]; 0 without wind and for a stand.

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from dorothie_gym.ontology import PhysicalAction, Sensor, WeatherParameter
+from dorothie_gym.ontology import ObjectClass, PhysicalAction, Sensor, WeatherParameter
 from dorothie_gym.world.actors import Actors
 from dorothie_gym.world.car.driver import Driver
 from dorothie_gym.world.car.hazards import Body, Hazard
 from dorothie_gym.world.car.planner import LocalPlanner
 from dorothie_gym.world.car.vehicle import Car
 from dorothie_gym.world.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
-from dorothie_gym.world.junctions import JunctionControl
+from dorothie_gym.world.kernel import WorldArrays, empty_world, step, town_arrays
+from dorothie_gym.world.kernel.parameters import FRAMES
+from dorothie_gym.world.kernel.records import EventCode
+from dorothie_gym.world.kernel.seeing import see
+from dorothie_gym.world.kernel.world_arrays import add_car
 from dorothie_gym.world.localizer import FIX_EVERY, Localizer
-from dorothie_gym.world.lookout import CAR, Lookout
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.network.road import TownRoad
 from dorothie_gym.world.perception import Perception
 from dorothie_gym.world.reports import Pose, Reports, WorldEvent, WorldEventKind
 from dorothie_gym.world.town.model import Array, Town
-from dorothie_gym.world.visibility import CLEAR_SIGHT, Visibility
+from dorothie_gym.world.visibility import Visibility
 from dorothie_gym.world.weather import Weather
 from dorothie_gym.world.wind import Wind
 
@@ -31,18 +32,17 @@ FAULT_SECONDS = 30.0
 CLARITY = {Sensor.BLUR: 0.25, Sensor.VIEW: 0.0}
 """Share of the signal that a fault of the view leaves: blur halves the sight."""
 
-EXTEND_EVERY = 15
-"""The path is lengthened this often [frames]."""
-
-HARD = 3.5
-"""Braking harder than this for something ahead is a hazard stop [m/s^2]."""
-
 
 class World:
     """A town in which a car drives among others.
 
+    All that moves is stepped by the compiled loops of `kernel`; this class lays the car's wishes before them, and
+    takes out what came of it.
+
     Attributes:
         town: the map.
+        network: its lanes as highway-env's graph.
+        road: highway-env's road, with the car and all others on it.
         car: the car.
         planner: its local planner.
         driver: what drives it.
@@ -54,7 +54,7 @@ class World:
         hazard: what the car is braking or standing for, or None.
         frame: physics frames since the start.
         frames: trajectory of the last call of `step` (n, 9), see `FRAME_COLUMNS`.
-        collisions: those of the car's own making.
+        offsets: how far the car was to the right of its path at each of these frames (n,) [m].
         reports: what has happened to the car, and how often it broke which rule.
     """
 
@@ -71,25 +71,28 @@ class World:
             departure: lane and distance along it [m] where the car stands.
             network: the town's network, if there is one already: it is never changed.
         """
-        traffic_seed, walk_seed, locate_seed, perceive_seed, wind_seed = seed.spawn(5)
+        traffic_seed, walk_seed, locate_seed, perceive_seed, wind_seed, chance_seed = seed.spawn(6)
         self.town, self.config = town, config
         self.network = network or TownNetwork(town)
+        self._arrays = town_arrays(self.network)
         lane, station = departure
-        start = town.lanes[lane]
+        state = empty_world(
+            self._arrays, vehicles=31 + config.vehicles, pedestrians=config.pedestrians, seed=chance_seed, driven=True
+        )
+        add_car(self._arrays, state, lane, station)
+        state.car.collision_stop = round(config.collisions_stop * FRAME_RATE)
         self.road = TownRoad(self.network, np_random=np.random.default_rng(traffic_seed))
-        self.car = Car(self.road, start.position(station), start.heading_at(station), start.height_at(station))
+        self.actors = Actors(
+            self.road, self._arrays, state,
+            traffic_rng=np.random.default_rng(traffic_seed), walk_rng=np.random.default_rng(walk_seed),
+        )  # fmt: skip
+        self.car = Car(self.road, self.actors)
         self.road.vehicles.append(self.car)
         self.planner = LocalPlanner(town, lane, station)
         self.driver = Driver(self.planner, length=self.car.LENGTH, cruise=config.cruise_speed)
-        self.junctions = JunctionControl(town)
         self.weather = Weather()
         self.wind = Wind(np.random.default_rng(wind_seed))
         self._perception = Perception(np.random.default_rng(perceive_seed))
-        self.actors = Actors(
-            self.road, self.junctions, self.car,
-            traffic_rng=np.random.default_rng(traffic_seed), walk_rng=np.random.default_rng(walk_seed),
-        )  # fmt: skip
-        self._lookout = Lookout(self.road, self.car, self.planner, self.junctions, self.actors)
         self.actors.populate(vehicles=config.vehicles, pedestrians=config.pedestrians)
         self.localizer = Localizer(
             float(self.car.position[0]), float(self.car.position[1]), float(self.car.heading),
@@ -97,13 +100,9 @@ class World:
         )  # fmt: skip
         self.lights = False
         self.faults: dict[Sensor, int] = {}
-        self.hazard: Hazard | None = None
-        self._hazard_since = 0
-        self._hazard_seen = 0
-        self._stopped_until = 0
         self.frame = 0
         self.frames: Array = np.zeros((0, len(FRAME_COLUMNS)))
-        self.collisions = 0
+        self.offsets: Array = np.zeros(0)
         self.reports = Reports(self.network, self._pose(), self.car.LENGTH)
 
     # --- time -------------------------------------------------------------------------------------------------------
@@ -115,50 +114,63 @@ class World:
 
     def step(self, frames: int) -> list[WorldEvent]:
         """Lets the world run for a number of physics frames; returns what happened to the car."""
-        rows = np.empty((frames, len(FRAME_COLUMNS)))
-        poses: list[Pose] = []
-        before = (float(self.car.position[0]), float(self.car.position[1]), float(self.car.heading))
-        for k in range(frames):
-            if k % EXTEND_EVERY == 0:
-                self.planner.extend(float(self.car.speed))
-            self._substep()
-            control = self.car.control
-            rows[k] = (
-                self.frame, self.car.position[0], self.car.position[1], self.car.heading, self.car.speed,
-                control.throttle, control.steer, control.brake, self.planner.lane,
-            )  # fmt: skip
-            poses.append(self._pose())
-        self.frames = rows
-        self._localize(np.vstack((before, rows[:, 1:4])))
-        self.actors.tidy()
+        before = (*self.car.position, self.car.heading)
+        parts = [self._run(min(FRAMES, frames - first)) for first in range(0, frames, FRAMES)]
+        trace = parts[0] if len(parts) == 1 else np.concatenate(parts)
+        self.frames, self.offsets = trace[:, : len(FRAME_COLUMNS)], trace[:, -1]
+        self._localize(np.vstack((before, trace[:, 1:4])))
         self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
+        poses = [Pose(*(float(v) for v in (row[1], row[2], row[3], row[4], row[9])), bool(row[10])) for row in trace]
         return self.reports.close(poses, self.frame)
 
-    def _substep(self) -> None:
-        dt = 1.0 / FRAME_RATE
-        car = self.car
-        self.junctions.note(CAR, self.planner.lane, float(car.speed), self.time)
-        hazard = self._lookout.look(self.perceived(), self.sight, self.time)
-        friction = self.weather.friction
-        car.friction, self.driver.sight = friction, self.sight
-        car.drift = self.wind.drift(
-            self.weather.above_clear(WeatherParameter.WIND_INTENSITY), self.time,
-            heading=float(car.heading), speed=float(car.speed),
-        )  # fmt: skip
-        control = self.driver.control(
-            float(car.position[0]), float(car.position[1]), float(car.heading), float(car.speed), hazard, dt, friction
-        )
-        if self.frame < self._stopped_until:
-            control = type(control)(throttle=0.0, steer=control.steer, brake=1.0)
-        self._note_hazard(hazard, control.brake)
-        car.height, car.sweep = self.planner.height, self.planner.sweep()
-        car.drive(control, dt)
-        self.actors.act(dt)
-        speed_before = float(car.speed)
-        self.road.step(dt)
-        self.frame += 1
-        if car.crashed:
-            self._collide(speed_before)
+    def _run(self, frames: int) -> Array:
+        """Steps all bodies by no more than `FRAMES` substeps; returns the car's way (frames, 12)."""
+        arrays = self.actors.arrays
+        self.planner.extend(self.car.speed)
+        self.driver.brief(arrays)
+        self._tell_weather(arrays)
+        step(self._arrays, arrays, frames, 1.0 / FRAME_RATE)
+        self.driver.debrief(arrays)
+        self.frame += frames
+        self._report(arrays)
+        return np.array(arrays.trace[:frames])
+
+    def _tell_weather(self, arrays: WorldArrays) -> None:
+        """Writes what the weather does to grip, sight and course into the world's arrays."""
+        car, eye, visibility = arrays.car.view(np.ndarray)[0], arrays.eye.view(np.ndarray)[0], self.visibility
+        car["friction"] = self.weather.friction
+        car["wind"] = self.weather.above_clear(WeatherParameter.WIND_INTENSITY)
+        car["wind_heading"], car["wind_phase"] = self.wind.heading, self.wind.phases
+        eye["sight"] = visibility.sight
+
+    def _report(self, arrays: WorldArrays) -> None:
+        """Takes over what happened to the car."""
+        for event in arrays.events[: int(arrays.car["events"][0])]:
+            frame, kind = int(event.frame), ObjectClass(int(event.kind))
+            if event.code == EventCode.HAZARD_STOP:
+                distance = round(float(event.value), 2)
+                self.reports.add(WorldEventKind.HAZARD_STOP, frame, reason=kind.label, distance=distance)
+            elif event.code == EventCode.HAZARD_END:
+                seconds = round(float(event.value) / FRAME_RATE, 2)
+                self.reports.add(WorldEventKind.HAZARD_END, frame, reason=kind.label, seconds=seconds)
+            else:
+                self.reports.infraction(
+                    WorldEventKind.COLLISION, frame, lane=int(event.lane), station=float(event.station),
+                    x=float(event.x), y=float(event.y), key=int(event.key), other=kind,
+                    own_fault=bool(event.own), speed=round(float(event.value), 2),
+                )  # fmt: skip
+
+    @property
+    def hazard(self) -> Hazard | None:
+        """What the car is braking or standing for, or None."""
+        car = self.actors.arrays.car.view(np.ndarray)[0]
+        kind = int(car["hazard"])
+        return Hazard(kind=ObjectClass(kind), gap=float(car["hazard_gap"])) if kind else None
+
+    @property
+    def collisions(self) -> int:
+        """Collisions of the car's own making."""
+        return int(self.actors.arrays.car["collisions"][0])
 
     def _localize(self, track: Array) -> None:
         """Takes in odometry of every frame, and a GPS fix of every so many.
@@ -190,50 +202,19 @@ class World:
 
     def perceived(self) -> list[Body]:
         """Bodies that the car perceives, where it takes them to be, nearest first."""
-        x, y = self.car.position
-        bodies = self.actors.bodies(self.car.position, CLEAR_SIGHT)
-        return self._perception.perceive(bodies, float(x), float(y), self.visibility, self.frame)
-
-    def _note_hazard(self, hazard: Hazard | None, brake: float) -> None:
-        """Logs when the car begins to stop for something, and when it goes on."""
-        free = self.driver.allowed_speed(None)
-        speed = float(self.car.speed)
-        limiting = hazard is not None and hazard.safe_speed(self.weather.friction) < free - 0.5
-        if self.hazard is None:
-            if hazard is not None and limiting and not self.planner.held:
-                if (speed < 1.0 and hazard.speed < 1.0) or brake * 8.0 > HARD:
-                    self.hazard, self._hazard_since, self._hazard_seen = hazard, self.frame, self.frame
-                    self.reports.add(
-                        WorldEventKind.HAZARD_STOP, self.frame,
-                        reason=hazard.kind.label, distance=round(max(hazard.gap, 0.0), 2),
-                    )  # fmt: skip
-            return
-        if limiting and hazard is not None:
-            self.hazard, self._hazard_seen = hazard, self.frame
-        if self.frame - self._hazard_seen > FRAME_RATE // 2:
-            seconds = (self.frame - self._hazard_since) / FRAME_RATE
-            self.reports.add(
-                WorldEventKind.HAZARD_END, self.frame, reason=self.hazard.kind.label, seconds=round(seconds, 2)
+        arrays = self.actors.arrays
+        car = arrays.vehicles.view(np.ndarray)[0]
+        count = see(
+            arrays.vehicles, arrays.pedestrians, arrays.props, arrays.seen, arrays.eye[0], car["x"], car["y"],
+            self.frame, 0,
+        )  # fmt: skip
+        return [
+            Body(
+                key=int(r.key), kind=ObjectClass(int(r.kind)), x=float(r.x), y=float(r.y), heading=float(r.heading),
+                length=float(r.length), width=float(r.width), speed=float(r.speed), height=float(r.height),
             )
-            self.hazard = None
-
-    # --- infractions ------------------------------------------------------------------------------------------------
-
-    def _collide(self, speed: float) -> None:
-        """Books collisions: whose fault they were, and who is towed away."""
-        car = self.car
-        for kind, other in self.actors.book(car.take_touched()):
-            offset = np.asarray(other.position) - car.position
-            forward = float(offset @ np.array([math.cos(car.heading), math.sin(car.heading)]))
-            own = speed > 0.5 and forward > 0.0
-            self.collisions += own
-            self.reports.infraction(
-                WorldEventKind.COLLISION, self.frame, lane=self.planner.lane, station=self.planner.station,
-                x=car.position[0], y=car.position[1], key=other.key, other=kind,
-                own_fault=own, speed=round(speed, 2),
-            )  # fmt: skip
-        car.speed = 0.0
-        self._stopped_until = self.frame + round(self.config.collisions_stop * FRAME_RATE)
+            for r in arrays.seen[:count]
+        ]  # fmt: skip
 
     def _pose(self) -> Pose:
         turning = self.planner.manoeuvre[0] is PhysicalAction.U_TURN and self.planner.in_manoeuvre

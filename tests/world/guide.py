@@ -18,7 +18,9 @@ from tests.world.driving import Trip, on_lane
 
 Instruction = tuple[PhysicalAction, int]
 
-DECISION = 0.5
+FRAMES = 15
+
+DECISION = FRAMES / FRAME_RATE
 """An instruction is given at most this often [s]."""
 
 STRAIGHT = {Entry.CHANGE_LEFT: 90, Entry.CHANGE_RIGHT: -90}
@@ -34,8 +36,8 @@ def guided_trip(roads: TownNetwork, start: Site, goal: Site, *, most: float = 12
         most: seconds after which it is given up.
     """
     town = roads.town
-    car, driver = on_lane(roads, start.lane, start.station)
-    planner = driver.planner
+    world = on_lane(roads, start.lane, start.station)
+    car, driver, planner = world.car, world.driver, world.planner
     driver.cruise = 60.0
     driver.set_goals([GoalAhead(lane=goal.lane, station=goal.station)])
     worst = 0.0
@@ -44,20 +46,14 @@ def guided_trip(roads: TownNetwork, start: Site, goal: Site, *, most: float = 12
         planner.extend(speed)
         if planner.held and speed < 0.1:
             if math.dist(car.position, goal.waypoint) <= ARRIVAL_DISTANCE:
-                return Trip(car, driver, worst, True)
+                return Trip(world, worst, True)
             planner.command(PhysicalAction.START, 0, speed)
         instruction = _next(town, planner, goal, speed)
         if instruction is not None:
             planner.command(*instruction, speed)
-        for _ in range(round(DECISION * FRAME_RATE)):
-            x, y = (float(v) for v in car.position)
-            control = driver.control(x, y, float(car.heading), speed := float(car.speed), None, 1.0 / FRAME_RATE)
-            car.height = planner.height
-            car.drive(control, 1.0 / FRAME_RATE)
-            car.step(1.0 / FRAME_RATE)
-            planner.advance(*(float(v) for v in car.position))
-            worst = max(worst, abs(planner.offset))
-    return Trip(car, driver, worst, False)
+        world.step(FRAMES)
+        worst = max(worst, float(np.abs(world.offsets).max()))
+    return Trip(world, worst, False)
 
 
 def _next(town: Town, planner: LocalPlanner, goal: Site, speed: float) -> Instruction | None:

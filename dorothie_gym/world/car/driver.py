@@ -1,18 +1,18 @@
-"""Drives the car along the planner's path, no faster than curves, limits, goals and hazards allow."""
+"""Tells the compiled world (`kernel.guiding`) which way the car goes, and how fast it may be there."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from dorothie_gym.ontology import SPEED_STEP, ObjectClass, PhysicalAction
-from dorothie_gym.world.car.control import MAX_BRAKING, Control, PathController
-from dorothie_gym.world.car.hazards import Hazard
+from dorothie_gym.ontology import SPEED_STEP
 from dorothie_gym.world.car.path import Path
-from dorothie_gym.world.car.planner import BRAKING, U_TURN_SPEED, LocalPlanner
+from dorothie_gym.world.car.planner import U_TURN_SPEED, LocalPlanner
+from dorothie_gym.world.town.model import Array
 
 KMH = 1 / 3.6
 """[m/s] of one km/h."""
@@ -53,60 +53,76 @@ class GoalAhead:
     station: float
 
 
-class SpeedProfile:
-    """Speed that curves, limits and the end of a path allow, at every point of it."""
+BEHIND, AHEAD = 12.0, 150.0
+"""Stretch of path that the compiled world is told at least, behind and ahead of the car [m]."""
 
-    def __init__(self, path: Path, *, stop_at: float | None) -> None:
-        bend = np.convolve(np.pad(np.abs(path.curvatures), 1, mode="edge"), np.full(3, 1 / 3), mode="valid")
-        squared = np.minimum(path.limits**2, LATERAL_ACCELERATION / np.maximum(bend, 1e-4))
-        if path.manoeuvre.any():
-            tight = path.manoeuvre & (bend > 0.1)
-            squared = np.where(tight, np.minimum(squared, U_TURN_SPEED**2), squared)
-        if stop_at is not None:
-            squared = np.where(path.s >= stop_at, 0.0, squared)
-        # v^2 may grow by 2 a ds towards the past: a running minimum from the end
-        slope = 2 * PROFILE_BRAKING * path.s
-        squared = np.minimum.accumulate((squared + slope)[::-1])[::-1] - slope
-        self._path, self._stop_at = path, stop_at
-        self._speeds: list[float] = np.sqrt(np.maximum(squared, 0.0)).tolist()
 
-    def at(self, s: float) -> float:
-        """Speed allowed at a distance along the path [m/s]."""
-        if self._stop_at is not None:
-            # exact near the end, where the points are too coarse
-            left = self._stop_at - s
-            near = math.sqrt(2 * PROFILE_BRAKING * left) if left > 0.0 else 0.0
-        else:
-            near = math.inf
-        return min(near, self._speeds[self._path.index_at(s)])
+def speed_profile(path: Path, stop_at: float | None) -> Array:
+    """Speed that curves, limits and the end of a path allow at each of its points (n,) [m/s].
 
-    def braking(self, s: float, speed: float) -> float:
-        """Deceleration that stops the car at the end of the path from a speed [m/s]; 0 where it goes on [m/s^2]."""
-        if self._stop_at is None:
-            return 0.0
-        return speed**2 / (2 * max(self._stop_at - s, 0.05))
+    Args:
+        path: the path.
+        stop_at: where the car has to stop [m], or None.
+    """
+    bend = np.convolve(np.pad(np.abs(path.curvatures), 1, mode="edge"), np.full(3, 1 / 3), mode="valid")
+    squared = np.minimum(path.limits**2, LATERAL_ACCELERATION / np.maximum(bend, 1e-4))
+    if path.manoeuvre.any():
+        tight = path.manoeuvre & (bend > 0.1)
+        squared = np.where(tight, np.minimum(squared, U_TURN_SPEED**2), squared)
+    if stop_at is not None:
+        squared = np.where(path.s >= stop_at, 0.0, squared)
+    # v^2 may grow by 2 a ds towards the past: a running minimum from the end
+    slope = 2 * PROFILE_BRAKING * path.s
+    squared = np.minimum.accumulate((squared + slope)[::-1])[::-1] - slope
+    speeds: Array = np.sqrt(np.maximum(squared, 0.0))
+    return speeds
+
+
+def write_path(arrays: Any, path: Path, s: float, speeds: Array) -> float:
+    """Writes the stretch of a path around a place into the arrays of a world.
+
+    Args:
+        arrays: `kernel.WorldArrays` of a world with a driven car.
+        path: the path.
+        s: where the car is on it [m].
+        speeds: allowed at its points (n,) [m/s].
+
+    Returns:
+        Where the stretch ends [m].
+    """
+    car, table = arrays.car.view(np.ndarray)[0], arrays.path.view(np.ndarray)
+    first = path.index_at(s - BEHIND)
+    cut = slice(first, first + len(table))
+    lanes, headings = path.lanes[cut], path.headings[cut]
+    rows = table[: len(lanes)]
+    rows["s"], rows["x"], rows["y"] = path.s[cut], path.points[cut, 0], path.points[cut, 1]
+    rows["heading"], rows["cos"], rows["sin"] = headings, np.cos(headings), np.sin(headings)
+    rows["height"], rows["station"], rows["speed"] = path.heights[cut], path.stations[cut], speeds[cut]
+    rows["lane"], rows["manoeuvre"] = lanes, path.manoeuvre[cut]
+    starts = np.concatenate(([0], 1 + np.flatnonzero(lanes[1:] != lanes[:-1])))[: len(car["run_lane"])]
+    car["runs"], car["run"] = len(starts), -1
+    car["run_lane"][: len(starts)], car["run_first"][: len(starts)] = lanes[starts], starts
+    car["points"], car["at"], car["s"] = len(lanes), path.index_at(s) - first, s
+    return float(path.s[cut][-1])
 
 
 class Driver:
-    """From the path, the goals and the hazards to the controls of every substep.
+    """Lays the planner's path, the goals and the wishes of the Co-Wizard before the compiled world.
 
     Attributes:
+        planner: the car's local planner.
         cruise: desired speed [km/h].
         goals: places where the car is expected to stop; it comes up to them slowly.
-        sight: how far the car perceives bodies now [m]; it goes no faster than it can stop within.
     """
 
     def __init__(self, planner: LocalPlanner, *, length: float, cruise: float = 40.0) -> None:
         self.planner = planner
         self.cruise = cruise
         self.goals: Sequence[GoalAhead] = ()
-        self.sight = math.inf
         self._length = length
-        self._controller = PathController()
-        self._profile: SpeedProfile | None = None
-        self._profiled: Path | None = None
-        self._goals_on_path: list[float] = []
-        self._hold_speed: float | None = None
+        self._told: Path | None = None
+        self._told_until = 0.0
+        self._speeds: Array = np.zeros(0)
 
     def change_cruise(self, up: bool) -> str | None:
         """Changes the cruise speed by 5 km/h; returns the reason if that cannot be."""
@@ -119,75 +135,44 @@ class Driver:
     def set_goals(self, goals: Sequence[GoalAhead]) -> None:
         """Sets where the car is expected to stop."""
         self.goals = tuple(goals)
-        self._profiled = None
+        self._told = None
 
-    def allowed_speed(self, hazard: Hazard | None, friction: float = 1.0) -> float:
-        """Target speed now [m/s]."""
-        planner = self.planner
-        self._prepare()
-        assert self._profile is not None
-        speed = min(self.cruise * KMH, self._profile.at(planner.s + 0.1), self._sight_speed(friction))
-        for place in self._goals_on_path:
-            left = place - planner.s
-            if -1.0 <= left:
-                beyond = max(left - APPROACH_DISTANCE, 0.0)
-                speed = min(speed, math.sqrt(APPROACH_SPEED**2 + 2 * PROFILE_BRAKING * beyond))
-        if hazard is not None:
-            speed = min(speed, hazard.safe_speed(friction))
-        return speed
+    def brief(self, arrays: Any) -> None:
+        """Writes what the car is to do into the arrays of a world (`kernel.WorldArrays`), before it is stepped."""
+        planner, car = self.planner, arrays.car.view(np.ndarray)[0]
+        if planner.path is not self._told:
+            self._tell(arrays, car, anew=True)
+        elif self._told_until < min(planner.s + AHEAD, planner.path.length):
+            self._tell(arrays, car, anew=False)
+        action, _ = planner.manoeuvre
+        car["action"] = 0 if action is None else action.value
+        car["action_end"] = planner.manoeuvre_end
+        car["cruise"], car["held"] = self.cruise * KMH, planner.held
 
-    def _sight_speed(self, friction: float) -> float:
-        """Speed from which the car can stop behind a roadblock that comes in sight [m/s]."""
-        if math.isinf(self.sight):
-            return math.inf
-        unseen = Hazard(kind=ObjectClass.STATIC, gap=self.sight - self._length / 2 - PROP_DEPTH)
-        return max(unseen.safe_speed(friction), WALKING_SPEED)
+    def debrief(self, arrays: Any) -> None:
+        """Takes over where the car is, after the world was stepped."""
+        car = arrays.car.view(np.ndarray)[0]
+        self.planner.note(float(car["s"]), float(car["offset"]), float(car["roadblock"]))
 
-    def control(self, x: float, y: float, heading: float, speed: float, hazard: Hazard | None, dt: float,
-                friction: float = 1.0) -> Control:  # fmt: skip
-        """Controls for the next substep.
+    def _tell(self, arrays: Any, car: Any, *, anew: bool) -> None:
+        """Writes the stretch of path around the car; all else that follows from the path if that was laid anew."""
+        path, s = self.planner.path, self.planner.s
+        if anew:
+            stop_at = path.length - self._length / 2 - END_GAP if self.planner.waits_at_end else None
+            self._speeds = speed_profile(path, stop_at)
+            goals = self._goals_on(path)[: car["goal"].shape[0]]
+            car["goals"], car["goal"][: len(goals)] = len(goals), goals
+            car["stop_at"] = math.inf if stop_at is None else stop_at
+            self._told = path
+        car["offset"] = self.planner.offset
+        self._told_until = write_path(arrays, path, s, self._speeds)
 
-        Args:
-            x: position [m]; `y` likewise.
-            y: [m].
-            heading: [rad].
-            speed: [m/s].
-            hazard: what is ahead.
-            dt: substep [s].
-            friction: share of the dry road's grip.
-        """
-        planner = self.planner
-        planner.advance(x, y)
-        target = self.allowed_speed(hazard, friction)
-        if planner.held:
-            self._hold_speed = min(speed if self._hold_speed is None else self._hold_speed, speed)
-            self._hold_speed = max(self._hold_speed - BRAKING * dt, 0.0)
-            target = min(target, self._hold_speed)
-        else:
-            self._hold_speed = None
-        control = self._controller.step(planner.path, planner.s, planner.offset, heading, speed, target, dt)
-        assert self._profile is not None
-        needed = max(self._profile.braking(planner.s, speed), hazard.braking(speed) if hazard is not None else 0.0)
-        if needed > SURE_BRAKING:
-            # the speed controller lags behind: before a hazard or line the brake is applied that stops the car in time
-            control = replace(control, throttle=0.0, brake=max(control.brake, min(needed / MAX_BRAKING, 1.0)))
-        return control
-
-    def _prepare(self) -> None:
-        path = self.planner.path
-        if path is self._profiled:
-            return
-        stop_at = path.length - self._length / 2 - END_GAP if self.planner.waits_at_end else None
-        self._profile = SpeedProfile(path, stop_at=stop_at)
-        self._profiled = path
-        self._goals_on_path = []
+    def _goals_on(self, path: Path) -> list[float]:
+        """Places of the goals along a path [m], those of the lanes beside it among them."""
+        found: list[float] = []
         for goal in self.goals:
             for lane, station in self.planner.beside(goal.lane, goal.station):
                 on = np.flatnonzero((path.lanes == lane) & ~path.manoeuvre)
                 if len(on) and path.stations[on[0]] - 1.0 <= station <= path.stations[on[-1]] + 1.0:
-                    self._goals_on_path.append(float(np.interp(station, path.stations[on], path.s[on])))
-
-
-def is_turning_round(planner: LocalPlanner) -> bool:
-    """Whether a U-turn is under way or about to begin."""
-    return planner.manoeuvre[0] is PhysicalAction.U_TURN
+                    found.append(float(np.interp(station, path.stations[on], path.s[on])))
+        return sorted(place for place in found if place >= self.planner.s - 1.0)

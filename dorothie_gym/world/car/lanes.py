@@ -12,6 +12,9 @@ from dorothie_gym.world.town.model import Exit, LinkType, Town, wrap_degrees
 HORIZON = 120.0
 """Length of path kept ahead [m]."""
 
+LAID = 180.0
+"""Length of path that is laid ahead: so it has to be laid anew only now and then [m]."""
+
 SWITCH_TIME = 3.0
 """A lane switch takes about this long [s]."""
 
@@ -212,7 +215,7 @@ class Lanes:
 
     def _grow(self, steps: list[Step], ahead: float) -> bool:
         """Adds the lanes that follow until there is path enough; tells whether the path has an open end."""
-        while ahead < HORIZON:
+        while ahead < LAID:
             on = self.default_successor(steps[-1].lane)
             if on is None:
                 return True

@@ -117,10 +117,15 @@ class LocalPlanner:
         rest = self.path.points[k:][self.path.manoeuvre[k:]][::SWEEP_STEP]
         return [(float(x), float(y)) for x, y in rest]
 
-    def advance(self, x: float, y: float) -> None:
-        """Takes note of where the car is now [m]."""
-        self.s, self.offset = self.path.project(x, y, self.s)
-        if self._manoeuvre is not None and self.s >= self._manoeuvre_end:
+    @property
+    def manoeuvre_end(self) -> float:
+        """Where along the path the manoeuvre is over [m]."""
+        return self._manoeuvre_end
+
+    def note(self, s: float, offset: float, roadblock: float) -> None:
+        """Takes note of where the car is along the path, how far to the right of it, and where a roadblock is [m]."""
+        self.s, self.offset, self.roadblock = s, offset, roadblock
+        if self._manoeuvre is not None and s >= self._manoeuvre_end:
             self._manoeuvre, self._manoeuvre_angle = None, 0
 
     def extend(self, speed: float) -> None:

@@ -5,20 +5,24 @@ functions; `step` lets it go on. Compiled and in plain Python (``NUMBA_DISABLE_J
 byte, and it is a function of the state alone: of seed and actions, not of the process or the order of worlds.
 """
 
-from dorothie_gym.world.kernel.records import Kind, Wait, Walk
-from dorothie_gym.world.kernel.stepping import step
-from dorothie_gym.world.kernel.town_arrays import TownArrays, town_arrays
-from dorothie_gym.world.kernel.world_arrays import (
-    WorldArrays,
+from dorothie_gym.world.kernel.editing import (
     add_pedestrian,
     add_prop,
+    add_street_walker,
     add_vehicle,
-    empty_world,
-    populate,
+    move_prop,
+    remove_pedestrian,
     remove_prop,
+    remove_vehicle,
 )
+from dorothie_gym.world.kernel.populating import populate
+from dorothie_gym.world.kernel.records import Footway, Kind, Wait, Walk
+from dorothie_gym.world.kernel.stepping import step
+from dorothie_gym.world.kernel.town_arrays import TownArrays, town_arrays
+from dorothie_gym.world.kernel.world_arrays import WorldArrays, empty_world, grown
 
 __all__ = [
-    "Kind", "TownArrays", "Wait", "Walk", "WorldArrays", "add_pedestrian", "add_prop", "add_vehicle", "empty_world",
-    "populate", "remove_prop", "step", "town_arrays",
+    "Footway", "Kind", "TownArrays", "Wait", "Walk", "WorldArrays", "add_pedestrian", "add_prop", "add_street_walker",
+    "add_vehicle", "empty_world", "grown", "move_prop", "populate", "remove_pedestrian", "remove_prop",
+    "remove_vehicle", "step", "town_arrays",
 ]  # fmt: skip

@@ -1,7 +1,7 @@
 """Changing lanes: highway-env's MOBIL (Kesting, Treiber and Helbing 2007) without politeness, as there.
 
-Beyond stock's rules, nobody begins a change in a junction, after having been let into one, or too near to the end of
-the lane to complete it; and a lane that ends is left, not entered.
+Cyclists overtake nobody and move over to the right. Beyond stock's rules, nobody begins a change in a junction, after
+having been let into one, or too near to the end of the lane to complete it; and a lane that ends is left, not entered.
 """
 
 from __future__ import annotations
@@ -15,11 +15,13 @@ from dorothie_gym.world.kernel.order import around
 from dorothie_gym.world.kernel.parameters import (
     CAR_LENGTH,
     CHANGE_TIME,
+    CYCLIST_BEFORE,
+    CYCLIST_BEHIND,
     LANE_CHANGE_BRAKING,
     LANE_CHANGE_DELAY,
     LANE_CHANGE_GAIN,
 )
-from dorothie_gym.world.kernel.plan import take
+from dorothie_gym.world.kernel.plan import may_cycle, take
 from dorothie_gym.world.kernel.records import Kind, Records
 
 if TYPE_CHECKING:
@@ -45,6 +47,9 @@ def change_lanes(town: TownArrays, world: WorldArrays, i: int) -> None:
         return
     if lane.successors > 0 and left < CAR_LENGTH + CHANGE_TIME * vehicle.speed:
         return
+    if vehicle.kind == Kind.CYCLIST and lane.successors > 0:
+        _move_over(town, world, i, lane)
+        return
     if lane.left >= 0:
         _consider(town, world, i, lane, int(lane.left))
     if lane.right >= 0:
@@ -62,6 +67,18 @@ def _consider(town: TownArrays, world: WorldArrays, i: int, lane: Records, side:
         return
     if mobil(town, world, i, side, station, lane.successors == 0):
         take(town, vehicle, side)
+
+
+@compiled
+def _move_over(town: TownArrays, world: WorldArrays, i: int, lane: Records) -> None:
+    """A cyclist changes to the lane to the right, if there is one where it may ride and room on it, and to no other."""
+    vehicle = world.vehicles[i]
+    if lane.right < 0 or not may_cycle(town.lanes[lane.right]) or town.lanes[lane.right].successors == 0:
+        return
+    station, _, _ = project(town, lane.right, vehicle.x, vehicle.y)
+    _, ahead, _, behind = around(town, world, lane.right, station, i)
+    if ahead > CYCLIST_BEFORE and behind > CYCLIST_BEHIND:
+        take(town, vehicle, int(lane.right))
 
 
 @compiled

@@ -11,7 +11,8 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.world.kernel.compiling import compiled, inlined
-from dorothie_gym.world.kernel.records import Kind, Records, Walk
+from dorothie_gym.world.kernel.events import log
+from dorothie_gym.world.kernel.records import PEDESTRIAN_CLASS, STATIC, VEHICLES, EventCode, Kind, Records, Walk
 from dorothie_gym.world.network.ahead import LEVEL
 
 if TYPE_CHECKING:
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 
 AXIS_X, AXIS_Y = 0.8, 0.6
 """Direction along which bodies are sorted."""
+
+MOVES = 0.5
+"""A car that is slower than this runs into nobody [m/s]."""
 
 WALKER_RADIUS, WALKER_SIZE = 0.354, 0.5
 """Half the diagonal and the side of a pedestrian's outline [m], `Pedestrian.LENGTH`."""
@@ -130,7 +134,9 @@ def _radius(world: WorldArrays, body: int) -> float:
 def _meet(world: WorldArrays, one: int, other: int, vehicles: int, walkers: int) -> None:
     """Marks a vehicle and another body as crashed if they touch."""
     vehicle, clock = world.vehicles[one], world.clock[0]
-    if other < vehicles:
+    if vehicle.kind == Kind.DRIVEN:
+        _touch_by_car(world, other, vehicles, walkers)
+    elif other < vehicles:
         second = world.vehicles[other]
         if _touch(vehicle, second, second.radius, second.length, second.width):
             if not (vehicle.crashed and second.crashed):
@@ -149,6 +155,45 @@ def _meet(world: WorldArrays, one: int, other: int, vehicles: int, walkers: int)
             if not vehicle.crashed:
                 clock.collisions += 1
             vehicle.crashed = True
+
+
+@compiled
+def _touch_by_car(world: WorldArrays, other: int, vehicles: int, walkers: int) -> None:
+    """Books what the session's car touches, once each, and brings both to a stand; a prop is taken away."""
+    vehicle = world.vehicles[0]
+    if other < vehicles:
+        second = world.vehicles[other]
+        if second.touched or not _touch(vehicle, second, second.radius, second.length, second.width):
+            return
+        second.touched = second.crashed = True
+        second.speed = 0.0  # else it would go on through the car
+        _book(world, VEHICLES, int(second.key), other, second.x, second.y)
+    elif other < vehicles + walkers:
+        walker = world.pedestrians[other - vehicles]
+        if walker.crashed or not _touch(vehicle, walker, WALKER_RADIUS, WALKER_SIZE, WALKER_SIZE):
+            return
+        walker.crashed = True
+        world.clock[0].run_over += 1
+        _book(world, PEDESTRIAN_CLASS, int(walker.key), other - vehicles, walker.x, walker.y)
+    else:
+        prop = world.props[other - vehicles - walkers]
+        if not _touch(vehicle, prop, prop.radius, prop.length, prop.width):
+            return
+        prop.present = False
+        _book(world, STATIC, int(prop.key), other - vehicles - walkers, prop.x, prop.y)
+
+
+@compiled
+def _book(world: WorldArrays, kind: int, key: int, body: int, x: float, y: float) -> None:
+    """Takes down a collision: it is of the car's own making if it drove towards the other one."""
+    car, vehicle, clock = world.car[0], world.vehicles[0], world.clock[0]
+    event = world.events[log(world, EventCode.COLLISION, kind, key, car.before)]
+    event.frame, event.body = clock.frame + 1, body
+    event.own = bool(car.before > MOVES and (x - vehicle.x) * vehicle.cos + (y - vehicle.y) * vehicle.sin > 0.0)
+    if event.own:
+        car.collisions += 1
+    vehicle.speed = 0.0
+    car.stopped_until = clock.frame + 1 + car.collision_stop
 
 
 @inlined

@@ -5,18 +5,21 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dorothie_gym.world.car.planner import SWEEP_STEP
 from dorothie_gym.world.junctions import CRITICAL_GAP, HARDEST_BRAKING
 from dorothie_gym.world.kernel.changing import change_lanes
 from dorothie_gym.world.kernel.compiling import compiled, inlined
 from dorothie_gym.world.kernel.following import brake_to, following_acceleration, free_acceleration
 from dorothie_gym.world.kernel.junctions import announce, forget, note, request
+from dorothie_gym.world.kernel.lanes import project
 from dorothie_gym.world.kernel.motion import slip_towards_lane
 from dorothie_gym.world.kernel.order import around, next_on_lane
-from dorothie_gym.world.kernel.parameters import ACC_MAX
+from dorothie_gym.world.kernel.parameters import ACC_MAX, CYCLIST_ACCELERATION
 from dorothie_gym.world.kernel.plan import extend, follow_road
-from dorothie_gym.world.kernel.records import NOBODY, Records, Wait, Walk
-from dorothie_gym.world.network.ahead import HORIZON
-from dorothie_gym.world.traffic import ASKING, CURVE_BRAKING, LINE_GAP, STOP_BRAKING
+from dorothie_gym.world.kernel.records import NOBODY, Kind, Records, Wait, Walk
+from dorothie_gym.world.kernel.straying import give_way_to_strayers
+from dorothie_gym.world.network.ahead import HORIZON, LEVEL
+from dorothie_gym.world.traffic import ASKING, CROSSING_MARGIN, CROSSING_SIGHT, CURVE_BRAKING, LINE_GAP, STOP_BRAKING
 
 if TYPE_CHECKING:
     from dorothie_gym.world.kernel.town_arrays import TownArrays
@@ -50,7 +53,11 @@ def drive(town: TownArrays, world: WorldArrays, i: int) -> None:
     follow_road(town, vehicle)
     note(town, vehicle, world.clock[0].time)
     change_lanes(town, world, i)
-    vehicle.acceleration = min(max(_acceleration(town, world, i), -ACC_MAX), ACC_MAX)
+    most = CYCLIST_ACCELERATION if vehicle.kind == Kind.CYCLIST else ACC_MAX
+    wanted = _acceleration(town, world, i)
+    if world.clock[0].straying > 0:
+        wanted = min(wanted, give_way_to_strayers(town, world, i))
+    vehicle.acceleration = min(max(wanted, -ACC_MAX), most)
     vehicle.slip = slip_towards_lane(town.points, town.lanes[vehicle.plan[0]], vehicle)
 
 
@@ -91,7 +98,30 @@ def _acceleration(town: TownArrays, world: WorldArrays, i: int) -> float:
         left = begin - 0.5 * vehicle.length - LINE_GAP
         if left < vehicle.speed * vehicle.speed / (2.0 * STOP_BRAKING) + ASKING:
             stop = min(stop, brake_to(vehicle.speed, left))
+    if world.car[0].sweeping and vehicle.kind != Kind.DRIVEN:
+        stop = min(stop, _give_way_to_turning(town, world, vehicle))
     return min(found, stop, _approach(town, world, i, junction, line, front, gap))
+
+
+@compiled
+def _give_way_to_turning(town: TownArrays, world: WorldArrays, vehicle: Records) -> float:
+    """Acceleration that stops a vehicle before the way of the car that turns round [m/s^2]; inf where it is clear."""
+    car, other = world.car[0], world.vehicles[0]
+    dx, dy = other.x - vehicle.x, other.y - vehicle.y
+    if dx * dx + dy * dy > CROSSING_SIGHT * CROSSING_SIGHT or abs(other.height - vehicle.height) > LEVEL:
+        return math.inf
+    gap, start = math.inf, 0.0
+    beside = 0.5 * (vehicle.width + other.width) + CROSSING_MARGIN
+    for k in range(min(int(vehicle.planned), 3)):
+        lane = town.lanes[vehicle.plan[k]]
+        for p in range(car.sweep_first, car.sweep_last + 1, SWEEP_STEP):
+            station, lateral, _ = project(town, vehicle.plan[k], world.path[p].x, world.path[p].y)
+            if abs(lateral) < beside and 0.0 <= station <= lane.length:
+                gap = min(gap, start + station - vehicle.station)
+        start += lane.length
+    gap -= 0.5 * (vehicle.length + other.length)
+    # whoever is in its way already had better go on
+    return brake_to(vehicle.speed, gap) if -1.0 < gap < math.inf else math.inf
 
 
 @inlined

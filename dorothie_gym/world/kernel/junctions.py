@@ -24,7 +24,7 @@ from dorothie_gym.world.junctions import (
 )
 from dorothie_gym.world.kernel.compiling import compiled, inlined
 from dorothie_gym.world.kernel.lights import light
-from dorothie_gym.world.kernel.parameters import AFTER_END
+from dorothie_gym.world.kernel.parameters import AFTER_END, CLOSED
 from dorothie_gym.world.kernel.records import NOBODY, Colour, Control, Kind, Records, Relation, Wait
 from dorothie_gym.world.traffic import ROOM_BEHIND, ROOM_EACH, ROOM_SIGHT, SLOW
 
@@ -114,7 +114,47 @@ def _reason_to_wait(town: TownArrays, world: WorldArrays, i: int, k: int, now: f
         own.since = math.inf  # whoever cannot leave the junction keeps nobody waiting
         return Wait.NO_ROOM
     own.since = min(own.since, now)
+    if _is_closed(town, world, i, now):
+        return Wait.CLOSED
     return _others(town, world, i, now)
+
+
+@inlined
+def _is_closed(town: TownArrays, world: WorldArrays, i: int, now: float) -> bool:
+    """Whether the car turns round in the junction, and a vehicle is not that car."""
+    if world.vehicles[i].kind == Kind.DRIVEN:
+        return False
+    car, junction = world.car[0], town.lanes[world.vehicles[i].approach].junction
+    for c in range(CLOSED):
+        if car.closed[c] == junction and now - car.closed_at[c] < LAPSE:
+            return True
+    return False
+
+
+@compiled
+def close(town: TownArrays, world: WorldArrays, junction: int) -> bool:
+    """Asks for a whole junction for the car, to turn round in its mouth; to be repeated as long as it is needed.
+
+    Returns:
+        Whether it is empty; then nobody else is let in while this is repeated.
+    """
+    car, slot = world.car[0], 0
+    for c in range(CLOSED):
+        if car.closed[c] == junction:
+            slot = c
+            break
+        if car.closed_at[c] < car.closed_at[slot]:
+            slot = c
+    car.closed[slot], car.closed_at[slot] = junction, world.clock[0].time
+    for i in range(1, len(world.vehicles)):
+        other = world.vehicles[i]
+        if other.kind == Kind.EMPTY:
+            continue
+        if other.claim >= 0 and town.lanes[other.claim].junction == junction:
+            return False
+        if other.inside >= 0 and town.lanes[other.inside].junction == junction:
+            return False
+    return True
 
 
 @compiled

@@ -52,7 +52,8 @@ def rebuild(town: TownArrays, world: WorldArrays) -> None:
 def _is_on_followed(town: TownArrays, vehicle: Records) -> bool:
     """Whether a vehicle is on the lane that it follows, which is not the closest one."""
     lane = town.lanes[vehicle.lane]
-    if lane.left != vehicle.plan[0] and lane.right != vehicle.plan[0]:
+    beside = lane.left == vehicle.plan[0] or lane.right == vehicle.plan[0]
+    if not beside and vehicle.kind != Kind.DRIVEN:  # which may turn round, across both
         return True  # one lane leads into the other, or they cross in a junction
     return bool(abs(vehicle.lateral) <= town.lanes[vehicle.plan[0]].half_width + MARGIN)
 

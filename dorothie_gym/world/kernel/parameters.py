@@ -65,6 +65,21 @@ AFTER_END = CAR_LENGTH / 2
 PLANNED = 24
 """Most lanes that a vehicle plans ahead, its own one included."""
 
+GOALS = 16
+"""Most places on the car's path that it comes up to slowly."""
+
+CLOSED = 4
+"""Most junctions that a car turns round in at once."""
+
+POINTS = 256
+"""Most points of the car's path that the loops look at: 1 m apart, half a metre in U-turns."""
+
+EVENTS = 64
+"""Most things that happen to the car within a call."""
+
+FRAMES = 15
+"""Most substeps within a call of a world with a driven car: its path is lengthened in between."""
+
 STOPPED = 0.05
 """Who brakes at less than this stands [m/s]."""
 
@@ -79,8 +94,20 @@ CHANGE_TIME = 3.0
 CYCLIST_LENGTH, CYCLIST_WIDTH = 1.8, 0.7
 """Size of a bicycle with its rider [m] (AASHTO, Guide for the Development of Bicycle Facilities, 2012: 70 x 30 in)."""
 
-CYCLIST_SPEED = 4.5
-"""Speed that a cyclist likes [m/s] (the same guide: 8 to 15 mph for most adults)."""
+CYCLIST_SPEEDS = 15.0 / 3.6, 20.0 / 3.6
+"""Slowest and fastest cyclist [m/s]: the middle of what is measured in towns (Dozza & Werneke 2014: 14 to 20 km/h)."""
+
+CYCLIST_ACCELERATION = 1.0
+"""Greatest acceleration of a cyclist [m/s^2]."""
+
+CYCLIST_SHARE = 1 / 8
+"""Share of cyclists among the vehicles of a town."""
+
+CYCLIST_ROADS = 60.5 / 3.6
+"""Where more is allowed than this, nobody rides a bicycle [m/s]."""
+
+CYCLIST_BEFORE, CYCLIST_BEHIND = 6.0, 15.0
+"""Gaps to those before and behind on the lane to the right [m] for which a cyclist moves over to it."""
 
 CYCLIST_FROM_EDGE = 0.9
 """Distance of a cyclist from the right edge of the lane [m]."""
@@ -93,5 +120,29 @@ TOW_CRASHED = 3.0
 TOW_BLOCKED = 15.0
 """A vehicle that stands before a prop gives up after this long [s]."""
 
-CLEAR_OF_OTHERS = 14.0
-"""Nobody appears closer to others than this [m]."""
+TOW_FACING = 6.0
+"""A vehicle that stands before a car that stands in the middle of a U-turn gives way to it after this long [s]."""
+
+TOW_STUCK = 60.0
+"""Any vehicle that stands for this long, not for a red light, is towed away: no knot lasts for ever [s]."""
+
+GOES_HOME = 45.0
+"""A pedestrian who has not got on for this long goes home [s]; longer than one waits at a crosswalk."""
+
+CLEAR_OF_CAR = 25.0
+"""Nobody is brought to a town closer to the car than this [m]."""
+
+CLEAR_OF_WALKER = 8.0
+"""No pedestrian is brought closer to the car than this [m], nor than `CLEAR_OF_PEOPLE` to another one."""
+
+CLEAR_OF_PEOPLE = 1.5
+"""See there [m]."""
+
+OUT_OF_SIGHT = 60.0
+"""Who comes back elsewhere does so no closer to the car than this [m]."""
+
+CLEAR_OF_OTHERS, CLEAR_BESIDE = 14.0, 2.5
+"""Nobody appears closer to others before or behind it than this [m] who are no farther aside than that [m], ..."""
+
+CLEAR_OF_BODIES = 6.0
+"""... nor this close to the middle of any, half of it aside [m]."""

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.world.kernel.compiling import compiled, inlined
 from dorothie_gym.world.kernel.lanes import project
-from dorothie_gym.world.kernel.parameters import AFTER_END, PLANNED
+from dorothie_gym.world.kernel.parameters import AFTER_END, CYCLIST_FROM_EDGE, CYCLIST_ROADS, PLANNED
 from dorothie_gym.world.kernel.randomness import choose
-from dorothie_gym.world.kernel.records import Records
+from dorothie_gym.world.kernel.records import Kind, Records
 from dorothie_gym.world.network.ahead import HORIZON
 
 if TYPE_CHECKING:
@@ -22,8 +22,22 @@ def follow_road(town: TownArrays, vehicle: Records) -> None:
         for k in range(1, vehicle.planned):
             vehicle.plan[k - 1] = vehicle.plan[k]
         vehicle.planned -= 1
+        keep_side(vehicle, town.lanes[vehicle.plan[0]])
         locate(town, vehicle)
         extend(town, vehicle)
+
+
+@inlined
+def keep_side(vehicle: Records, lane: Records) -> None:
+    """A cyclist keeps to the right edge of its lane, cars to its middle."""
+    if vehicle.kind == Kind.CYCLIST:
+        vehicle.to_right = max(lane.half_width - CYCLIST_FROM_EDGE, 0.0)
+
+
+@inlined
+def may_cycle(lane: Records) -> bool:
+    """Whether cyclists ride on a lane."""
+    return bool(lane.limit <= CYCLIST_ROADS)
 
 
 @inlined
@@ -36,6 +50,7 @@ def locate(town: TownArrays, vehicle: Records) -> None:
 def take(town: TownArrays, vehicle: Records, lane: int) -> None:
     """Follows a lane and plans on from there."""
     vehicle.plan[0], vehicle.planned = lane, 1
+    keep_side(vehicle, town.lanes[lane])
     locate(town, vehicle)
     extend(town, vehicle)
 
@@ -50,8 +65,40 @@ def extend(town: TownArrays, vehicle: Records) -> None:
         last = town.lanes[vehicle.plan[vehicle.planned - 1]]
         if last.successors == 0:
             return
-        way = choose(vehicle, last.successors) if last.successors > 1 else 0
-        lane = town.neighbours[last.successor + way]
+        lane = town.neighbours[last.successor]
+        if last.successors > 1:
+            lane = _drawn(town, vehicle, last)
         vehicle.plan[vehicle.planned] = lane
         vehicle.planned += 1
         ahead += town.lanes[lane].length
+
+
+@compiled
+def _drawn(town: TownArrays, vehicle: Records, last: Records) -> int:
+    """One of the ways on from a lane; for cyclists of those that lead along streets where they may ride, if any do."""
+    streets = 0
+    if vehicle.kind == Kind.CYCLIST:
+        for k in range(last.successor, last.successor + last.successors):
+            streets += _leads_along_streets(town, town.neighbours[k])
+    if streets == 0:
+        return int(town.neighbours[last.successor + choose(vehicle, last.successors)])
+    left = choose(vehicle, streets)
+    for k in range(last.successor, last.successor + last.successors):
+        if _leads_along_streets(town, town.neighbours[k]):
+            if left == 0:
+                return int(town.neighbours[k])
+            left -= 1
+    return int(town.neighbours[last.successor])
+
+
+@compiled
+def _leads_along_streets(town: TownArrays, number: int) -> bool:
+    """Whether cyclists may ride on a lane and, if that crosses a junction, behind it."""
+    lane = town.lanes[number]
+    if not may_cycle(lane):
+        return False
+    if lane.junction >= 0:
+        for k in range(lane.successor, lane.successor + lane.successors):
+            if not may_cycle(town.lanes[town.neighbours[k]]):
+                return False
+    return True

@@ -10,7 +10,15 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from dorothie_gym.world.kernel.parameters import PLANNED
+from dorothie_gym.ontology import ObjectClass, PhysicalAction
+from dorothie_gym.world.kernel.parameters import CLOSED, GOALS, PLANNED
+
+VEHICLES, PEDESTRIAN_CLASS, STATIC = (
+    int(kind.value) for kind in (ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC)
+)
+"""Object classes of bodies, as plain numbers."""
+
+U_TURN = int(PhysicalAction.U_TURN.value)
 
 Records: TypeAlias = Any
 """An array of records; mypy knows no types of their fields."""
@@ -68,12 +76,21 @@ class Wait(enum.IntEnum):
 
 
 class Walk(enum.IntEnum):
-    """What a pedestrian does."""
+    """What a pedestrian does; who strays crosses the road where there is no crosswalk."""
 
     EMPTY = 0
     WALKING = 1
     WAITING = 2
     CROSSING = 3
+    STRAYING = 4
+
+
+class Footway(enum.IntEnum):
+    """What a way is that people walk along."""
+
+    PAVEMENT = 0
+    CORNER = 1
+    STREET = 2
 
 
 LANE = np.dtype(
@@ -129,17 +146,19 @@ PROGRAMME = np.dtype(
 
 WALKWAY = np.dtype(
     [("length", "f8"), ("first", "i4"), ("last", "i4"), ("mouth", "i4"), ("mouths", "i4"), ("half_width", "f8"),
-     ("next_walk", "i4", (2,)), ("next_end", "i4", (2,))],
+     ("next_walk", "i4", (2,)), ("next_end", "i4", (2,)), ("kind", "i4"), ("lane", "i4")],
     align=True,
 )  # fmt: skip
-"""A pavement: its points, the mouths of crosswalks along it, and where one walks on beyond its two ends, or -1."""
+"""A way along which people walk: its points, the mouths of crosswalks along it, and where one walks on beyond its two
+ends, or -1; its kind (`Footway`), and of a street walk the lane that it is beside, else -1."""
 
 CROSSING = np.dtype(
     [("x", "f8", (2,)), ("y", "f8", (2,)), ("cos", "f8"), ("sin", "f8"), ("length", "f8"), ("height", "f8"),
-     ("walk", "i4", (2,)), ("station", "f8", (2,))],
+     ("walk", "i4", (2,)), ("station", "f8", (2,)), ("light", "i4"), ("lights", "i4")],
     align=True,
 )  # fmt: skip
-"""A crosswalk: its two ends, its direction from the first to the second, and the pavements that it joins."""
+"""A crosswalk: its two ends, its direction from the first to the second, the pavements that it joins, and where the
+lanes are in `neighbours` whose lights must be red while one crosses."""
 
 MOUTH = np.dtype([("station", "f8"), ("crossing", "i4"), ("end", "i4")], align=True)
 """Where a crosswalk leaves a pavement."""
@@ -158,6 +177,7 @@ VEHICLE = np.dtype(
         ("own_station", "f8"), ("own_lateral", "f8"),  # on the lane that is closest [m]
         ("timer", "f8"),  # since it thought of changing lanes [s]
         ("standing", "f8"),  # for how long it has been standing, its light not being red [s]
+        ("stuck", "f8"),  # the same less the time for which the light ahead was not green, also behind others [s]
         ("crash_age", "f8"),  # since it crashed [s]
         ("odometer", "f8"),  # way driven [m]
         ("distance", "f8"),  # from its front to the line before the next junction [m]
@@ -186,6 +206,9 @@ PEDESTRIAN = np.dtype(
         ("pace", "f8"),  # speed that it likes [m/s]
         ("aside", "f8"),  # how far to the right of the middle it keeps [m]
         ("waited", "f8"), ("odometer", "f8"),
+        ("far", "f8"),  # of who strays: to the other side of the road [m]
+        ("staying", "f8"), ("left_x", "f8"), ("left_y", "f8"),  # for how long it has not got on [s], and from where [m]
+        ("crash_age", "f8"),  # since it was touched [s]
         ("random", "i8"),
         ("walk", "i4"), ("segment", "i4"), ("crossing", "i4"), ("mouth", "i4"), ("state", "i4"), ("key", "i4"),
         ("crashed", "b1"),
@@ -211,12 +234,98 @@ NODE = np.dtype(
 )  # fmt: skip
 """A body in the list of a lane, ordered by station."""
 
+POINT = np.dtype(
+    [
+        ("s", "f8"),  # distance along the path [m]
+        ("x", "f8"), ("y", "f8"), ("heading", "f8"), ("cos", "f8"), ("sin", "f8"), ("height", "f8"),
+        ("station", "f8"),  # along its lane [m]; during a U-turn where that ends
+        ("speed", "f8"),  # that curves, limits and the path's end allow [m/s]
+        ("lane", "i4"),
+        ("manoeuvre", "b1"),  # whether the path is off the lanes' middles here: lane switch or U-turn
+    ],
+    align=True,
+)  # fmt: skip
+"""A point of the path that the car follows."""
+
+CAR = np.dtype(
+    [
+        ("points", "i4"), ("at", "i4"),  # of the path: how many, and the one at or before the car
+        ("s", "f8"), ("offset", "f8"),  # where it is along the path, and how far to the right of it [m]
+        ("stop_at", "f8"),  # where it has to stop, infinite where the path does not end [m]
+        ("runs", "i4"), ("run", "i4"),  # lanes of the path one after another: how many, and the one that it is on
+        ("run_lane", "i4", (PLANNED,)), ("run_first", "i4", (PLANNED,)),  # and the first point on each
+        ("action", "i4"), ("action_end", "f8"),  # manoeuvre that is prepared or driven, a `PhysicalAction`, or 0; its end
+        ("cruise", "f8"),  # desired speed [m/s]
+        ("held", "b1"), ("hold_speed", "f8"),  # whether it stops by command, and how fast it still is then; -1 for none
+        ("goals", "i4"), ("goal", "f8", (GOALS,)),  # places along the path to come up to slowly [m]
+        ("lateral_sum", "f8"), ("lateral_last", "f8"), ("speed_sum", "f8"),  # memory of the controllers
+        ("throttle", "f8"), ("steer", "f8"), ("brake", "f8"),
+        ("before", "f8"),  # speed at the start of the substep [m/s]
+        ("friction", "f8"),  # share of the dry road's grip
+        ("wind", "f8"), ("wind_heading", "f8"), ("wind_phase", "f8", (3,)),  # strength in [0, 1], where to, gusts
+        ("roadblock", "f8"),  # how far ahead of its middle a prop is seen on the path [m], or infinite
+        ("sweeping", "b1"), ("sweep_first", "i4"), ("sweep_last", "i4"),  # points that it has still to pass turning round
+        ("closed", "i4", (CLOSED,)), ("closed_at", "f8", (CLOSED,)),  # junctions that it needs to turn round, and when
+        ("kind", "i4"), ("gap", "f8"), ("ahead_speed", "f8"), ("other", "i4"),  # what limits its speed: an `ObjectClass`
+        ("tight", "b1"), ("line", "b1"),  # or 0, its gap [m], speed [m/s] and key; see `car.hazards.Hazard`
+        ("hazard", "i4"), ("hazard_gap", "f8"), ("hazard_key", "i4"),  # what it stops for: as `kind`, 0 for nothing
+        ("hazard_since", "i8"), ("hazard_seen", "i8"),  # frames
+        ("stopped_until", "i8"), ("collision_stop", "i8"),  # frames for which it stands after a collision
+        ("collisions", "i8"),  # those of its own making
+        ("events", "i4"), ("frames", "i4"),  # rows of `events` and `trace` that are in use
+    ],
+    align=True,
+)  # fmt: skip
+"""What drives the session's car, the vehicle of the kind `Kind.DRIVEN`."""
+
+
+SEEN = np.dtype(
+    [
+        ("distance2", "f8"),  # square of its distance [m^2]
+        ("x", "f8"), ("y", "f8"),  # where it seems to be [m]
+        ("heading", "f8"), ("cos", "f8"), ("sin", "f8"), ("speed", "f8"),
+        ("length", "f8"), ("width", "f8"), ("height", "f8"),
+        ("kind", "i4"), ("key", "i4"), ("body", "i4"),
+    ],
+    align=True,
+)  # fmt: skip
+
+EYE = np.dtype(
+    [("seed", "i8"), ("sight", "f8"), ("fog", "f8"), ("fog_start", "f8"), ("rain", "f8"), ("light", "f8"),
+     ("lamps", "f8"), ("clarity", "f8"), ("clear", "b1")],
+    align=True,
+)  # fmt: skip
+
+
+class EventCode(enum.IntEnum):
+    """What happened to the car."""
+
+    HAZARD_STOP = 1
+    HAZARD_END = 2
+    COLLISION = 3
+
+
+EVENT = np.dtype(
+    [
+        ("frame", "i8"), ("code", "i4"), ("kind", "i4"), ("key", "i4"), ("body", "i4"), ("own", "b1"),
+        ("value", "f8"),  # gap [m], seconds, or speed [m/s]
+        ("x", "f8"), ("y", "f8"), ("station", "f8"), ("lane", "i4"),
+    ],
+    align=True,
+)  # fmt: skip
+"""Something that happened to the car: an `EventCode`, with the class, key and number of the counterpart."""
+
+TRACE = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "brake", "lane", "height", "turning",
+         "offset")
+"""Columns of the way of the car."""
+
 CLOCK = np.dtype(
     [("time", "f8"), ("frame", "i8"), ("collisions", "i8"), ("run_over", "i8"), ("random", "i8"), ("towed", "i8"),
-     ("keys", "i8")],
+     ("keys", "i8"), ("straying", "i8")],
     align=True,
-)
-"""What a world counts: time [s], substeps, collisions of vehicles, pedestrians touched, vehicles towed, keys given."""
+)  # fmt: skip
+"""What a world counts: time [s], substeps, collisions of vehicles, pedestrians touched, vehicles towed, keys given, and
+how many stray over a road now; `random` is a number from which those of all bodies are drawn."""
 
 LAMP = np.dtype([("until", "f8"), ("phase", "i4")], align=True)
 """The phase of a light programme now, which holds until a time [s]."""

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from dorothie_gym.world.kernel.collisions import collide
 from dorothie_gym.world.kernel.compiling import compiled, inlined
 from dorothie_gym.world.kernel.driving import drive
+from dorothie_gym.world.kernel.events import trace
+from dorothie_gym.world.kernel.guiding import guide
 from dorothie_gym.world.kernel.lanes import closest_lane, value_near
 from dorothie_gym.world.kernel.motion import move, slip_of
 from dorothie_gym.world.kernel.order import rebuild
@@ -43,10 +45,13 @@ def step(
         steering: angle of their front wheels, positive to the right [rad].
     """
     vehicles, clock = world.vehicles, world.clock[0]
+    world.car[0].events = world.car[0].frames = 0
     for _ in range(substeps):
         for i in range(len(vehicles)):
             vehicle = vehicles[i]
-            if vehicle.kind == Kind.EGO:
+            if vehicle.kind == Kind.DRIVEN:
+                guide(town, world, dt)
+            elif vehicle.kind == Kind.EGO:
                 vehicle.acceleration, vehicle.slip = acceleration, slip_of(steering)
             elif vehicle.kind != Kind.EMPTY:
                 drive(town, world, i)
@@ -55,10 +60,12 @@ def step(
             if vehicles[i].kind != Kind.EMPTY:
                 _go_on(town, vehicles[i], dt)
         collide(world)
-        tow(town, world, dt)
+        tow(town, world, dt, bool(world.car[0].sweeping))
         rebuild(town, world)
-        clock.time += dt
         clock.frame += 1
+        clock.time = clock.frame * dt
+        if len(vehicles) > 0 and vehicles[0].kind == Kind.DRIVEN:
+            trace(world)
 
 
 @inlined
@@ -89,7 +96,7 @@ def find(town: TownArrays, vehicle: Records) -> None:
         vehicle.station, vehicle.lateral, vehicle.segment = station, lateral, segment
     else:
         locate(town, vehicle)
-    if not town.flat:
+    if not town.flat and vehicle.kind != Kind.DRIVEN:
         vehicle.height = value_near(town.points, town.lanes[lane], segment, 4, station)
 
 

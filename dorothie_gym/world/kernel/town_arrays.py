@@ -40,7 +40,7 @@ class TownArrays(NamedTuple):
     Attributes:
         points: (p, 6) x, y, station, heading, height, width of all points of centre lines, the network's own table.
         lanes: `records.LANE`.
-        neighbours: int32 lists of lanes that follow and precede others.
+        neighbours: int32 lists of lanes that follow and precede others, and of those whose lights one heeds on foot.
         relations: uint8 rows of `records.Relation` of each connector to those of its junction.
         siblings: `records.SIBLING`.
         programmes: `records.PROGRAMME`.
@@ -49,11 +49,14 @@ class TownArrays(NamedTuple):
         origin: (2,) corner of the cells [m].
         cells: (rows, columns, 2) int32, see `cells.Cells`.
         entries: `records.ENTRY`.
-        walk_points: (q, 6) points of the pavements, as `points`.
-        walks: `records.WALKWAY`.
+        walk_points: (q, 6) points of the footways, as `points`; of those beside streets the last column tells how far
+            it is to the kerb across, 0 where nobody crosses [m].
+        walks: `records.WALKWAY`: the pavements with the town's own ids, the ways between their ends, the ways beside
+            the rightmost lanes.
         mouths: `records.MOUTH`, those of a pavement in the order of their stations.
         crossings: `records.CROSSING`.
         passages: `records.PASSAGE`, those of a lane in the order of their stations.
+        junctions: (j, 3) middle [m] of each junction's connectors, and the radius in which they lie [m].
         flat: whether all lanes are so level that heights need not be looked at.
     """
 
@@ -73,6 +76,7 @@ class TownArrays(NamedTuple):
     mouths: Records
     crossings: Records
     passages: Records
+    junctions: Array
     flat: bool
 
     @property
@@ -103,11 +107,13 @@ def _build(network: TownNetwork) -> TownArrays:
     programmes, phase_ends, colours = _lights(town, lanes)
     cells = build_cells(network.table.points, lanes)
     walkways = build_walkways(network, lanes)
+    walkways.crossings.light += len(neighbours)
+    neighbours = np.concatenate((neighbours, walkways.heeded))
     low, high = network.height_range
     return TownArrays(
         network.table.points, lanes, neighbours, relations, siblings, programmes, phase_ends, colours,
         cells.origin, cells.bounds, cells.entries,
-        walkways.points, walkways.walks, walkways.mouths, walkways.crossings, walkways.passages,
+        walkways.points, walkways.walks, walkways.mouths, walkways.crossings, walkways.passages, _mouths(town, lanes),
         bool(high - low < LEVEL_TOWN),
     )  # fmt: skip
 
@@ -162,6 +168,17 @@ def _relate(town: Town, lanes: Records, rules: RightOfWay) -> NDArray[np.uint8]:
             rows.append(row)
             begin += len(row)
     return np.concatenate(rows) if rows else np.zeros(1, dtype=np.uint8)
+
+
+def _mouths(town: Town, lanes: Records) -> Array:
+    found = np.zeros((max(int(lanes.junction.max()) + 1, 1), 3))
+    for number in range(len(found)):
+        points = [lane.points[:, :2] for lane in town.lanes if lanes[lane.id].junction == number]
+        if points:
+            every = np.concatenate(points)
+            middle = (every.min(axis=0) + every.max(axis=0)) / 2
+            found[number] = *middle, float(np.sqrt(((every - middle) ** 2).sum(axis=1)).max())
+    return found
 
 
 def _exit(town: Town, connector: int) -> int:

@@ -1,20 +1,42 @@
-"""Where people walk: along the pavements of a town and over its crosswalks."""
+"""Where people walk: along the pavements of a town, from one to the next, over its crosswalks, and beside its lanes."""
 
 from __future__ import annotations
 
 import math
 from collections import defaultdict
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from dorothie_gym.world.kernel.records import CROSSING, MOUTH, NOBODY, PASSAGE, WALKWAY, Records
+from dorothie_gym.world.kernel.records import CROSSING, MOUTH, NOBODY, PASSAGE, WALKWAY, Footway, Records
+from dorothie_gym.world.kernel.street_walks import street_walks
 from dorothie_gym.world.network.network import TownNetwork
+from dorothie_gym.world.town.lane_edges import LaneEdges
 from dorothie_gym.world.town.model import Array, Crosswalk, Lane, Sidewalk, Town
 
-JOINT = 1.5
+JOINT = 0.5
 """Ends of pavements that are this close are one place [m]."""
+
+CORNER = 45.0
+"""People walk on from the end of one pavement to one of another that is this close [m], if no lane lies between."""
+
+CORNER_WIDTH = 1.4
+"""Width of the ways between them [m]."""
+
+BOWS = 0.0, 2.0, -2.0, 4.0, -4.0, 6.0, -6.0
+"""How far to a side of the straight line such ways are tried [m]: round the outside of a bend they lead in a bow."""
+
+CLEARANCE = 0.45
+"""How far from the lanes' edges the middles of these ways keep [m]."""
+
+STREET_HALF_WIDTH = 0.8
+"""Half the width of a way beside a street without a pavement [m]: half of `pedestrians.KERB`."""
+
+HEEDED = 8.0
+"""Lights are heeded on a crosswalk whose lanes end this close to its line [m], and not across the junction."""
 
 KERB_REACH = 6.0
 """A crosswalk belongs to a pavement that comes this close to its end [m]."""
@@ -29,56 +51,131 @@ LEVEL = 2.5
 """Lanes further above or below a crosswalk do not pass it [m]."""
 
 
+_End: TypeAlias = tuple[int, int]
+"""Number of a way, and 0 for its beginning or 1 for its end."""
+
+
 class Walkways(NamedTuple):
-    """Arrays of the pavements and crosswalks; see `TownArrays`."""
+    """Arrays of the pavements and crosswalks; see `TownArrays`. `heeded` are lists of lanes, for `CROSSING.light`."""
 
     points: Array
     walks: Records
     mouths: Records
     crossings: Records
     passages: Records
+    heeded: NDArray[np.int32]
 
 
 def build_walkways(network: TownNetwork, lanes: Records) -> Walkways:
-    """Pavements joined at their ends, and the crosswalks that join two of them; notes passages in `lanes`."""
+    """All ways along which people walk, and the crosswalks; notes passages in `lanes`.
+
+    Args:
+        network: of the town.
+        lanes: `records.LANE`, complete but for the passages.
+    """
     town = network.town
-    rows = [_columns(walk) for walk in town.sidewalks]
+    edges = LaneEdges(town)
+    pavements = [_pavement(walk.points, walk.width) for walk in town.sidewalks]
+    corners = _corners(town.sidewalks, edges)
+    ways = pavements + [_pavement(corner.points, CORNER_WIDTH) for corner in corners.laid]
+    streets = street_walks(network.table.points, lanes, town, edges)
+    rows = ways + [street.points for street in streets]
     firsts = np.concatenate(([0], np.cumsum([len(row) for row in rows]))).astype(int)
     walks = np.zeros(max(len(rows), 1), dtype=WALKWAY).view(np.recarray)
-    walks.next_walk = NOBODY
-    for k, walk in enumerate(town.sidewalks):
-        walks[k].first, walks[k].last = firsts[k], firsts[k + 1] - 1
-        walks[k].length, walks[k].half_width = rows[k][-1, 2], walk.width / 2
-    _join_ends(town.sidewalks, walks)
+    walks.next_walk = walks.lane = NOBODY
+    for k, row in enumerate(rows):
+        walks[k].first, walks[k].last, walks[k].length = firsts[k], firsts[k + 1] - 1, row[-1, 2]
+        walks[k].half_width = row[0, 5] / 2
+    walks.kind[len(pavements) : len(ways)] = Footway.CORNER
+    walks.kind[len(ways) : len(rows)] = Footway.STREET
+    walks.half_width[len(ways) : len(rows)] = STREET_HALF_WIDTH
+    walks.lane[len(ways) : len(rows)] = [street.lane for street in streets]
+    for (walk, end), (after, which) in corners.onward.items():
+        walks[walk].next_walk[end], walks[walk].next_end[end] = after, which
     crossings, mouths = _crossings(network, walks)
     passages = _passages(town, lanes, crossings)
+    heeded = _lights(town, lanes, crossings, passages)
     points = np.concatenate(rows) if rows else np.zeros((1, 6))
-    return Walkways(np.ascontiguousarray(points), walks, mouths, crossings, passages)
+    return Walkways(np.ascontiguousarray(points), walks, mouths, crossings, passages, heeded)
 
 
-def _columns(walk: Sidewalk) -> Array:
-    """x, y, station, heading, height, width of a pavement's points."""
-    steps = np.diff(walk.points[:, :2], axis=0)
+def _pavement(points: Array, width: float) -> Array:
+    """x, y, station, heading, height, width of a pavement's points (n, 3)."""
+    steps = np.diff(points[:, :2], axis=0)
     stations = np.concatenate(([0.0], np.cumsum(np.sqrt((steps * steps).sum(axis=1)))))
     headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
     heading = np.concatenate((headings, headings[-1:]))
-    return np.column_stack(
-        (walk.points[:, :2], stations, heading, walk.points[:, 2], np.full(len(stations), walk.width))
-    )
+    return np.column_stack((points[:, :2], stations, heading, points[:, 2], np.full(len(stations), width)))
 
 
-def _join_ends(sidewalks: Sequence[Sidewalk], walks: Records) -> None:
-    """Notes for each end of a pavement the closest end of another one, if they are one place."""
-    ends = [(k, end, walk.points[(0, -1)[end]]) for k, walk in enumerate(sidewalks) for end in (0, 1)]
-    for k, end, place in ends:
-        near = [
-            (float(np.linalg.norm(place - other)), walk, which)
-            for walk, which, other in ends
-            if (walk, which) != (k, end)
-        ]
-        gap, walk, which = min(near, default=(math.inf, NOBODY, 0))
-        if gap < JOINT:
-            walks[k].next_walk[end], walks[k].next_end[end] = walk, which
+class _Corner(NamedTuple):
+    """A way from one end of a pavement to one of another."""
+
+    ends: tuple[_End, _End]
+    points: Array
+
+
+class _Corners(NamedTuple):
+    """Ways round corners, numbered on after the pavements, and what one comes to beyond each end of each way."""
+
+    laid: list[_Corner]
+    onward: dict[_End, _End]
+
+
+def _corners(sidewalks: Sequence[Sidewalk], edges: LaneEdges) -> _Corners:
+    """From each end of a pavement the way to the nearest end of another one that leads over no lane.
+
+    Ends that are one place need no way between them. An end from which no other one is reached is a dead end.
+    """
+    ends = [(k, end) for k in range(len(sidewalks)) for end in (0, 1)]
+    found = _Corners([], {})
+    if len(ends) < 2:
+        return found
+    places = np.array([sidewalks[k].points[(0, -1)[end]] for k, end in ends])
+    numbers: dict[tuple[int, int], int] = {}
+    for one, near in enumerate(_near(ends, places)):
+        way = _way_on(places, one, near, edges)
+        if way is None:
+            continue
+        other, points = way
+        pair = min(one, other), max(one, other)
+        if np.hypot(*(places[one] - places[other])[:2]) < JOINT:
+            found.onward[ends[one]] = ends[other]
+            continue
+        if pair not in numbers:
+            numbers[pair] = len(sidewalks) + len(found.laid)
+            found.laid.append(_Corner((ends[pair[0]], ends[pair[1]]), points if pair[0] == one else points[::-1]))
+            found.onward[numbers[pair], 0], found.onward[numbers[pair], 1] = ends[pair[0]], ends[pair[1]]
+        found.onward[ends[one]] = (numbers[pair], 0 if pair[0] == one else 1)
+    return found
+
+
+def _near(ends: Sequence[_End], places: Array) -> list[list[int]]:
+    """For each end the others that are not far away, the nearest first; back along one's own pavement is no way on."""
+    near: list[list[tuple[float, int]]] = [[] for _ in ends]
+    for one, other in sorted(cKDTree(places[:, :2]).query_pairs(CORNER)):
+        gap = float(np.hypot(*(places[one] - places[other])[:2]))
+        if abs(places[one, 2] - places[other, 2]) < LEVEL and (ends[one][0] != ends[other][0] or gap < JOINT):
+            near[one].append((gap, other))
+            near[other].append((gap, one))
+    return [[other for _, other in sorted(others)] for others in near]
+
+
+def _way_on(places: Array, one: int, others: Sequence[int], edges: LaneEdges) -> tuple[int, Array] | None:
+    """The first of some ends that is reached over no lane, and the way there: straight, else in a bow."""
+    for bow in BOWS:
+        for other in others:
+            line = places[[one, other]]
+            across = line[1, :2] - line[0, :2]
+            length = float(np.hypot(*across))
+            if length < JOINT:
+                return other, line
+            if bow != 0.0:
+                aside = bow / length * np.array([-across[1], across[0], 0.0])
+                line = np.array([line[0], *(line[0] + s * (line[1] - line[0]) + aside for s in (0.25, 0.75)), line[1]])
+            if all(edges.is_clear(leg, float(line[0, 2]), CLEARANCE) for leg in zip(line, line[1:], strict=False)):
+                return other, line
+    return None
 
 
 def _crossings(network: TownNetwork, walks: Records) -> tuple[Records, Records]:
@@ -167,3 +264,22 @@ def _passage(lane: Lane, crossing: Records) -> tuple[float, float, float] | None
     if not on.any():
         return None
     return float(stations[on][0]), float(stations[on][-1]), float(along[on].mean())
+
+
+def _lights(town: Town, lanes: Records, crossings: Records, passages: Records) -> NDArray[np.int32]:
+    """Notes for each crosswalk the lanes that lead onto it from a light which stands right before it."""
+    passing: defaultdict[int, set[int]] = defaultdict(set)
+    for lane in town.lanes:
+        record = lanes[lane.id]
+        for passage in passages[record.passage : record.passage + record.passages]:
+            passing[int(passage.crossing)] |= {lane.id, *town.predecessors(lane.id)}
+    heeded: list[int] = []
+    for k, crossing in enumerate(crossings):
+        crossing.light = len(heeded)
+        for lane in sorted(passing[k]):
+            dx, dy = town.lanes[lane].points[-1, :2] - (crossing.x[0], crossing.y[0])
+            along, aside = dx * crossing.cos + dy * crossing.sin, abs(dy * crossing.cos - dx * crossing.sin)
+            if lanes[lane].programme >= 0 and aside < HEEDED and 0.0 < along < crossing.length:
+                heeded.append(lane)
+        crossing.lights = len(heeded) - crossing.light
+    return np.array(heeded, dtype=np.int32)

@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.spatial import cKDTree
 
+from dorothie_gym.world.town.lane_edges import LEVEL, LaneEdges
 from dorothie_gym.world.town.model import Array, Crosswalk, Town
 
 KERB_REACH = 7.0
@@ -28,12 +29,6 @@ CORNER_WIDTH = 1.5
 
 CLEARANCE = 0.2
 """Way round a corner that is kept from the lanes' edges [m]."""
-
-LEVEL = 2.0
-"""What is farther apart in height is not joined [m]."""
-
-SAMPLE = 0.5
-"""Step in which ways are compared with lanes [m]."""
 
 
 class WayKind(enum.Enum):
@@ -93,7 +88,7 @@ class Footways:
         self._town = town
         self._nodes: list[tuple[float, float, float]] = []
         self.ways: list[Way] = []
-        self._lanes = _LaneEdges(town) if town.sidewalks else None
+        self._lanes = LaneEdges(town) if town.sidewalks else None
         cuts: defaultdict[int, dict[float, int]] = defaultdict(dict)  # by pavement: nodes at stations
         lines = [(sidewalk.points, _stations(sidewalk.points)) for sidewalk in town.sidewalks]
         for k, (points, stations) in enumerate(lines):
@@ -166,7 +161,7 @@ class Footways:
                 if abs(station - end) < SNAP:
                     station = end
             foot = np.array([np.interp(station, stations, points[:, i]) for i in range(3)])
-            if abs(foot[2] - height) < LEVEL and self._lanes.clear(np.array([place, foot[:2]]), height, 0.0):
+            if abs(foot[2] - height) < LEVEL and self._lanes.is_clear(np.array([place, foot[:2]]), height, 0.0):
                 found.append((float(np.hypot(*(foot[:2] - place))), k, station))
         return min(found)[1:] if found else None
 
@@ -181,41 +176,8 @@ class Footways:
             pair = ends[i], ends[j]
             if abs(places[i, 2] - places[j, 2]) > LEVEL or pair in joined or pair[::-1] in joined:
                 continue
-            if self._lanes.clear(places[[i, j], :2], float(places[i, 2]), CLEARANCE):
+            if self._lanes.is_clear(places[[i, j], :2], float(places[i, 2]), CLEARANCE):
                 self._lay(WayKind.CORNER, pair, places[[i, j]], CORNER_WIDTH)
-
-
-class _LaneEdges:
-    """Lanes as discs on their centre lines, to keep people off them."""
-
-    def __init__(self, town: Town) -> None:
-        rows = []
-        for lane in town.lanes:
-            at = np.linspace(0.0, lane.length, max(2, math.ceil(lane.length / SAMPLE) + 1))
-            rows.append(
-                np.column_stack(
-                    [np.interp(at, lane.stations, column) for column in (*lane.points.T, lane.widths / 2)]
-                )
-            )  # fmt: skip
-        self._discs = np.concatenate(rows)  # (n, 4) x, y, z, radius
-        self._tree = cKDTree(self._discs[:, :2])
-        self._widest = float(self._discs[:, 3].max())
-
-    def height(self, place: Array) -> float:
-        """Height of the road that is nearest to a place (2,) [m]."""
-        return float(self._discs[int(self._tree.query(place)[1]), 2])
-
-    def clear(self, ends: Array, height: float, margin: float) -> bool:
-        """Whether a straight line (2, 2) keeps off all lanes by a margin [m]."""
-        length = float(np.hypot(*(ends[1] - ends[0])))
-        share = np.linspace(0.0, 1.0, max(2, math.ceil(length / SAMPLE) + 1))[:, None]
-        places = (1.0 - share) * ends[0] + share * ends[1]
-        for place, near in zip(places, self._tree.query_ball_point(places, self._widest + margin), strict=True):
-            discs = self._discs[near]
-            away = np.hypot(discs[:, 0] - place[0], discs[:, 1] - place[1])
-            if np.any((away < discs[:, 3] + margin) & (np.abs(discs[:, 2] - height) < LEVEL)):
-                return False
-        return True
 
 
 def axis(crosswalk: Crosswalk) -> tuple[Array, float]:

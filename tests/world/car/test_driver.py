@@ -11,7 +11,7 @@ from tests.world.driving import drive, long_lane, network, on_lane
 
 def test_cruise_speed_goes_by_steps_of_five_within_its_range() -> None:
     roads = network("brookside")
-    _, driver = on_lane(roads, long_lane(roads.town), 2.0)
+    driver = on_lane(roads, long_lane(roads.town), 2.0).driver
     seen = [driver.cruise]
     while driver.change_cruise(up=True) is None:
         seen.append(driver.cruise)
@@ -24,9 +24,10 @@ def test_cruise_speed_goes_by_steps_of_five_within_its_range() -> None:
 
 def test_car_drives_at_its_cruise_speed() -> None:
     roads = network("brookside")
-    car, driver = on_lane(roads, long_lane(roads.town), 2.0)
+    world = on_lane(roads, long_lane(roads.town), 2.0)
+    car, driver = world.car, world.driver
     driver.cruise = 20.0
-    drive(car, driver, lambda: False, 8.0)
+    drive(world, lambda: False, 8.0)
     assert float(car.speed) == pytest.approx(20.0 * KMH, abs=0.4)
 
 
@@ -34,10 +35,11 @@ def test_car_drives_at_its_cruise_speed() -> None:
 def test_car_comes_slowly_to_a_goal_and_can_be_stopped_within_two_metres(cruise: float) -> None:
     roads = network("brookside")
     lane = long_lane(roads.town)
-    car, driver = on_lane(roads, lane, 2.0)
+    world = on_lane(roads, lane, 2.0)
+    car, driver = world.car, world.driver
     driver.cruise = cruise
     driver.set_goals([GoalAhead(lane=lane, station=80.0)])
-    drive(car, driver, lambda: driver.planner.station > 80.0 - 15.0)
+    drive(world, lambda: driver.planner.station > 80.0 - 15.0)
     assert car.speed <= 16.0 * KMH
     # twice a second somebody decides whether to stop now
     while True:
@@ -45,14 +47,15 @@ def test_car_comes_slowly_to_a_goal_and_can_be_stopped_within_two_metres(cruise:
         if 80.0 - driver.planner.station < speed**2 / 6.0 + 0.56 * speed + 0.5 * speed / 2:
             driver.planner.command(PhysicalAction.STOP, 0, speed)
             break
-        drive(car, driver, lambda: False, 0.5)
-    drive(car, driver, lambda: car.speed == 0.0, 8.0)
+        drive(world, lambda: False, 0.5)
+    drive(world, lambda: car.speed == 0.0, 8.0)
     assert abs(driver.planner.station - 80.0) < 2.0
 
 
 def test_controls_are_normalised_and_the_car_never_rolls_back() -> None:
     roads = network("Town02")
-    car, driver = on_lane(roads, long_lane(roads.town, 60.0), 2.0)
+    world = on_lane(roads, long_lane(roads.town, 60.0), 2.0)
+    car, driver = world.car, world.driver
     driver.planner.command(PhysicalAction.J_TURN, 90, 0.0)
 
     def check() -> bool:
@@ -66,4 +69,4 @@ def test_controls_are_normalised_and_the_car_never_rolls_back() -> None:
         assert abs(yaw) * float(car.speed) ** 2 < 4.5  # [m/s^2] to the side
         return False
 
-    drive(car, driver, check, 30.0)
+    drive(world, check, 30.0)

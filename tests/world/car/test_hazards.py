@@ -1,32 +1,63 @@
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
+import numpy as np
 import pytest
 
 from dorothie_gym.ontology import ObjectClass
-from dorothie_gym.world.car.hazards import Body, Hazard, bodies_ahead
+from dorothie_gym.world.car.driver import write_path
 from dorothie_gym.world.car.path import Path, follow
+from dorothie_gym.world.kernel import empty_world, town_arrays
+from dorothie_gym.world.kernel.obstacles import bodies_ahead, room, safe_speed
+from dorothie_gym.world.kernel.world_arrays import add_car
 from dorothie_gym.world.town import Lane
+from tests.world.driving import network
 from tests.world.network.towns import lane
 
 ROAD: Lane = lane(0, [(0.0, 0.0), (100.0, 0.0)])
 
 
-def body(x: float, y: float = 0.0, *, kind: ObjectClass = ObjectClass.VEHICLES, **fields: float) -> Body:
+class Found(NamedTuple):
+    """What is in the way: class, gap [m], its speed [m/s], and the speed that it allows [m/s]."""
+
+    kind: ObjectClass
+    gap: float
+    speed: float
+    safe_speed: float
+
+
+def body(x: float, y: float = 0.0, *, kind: ObjectClass = ObjectClass.VEHICLES, **fields: float) -> dict[str, Any]:
     values = {"heading": 0.0, "length": 5.0, "width": 2.0, "speed": 0.0, "height": 0.0} | fields
-    return Body(key=1, kind=kind, x=x, y=y, **values)
+    return {"x": x, "y": y, "kind": kind.value, **values}
 
 
-def ahead(*bodies: Body, road: Lane = ROAD, speed: float = 0.0) -> Hazard | None:
-    return bodies_ahead(Path([follow(road)]), 10.0, bodies, length=5.0, width=2.0, speed=speed)
+def ahead(*bodies: dict[str, Any], road: Lane = ROAD, speed: float = 0.0) -> Found | None:
+    """What a car 10 m from the start of a road, in whose lane it keeps, finds in its way."""
+    town = town_arrays(network("brookside"))
+    world = empty_world(town, vehicles=4, pedestrians=0, driven=True)
+    add_car(town, world, 0, 5.0)
+    path = Path([follow(road)])
+    write_path(world, path, 10.0, np.full(len(path.s), 10.0))
+    world.vehicles[0].speed = speed
+    for row, fields in zip(world.seen, bodies, strict=False):
+        for name, value in fields.items():
+            row[name] = value
+        row.cos, row.sin = math.cos(row.heading), math.sin(row.heading)
+        row.distance2 = (row.x - 10.0) ** 2 + row.y**2
+    safe = float(bodies_ahead(world, len(bodies)))
+    if math.isinf(safe):
+        return None
+    car = world.car[0]
+    return Found(ObjectClass(int(car.kind)), float(car.gap), float(car.ahead_speed), safe)
 
 
 def test_gap_is_from_nose_to_tail() -> None:
     hazard = ahead(body(30.0))
     assert hazard is not None
     assert hazard.gap == pytest.approx(15.0, abs=0.1)
-    assert hazard.safe_speed() > 0.0
+    assert hazard.safe_speed > 0.0
 
 
 @pytest.mark.parametrize("place", [(-5.0, 0.0), (30.0, 3.5), (30.0, -3.5), (90.0, 0.0)])
@@ -67,17 +98,20 @@ def test_the_most_pressing_of_several_counts() -> None:
     assert hazard.kind is ObjectClass.STATIC
 
 
+def safe(gap: float, kind: ObjectClass = ObjectClass.VEHICLES, *, line: bool = False, friction: float = 1.0) -> float:
+    return float(safe_speed(0.0, room(kind.value, gap, 0.0, False, line), friction))
+
+
 def test_safe_speed_falls_with_gap_and_grip() -> None:
-    speeds = [Hazard(kind=ObjectClass.VEHICLES, gap=gap).safe_speed() for gap in (2.0, 5.0, 10.0, 40.0)]
+    speeds = [safe(gap) for gap in (2.0, 5.0, 10.0, 40.0)]
     assert speeds[0] == 0.0
     assert speeds == sorted(speeds)
-    assert Hazard(kind=ObjectClass.VEHICLES, gap=20.0).safe_speed(0.7) < speeds[-1]
-    assert Hazard(kind=ObjectClass.VEHICLES, gap=20.0).braking(8.0) == pytest.approx(64 / 35)
+    assert safe(20.0, friction=0.7) < speeds[-1]
 
 
 def test_car_comes_closer_to_a_line_than_to_a_body_and_stops_before_it() -> None:
     gaps = [0.1 * k for k in range(60)]
-    light = [Hazard(kind=ObjectClass.TRAFFIC_LIGHT, gap=gap, line=True).safe_speed() for gap in gaps]
-    vehicle = [Hazard(kind=ObjectClass.VEHICLES, gap=gap).safe_speed() for gap in gaps]
+    light = [safe(gap, ObjectClass.TRAFFIC_LIGHT, line=True) for gap in gaps]
+    vehicle = [safe(gap) for gap in gaps]
     stops = [gaps[speeds.index(next(speed for speed in speeds if speed > 0.0))] for speeds in (light, vehicle)]
     assert 1.0 < stops[0] < 2.0 < stops[1]

@@ -160,5 +160,5 @@ def test_world_without_room_refuses_one_more():
         add_vehicle(arrays, world, 0, 10.0, desired=8.0)
     with pytest.raises(ValueError, match="room for 0 props"):
         add_prop(network, arrays, world, PropKind.TREE, 0, 10.0)
-    with pytest.raises(ValueError, match="no pavement 0"):
+    with pytest.raises(ValueError, match="no footway 0"):
         add_pedestrian(arrays, world, 0, 1.0, pace=1.2)

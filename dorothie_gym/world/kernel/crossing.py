@@ -1,0 +1,163 @@
+"""Crosswalks: people wait at the kerb until lights and vehicles let them cross."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from dorothie_gym.world.crosswalks import BRAKING, REACTION, ROOM, STANDING
+from dorothie_gym.world.crosswalks import SIGHT as VEHICLES_SIGHT
+from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.kernel.footways import ASIDE
+from dorothie_gym.world.kernel.lights import light
+from dorothie_gym.world.kernel.pacing import AHEAD, LEVEL, walk_towards
+from dorothie_gym.world.kernel.randomness import draw
+from dorothie_gym.world.kernel.records import NOBODY, Colour, Kind, Records, Walk
+from dorothie_gym.world.pedestrians import PATIENCE
+
+if TYPE_CHECKING:
+    from dorothie_gym.world.kernel.town_arrays import TownArrays
+    from dorothie_gym.world.kernel.world_arrays import WorldArrays
+
+CROSSING_SHARE = 0.35
+"""How often somebody who passes a crosswalk wants to cross."""
+
+GIVES_UP = 40.0
+"""Who has not been able to cross for this long walks on [s]."""
+
+REST = 5.0
+"""Who leaves a crosswalk wants to cross none for this long [s]."""
+
+PLACES, PLACES_APART = 3, 0.7
+"""People wait beside one another in so many places, this far apart [m] ..."""
+
+FROM_KERB = 0.6
+"""... and this far from the kerb [m]."""
+
+READY = 1.0
+"""Who waits steps onto the crosswalk from this close to its place [m]."""
+
+HALF_DEPTH = 1.5
+"""Half of what a crosswalk measures along the road [m]."""
+
+OVER = 0.1
+"""Who is this close to the end of a crosswalk has crossed [m]."""
+
+
+@inlined
+def comes_to_crosswalk(town: TownArrays, walker: Records, way: Records, time: float) -> bool:
+    """Whether one stops at a crosswalk that is passed within some time [s], to wait there."""
+    step = walker.pace * time
+    for m in range(way.mouth, way.mouth + way.mouths):
+        mouth = town.mouths[m]
+        left = (mouth.station - walker.station) * walker.direction
+        if 0.0 <= left < step and draw(walker) < CROSSING_SHARE:
+            walker.state, walker.crossing, walker.mouth = Walk.WAITING, mouth.crossing, mouth.end
+            walker.direction = 1.0 if mouth.end == 0 else -1.0
+            walker.waited, walker.speed = 0.0, 0.0
+            return True
+    return False
+
+
+@inlined
+def wait(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
+    """Stands at the kerb until one may step onto the crosswalk, or goes on when that takes too long."""
+    walker = world.pedestrians[p]
+    crossing = town.crossings[walker.crossing]
+    walker.waited += time
+    cos, sin = walker.direction * crossing.cos, walker.direction * crossing.sin
+    inward = max(town.walks[walker.walk].half_width - FROM_KERB, 0.0)
+    beside = (p % PLACES - (PLACES - 1) // 2) * PLACES_APART
+    x = crossing.x[walker.mouth] + inward * cos - beside * sin
+    y = crossing.y[walker.mouth] + inward * sin + beside * cos
+    walk_towards(world, p, x, y, cos, sin, 0.0, math.inf, time)
+    if abs(walker.x - x) > READY or abs(walker.y - y) > READY:
+        ready = False
+    else:
+        ready = _may_step(town, world, crossing, crossing.length / walker.pace)
+    if ready:
+        walker.state, walker.waited = Walk.CROSSING, 0.0
+        _advance(crossing, walker)
+    elif walker.waited > GIVES_UP:
+        _leave(town, walker)
+
+
+@inlined
+def cross(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
+    """Walks over a crosswalk; back again if a vehicle does not leave the way."""
+    walker = world.pedestrians[p]
+    crossing = town.crossings[walker.crossing]
+    lateral = _advance(crossing, walker)
+    if crossing.length - walker.station < OVER if walker.direction > 0.0 else walker.station < OVER:
+        walker.mouth = 1 if walker.direction > 0.0 else 0
+        _leave(town, walker)
+        return
+    cos, sin = walker.direction * crossing.cos, walker.direction * crossing.sin
+    ahead = walker.station + walker.direction * AHEAD
+    x = crossing.x[0] + ahead * crossing.cos - ASIDE * sin
+    y = crossing.y[0] + ahead * crossing.sin + ASIDE * cos
+    if walk_towards(world, p, x, y, cos, sin, walker.direction * lateral, HALF_DEPTH, time):
+        walker.waited = 0.0
+        return
+    walker.waited += time
+    if walker.waited > PATIENCE:
+        walker.direction, walker.waited = -walker.direction, 0.0
+
+
+@inlined
+def _advance(crossing: Records, walker: Records) -> float:
+    """Finds out how far along a crosswalk somebody is; returns how far to the right of its line [m]."""
+    dx, dy = walker.x - crossing.x[0], walker.y - crossing.y[0]
+    walker.station = dx * crossing.cos + dy * crossing.sin
+    walker.height = crossing.height
+    return float(dy * crossing.cos - dx * crossing.sin)
+
+
+@inlined
+def _leave(town: TownArrays, walker: Records) -> None:
+    """Walks on along the pavement where one has been waiting, or come to."""
+    crossing = town.crossings[walker.crossing]
+    walker.walk, walker.station = crossing.walk[walker.mouth], crossing.station[walker.mouth]
+    way = town.walks[walker.walk]
+    walker.segment = way.first
+    while walker.segment < way.last - 1 and town.walk_points[walker.segment + 1, 2] <= walker.station:
+        walker.segment += 1
+    walker.direction = 1.0 if draw(walker) < 0.5 else -1.0
+    walker.state, walker.crossing, walker.waited = Walk.WALKING, NOBODY, -REST
+
+
+@compiled
+def _may_step(town: TownArrays, world: WorldArrays, crossing: Records, time: float) -> bool:
+    """Whether one may step onto a crosswalk that takes some time to cross [s].
+
+    Not while a lane with a light leads onto it whose light is not red, or will not be until one is across; nor while
+    somebody drives towards it who could not stop with ease, or stands on it.
+    """
+    now = world.clock[0].time
+    for k in range(crossing.light, crossing.light + crossing.lights):
+        lane = town.neighbours[k]
+        for share in range(3):
+            if light(town, world, lane, now + 0.5 * share * time) != Colour.RED:
+                return False
+    for i in range(len(world.vehicles)):
+        vehicle = world.vehicles[i]
+        if vehicle.kind != Kind.EMPTY and _is_danger(vehicle, crossing):
+            return False
+    return True
+
+
+@inlined
+def _is_danger(vehicle: Records, crossing: Records) -> bool:
+    """Whether a vehicle is on a crosswalk, or comes towards it too fast to stop with ease."""
+    dx, dy = vehicle.x - crossing.x[0], vehicle.y - crossing.y[0]
+    along = min(max(dx * crossing.cos + dy * crossing.sin, 0.0), crossing.length)
+    dx, dy = crossing.x[0] + along * crossing.cos - vehicle.x, crossing.y[0] + along * crossing.sin - vehicle.y
+    away = dx * dx + dy * dy
+    if away > VEHICLES_SIGHT * VEHICLES_SIGHT or abs(vehicle.height - crossing.height) > LEVEL:
+        return False
+    front = math.sqrt(away) - 0.5 * vehicle.length
+    if front < HALF_DEPTH:
+        return True
+    if vehicle.speed < STANDING or (dx * vehicle.cos + dy * vehicle.sin < 0.0 and front > ROOM):
+        return False  # it stands before it, or has passed
+    return bool(front < ROOM + REACTION * vehicle.speed + vehicle.speed * vehicle.speed / (2.0 * BRAKING))

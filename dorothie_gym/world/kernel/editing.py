@@ -1,0 +1,234 @@
+"""Bodies that come to a world and leave it, while it goes on."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from dorothie_gym.ontology import PropKind
+from dorothie_gym.world.kernel.footways import closest_walk
+from dorothie_gym.world.kernel.order import rebuild
+from dorothie_gym.world.kernel.parameters import (
+    CAR_LENGTH,
+    CAR_WIDTH,
+    CLEAR_OF_WALKER,
+    CYCLIST_LENGTH,
+    CYCLIST_SPEEDS,
+    CYCLIST_WIDTH,
+)
+from dorothie_gym.world.kernel.records import NOBODY, Footway, Kind, Records, Walk
+from dorothie_gym.world.kernel.towing import is_clear_of_people, new_key, put_on_lane
+from dorothie_gym.world.kernel.town_arrays import TownArrays
+from dorothie_gym.world.kernel.walking import place_walker
+from dorothie_gym.world.kernel.world_arrays import WorldArrays
+from dorothie_gym.world.network.network import TownNetwork
+from dorothie_gym.world.pedestrians import KERB, WALKING_SPEED, rightmost
+
+BESIDE = 1.0
+"""A way beside a street is walked on where it is this close [m]."""
+
+PROP_LEVEL = 2.0
+"""A prop is on the lanes of about its own height [m]."""
+
+
+def add_vehicle(
+    town: TownArrays, world: WorldArrays, lane: int, station: float, *, kind: Kind = Kind.CAR, desired: float
+) -> int:
+    """Puts a vehicle on a lane, in the first place that is empty.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world.
+        lane: id of the lane.
+        station: along it [m].
+        kind: what it is.
+        desired: speed that it likes [m/s].
+
+    Returns:
+        Its number.
+
+    Raises:
+        ValueError: the world has no room for another one.
+    """
+    empty = np.flatnonzero(world.vehicles.kind == Kind.EMPTY)
+    if not len(empty):
+        raise ValueError(f"the world has room for {len(world.vehicles)} vehicles, and all are there")
+    number = int(empty[0])
+    vehicle = world.vehicles[number]
+    vehicle.kind, vehicle.key, vehicle.touched, vehicle.odometer = kind, new_key(world), False, 0.0
+    vehicle.random = _random(world, int(vehicle.key))
+    vehicle.length, vehicle.width, vehicle.desired, vehicle.to_right = CAR_LENGTH, CAR_WIDTH, desired, 0.0
+    if kind is Kind.CYCLIST:
+        vehicle.length, vehicle.width = CYCLIST_LENGTH, CYCLIST_WIDTH
+        vehicle.desired = min(max(desired, CYCLIST_SPEEDS[0]), CYCLIST_SPEEDS[1])
+    vehicle.radius = 0.5 * math.hypot(vehicle.length, vehicle.width)
+    put_on_lane(town, vehicle, lane, float(station))
+    rebuild(town, world)
+    return number
+
+
+def add_car(town: TownArrays, world: WorldArrays, lane: int, station: float) -> None:
+    """Puts the session's car on a lane, as vehicle 0 of a world that was made for it (`driven`).
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world, with nobody in it yet.
+        lane: id of the lane.
+        station: along it [m].
+    """
+    add_vehicle(town, world, lane, station, kind=Kind.DRIVEN, desired=0.0)
+    world.vehicles[0].key = CAR_KEY
+
+
+def remove_vehicle(town: TownArrays, world: WorldArrays, number: int) -> None:
+    """Takes a vehicle away; its place is empty, and the others keep theirs."""
+    world.vehicles[number].kind = Kind.EMPTY
+    rebuild(town, world)
+
+
+def add_pedestrian(town: TownArrays, world: WorldArrays, walk: int, station: float, *, pace: float) -> int:
+    """Puts a pedestrian on a footway, in the first place that is empty.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world.
+        walk: number of the footway; a pavement has its id in the town.
+        station: along it [m].
+        pace: speed that it likes [m/s].
+
+    Returns:
+        Its number.
+
+    Raises:
+        ValueError: the world has no room for another one, or there is no such footway.
+    """
+    empty = np.flatnonzero(world.pedestrians.state == Walk.EMPTY)
+    if not len(empty):
+        raise ValueError(f"the world has room for {len(world.pedestrians)} pedestrians, and all are there")
+    if not 0 <= walk < len(town.walks) or town.walks[walk].length <= 0.0:
+        raise ValueError(f"there is no footway {walk} in this town")
+    number = int(empty[0])
+    walker = world.pedestrians[number]
+    walker.key, walker.odometer = new_key(world), 0.0
+    walker.random = _random(world, int(walker.key))
+    walker.walk, walker.station, walker.pace = walk, station, pace
+    walker.direction = 1.0 if walker.random & 2 else -1.0
+    place_walker(town, walker)
+    return number
+
+
+def add_street_walker(
+    network: TownNetwork, town: TownArrays, world: WorldArrays, lane: int, station: float
+) -> int | None:  # fmt: skip
+    """Puts a pedestrian beside a lane, or to the right of those beside it.
+
+    Such pedestrians keep to the street where they are, and cross it anywhere but near junctions.
+
+    Args:
+        network: of the town.
+        town: its arrays.
+        world: arrays of the world.
+        lane: id of the lane.
+        station: along it [m].
+
+    Returns:
+        Its number; None if nobody may walk there, if somebody or the car is there already, or if the world has room
+        for nobody else.
+    """
+    beside = network.town.lanes[rightmost(network.town, lane)]
+    station = min(station, beside.length)
+    x, y = (float(value) for value in beside.position(station, beside.width_at(station) / 2 + KERB))
+    walk, at, _ = closest_walk(town, Footway.STREET, x, y, BESIDE)
+    if walk < 0 or town.walks[walk].lane != beside.id or not is_clear_of_people(world, x, y, NOBODY, CLEAR_OF_WALKER):
+        return None
+    if (world.pedestrians.state != Walk.EMPTY).all():
+        return None
+    return add_pedestrian(town, world, walk, at, pace=WALKING_SPEED)
+
+
+def remove_pedestrian(world: WorldArrays, number: int) -> None:
+    """Takes a pedestrian away; the place is empty, and the others keep theirs."""
+    walker = world.pedestrians[number]
+    walker.state, walker.crashed, walker.crash_age, walker.speed = Walk.EMPTY, False, 0.0, 0.0
+
+
+def add_prop(
+    network: TownNetwork, town: TownArrays, world: WorldArrays, kind: PropKind, lane: int, station: float
+) -> int:
+    """Puts a prop on a lane, where it stands across it.
+
+    Args:
+        network: of the town.
+        town: its arrays.
+        world: arrays of the world.
+        kind: what it is.
+        lane: id of the lane.
+        station: along it [m].
+
+    Returns:
+        Its number.
+
+    Raises:
+        ValueError: the world has no room for another one.
+    """
+    empty = np.flatnonzero(~world.props.present)
+    if not len(empty):
+        raise ValueError(f"the world has room for {len(world.props)} props, and all are there")
+    number = int(empty[0])
+    prop = world.props[number]
+    prop.length, prop.width = kind.length, kind.width
+    prop.radius = 0.5 * math.hypot(kind.length, kind.width)
+    prop.present, prop.key = True, new_key(world)
+    move_prop(network, town, world, number, lane, station)
+    return number
+
+
+def move_prop(
+    network: TownNetwork, town: TownArrays, world: WorldArrays, number: int, lane: int, station: float
+) -> None:  # fmt: skip
+    """Puts a prop on another place, where it stands across a lane; it keeps its key.
+
+    Args:
+        network: of the town.
+        town: its arrays.
+        world: arrays of the world.
+        number: of the prop.
+        lane: id of the lane.
+        station: along it [m].
+    """
+    prop, town_lane = world.props[number], network.town.lanes[lane]
+    prop.x, prop.y = town_lane.position(station)
+    prop.heading, prop.height = town_lane.heading_at(station), town_lane.height_at(station)
+    prop.cos, prop.sin = math.cos(prop.heading), math.sin(prop.heading)
+    prop.lane = NOBODY
+    for k, (reached, at) in enumerate(_reached(network, town, prop)[:4]):
+        prop.lane[k], prop.station[k] = reached, at
+    rebuild(town, world)
+
+
+def remove_prop(town: TownArrays, world: WorldArrays, number: int) -> None:
+    """Takes a prop away."""
+    world.props[number].present = False
+    rebuild(town, world)
+
+
+def _reached(network: TownNetwork, town: TownArrays, prop: Records) -> list[tuple[int, float]]:
+    """Lanes on which a vehicle would touch a prop, the closest first, and where [m]."""
+    found = []
+    half = 0.5 * max(prop.width, prop.length) + 0.5 * CAR_WIDTH
+    lanes = town.lanes
+    near = (lanes.left_edge < prop.x + half) & (lanes.right_edge > prop.x - half)
+    near &= (lanes.low_edge < prop.y + half) & (lanes.high_edge > prop.y - half)
+    for number in np.flatnonzero(near):
+        lane = network.town.lanes[number]
+        station, lateral = network.lane_of(lane.id).local_coordinates(np.array([prop.x, prop.y]))
+        level = abs(lane.height_at(station) - prop.height) < PROP_LEVEL
+        if abs(lateral) < half and 0.0 <= station <= lane.length and level:
+            found.append((abs(lateral), lane.id, station))
+    return [(lane, station) for _, lane, station in sorted(found)]
+
+
+def _random(world: WorldArrays, key: int) -> int:
+    """What the random numbers of a body begin with: a matter of the world's seed and the body's key alone."""
+    return int(np.random.SeedSequence((int(world.clock[0].random), key)).generate_state(1)[0]) | 1
