@@ -82,6 +82,7 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         self._town = town_arrays(self._network)
         self._worlds = VectorWorld(self._town, self._empty(0), num_envs, threads=threads)
         self._egos = self._make_egos()
+        self._shown = np.zeros_like(self._egos.observations)
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._seeds: list[int] = [-1] * num_envs
         self._elapsed = np.zeros(num_envs)
@@ -131,7 +132,7 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         seeds = self._seeds_of(seed)
         for i in np.flatnonzero(mask):
             self._begin(int(i), seeds[int(i)])
-        return self._observe(), self._infos(mask, np.zeros_like(self.action_space.sample()))
+        return self._observe(mask), self._infos(mask, np.zeros(self.action_space.shape or (), self.action_space.dtype))
 
     def step(
         self, actions: NDArray[Any]
@@ -155,21 +156,17 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         if mode is AutoresetMode.DISABLED and self._over.any():
             raise ValueError(f"the environments {np.flatnonzero(self._over)} are over: reset them with a reset_mask")
         codes = self._actions.read(actions, self.action_space, self._egos.helms)
-        playing = ~self._over
-        self._play(codes, playing)
-        again = self._over.copy()
-        for i in np.flatnonzero(again):
-            self._begin(int(i), None)
-        rewards = np.where(playing, sum(self._terms().values()), 0.0)
-        terminations = playing & self._egos.outcomes.crashed
-        truncations = playing & (self._elapsed >= self.config["duration"])
+        again, everywhere = self._over.copy(), np.ones(self.num_envs, dtype=np.bool_)
+        self._play(codes, ~again)
+        self._begin_all(again)
+        rewards = np.where(again, 0.0, sum(self._terms().values()))
+        terminations = ~again & self._egos.outcomes.crashed
+        truncations = ~again & (self._elapsed >= self.config["duration"])
         self._over = terminations | truncations
-        everywhere = np.ones(self.num_envs, dtype=np.bool_)
-        shown = np.where(again if actions.ndim == 1 else again[:, None], np.zeros_like(actions), actions)
-        infos = self._infos(everywhere, shown)
+        observations, infos = self._observe(everywhere), self._infos(everywhere, _without(actions, again))
         if mode is AutoresetMode.SAME_STEP and self._over.any():
-            infos = self._begin_at_once(infos, shown)
-        return self._observe(), rewards, terminations, truncations, infos
+            observations, infos = self._begin_at_once(observations, actions)
+        return observations, rewards, terminations, truncations, infos
 
     def _seeds_of(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
         if seed is None:
@@ -180,20 +177,19 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
             raise ValueError(f"{len(seed)} seeds for {self.num_envs} environments")
         return seed
 
-    def _begin_at_once(self, infos: dict[str, Any], shown: NDArray[Any]) -> dict[str, Any]:
-        """Resets what is over and hands on how it ended: the infos of mode `SAME_STEP`."""
-        over, everywhere = self._over.copy(), np.ones(self.num_envs, dtype=np.bool_)
+    def _begin_at_once(
+        self, last: NDArray[np.float32], actions: NDArray[Any]
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Resets what is over, and tells of how it ended and began: observations and infos of mode `SAME_STEP`."""
+        over = self._over.copy()
         final = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(over):
-            final[i] = self._egos.observations[i].copy()
-        ended = self._infos(over, shown)
-        for i in np.flatnonzero(over):
-            self._begin(int(i), None)
-        begun = np.where(over if shown.ndim == 1 else over[:, None], np.zeros_like(shown), shown)
-        return {
-            **self._infos(everywhere, begun), "final_obs": final, "_final_obs": over,
-            "final_info": ended, "_final_info": over.copy(),
-        }  # fmt: skip
+            final[i] = last[i]
+        ended = self._infos(over, actions)
+        self._begin_all(over)
+        infos = self._infos(np.ones(self.num_envs, dtype=np.bool_), _without(actions, over))
+        infos |= {"final_obs": final, "_final_obs": over, "final_info": ended, "_final_info": over.copy()}
+        return self._observe(over), infos
 
     def close_extras(self, **kwargs: Any) -> None:
         """Lets the threads go."""
@@ -247,6 +243,10 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         self._actions.limit(self._egos.helms[i])
         self._elapsed[i], self._over[i], self._begun[i] = 0.0, False, True
 
+    def _begin_all(self, mask: NDArray[np.bool_]) -> None:
+        for i in np.flatnonzero(mask):
+            self._begin(int(i), None)
+
     def _empty(self, seed: int) -> WorldArrays:
         vehicles, pedestrians = int(self.config["vehicles"]), int(self.config["pedestrians"])
         return empty_world(self._town, vehicles=1 + vehicles, pedestrians=pedestrians, props=0, seed=seed)
@@ -258,12 +258,13 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
             self._generators[i] = found
         return found
 
-    def _observe(self) -> NDArray[np.float32]:
-        rows = self._egos.observations.copy()
+    def _observe(self, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+        """What all environments show; those of the mask anew."""
+        self._shown[mask] = self._egos.observations[mask]
         if self._kinematics.shuffled:
-            for i, row in enumerate(rows):
-                self._generator(i).shuffle(row[1:])
-        return rows
+            for i in np.flatnonzero(mask):
+                self._generator(int(i)).shuffle(self._shown[i, 1:])
+        return self._shown.copy()
 
     def _terms(self) -> dict[str, NDArray[np.float64]]:
         outcomes = self._egos.outcomes
@@ -288,3 +289,10 @@ def _with_masks(values: dict[str, NDArray[Any]], mask: NDArray[np.bool_]) -> dic
         infos[name][mask] = value[mask]
         infos[f"_{name}"] = mask.copy()
     return infos
+
+
+def _without(actions: NDArray[Any], mask: NDArray[np.bool_]) -> NDArray[Any]:
+    """A copy of the actions with zeros for those of a mask, who took none."""
+    taken = actions.copy()
+    taken[mask] = 0
+    return taken

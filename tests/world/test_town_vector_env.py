@@ -19,7 +19,6 @@ from highway_env.vehicle.kinematics import Vehicle
 
 from dorothie_gym.world.kernel import Kind
 from dorothie_gym.world.kernel.randomness import choose
-from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.network.road import TownRoad
 from dorothie_gym.world.town_env import TownEnv
 from dorothie_gym.world.town_vector_env import TownVectorEnv
@@ -282,12 +281,13 @@ def test_resets_may_be_left_to_the_caller() -> None:
     env = TownVectorEnv(2, autoreset_mode=AutoresetMode.DISABLED)
     env.reset(seed=4)
     env.world(1).vehicles.crashed[0] = True
-    env.step(np.full(2, FASTER))
+    last = env.step(np.full(2, FASTER))[0]
     with pytest.raises(ValueError, match="reset_mask"):
         env.step(np.full(2, FASTER))
     before = env.world(0).tobytes()
-    _, infos = env.reset(options={"reset_mask": np.array([False, True])})
+    observations, infos = env.reset(options={"reset_mask": np.array([False, True])})
     assert infos["_speed"].tolist() == [False, True] and env.world(0).tobytes() == before
+    assert (observations[0] == last[0]).all() and (observations[1] != last[1]).any()
     env.step(np.full(2, FASTER))
 
 
@@ -345,34 +345,6 @@ def test_the_bytes_are_the_same_in_plain_python() -> None:
 # --- mistakes ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "config",
-    [
-        {"observation": {"type": "LidarObservation"}},
-        {"observation": {"type": "Kinematics", "features": ["x", "cos_d"]}},
-        {"action": {"type": "DiscreteAction"}},
-        {"action": {"type": "ContinuousAction", "dynamical": True}},
-        {"action": {"type": "ContinuousAction", "speed_range": [0, 50]}},
-    ],
-)
-def test_what_only_plain_environments_can_do_is_referred_to_them(config: dict[str, Any]) -> None:
-    with pytest.raises(ValueError, match='vectorization_mode="sync"'):
-        gym.make_vec("dorothie_gym/Town-v0", num_envs=2, config=config)
-
-
-@pytest.mark.parametrize(
-    ("config", "words"),
-    [
-        ({"observation": {"type": "Kinematics", "vehicles_count": 0}}, "vehicles_count"),
-        ({"observation": {"type": "Kinematics", "order": "upwards"}}, "order"),
-        ({"action": {"type": "DiscreteMetaAction", "target_speeds": [5.0]}}, "target_speeds"),
-    ],
-)
-def test_impossible_settings_are_named(config: dict[str, Any], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        TownVectorEnv(2, config)
-
-
 def test_pictures_are_left_to_plain_environments() -> None:
     with pytest.raises(ValueError, match="sync"):
         gym.make_vec("dorothie_gym/Town-v0", num_envs=2, render_mode="rgb_array")
@@ -404,5 +376,10 @@ def test_a_reset_that_cannot_be_is_refused(arguments: dict[str, Any], words: str
         TownVectorEnv(2, LONELY).reset(**arguments)
 
 
-def test_the_network_is_the_towns() -> None:
-    assert isinstance(TownVectorEnv(1, LONELY)._network, TownNetwork)
+def test_the_action_spaces_numbers_are_left_to_their_owner() -> None:
+    env = TownVectorEnv(2, LONELY)
+    env.action_space.seed(1)
+    first = env.action_space.sample()
+    env.action_space.seed(1)
+    env.reset(seed=1)
+    assert (env.action_space.sample() == first).all()
