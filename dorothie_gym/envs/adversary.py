@@ -89,7 +89,8 @@ class Adversary:
         if action.count == 0:
             return "nobody was to come: count is 0"
         crowd = world.actors.vehicles if action.exception is ExceptionKind.SPAWN_VEHICLES else world.actors.pedestrians
-        if len(crowd) >= MOST:
+        there = len(crowd)
+        if there >= MOST:
             return f"there are {MOST} of them in the town already"
         middle = world.town.lanes[action.place.lane].position(action.place.metres)
         half = max(float(action.extent), 5.0)
@@ -100,7 +101,7 @@ class Adversary:
         )
         done = 0
         for k in order:
-            if done == action.count or len(crowd) >= MOST:
+            if done == action.count or there + done >= MOST:
                 break
             lane, station = candidates[int(k)]
             if driving:
@@ -144,25 +145,22 @@ class Adversary:
             return f"there is no prop {action.item}"
         if (reason := self._no_such_place(action) or self._unsafe(action, prop.kind, without=prop)) is not None:
             return reason
-        row = self._world.actors.props.index(prop)
-        self._world.actors.remove_prop(prop)
-        moved = self._world.actors.add_prop(prop.kind, action.place.lane, float(action.place.metres), key=prop.key)
-        props = self._world.actors.props
-        props.insert(row, props.pop())
+        self._world.actors.move_prop(prop, action.place.lane, float(action.place.metres))
         return {
             "item": action.item,
-            "prop": str(moved.kind),
-            "lane": moved.lane_id,
-            "station": moved.station,
-            **_xy(moved),
+            "prop": str(prop.kind),
+            "lane": prop.lane_id,
+            "station": prop.station,
+            **_xy(prop),
         }
 
     def _delete_prop(self, action: AdWizardAction) -> Outcome:
         prop = self._prop(action.item)
         if prop is None:
             return f"there is no prop {action.item}"
+        gone = {"item": action.item, "prop": str(prop.kind), **_xy(prop)}
         self._world.actors.remove_prop(prop)
-        return {"item": action.item, "prop": str(prop.kind), **_xy(prop)}
+        return gone
 
     def _fault(self, action: AdWizardAction) -> Outcome:
         reason = self._world.set_fault(action.sensor, action.on)

@@ -12,7 +12,7 @@ from dorothie_gym.envs.place_filter import PlaceEstimate, about, refined
 from dorothie_gym.envs.scenario import Scenario
 from dorothie_gym.ontology import DialogueAct, DialogueMove, LandmarkName, Role, Slot, StreetName
 from dorothie_gym.world.car.driver import GoalAhead
-from dorothie_gym.world.perception import RANGE_SCALE
+from dorothie_gym.world.kernel.seeing import RANGE_SCALE
 from dorothie_gym.world.town import Town
 from dorothie_gym.world.town.model import Array
 

@@ -323,6 +323,11 @@ class Bodies:
         states = np.asarray(self._holder.arrays.pedestrians)["state"].tolist()
         return [self._view(Pedestrian, row) for row, state in enumerate(states) if state != Walk.EMPTY]
 
+    def prop(self, row: int) -> Prop:
+        """The prop in a row."""
+        view: Prop = self._view(Prop, row)
+        return view
+
     def props(self) -> list[Prop]:
         """Props, in the order of the rows."""
         present = np.asarray(self._holder.arrays.props)["present"].tolist()

@@ -27,7 +27,7 @@ class CompiledRoad(TownRoad):
     `vehicles` and `objects` are plain lists, as everywhere in highway-env, and they say who is there: a view that is
     taken out of them leaves the arrays, and a vehicle of highway-env's that is put into them, a guest, is seen, yielded
     to and struck by everybody. Guests decide and move as their class does; all others do so in one call a substep.
-    Objects of highway-env's own are heeded by guests alone.
+    Objects of highway-env's own are heeded by guests alone. A guest with a `height` [m] begins on a lane of it.
 
     Attributes:
         arrays: state of everybody; replaced by bigger ones where guests find no room.
@@ -97,6 +97,8 @@ class CompiledRoad(TownRoad):
             crashed[self._rows[k]] = guest.crashed
         step_around(self.town_arrays, self.arrays, dt, self._rows, self._poses)
         for row, guest in zip(self._rows.tolist(), self._guests, strict=True):
+            if not self.town_arrays.flat:
+                self._level(guest, self.arrays.vehicles[row])
             if crashed[row] and not guest.crashed:
                 guest.crashed = True
                 self._mark_props(guest)
@@ -107,6 +109,12 @@ class CompiledRoad(TownRoad):
             for view in self.vehicles:
                 if isinstance(view, TrafficVehicle):
                     view.remember()
+
+    def _level(self, guest: Any, record: Any) -> None:
+        """Tells a guest the closest lane of its height; highway-env would take one of a bridge below or above it."""
+        guest.height = float(record.height)
+        guest.lane_index = self.network.index_of(record.lane)
+        guest.lane = self.network.get_lane(guest.lane_index)
 
     def _mark_props(self, guest: Any) -> None:
         """Marks the props that a guest has run into, as highway-env does; the kernel keeps no such mark."""
@@ -157,7 +165,8 @@ class CompiledRoad(TownRoad):
         record.kind, record.key = Kind.EGO, new_key(self.arrays) if row else 0
         record.length, record.width, record.desired, record.to_right = guest.LENGTH, guest.WIDTH, guest.speed, 0.0
         record.radius = 0.5 * math.hypot(guest.LENGTH, guest.WIDTH)
-        lane = self.network.get_lane(guest.lane_index)
+        height = getattr(guest, "height", None)
+        lane = self.network.get_lane(self.network.get_closest_lane_index(guest.position, guest.heading, height=height))
         put_on_lane(town, record, lane.town_lane.id, lane.local_coordinates(guest.position)[0])
         (record.x, record.y), record.heading, record.speed = guest.position, guest.heading, guest.speed
         record.cos, record.sin, record.crashed = math.cos(guest.heading), math.sin(guest.heading), guest.crashed

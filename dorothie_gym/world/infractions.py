@@ -8,38 +8,24 @@ from __future__ import annotations
 
 import enum
 import math
+import weakref
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.world.config import FRAME_RATE
-from dorothie_gym.world.junctions import AT_LINE, STANDING
-from dorothie_gym.world.network.compiled import compiled
+from dorothie_gym.world.kernel import town_arrays
+from dorothie_gym.world.kernel.records import FINDING, LINE, MARK, Records
+from dorothie_gym.world.kernel.rules import HEIGHT, WIDE, Found, WatchArrays, X, Y, watch
 from dorothie_gym.world.network.network import TownNetwork
-from dorothie_gym.world.network.polyline import IntArray, local_coordinates, value_at
+from dorothie_gym.world.network.polyline import WIDTH
 from dorothie_gym.world.town.lights import LightColour
 from dorothie_gym.world.town.model import Array, SignalKind
 from dorothie_gym.world.town.right_of_way import right_of_way
 
-OFF_ROAD = 0.5
-"""The car has left the road when its middle is farther than this outside of every lane, connectors included [m]."""
-
-AGAINST = math.cos(math.radians(120.0))
-"""Cosine of the angle to a lane from which on the car drives against it (CARLA's scenario runner, WrongLaneTest)."""
-
-LEVEL = 2.5
-"""Lanes further above or below the car are another road's [m]."""
-
-NEARBY = 10.0
-"""How far around the car lanes are looked at [m]: more than half of any lane's width."""
-
-OVER = 1.0
-"""Off the road, or against the traffic, is over when it has not been so for this long; then it may count anew [s]."""
-
-FORGET = 12.0
-"""Who has stood at a stop sign and is this far from its line has to stand again [m]."""
+LONG_AGO = -(1 << 40)
+"""A frame before all others."""
 
 
 class Infraction(enum.StrEnum):
@@ -79,191 +65,105 @@ class Breach:
     other: ObjectClass | None = None
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Track:
-    """The way of a car: its poses at successive frames; the first is the last one of the track before.
+class InfractionWatch:
+    """Looks at the way of one car, stretch by stretch, and tells each breach of a rule once."""
 
-    Attributes:
-        frame: number of the first pose's frame.
-        x: of its middle (n,) [m]; `y` likewise.
-        headings: (n,) [rad].
-        speeds: (n,) [m/s].
-        heights: of the road under it (n,) [m].
-        turning: whether it was turning round, as it may across the lanes of a road (n,).
-        length: of the car [m].
-    """
+    def __init__(self, network: TownNetwork, length: float) -> None:
+        """Begins to watch a car of a length [m] that has not been seen before."""
+        self._network, self._town, self._length = network, network.town, length
+        self._lines = _lines(network)
+        town = town_arrays(network)
+        self._wide = bool(network.table.points[:, WIDTH].max() > WIDE)
+        self._arrays = WatchArrays(
+            town.points, town.lanes, town.origin, town.cells, town.entries, self._lines.records,
+            np.zeros(len(self._lines.lanes), dtype=MARK).view(np.recarray), np.full(2, LONG_AGO),
+            np.zeros(0, dtype=FINDING).view(np.recarray),
+        )  # fmt: skip
 
-    frame: int
-    x: Array
-    y: Array
-    headings: Array
-    speeds: Array
-    heights: Array
-    turning: NDArray[np.bool_]
-    length: float
+    def look(self, poses: Array, frame: int) -> list[Breach]:
+        """Breaches on a stretch of way, in the order in which they happened.
+
+        Args:
+            poses: of the car at successive frames (n + 1, 6), C-contiguous, columns as in `kernel.rules`; the first
+                is the last one of the stretch before.
+            frame: of the first pose.
+        """
+        if len(self._arrays.found) < 3 * len(poses):
+            room = np.zeros(3 * len(poses), dtype=FINDING).view(np.recarray)
+            self._arrays = self._arrays._replace(found=room)
+        count = watch(self._arrays, poses, frame, self._length, self._wide)
+        found: list[Breach] = []
+        for station, k, kind, number in self._arrays.found[:count].tolist() if count else ():
+            if kind in (Found.LIGHT, Found.STOP_SIGN):
+                found += self._at_line(number, frame + k, poses[k])
+            else:
+                breach = Infraction.OFF_ROAD if kind == Found.OFF_ROAD else Infraction.WRONG_WAY
+                found.append(self._beside_lanes(breach, number, station, frame + k, poses[k]))
+        return found
+
+    def _at_line(self, line: int, frame: int, pose: Array) -> list[Breach]:
+        """The breach of passing a line, if it is one: at a stop sign without a stand, or at a red light."""
+        kind, signal = self._lines.signals[line]
+        lane = self._lines.lanes[line]
+        infraction, other = Infraction.STOP_SIGN, ObjectClass.TRAFFIC_SIGN
+        if kind is SignalKind.TRAFFIC_LIGHT:
+            # what it showed when the frame began: so the car was let in
+            if self._town.light(lane, (frame - 1) / FRAME_RATE) is not LightColour.RED:
+                return []
+            infraction, other = Infraction.RED_LIGHT, ObjectClass.TRAFFIC_LIGHT
+        return [
+            Breach(
+                kind=infraction, frame=frame, lane=lane, station=self._town.lanes[lane].length,
+                x=float(pose[X]), y=float(pose[Y]), key=signal, other=other,
+            )
+        ]  # fmt: skip
+
+    def _beside_lanes(self, kind: Infraction, lane: int, station: float, frame: int, pose: Array) -> Breach:
+        """The breach of being off the road or against the traffic, at the nearest lane."""
+        x, y = float(pose[X]), float(pose[Y])
+        if lane < 0:
+            place = np.array([x, y])
+            index = self._network.get_closest_lane_index(place, height=float(pose[HEIGHT]))
+            lane = self._network.lane_id(index)
+            station = float(self._network.get_lane(index).local_coordinates(place)[0])
+        station = min(max(station, 0.0), self._town.lanes[lane].length)
+        return Breach(kind=kind, frame=frame, lane=lane, station=station, x=x, y=y)
 
 
 @dataclass(frozen=True, eq=False)
 class _Lines:
-    """Ends of lanes with a light or stop sign (m,): place [m], direction, half width and height [m], lane, signal."""
+    """Ends of lanes with a light or stop sign: `kernel.records.LINE` (m,), lanes, kinds and ids of signals."""
 
-    x: Array
-    y: Array
-    cosines: Array
-    sines: Array
-    halves: Array
-    heights: Array
+    records: Records
     lanes: tuple[int, ...]
     signals: tuple[tuple[SignalKind, int], ...]
 
-    @classmethod
-    def of(cls, network: TownNetwork) -> _Lines:
-        town, rules = network.town, right_of_way(network.town)
-        found = {
-            lane: (signal.kind, signal.id)
-            for signal in town.signals
-            if signal.kind in (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP)
-            for lane in signal.lanes
-            if rules.control(lane) is signal.kind
-        }
-        lanes = [town.lanes[lane] for lane in sorted(found)]
-        headings = np.array([lane.headings[-1] for lane in lanes])
-        ends = np.array([lane.points[-1] for lane in lanes]).reshape(-1, 3)
-        return cls(
-            x=ends[:, 0], y=ends[:, 1], cosines=np.cos(headings), sines=np.sin(headings),
-            halves=np.array([lane.widths[-1] for lane in lanes]) / 2, heights=ends[:, 2],
-            lanes=tuple(sorted(found)), signals=tuple(found[lane] for lane in sorted(found)),
-        )  # fmt: skip
+
+_found_lines: weakref.WeakKeyDictionary[TownNetwork, _Lines] = weakref.WeakKeyDictionary()
 
 
-class InfractionWatch:
-    """Looks at the way of one car, stretch by stretch, and tells each breach of a rule once."""
-
-    def __init__(self, network: TownNetwork) -> None:
-        self._network = network
-        self._town = network.town
-        self._lines = _Lines.of(network)
-        lanes = [self._town.lanes[network.lane_id(index)] for index in network.lanes_dict()]
-        self._ids = [lane.id for lane in lanes]
-        self._connectors = np.array([lane.in_junction for lane in lanes])
-        self._stood: set[int] = set()  # lines at which the car has come to a stand
-        self._last: dict[Infraction, int] = {}  # frames at which it was off the road, or against the traffic
-
-    def look(self, track: Track) -> list[Breach]:
-        """Breaches on a stretch of way, in the order in which they happened."""
-        found = self._at_lines(track) if self._lines.lanes else []
-        for k in range(1, len(track.x)):
-            if not track.turning[k]:
-                found += self._beside_lanes(track, k)
-        return sorted(found, key=lambda breach: breach.frame)
-
-    # --- lines ------------------------------------------------------------------------------------------------------
-
-    def _at_lines(self, track: Track) -> list[Breach]:
-        """Lines that the car's front passed though it should not have."""
-        lines = self._lines
-        c, s = np.cos(track.headings), np.sin(track.headings)
-        dx = (track.x + track.length / 2 * c)[:, None] - lines.x  # (n, m)
-        dy = (track.y + track.length / 2 * s)[:, None] - lines.y
-        beyond, across = dx * lines.cosines + dy * lines.sines, dy * lines.cosines - dx * lines.sines
-        facing = c[:, None] * lines.cosines + s[:, None] * lines.sines > 0.5
-        on = facing & (np.abs(across) <= lines.halves) & (np.abs(track.heights[:, None] - lines.heights) <= LEVEL)
-        passed = on[1:] & (beyond[:-1] <= 0.0) & (beyond[1:] > 0.0) & ~track.turning[1:, None]
-        stands = on & (beyond <= 0.0) & (beyond >= -AT_LINE) & (track.speeds < STANDING)[:, None]
-        found: list[Breach] = []
-        for k in range(1, len(track.x)):
-            self._stood.update(int(j) for j in np.flatnonzero(stands[k - 1]))
-            crossed = np.flatnonzero(passed[k - 1])
-            if len(crossed):  # on the border of two lanes it is on the one whose middle is nearer
-                j = int(crossed[np.argmin(np.abs(across[k, crossed]))])
-                found += self._judge(j, track, k)
-                self._stood.discard(j)
-        self._stood = {j for j in self._stood if math.hypot(dx[-1, j], dy[-1, j]) < FORGET}
-        return found
-
-    def _judge(self, j: int, track: Track, k: int) -> list[Breach]:
-        kind, signal = self._lines.signals[j]
-        lane = self._lines.lanes[j]
-        if kind is SignalKind.TRAFFIC_LIGHT:
-            # what it showed when the frame began: so the car was let in
-            broken = self._town.light(lane, (track.frame + k - 1) / FRAME_RATE) is LightColour.RED
-            infraction, other = Infraction.RED_LIGHT, ObjectClass.TRAFFIC_LIGHT
-        else:
-            broken = j not in self._stood
-            infraction, other = Infraction.STOP_SIGN, ObjectClass.TRAFFIC_SIGN
-        if not broken:
-            return []
-        station = self._town.lanes[lane].length
-        return [self._breach(infraction, track, k, lane=lane, station=station, key=signal, other=other)]
-
-    # --- lanes ------------------------------------------------------------------------------------------------------
-
-    def _beside_lanes(self, track: Track, k: int) -> list[Breach]:
-        table = self._network.table
-        x, y, height = float(track.x[k]), float(track.y[k]), float(track.heights[k])
-        outside, against, row, station = _survey(
-            table.points, table.offsets, table.ends, table.boxes, self._connectors,
-            x, y, float(track.headings[k]), height,
-        )  # fmt: skip
-        broken = {Infraction.OFF_ROAD: outside > OFF_ROAD, Infraction.WRONG_WAY: bool(against)}
-        found: list[Breach] = []
-        for kind in (kind for kind, is_broken in broken.items() if is_broken):
-            frame = track.frame + k
-            last = self._last.get(kind)
-            self._last[kind] = frame
-            if last is not None and frame - last <= OVER * FRAME_RATE:
-                continue
-            if row < 0:
-                index = self._network.get_closest_lane_index(np.array([x, y]), height=height)
-                row = self._network.row(index)
-                station = float(
-                    np.clip(self._network.get_lane(index).local_coordinates(np.array([x, y]))[0], 0.0, None)
-                )
-            lane = self._ids[row]
-            station = min(max(station, 0.0), self._town.lanes[lane].length)
-            found.append(self._breach(kind, track, k, lane=lane, station=station))
-        return found
-
-    def _breach(
-        self, kind: Infraction, track: Track, k: int, *, lane: int, station: float,
-        key: int | None = None, other: ObjectClass | None = None,
-    ) -> Breach:  # fmt: skip
-        return Breach(
-            kind=kind, frame=track.frame + k, lane=lane, station=float(station),
-            x=float(track.x[k]), y=float(track.y[k]), key=key, other=other,
-        )  # fmt: skip
+def _lines(network: TownNetwork) -> _Lines:
+    """The lines of a town's network, looked for when they are asked for first."""
+    found = _found_lines.get(network)
+    if found is None:
+        found = _found_lines[network] = _look_for_lines(network)
+    return found
 
 
-@compiled
-def _survey(
-    points: Array, offsets: IntArray, ends: Array, boxes: Array, connectors: NDArray[np.bool_],
-    x: float, y: float, heading: float, height: float,
-) -> tuple[float, bool, int, float]:  # fmt: skip
-    """How far outside of all lanes a place is [m], whether all lanes it is on run against a heading, and the nearest.
-
-    Returns:
-        Distance to the nearest lane's area (negative inside), whether it is on lanes and all of them run the other
-        way (connectors never do), row of the nearest lane (-1: none nearby) and the station on it [m].
-    """
-    outside, nearest, at = np.inf, -1, 0.0
-    with_it, against = False, False
-    for row in range(len(boxes)):
-        if x < boxes[row, 0] - NEARBY or x > boxes[row, 2] + NEARBY:
-            continue
-        if y < boxes[row, 1] - NEARBY or y > boxes[row, 3] + NEARBY:
-            continue
-        station, lateral = local_coordinates(points, offsets, ends, row, x, y)
-        if abs(value_at(points, offsets, row, 4, station) - height) > LEVEL:
-            continue
-        length = points[offsets[row + 1] - 1, 2]
-        side = abs(lateral) - 0.5 * value_at(points, offsets, row, 5, station)
-        out = max(side, -station, station - length)
-        if out < outside:
-            outside, nearest, at = out, row, station
-        if out > 0.0:
-            continue
-        if connectors[row] or math.cos(heading - value_at(points, offsets, row, 3, station)) > AGAINST:
-            with_it = True
-        else:
-            against = True
-    return outside, against and not with_it, nearest, at
+def _look_for_lines(network: TownNetwork) -> _Lines:
+    town, rules = network.town, right_of_way(network.town)
+    found = {
+        lane: (signal.kind, signal.id)
+        for signal in town.signals
+        if signal.kind in (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP)
+        for lane in signal.lanes
+        if rules.control(lane) is signal.kind
+    }
+    records = np.zeros(len(found), dtype=LINE).view(np.recarray)
+    for record, lane in zip(records, sorted(found), strict=True):
+        end, heading = town.lanes[lane].points[-1], float(town.lanes[lane].headings[-1])
+        record.x, record.y, record.height = end
+        record.cos, record.sin = math.cos(heading), math.sin(heading)
+        record.half_width = float(town.lanes[lane].widths[-1]) / 2
+        record.is_stop = found[lane][0] is SignalKind.STOP
+    return _Lines(records, tuple(sorted(found)), tuple(found[lane] for lane in sorted(found)))

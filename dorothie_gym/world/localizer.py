@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from dorothie_gym.world.config import FRAME_RATE
-from dorothie_gym.world.odometry import BIAS_SIGMA, DRAWS, SCALE_SIGMA, dead_reckon, process_noise
+from dorothie_gym.world.kernel.compiling import compiled
+from dorothie_gym.world.odometry import BIAS_SIGMA, DRAWS, SCALE_SIGMA, STATES, measure, reckon
 from dorothie_gym.world.town.model import Array
 
 GPS_SIGMA = 0.5
@@ -23,60 +24,88 @@ DEPARTURE_SIGMAS = (0.1, 0.1, 0.01)
 
 
 class Localizer:
-    """Estimates where the car is from what its sensors measure; their errors are made here, by the seed.
-
-    Attributes:
-        pose: estimate (x, y, heading) [m, m, rad].
-        covariance: of the estimate (3, 3).
-    """
+    """Estimates where the car is from what its sensors measure; their errors are made here, by the seed."""
 
     def __init__(self, x: float, y: float, heading: float, rng: np.random.Generator) -> None:
-        # imported here: filterpy brings matplotlib along, which is slow to import
-        from filterpy.kalman import ExtendedKalmanFilter
-
-        self._filter = ExtendedKalmanFilter(dim_x=5, dim_z=2)
-        self._filter.x = np.array([x, y, heading, 1.0, 0.0])
-        self._filter.P = np.diag(np.square([*DEPARTURE_SIGMAS, SCALE_SIGMA, BIAS_SIGMA]))
-        self._filter.R = np.eye(2) * GPS_SIGMA**2
+        self._mean = np.array([x, y, heading, 1.0, 0.0])
+        self._covariance = np.diag(np.square([*DEPARTURE_SIGMAS, SCALE_SIGMA, BIAS_SIGMA]))
         self._rng = rng
-        self._true_scale = 1.0 + SCALE_SIGMA * float(rng.standard_normal())
-        self._true_bias = BIAS_SIGMA * float(rng.standard_normal())
+        scale, bias = rng.standard_normal(2)
+        self._truth = np.array([1.0 + SCALE_SIGMA * scale, BIAS_SIGMA * bias])
 
     @property
     def pose(self) -> Array:
-        """Estimate (x, y, heading)."""
-        return np.array(self._filter.x[:3], dtype=np.float64)
+        """Estimate (x, y, heading) [m, m, rad]."""
+        return self._mean[:3].copy()
 
     @property
     def covariance(self) -> Array:
         """Covariance (3, 3) of the estimate."""
-        return np.array(self._filter.P[:3, :3], dtype=np.float64)
+        return self._covariance[:3, :3].copy()
 
-    def predict(self, track: Array, dt: float) -> None:
-        """Moves the estimate on by odometry.
+    def localize(self, track: Array, frame: int, *, gps_from: int = 0) -> None:
+        """Takes in odometry of every frame, and a GPS fix of every `FIX_EVERY`th; the sensors' errors are added here.
+
+        Nothing depends on how many frames a call has: all draw the same numbers.
 
         Args:
-            track: true poses (x, y, heading) of successive frames, the first of them known already (n + 1, 3); the
-                errors of the wheels, of the side slip and of the gyro are added here.
-            dt: time between two of them [s].
+            track: true poses of successive frames, the first of them known already: x, y, heading, and columns that
+                do not matter here (n + 1, 3 or more) [m, m, rad].
+            frame: number of the first pose's frame.
+            gps_from: there is no GPS before this frame.
         """
-        draws = self._rng.standard_normal((len(track) - 1, DRAWS))  # row by row: the same however frames are bundled
-        x, y, heading, scale, bias = (float(v) for v in self._filter.x)
-        east, south, turned, length, moving, east_moment, south_moment, self._true_bias = dead_reckon(
-            track, draws, dt, self._true_scale, self._true_bias, heading, scale, bias
-        ).tolist()
-        jacobian = np.eye(5)
-        jacobian[0, 2:] = -south, -east / scale, south_moment
-        jacobian[1, 2:] = east, -south / scale, -east_moment
-        jacobian[2, 4] = -moving
-        self._filter.x = np.array([x + east, y + south, heading + turned, scale, bias])
-        noise = process_noise(east, south, length, moving, (len(track) - 1) * dt)
-        self._filter.P = jacobian @ self._filter.P @ jacobian.T + noise
-
-    def correct(self, x: float, y: float) -> None:
-        """Takes in a GPS fix of the true position [m]; the receiver's error is added here."""
-        fix = np.array([x, y]) + GPS_SIGMA * self._rng.standard_normal(2)
-        self._filter.update(fix, lambda _: _OBSERVE, lambda state: state[:2])
+        draws = self._rng.standard_normal((len(track) - 1, DRAWS + 2))
+        follow(track, draws, frame, gps_from, 1.0 / FRAME_RATE, self._mean, self._covariance, self._truth)
 
 
-_OBSERVE = np.eye(2, 5)
+@compiled
+def follow(
+    track: Array, draws: Array, frame: int, gps_from: int, dt: float, mean: Array, covariance: Array, truth: Array
+) -> None:
+    """As `Localizer.localize`.
+
+    Args:
+        track: true poses (n + 1, 3 or more).
+        draws: normal numbers (n, DRAWS + 2): those of odometry, and of a fix.
+        frame: number of the first pose's frame.
+        gps_from: there is no GPS before this frame.
+        dt: time of a frame [s].
+        mean: (5,) estimate; written.
+        covariance: (5, 5) of it; written.
+        truth: (2,) true scale of the odometer and true bias of the gyro [rad/s]; written.
+    """
+    for k in range(len(draws)):
+        ahead, right, turn = measure(track, draws, k, dt, truth)
+        reckon(mean, covariance, ahead, right, turn, dt)
+        now = frame + k + 1
+        if now % FIX_EVERY == 0 and now >= gps_from:
+            for axis in range(2):
+                correct(mean, covariance, axis, track[k + 1, axis] + GPS_SIGMA * draws[k, DRAWS + axis])
+
+
+@compiled
+def correct(mean: Array, covariance: Array, axis: int, fix: float) -> None:
+    """Takes in the measurement of one coordinate by GPS.
+
+    A fix's errors along the two axes do not depend on one another, so they may be taken in one after the other.
+
+    Args:
+        mean: (5,) estimate; written.
+        covariance: (5, 5) of it; written.
+        axis: 0 for x, 1 for y.
+        fix: measured coordinate [m].
+    """
+    p = covariance
+    off, spread = fix - mean[axis], p[axis, axis] + GPS_SIGMA * GPS_SIGMA
+    for i in range(STATES):
+        mean[i] += p[i, axis] / spread * off
+    for i in range(STATES):
+        for j in range(STATES):
+            if i != axis and j != axis:
+                p[i, j] -= p[i, axis] * p[axis, j] / spread
+    left = GPS_SIGMA * GPS_SIGMA / spread
+    for i in range(STATES):
+        if i != axis:
+            p[i, axis] *= left
+            p[axis, i] = p[i, axis]
+    p[axis, axis] *= left

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from dorothie_gym.world.network.compiled import compiled
+from dorothie_gym.world.kernel.compiling import compiled
 from dorothie_gym.world.town.model import Array
 
 SCALE_SIGMA = 0.02
@@ -33,66 +31,76 @@ STANDS = 1e-3
 DRAWS = 4
 """Normal numbers that a frame takes: of the bias, the gyro, the slip and the skid."""
 
+STATES = 5
+"""x, y [m], heading [rad], scale of the odometer, bias of the gyro [rad/s]."""
+
 
 @compiled
-def dead_reckon(
-    track: Array, draws: Array, dt: float, true_scale: float, true_bias: float,
-    heading: float, scale: float, bias: float,
-) -> Array:  # fmt: skip
-    """Where measured ways and turns lead from a believed heading.
+def measure(track: Array, draws: Array, k: int, dt: float, truth: Array) -> tuple[float, float, float]:
+    """What the sensors tell of a frame.
 
     Args:
-        track: true poses (x, y, heading) of successive frames (n + 1, 3) [m, m, rad].
-        draws: normal numbers (n, DRAWS).
+        track: true poses, x, y, heading and whatever else, of successive frames (n + 1, 3 or more) [m, m, rad].
+        draws: normal numbers (n, DRAWS or more).
+        k: number of the frame: from pose k to k + 1.
         dt: time of a frame [s].
-        true_scale: of the odometer.
-        true_bias: of the gyro [rad/s].
-        heading: believed at the start [rad].
-        scale: of the odometer, as believed.
-        bias: of the gyro, as believed [rad/s].
+        truth: (2,) true scale of the odometer and true bias of the gyro [rad/s], which wanders on.
 
     Returns:
-        (8,): way east and south [m], turn [rad], length of the way [m], time for which the car moved [s], moments in
-        time of the way east and south [m s], and the true bias at the end [rad/s].
+        Way ahead and to the right [m] and turn [rad]; all of them 0 if the car stands.
     """
-    east = south = turned = length = moving = east_moment = south_moment = 0.0
-    for k in range(len(draws)):
-        true_bias += BIAS_WALK * math.sqrt(dt) * draws[k, 0]
-        dx, dy = track[k + 1, 0] - track[k, 0], track[k + 1, 1] - track[k, 1]
-        way = math.sqrt(dx * dx + dy * dy)
-        if way <= STANDS:
-            continue
-        c, s = math.cos(track[k, 2]), math.sin(track[k, 2])
-        ahead = ((dx * c + dy * s) * true_scale + SLIP * math.sqrt(way) * draws[k, 2]) / scale
-        right = ((dy * c - dx * s) * true_scale + SKID * math.sqrt(way) * draws[k, 3]) / scale
-        turn = track[k + 1, 2] - track[k, 2] + true_bias * dt + GYRO_NOISE * math.sqrt(dt) * draws[k, 1]
-        c, s = math.cos(heading + turned), math.sin(heading + turned)
-        dx, dy = ahead * c - right * s, ahead * s + right * c
-        east, south, length = east + dx, south + dy, length + way
-        east_moment, south_moment = east_moment + dx * moving, south_moment + dy * moving
-        turned += turn - bias * dt
-        moving += dt
-    return np.array([east, south, turned, length, moving, east_moment, south_moment, true_bias])
+    truth[1] += BIAS_WALK * math.sqrt(dt) * draws[k, 0]
+    dx, dy = track[k + 1, 0] - track[k, 0], track[k + 1, 1] - track[k, 1]
+    way = math.sqrt(dx * dx + dy * dy)
+    if way <= STANDS:
+        return 0.0, 0.0, 0.0
+    c, s, root = math.cos(track[k, 2]), math.sin(track[k, 2]), math.sqrt(way)
+    ahead = (dx * c + dy * s) * truth[0] + SLIP * root * draws[k, 2]
+    right = (dy * c - dx * s) * truth[0] + SKID * root * draws[k, 3]
+    turn = track[k + 1, 2] - track[k, 2] + truth[1] * dt + GYRO_NOISE * math.sqrt(dt) * draws[k, 1]
+    return ahead, right, turn
 
 
-def process_noise(east: float, south: float, length: float, moving: float, passed: float) -> Array:
-    """Covariance that a movement adds to x, y, heading, scale and bias (5, 5).
+@compiled
+def reckon(mean: Array, covariance: Array, ahead: float, right: float, turn: float, dt: float) -> None:
+    """Moves an estimate on by what the sensors tell of a frame: the prediction of an extended Kalman filter.
+
+    With F the derivatives of the new state by the old one, P becomes F P F^T + Q. Of F only seven numbers outside the
+    diagonal are not 0, so that it is applied row by row, then column by column.
 
     Args:
-        east: way east [m].
-        south: way south [m].
-        length: length of the way [m].
-        moving: time for which the car moved [s].
-        passed: all time that passed [s].
+        mean: (5,) see `STATES`; written.
+        covariance: (5, 5) of it; written.
+        ahead: way ahead [m]; `right` to the right of that.
+        right: [m].
+        turn: [rad].
+        dt: time of a frame [s].
     """
-    noise = np.zeros((5, 5))
-    noise[4, 4] = BIAS_WALK * BIAS_WALK * passed
-    if length <= 0.0:
-        return noise
-    chord = max(math.hypot(east, south), STANDS)
-    along, across = np.array([east, south]) / chord, np.array([-south, east]) / chord
-    noise[:2, :2] = length * (SLIP**2 * np.outer(along, along) + SKID**2 * np.outer(across, across))
-    # the gyro's noise turns all that follows it: on average half of the way
-    lever = np.array([-south / 2, east / 2, 1.0])
-    noise[:3, :3] += GYRO_NOISE**2 * moving * np.outer(lever, lever)
-    return noise
+    p = covariance
+    p[4, 4] += BIAS_WALK * BIAS_WALK * dt
+    if ahead == 0.0 and right == 0.0:
+        return
+    scale = mean[3]
+    ahead, right = ahead / scale, right / scale
+    c, s = math.cos(mean[2]), math.sin(mean[2])
+    dx, dy = ahead * c - right * s, ahead * s + right * c
+    for j in range(STATES):
+        p[0, j] -= dy * p[2, j] + dx / scale * p[3, j]
+        p[1, j] += dx * p[2, j] - dy / scale * p[3, j]
+        p[2, j] -= dt * p[4, j]
+    for i in range(STATES):
+        p[i, 0] -= dy * p[i, 2] + dx / scale * p[i, 3]
+        p[i, 1] += dx * p[i, 2] - dy / scale * p[i, 3]
+        p[i, 2] -= dt * p[i, 4]
+    way = math.sqrt(dx * dx + dy * dy)
+    slip, skid = SLIP * SLIP * way / (scale * scale), SKID * SKID * way / (scale * scale)
+    p[0, 0] += slip * c * c + skid * s * s
+    p[1, 1] += slip * s * s + skid * c * c
+    p[0, 1] += (slip - skid) * c * s
+    p[2, 2] += GYRO_NOISE * GYRO_NOISE * dt
+    for i in range(1, STATES):  # rounding must not tear the two halves apart
+        for j in range(i):
+            p[i, j] = p[j, i]
+    mean[0] += dx
+    mean[1] += dy
+    mean[2] += turn - mean[4] * dt

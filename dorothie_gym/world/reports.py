@@ -8,11 +8,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from dorothie_gym.ontology import ObjectClass
-from dorothie_gym.world.infractions import InfractionWatch, Track
+from dorothie_gym.world.infractions import InfractionWatch
 from dorothie_gym.world.network.network import TownNetwork
+from dorothie_gym.world.town.model import Array
 
 
 class WorldEventKind(enum.StrEnum):
@@ -43,18 +42,6 @@ class WorldEvent:
     data: Mapping[str, Any] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Pose:
-    """What the rules are about: place [m], heading [rad], speed [m/s], height of the road [m], and `turning` round."""
-
-    x: float
-    y: float
-    heading: float
-    speed: float
-    height: float
-    turning: bool
-
-
 class Reports:
     """Collects what happens to the car.
 
@@ -62,10 +49,9 @@ class Reports:
         infractions: how often each rule has been broken, collisions of whosever making among them.
     """
 
-    def __init__(self, network: TownNetwork, pose: Pose, length: float) -> None:
-        """Begins with the pose of the car and its length [m]."""
-        self._watch = InfractionWatch(network)
-        self._pose, self._length = pose, length
+    def __init__(self, network: TownNetwork, length: float) -> None:
+        """Begins with nothing; `length` is that of the car [m]."""
+        self._watch = InfractionWatch(network, length)
         self._events: list[WorldEvent] = []
         self.infractions: Counter[WorldEventKind] = Counter()
 
@@ -96,26 +82,19 @@ class Reports:
         }  # fmt: skip
         self.add(kind, frame, **place, key=key, other=None if other is None else other.label, **data)
 
-    def close(self, poses: list[Pose], frame: int) -> list[WorldEvent]:
+    def close(self, poses: Array, frame: int) -> list[WorldEvent]:
         """Looks for breaches on the car's way since the last call, and returns all that has been reported since.
 
         Args:
-            poses: of the car, one a frame.
+            poses: of the car before the way and after each of its frames (n + 1, 6), columns as in `kernel.rules`.
             frame: that of the last of them.
         """
-        way = [self._pose, *poses]
-        self._pose = way[-1]
-        track = Track(
-            frame=frame - len(poses),
-            x=np.array([pose.x for pose in way]), y=np.array([pose.y for pose in way]),
-            headings=np.array([pose.heading for pose in way]), speeds=np.array([pose.speed for pose in way]),
-            heights=np.array([pose.height for pose in way]), turning=np.array([pose.turning for pose in way]),
-            length=self._length,
-        )  # fmt: skip
-        for breach in self._watch.look(track):
+        for breach in self._watch.look(poses, frame - len(poses) + 1):
             self.infraction(
                 WorldEventKind(breach.kind.value), breach.frame, lane=breach.lane, station=breach.station,
                 x=breach.x, y=breach.y, key=breach.key, other=breach.other,
             )  # fmt: skip
+        if not self._events:
+            return []
         events, self._events = sorted(self._events, key=lambda event: event.frame), []
         return events

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dorothie_gym.world.kernel import Kind, Walk, WorldArrays, populate, town_arrays
 from dorothie_gym.world.kernel.order import rebuild
@@ -33,13 +34,20 @@ def populate_around(
     town = town_arrays(network)
     ego, bodies = world.vehicles[0], (world.vehicles[1:], world.pedestrians)
     for _ in range(ROUNDS):
-        here = world.vehicles.kind[1:] != Kind.EMPTY, world.pedestrians.state != Walk.EMPTY
-        missing = vehicles - int(here[0].sum()), pedestrians - int(here[1].sum())
-        if not any(missing):
+        there = _counts(world)
+        missing = np.array((vehicles + 1, pedestrians)) - there
+        if not missing.any():
             break
         seed = int(rng.integers(SEEDS))
-        populate(network, town, world, seed=seed, vehicles=missing[0], pedestrians=missing[1])
+        populate(network, town, world, seed=seed, vehicles=int(missing[0]), pedestrians=int(missing[1]))
+        if (_counts(world) == there).all():
+            break  # the town is full
         for records, field, nobody in zip(bodies, ("kind", "state"), (Kind.EMPTY, Walk.EMPTY), strict=True):
             close = np.hypot(records.x - ego.x, records.y - ego.y) < CLEAR_OF_EGO
             records[field][close] = nobody
     rebuild(town, world)
+
+
+def _counts(world: WorldArrays) -> NDArray[np.int64]:
+    """How many vehicles and pedestrians there are (2,)."""
+    return np.array(((world.vehicles.kind != Kind.EMPTY).sum(), (world.pedestrians.state != Walk.EMPTY).sum()))

@@ -8,14 +8,14 @@ import numpy as np
 from gymnasium import spaces
 from highway_env.envs.common.abstract import AbstractEnv
 from highway_env.envs.common.graphics import EnvViewer
-from highway_env.envs.common.observation import KinematicObservation
+from highway_env.vehicle.controller import ControlledVehicle
 from highway_env.vehicle.objects import Landmark
 from numpy.typing import NDArray
 
 from dorothie_gym.world.compiled_road import CompiledRoad
 from dorothie_gym.world.kernel import empty_world, town_arrays
-from dorothie_gym.world.kinematics import Kinematics
 from dorothie_gym.world.network.network import FARTHEST, TownNetwork
+from dorothie_gym.world.observing import parts_of, quicken
 from dorothie_gym.world.places import free_places
 from dorothie_gym.world.surroundings import SEEDS, populate_around
 from dorothie_gym.world.town import load_town
@@ -98,10 +98,9 @@ class TownEnv(AbstractEnv):
     def define_spaces(self) -> None:
         """Sets the spaces, with finite bounds: nothing in a town is beyond `FARTHEST`."""
         super().define_spaces()
-        if type(self.observation_type) is KinematicObservation:
-            self.observation_type = Kinematics(self, **self.config["observation"])
+        quicken(self.observation_type)
         self.observation_space = finite(self.observation_space)
-        for kind in _observation_types(self.observation_type):
+        for kind in parts_of(self.observation_type):
             viewer = getattr(kind, "viewer", None)
             if viewer is not None:
                 viewer.enabled = True  # under SDL's dummy video driver it would show black
@@ -118,9 +117,15 @@ class TownEnv(AbstractEnv):
             network, arrays, np_random=self.np_random, record_history=self.config["show_trajectories"]
         )
         (lane, station), (goal, there) = free_places(town, self.np_random, 2)
-        self.vehicle = self.action_type.vehicle_class(
-            self.road, town.lanes[lane].position(station), heading=town.lanes[lane].heading_at(station), speed=0.0
+        start = town.lanes[lane]
+        vehicle = self.vehicle = self.action_type.vehicle_class(
+            self.road, start.position(station), heading=start.heading_at(station), speed=0.0
         )
+        vehicle.height = start.height_at(station)
+        vehicle.lane_index = network.index_of(lane)  # highway-env asks for the closest one, be it under a bridge
+        vehicle.lane = network.get_lane(vehicle.lane_index)
+        if isinstance(vehicle, ControlledVehicle):
+            vehicle.target_lane_index = vehicle.lane_index
         self.vehicle.goal = Landmark(self.road, town.lanes[goal].position(there), town.lanes[goal].heading_at(there))
         self.road.vehicles.append(self.vehicle)
         self.road.show()
@@ -165,9 +170,3 @@ def finite(space: spaces.Space[Any]) -> spaces.Space[Any]:
         low, high = np.clip(space.low, -FARTHEST, FARTHEST), np.clip(space.high, -FARTHEST, FARTHEST)
         return spaces.Box(low, high, dtype=space.dtype.type)
     return space
-
-
-def _observation_types(kind: Any) -> list[Any]:
-    """A type of observation and those that it consists of."""
-    parts = [*getattr(kind, "observation_types", ()), *getattr(kind, "agents_observation_types", ())]
-    return [kind, *(found for part in parts for found in _observation_types(part))]

@@ -22,6 +22,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dorothie_gym.world.network.compiled import compiled
+
 CLEAR_SIGHT = 80.0
 """How far bodies are perceived on a clear day [m]."""
 
@@ -103,6 +105,31 @@ def daylight(altitude: float, cloudiness: float) -> float:
     return float(clear * (1.0 - 0.75 * cloudiness**3.4))
 
 
+@compiled
+def transmission(fog: float, fog_start: float, rain: float, distance: float) -> float:
+    """Share of the contrast that the air leaves over a distance [m]; the rest as in `Visibility`."""
+    return math.exp(-fog * max(distance - fog_start, 0.0) - rain * distance)
+
+
+@compiled
+def gain(
+    fog: float, fog_start: float, rain: float, light: float, lamps: float, clarity: float, distance: float
+) -> float:
+    """Share G of a clear noon's signal, in [0, 1], of something at a distance [m]; the rest as in `Visibility`."""
+    air = transmission(fog, fog_start, rain, distance)
+    if lamps != 0.0 and light < FULL_LIGHT:  # their light passes through the air once more
+        near = max(distance, 1.0)
+        light += lamps / (near * near) * air
+    return clarity * air * min(1.0, math.sqrt(light / FULL_LIGHT))
+
+
+@compiled
+def signal(gain: float, distance: float) -> float:
+    """Signal S of something at a distance [m], 1 at the edge of sight on a clear day, by its gain."""
+    nearness = CLEAR_SIGHT / max(distance, 1.0)
+    return nearness * nearness * gain
+
+
 @dataclass(frozen=True, kw_only=True)
 class Visibility:
     """What is between a thing and whoever looks at it.
@@ -125,19 +152,15 @@ class Visibility:
 
     def transmission(self, distance: float) -> float:
         """Share of the contrast that the air leaves over a distance [m]."""
-        return math.exp(-self.fog * max(distance - self.fog_start, 0.0) - self.rain * distance)
+        return float(transmission(self.fog, self.fog_start, self.rain, distance))
 
     def gain(self, distance: float) -> float:
         """Share of a clear noon's signal, in [0, 1], of something at a distance [m]."""
-        air = self.transmission(distance)
-        light = self.light
-        if self.lamps and light < FULL_LIGHT:  # their light passes through the air once more
-            light += self.lamps / max(distance, 1.0) ** 2 * air
-        return self.clarity * air * min(1.0, math.sqrt(light / FULL_LIGHT))
+        return float(gain(self.fog, self.fog_start, self.rain, self.light, self.lamps, self.clarity, distance))
 
     def signal(self, distance: float) -> float:
         """Signal of something at a distance [m], 1 at the edge of sight."""
-        return (CLEAR_SIGHT / max(distance, 1.0)) ** 2 * self.gain(distance)
+        return float(signal(self.gain(distance), distance))
 
     @functools.cached_property
     def sight(self) -> float:

@@ -12,19 +12,21 @@ from dorothie_gym.world.car.planner import LocalPlanner
 from dorothie_gym.world.car.vehicle import Car
 from dorothie_gym.world.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
 from dorothie_gym.world.kernel import WorldArrays, empty_world, step, town_arrays
+from dorothie_gym.world.kernel.editing import add_car
 from dorothie_gym.world.kernel.parameters import FRAMES
-from dorothie_gym.world.kernel.records import EventCode
-from dorothie_gym.world.kernel.seeing import see
-from dorothie_gym.world.kernel.world_arrays import add_car
-from dorothie_gym.world.localizer import FIX_EVERY, Localizer
+from dorothie_gym.world.kernel.records import TRACE, EventCode
+from dorothie_gym.world.kernel.seeing import look_around
+from dorothie_gym.world.localizer import Localizer
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.network.road import TownRoad
-from dorothie_gym.world.perception import Perception
-from dorothie_gym.world.reports import Pose, Reports, WorldEvent, WorldEventKind
+from dorothie_gym.world.perception import BODY, Perception
+from dorothie_gym.world.reports import Reports, WorldEvent, WorldEventKind
 from dorothie_gym.world.town.model import Array, Town
 from dorothie_gym.world.visibility import Visibility
 from dorothie_gym.world.weather import Weather
 from dorothie_gym.world.wind import Wind
+
+_POSE = [TRACE.index(name) for name in ("x", "y", "heading", "speed", "height", "turning")]
 
 FAULT_SECONDS = 30.0
 """A sensor fault ends by itself after this long [s] (design)."""
@@ -71,21 +73,18 @@ class World:
             departure: lane and distance along it [m] where the car stands.
             network: the town's network, if there is one already: it is never changed.
         """
-        traffic_seed, walk_seed, locate_seed, perceive_seed, wind_seed, chance_seed = seed.spawn(6)
+        chance_seed, crowd_seed, locate_seed, perceive_seed, wind_seed = seed.spawn(5)
         self.town, self.config = town, config
         self.network = network or TownNetwork(town)
         self._arrays = town_arrays(self.network)
         lane, station = departure
         state = empty_world(
-            self._arrays, vehicles=31 + config.vehicles, pedestrians=config.pedestrians, seed=chance_seed, driven=True
+            self._arrays, vehicles=1 + config.vehicles, pedestrians=config.pedestrians, seed=chance_seed, driven=True
         )
         add_car(self._arrays, state, lane, station)
         state.car.collision_stop = round(config.collisions_stop * FRAME_RATE)
-        self.road = TownRoad(self.network, np_random=np.random.default_rng(traffic_seed))
-        self.actors = Actors(
-            self.road, self._arrays, state,
-            traffic_rng=np.random.default_rng(traffic_seed), walk_rng=np.random.default_rng(walk_seed),
-        )  # fmt: skip
+        self.road = TownRoad(self.network, np_random=np.random.default_rng(crowd_seed))
+        self.actors = Actors(self.road, self._arrays, state, seed=crowd_seed)
         self.car = Car(self.road, self.actors)
         self.road.vehicles.append(self.car)
         self.planner = LocalPlanner(town, lane, station)
@@ -103,7 +102,7 @@ class World:
         self.frame = 0
         self.frames: Array = np.zeros((0, len(FRAME_COLUMNS)))
         self.offsets: Array = np.zeros(0)
-        self.reports = Reports(self.network, self._pose(), self.car.LENGTH)
+        self.reports = Reports(self.network, self.car.LENGTH)
 
     # --- time -------------------------------------------------------------------------------------------------------
 
@@ -114,13 +113,14 @@ class World:
 
     def step(self, frames: int) -> list[WorldEvent]:
         """Lets the world run for a number of physics frames; returns what happened to the car."""
-        before = (*self.car.position, self.car.heading)
+        poses = np.empty((frames + 1, 6))
+        poses[0] = self._pose()
         parts = [self._run(min(FRAMES, frames - first)) for first in range(0, frames, FRAMES)]
         trace = parts[0] if len(parts) == 1 else np.concatenate(parts)
         self.frames, self.offsets = trace[:, : len(FRAME_COLUMNS)], trace[:, -1]
-        self._localize(np.vstack((before, trace[:, 1:4])))
+        poses[1:] = trace[:, _POSE]
+        self.localizer.localize(poses, self.frame - frames, gps_from=self.faults.get(Sensor.GPS, 0))
         self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
-        poses = [Pose(*(float(v) for v in (row[1], row[2], row[3], row[4], row[9])), bool(row[10])) for row in trace]
         return self.reports.close(poses, self.frame)
 
     def _run(self, frames: int) -> Array:
@@ -137,11 +137,11 @@ class World:
 
     def _tell_weather(self, arrays: WorldArrays) -> None:
         """Writes what the weather does to grip, sight and course into the world's arrays."""
-        car, eye, visibility = arrays.car.view(np.ndarray)[0], arrays.eye.view(np.ndarray)[0], self.visibility
+        self._perception.open(arrays.eye, self.visibility)
+        car = arrays.car.view(np.ndarray)[0]
         car["friction"] = self.weather.friction
         car["wind"] = self.weather.above_clear(WeatherParameter.WIND_INTENSITY)
         car["wind_heading"], car["wind_phase"] = self.wind.heading, self.wind.phases
-        eye["sight"] = visibility.sight
 
     def _report(self, arrays: WorldArrays) -> None:
         """Takes over what happened to the car."""
@@ -172,21 +172,6 @@ class World:
         """Collisions of the car's own making."""
         return int(self.actors.arrays.car["collisions"][0])
 
-    def _localize(self, track: Array) -> None:
-        """Takes in odometry of every frame, and a GPS fix of every so many.
-
-        Args:
-            track: poses (x, y, heading) before the frames and after each (frames + 1, 3).
-        """
-        began, first = 0, self.frame - len(track) + 1
-        for k in range(1, len(track)):
-            is_fix = (first + k) % FIX_EVERY == 0
-            if is_fix or k == len(track) - 1:
-                self.localizer.predict(track[began : k + 1], 1.0 / FRAME_RATE)
-                began = k
-            if is_fix and not self._is_faulty(Sensor.GPS, first + k):
-                self.localizer.correct(float(track[k, 0]), float(track[k, 1]))
-
     # --- perception -------------------------------------------------------------------------------------------------
 
     @property
@@ -202,24 +187,26 @@ class World:
 
     def perceived(self) -> list[Body]:
         """Bodies that the car perceives, where it takes them to be, nearest first."""
-        arrays = self.actors.arrays
-        car = arrays.vehicles.view(np.ndarray)[0]
-        count = see(
-            arrays.vehicles, arrays.pedestrians, arrays.props, arrays.seen, arrays.eye[0], car["x"], car["y"],
-            self.frame, 0,
-        )  # fmt: skip
         return [
             Body(
-                key=int(r.key), kind=ObjectClass(int(r.kind)), x=float(r.x), y=float(r.y), heading=float(r.heading),
-                length=float(r.length), width=float(r.width), speed=float(r.speed), height=float(r.height),
+                key=int(key), kind=ObjectClass(int(kind)), x=x, y=y, heading=heading, length=length, width=width,
+                speed=speed, height=height,
             )
-            for r in arrays.seen[:count]
+            for key, kind, x, y, heading, length, width, speed, height in self.seen().tolist()
         ]  # fmt: skip
 
-    def _pose(self) -> Pose:
+    def seen(self) -> Array:
+        """The same in numbers (n, 9): key, class, x, y [m], heading [rad], length, width [m], speed [m/s], height [m]."""
+        arrays = self.actors.arrays
+        self._perception.open(arrays.eye, self.visibility)
+        table = np.empty((len(arrays.seen), len(BODY)))
+        return table[: look_around(arrays, self.frame, table)]
+
+    def _pose(self) -> tuple[float, float, float, float, float, bool]:
+        """Of the car, in the columns of `kernel.rules`."""
         turning = self.planner.manoeuvre[0] is PhysicalAction.U_TURN and self.planner.in_manoeuvre
         x, y = self.car.position
-        return Pose(float(x), float(y), float(self.car.heading), float(self.car.speed), self.car.height, turning)
+        return float(x), float(y), float(self.car.heading), float(self.car.speed), self.car.height, turning
 
     # --- faults -----------------------------------------------------------------------------------------------------
 

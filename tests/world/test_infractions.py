@@ -11,12 +11,12 @@ from dorothie_gym.ontology import ObjectClass, PhysicalAction, PropKind
 from dorothie_gym.world.boxes import Box, boxes_touch
 from dorothie_gym.world.car.control import Control
 from dorothie_gym.world.config import WorldConfig
-from dorothie_gym.world.infractions import Breach, Infraction, InfractionWatch, Track
+from dorothie_gym.world.infractions import Breach, Infraction, InfractionWatch
 from dorothie_gym.world.junctions import JunctionControl
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.reports import INFRACTION_KINDS, WorldEvent, WorldEventKind
 from dorothie_gym.world.town import Town
-from dorothie_gym.world.town.model import SignalKind
+from dorothie_gym.world.town.model import Array, SignalKind
 from dorothie_gym.world.world import World
 from tests.world.crossings import across, crossing, lit_crossing, way_in, way_out
 from tests.world.driving import ALONE, long_lane, network, run, world_at
@@ -96,15 +96,19 @@ def test_nobody_has_to_stand_at_other_signs(kind: SignalKind, monkeypatch: pytes
     assert infractions(run(world, 25.0)) == []
 
 
-def track(town: Town, places: list[tuple[float, float]], heading: float, *, frame: int = 0, turning: bool = False,
-          speeds: list[float] | None = None) -> Track:  # fmt: skip
+def way(
+    places: list[tuple[float, float]], heading: float, *, turning: bool = False, speeds: list[float] | None = None
+) -> Array:
+    """Poses at successive frames."""
     count = len(places)
-    xy = np.array(places)
-    return Track(
-        frame=frame, x=xy[:, 0], y=xy[:, 1], headings=np.full(count, heading), heights=np.zeros(count),
-        speeds=np.array(speeds) if speeds is not None else np.full(count, 8.0),
-        turning=np.full(count, turning), length=5.0,
+    return np.column_stack(
+        (np.array(places), np.full(count, heading), speeds or np.full(count, 8.0), np.zeros(count),
+         np.full(count, turning))
     )  # fmt: skip
+
+
+def watch_in(town: Town) -> InfractionWatch:
+    return InfractionWatch(TownNetwork(town), 5.0)
 
 
 def northwards(middle: float, count: int, step: float = 0.25) -> list[tuple[float, float]]:
@@ -123,43 +127,43 @@ def test_light_counts_at_the_frame_at_which_the_front_passes() -> None:
     town = lit_crossing("ns", green=20.0)  # green for 20 s, yellow for 3 s
     places = northwards(15.0, 4)  # the front passes the line at 12 m between the poses 2 and 3
     for frame, broken in ((0, False), (599, False), (680, False), (687, False), (689, True), (1400, True)):
-        found = InfractionWatch(TownNetwork(town)).look(track(town, places, NORTH, frame=frame))
+        found = watch_in(town).look(way(places, NORTH), frame)
         assert kinds(found) == ([Infraction.RED_LIGHT] if broken else []), frame
         assert all(breach.frame == frame + 3 for breach in found)
 
 
 def test_line_is_not_passed_by_who_turns_round_or_comes_from_the_other_side() -> None:
     town = lit_crossing("ew")
-    watch = InfractionWatch(TownNetwork(town))
+    watch = watch_in(town)
     places = northwards(15.0, 8)
-    assert watch.look(track(town, places, NORTH, turning=True)) == []
-    assert kinds(watch.look(track(town, places[::-1], -NORTH))) == [Infraction.WRONG_WAY]
+    assert watch.look(way(places, NORTH, turning=True), 0) == []
+    assert kinds(watch.look(way(places[::-1], -NORTH), 0)) == [Infraction.WRONG_WAY]
     aside = [(x + 2.5, y) for x, y in places]  # on no lane that ends here
-    assert Infraction.RED_LIGHT not in kinds(watch.look(track(town, aside, NORTH)))
+    assert Infraction.RED_LIGHT not in kinds(watch.look(way(aside, NORTH), 0))
 
 
 @pytest.mark.parametrize(("stands_at", "broken"), [(1.0, False), (3.0, False), (5.0, True), (None, True)])
 def test_who_stands_too_far_before_the_line_has_not_stood(stands_at: float | None, broken: bool) -> None:
     town = crossing({"s": SignalKind.STOP})
-    watch = InfractionWatch(TownNetwork(town))
+    watch = watch_in(town)
     places = northwards(24.5, 60)
     speeds = [
         0.0 if stands_at is not None and abs(y - 2.5 - 12.0 - stands_at) < 0.1 else 8.0 for _, y in places
     ]  # fmt: skip
     assert (0.0 in speeds) == (stands_at is not None)
     # cut in two, as decisions cut it
-    found = watch.look(track(town, places[:40], NORTH, speeds=speeds[:40]))
-    found += watch.look(track(town, places[39:], NORTH, speeds=speeds[39:], frame=39))
+    found = watch.look(way(places[:40], NORTH, speeds=speeds[:40]), 0)
+    found += watch.look(way(places[39:], NORTH, speeds=speeds[39:]), 39)
     assert kinds(found) == ([Infraction.STOP_SIGN] if broken else [])
 
 
 def test_a_stand_counts_for_one_passage_only() -> None:
     town = crossing({"s": SignalKind.STOP})
-    watch = InfractionWatch(TownNetwork(town))
+    watch = watch_in(town)
     places = northwards(16.0, 12)
     speeds = [0.0] + [8.0] * 11
-    assert watch.look(track(town, places, NORTH, speeds=speeds)) == []
-    assert kinds(watch.look(track(town, places, NORTH))) == [Infraction.STOP_SIGN]
+    assert watch.look(way(places, NORTH, speeds=speeds), 0) == []
+    assert kinds(watch.look(way(places, NORTH), 0)) == [Infraction.STOP_SIGN]
 
 
 # --- lanes --------------------------------------------------------------------------------------------------------
@@ -170,7 +174,7 @@ def test_road_ends_half_a_metre_outside_of_its_lanes(beside: float, off: bool) -
     town = crossing()
     assert town.lanes[way_in("s")].widths[0] == 4.0
     places = [(2.0 + beside, 60.0 - k) for k in range(20)]
-    found = InfractionWatch(TownNetwork(town)).look(track(town, places, NORTH))
+    found = watch_in(town).look(way(places, NORTH), 0)
     assert kinds(found) == ([Infraction.OFF_ROAD] if off else [])
     for breach in found:
         assert breach.lane == way_in("s")
@@ -215,7 +219,7 @@ def test_driving_on_the_left_is_wrong_and_turning_round_is_not() -> None:
 def test_across_the_road_is_not_against_the_traffic(degrees: int, against: bool) -> None:
     town = crossing()
     places = [(2.0, 60.0)] * 5
-    found = InfractionWatch(TownNetwork(town)).look(track(town, places, NORTH + math.radians(degrees)))
+    found = watch_in(town).look(way(places, NORTH + math.radians(degrees)), 0)
     assert kinds(found) == ([Infraction.WRONG_WAY] if against else [])
 
 
@@ -223,7 +227,7 @@ def test_in_a_junction_no_way_is_wrong() -> None:
     town = crossing()
     connector = town.lanes[across("s", "n")]
     x, y = connector.position(connector.length / 2)
-    assert InfractionWatch(TownNetwork(town)).look(track(town, [(x, y)] * 5, -NORTH)) == []
+    assert watch_in(town).look(way([(x, y)] * 5, -NORTH), 0) == []
 
 
 # --- collisions ---------------------------------------------------------------------------------------------------

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from dorothie_gym.ontology import OntologyError, WeatherParameter
 from dorothie_gym.world.car.control import MAX_BRAKING
 from dorothie_gym.world.car.hazards import SIDE_MARGIN
-from dorothie_gym.world.perception import MOST_SIGMAS, detection_probability, position_error
+from dorothie_gym.world.kernel.seeing import MOST_SIGMAS
+from dorothie_gym.world.perception import detection_probability, position_error
 from dorothie_gym.world.visibility import CLEAR_SIGHT, DENSEST_FOG, SHORTEST_SIGHT, Visibility
 from dorothie_gym.world.weather import WET_LOSS, Weather
 

@@ -21,7 +21,7 @@ from dorothie_gym.world.kernel.records import NOBODY, Footway, Kind, Records, Wa
 from dorothie_gym.world.kernel.towing import is_clear_of_people, new_key, put_on_lane
 from dorothie_gym.world.kernel.town_arrays import TownArrays
 from dorothie_gym.world.kernel.walking import place_walker
-from dorothie_gym.world.kernel.world_arrays import WorldArrays
+from dorothie_gym.world.kernel.world_arrays import CAR_KEY, WorldArrays
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.pedestrians import KERB, WALKING_SPEED, rightmost
 

@@ -75,6 +75,14 @@ class Wait(enum.IntEnum):
     NO_ROOM = 7
 
 
+class Group(enum.IntEnum):
+    """In which array of a world a body is."""
+
+    VEHICLES = 0
+    PEDESTRIANS = 1
+    PROPS = 2
+
+
 class Walk(enum.IntEnum):
     """What a pedestrian does; who strays crosses the road where there is no crosswalk."""
 
@@ -279,24 +287,6 @@ CAR = np.dtype(
 """What drives the session's car, the vehicle of the kind `Kind.DRIVEN`."""
 
 
-SEEN = np.dtype(
-    [
-        ("distance2", "f8"),  # square of its distance [m^2]
-        ("x", "f8"), ("y", "f8"),  # where it seems to be [m]
-        ("heading", "f8"), ("cos", "f8"), ("sin", "f8"), ("speed", "f8"),
-        ("length", "f8"), ("width", "f8"), ("height", "f8"),
-        ("kind", "i4"), ("key", "i4"), ("body", "i4"),
-    ],
-    align=True,
-)  # fmt: skip
-
-EYE = np.dtype(
-    [("seed", "i8"), ("sight", "f8"), ("fog", "f8"), ("fog_start", "f8"), ("rain", "f8"), ("light", "f8"),
-     ("lamps", "f8"), ("clarity", "f8"), ("clear", "b1")],
-    align=True,
-)  # fmt: skip
-
-
 class EventCode(enum.IntEnum):
     """What happened to the car."""
 
@@ -329,3 +319,40 @@ how many stray over a road now; `random` is a number from which those of all bod
 
 LAMP = np.dtype([("until", "f8"), ("phase", "i4")], align=True)
 """The phase of a light programme now, which holds until a time [s]."""
+
+SEEN = np.dtype(
+    [
+        ("distance2", "f8"),  # square of its distance, as it seems [m^2]
+        ("x", "f8"), ("y", "f8"),  # where it seems to be [m]
+        ("heading", "f8"), ("cos", "f8"), ("sin", "f8"), ("speed", "f8"),
+        ("length", "f8"), ("width", "f8"), ("height", "f8"),  # its outline, and the height of the road under it [m]
+        ("kind", "i4"),  # value of the ontology's `ObjectClass`
+        ("key", "i4"),
+        ("body", "i4"), ("group", "i4"),  # its place in the array of its `Group`
+    ],
+    align=True,
+)  # fmt: skip
+"""A body that is perceived."""
+
+EYE = np.dtype(
+    [
+        ("seed", "i8"),
+        ("sight", "f8"),  # within which nothing is missed [m]
+        ("fog", "f8"), ("fog_start", "f8"), ("rain", "f8"), ("light", "f8"), ("lamps", "f8"), ("clarity", "f8"),
+        ("clear", "b1"),  # whether all within `visibility.CLEAR_SIGHT` is seen where it is
+    ],
+    align=True,
+)  # fmt: skip
+"""How well one sees: the fields of `visibility.Visibility`, and the seed of errors and misses."""
+
+LINE = np.dtype(
+    [("x", "f8"), ("y", "f8"), ("cos", "f8"), ("sin", "f8"), ("half_width", "f8"), ("height", "f8"), ("is_stop", "b1")],
+    align=True,
+)  # fmt: skip
+"""The end of a lane with a light or a stop sign: place [m], direction, half of the lane's width and height [m]."""
+
+MARK = np.dtype([("near", "i4"), ("stood", "b1")], align=True)
+"""A line, as one car has it: whether it has stood there; `near` lists the lines near it, for this moment only."""
+
+FINDING = np.dtype([("station", "f8"), ("pose", "i4"), ("kind", "i4"), ("number", "i4")], align=True)
+"""What was found: at which pose, `rules.Found`, and of which line or lane; on a lane, how far along it [m]."""

@@ -44,28 +44,52 @@ def step(
         acceleration: of vehicles of the kind `Kind.EGO` [m/s^2].
         steering: angle of their front wheels, positive to the right [rad].
     """
-    vehicles, clock = world.vehicles, world.clock[0]
+    vehicles, slip = world.vehicles, slip_of(steering)
     world.car[0].events = world.car[0].frames = 0
     for _ in range(substeps):
         for i in range(len(vehicles)):
-            vehicle = vehicles[i]
-            if vehicle.kind == Kind.DRIVEN:
-                guide(town, world, dt)
-            elif vehicle.kind == Kind.EGO:
-                vehicle.acceleration, vehicle.slip = acceleration, slip_of(steering)
-            elif vehicle.kind != Kind.EMPTY:
-                drive(town, world, i)
-        walk(town, world, dt)
-        for i in range(len(vehicles)):
-            if vehicles[i].kind != Kind.EMPTY:
-                _go_on(town, vehicles[i], dt)
-        collide(world)
-        tow(town, world, dt, bool(world.car[0].sweeping))
-        rebuild(town, world)
-        clock.frame += 1
-        clock.time = clock.frame * dt
+            if vehicles[i].kind == Kind.EGO:
+                vehicles[i].acceleration, vehicles[i].slip = acceleration, slip
+        _decide(town, world, dt)
+        _move(town, world, dt, True)
+        _meet(town, world, dt, True)
+        world.clock[0].time = world.clock[0].frame * dt
         if len(vehicles) > 0 and vehicles[0].kind == Kind.DRIVEN:
             trace(world)
+
+
+# Each phase is compiled on its own: woven into one function they would take the compiler twice as long.
+
+
+@compiled
+def _decide(town: TownArrays, world: WorldArrays, dt: float) -> None:
+    """Lets everybody decide, and those on foot walk."""
+    for i in range(len(world.vehicles)):
+        kind = world.vehicles[i].kind
+        if kind == Kind.DRIVEN:
+            guide(town, world, dt)
+        elif kind != Kind.EMPTY and kind != Kind.EGO:
+            drive(town, world, i)
+    walk(town, world, dt)
+
+
+@compiled
+def _move(town: TownArrays, world: WorldArrays, dt: float, egos: bool) -> None:
+    """Moves all vehicles; those of the kind `Kind.EGO` only if so wanted."""
+    for i in range(len(world.vehicles)):
+        kind = world.vehicles[i].kind
+        if kind != Kind.EMPTY and (egos or kind != Kind.EGO):
+            _go_on(town, world.vehicles[i], dt)
+
+
+@compiled
+def _meet(town: TownArrays, world: WorldArrays, dt: float, tows: bool) -> None:
+    """Finds out who touches whom, tows away if so wanted, and lists who is where; then the substep is over."""
+    collide(world)
+    if tows:
+        tow(town, world, dt, bool(world.car[0].sweeping))
+    rebuild(town, world)
+    world.clock[0].frame += 1
 
 
 @inlined
@@ -114,25 +138,15 @@ def step_around(town: TownArrays, world: WorldArrays, dt: float, rows: NDArray[n
         rows: (n,) rows of those vehicles.
         poses: (n, 4) where they are at its end: x, y [m], heading [rad], and their speed [m/s].
     """
-    vehicles, clock = world.vehicles, world.clock[0]
-    for i in range(len(vehicles)):
-        if vehicles[i].kind != Kind.EMPTY and vehicles[i].kind != Kind.EGO:
-            drive(town, world, i)
-    walk(town, world, dt)
-    for i in range(len(vehicles)):
-        if vehicles[i].kind != Kind.EMPTY and vehicles[i].kind != Kind.EGO:
-            _go_on(town, vehicles[i], dt)
+    vehicles = world.vehicles
+    _decide(town, world, dt)
+    _move(town, world, dt, False)
+    intact = True
     for k in range(len(rows)):
         vehicle = vehicles[rows[k]]
         vehicle.x, vehicle.y, vehicle.heading, vehicle.speed = poses[k, 0], poses[k, 1], poses[k, 2], poses[k, 3]
         vehicle.cos, vehicle.sin = math.cos(vehicle.heading), math.sin(vehicle.heading)
         find(town, vehicle)
-    collide(world)
-    intact = True
-    for k in range(len(rows)):
-        intact = intact and not vehicles[rows[k]].crashed
-    if intact:
-        tow(town, world, dt)
-    rebuild(town, world)
-    clock.time += dt
-    clock.frame += 1
+        intact = intact and not vehicle.crashed
+    _meet(town, world, dt, intact)
+    world.clock[0].time = world.clock[0].frame * dt

@@ -178,3 +178,26 @@ def test_empty_road_and_lone_vehicle():
     road.act()
     road.step(0.1)
     assert road.neighbour_vehicles(on(road, 0, 5.0)) == (None, None)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_those_close_to_a_vehicle_are_the_stock_ones(seed):
+    network = TownNetwork(straight_town(lanes=3, roads=3))
+    ours, stock = scattered(network, TownRoad, seed), scattered(network, Road, seed)
+    for options in (
+        {},
+        {"count": 4},
+        {"see_behind": False},
+        {"sort": False, "count": 3},
+        {"vehicles_only": True, "see_behind": False, "count": 0},
+    ):
+        for mine, theirs in zip(ours.vehicles, stock.vehicles, strict=True):
+            found, expected = (
+                ours.close_objects_to(mine, 90.0, **options),
+                stock.close_objects_to(theirs, 90.0, **options),
+            )
+            assert [place_in(ours.vehicles + ours.objects, t) for t in found] == [
+                place_in(stock.vehicles + stock.objects, t) for t in expected
+            ]
+    alone = TownRoad(network)
+    assert alone.close_objects_to(on(alone, 0, 5.0), 50.0) == []
