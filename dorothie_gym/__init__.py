@@ -115,7 +115,11 @@ def _register() -> None:
         )
     for task in ("UfN", "RfN", "NfD"):
         gymnasium.register(f"dorothie_gym/{task}-v0", f"dorothie_gym.evaluation.teacher_forced:{task}Env")
-    gymnasium.register("dorothie_gym/Town-v0", "dorothie_gym.world.town_env:TownEnv")
+    gymnasium.register(
+        "dorothie_gym/Town-v0",
+        "dorothie_gym.world.town_env:TownEnv",
+        vector_entry_point="dorothie_gym.world.town_vector_env:TownVectorEnv",
+    )
 
 
 _register()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,18 +13,13 @@ from highway_env.vehicle.objects import Landmark
 from numpy.typing import NDArray
 
 from dorothie_gym.world.compiled_road import CompiledRoad
-from dorothie_gym.world.kernel import Kind, Walk, WorldArrays, empty_world, populate, town_arrays
+from dorothie_gym.world.kernel import empty_world, town_arrays
 from dorothie_gym.world.network.network import FARTHEST, TownNetwork
 from dorothie_gym.world.observing import parts_of, quicken
 from dorothie_gym.world.places import free_places
+from dorothie_gym.world.surroundings import SEEDS, populate_around
 from dorothie_gym.world.town import load_town
 from dorothie_gym.world.town.model import Array
-
-CLEAR_OF_EGO = 25.0
-"""At the start nobody is closer to the vehicle than this [m]."""
-
-ROUNDS = 8
-"""So many times others are brought to places in lieu of those who were too close."""
 
 
 class TownEnv(AbstractEnv):
@@ -105,7 +99,7 @@ class TownEnv(AbstractEnv):
         """Sets the spaces, with finite bounds: nothing in a town is beyond `FARTHEST`."""
         super().define_spaces()
         quicken(self.observation_type)
-        self.observation_space = _finite(self.observation_space)
+        self.observation_space = finite(self.observation_space)
         for kind in parts_of(self.observation_type):
             viewer = getattr(kind, "viewer", None)
             if viewer is not None:
@@ -117,9 +111,8 @@ class TownEnv(AbstractEnv):
             self._network = TownNetwork(load_town(self._network_of))
         network, town = self._network, self._network.town
         vehicles, pedestrians = int(self.config["vehicles"]), int(self.config["pedestrians"])
-        arrays = empty_world(
-            town_arrays(network), vehicles=vehicles + 1, pedestrians=pedestrians, seed=self._draw_seed()
-        )  # fmt: skip
+        seed = int(self.np_random.integers(SEEDS))
+        arrays = empty_world(town_arrays(network), vehicles=vehicles + 1, pedestrians=pedestrians, seed=seed)
         self.road = CompiledRoad(
             network, arrays, np_random=self.np_random, record_history=self.config["show_trajectories"]
         )
@@ -136,34 +129,8 @@ class TownEnv(AbstractEnv):
         self.vehicle.goal = Landmark(self.road, town.lanes[goal].position(there), town.lanes[goal].heading_at(there))
         self.road.vehicles.append(self.vehicle)
         self.road.show()
-        self._populate(vehicles, pedestrians)
-
-    def _populate(self, vehicles: int, pedestrians: int) -> None:
-        """Brings others to random places, as many as fit and none close to the vehicle."""
-        road = self.road
-        arrays, (x, y) = road.arrays, self.vehicle.position
-        wanted = np.array((vehicles + 1, pedestrians))
-        for _ in range(ROUNDS):
-            there = _counts(arrays)
-            missing = wanted - there
-            if not missing.any():
-                break
-            populate(
-                road.network, road.town_arrays, arrays, seed=self._draw_seed(),
-                vehicles=int(missing[0]), pedestrians=int(missing[1]),
-            )  # fmt: skip
-            if (_counts(arrays) == there).all():
-                break  # the town is full
-            for body in arrays.vehicles:
-                if body.kind != Kind.EGO and math.hypot(body.x - x, body.y - y) < CLEAR_OF_EGO:
-                    body.kind = Kind.EMPTY
-            for body in arrays.pedestrians:
-                if math.hypot(body.x - x, body.y - y) < CLEAR_OF_EGO:
-                    body.state = Walk.EMPTY
-        road.show()
-
-    def _draw_seed(self) -> int:
-        return int(self.np_random.integers(2**31))
+        populate_around(network, arrays, self.np_random, vehicles=vehicles, pedestrians=pedestrians)
+        self.road.show()
 
     def _reward(self, action: Any) -> float:
         return float(sum(self._rewards(action).values()))
@@ -193,17 +160,12 @@ class TownEnv(AbstractEnv):
         return bool(self.time >= self.config["duration"])
 
 
-def _counts(arrays: WorldArrays) -> NDArray[np.int64]:
-    """How many vehicles and pedestrians there are (2,)."""
-    return np.array(((arrays.vehicles.kind != Kind.EMPTY).sum(), (arrays.pedestrians.state != Walk.EMPTY).sum()))
-
-
-def _finite(space: spaces.Space[Any]) -> spaces.Space[Any]:
+def finite(space: spaces.Space[Any]) -> spaces.Space[Any]:
     """The same space with finite bounds; images have them."""
     if isinstance(space, spaces.Dict):
-        return spaces.Dict({name: _finite(part) for name, part in space.items()})
+        return spaces.Dict({name: finite(part) for name, part in space.items()})
     if isinstance(space, spaces.Tuple):
-        return spaces.Tuple([_finite(part) for part in space])
+        return spaces.Tuple([finite(part) for part in space])
     if isinstance(space, spaces.Box) and space.dtype != np.uint8:
         low, high = np.clip(space.low, -FARTHEST, FARTHEST), np.clip(space.high, -FARTHEST, FARTHEST)
         return spaces.Box(low, high, dtype=space.dtype.type)

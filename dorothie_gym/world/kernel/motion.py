@@ -30,9 +30,24 @@ STEEP = math.sin(LARGEST_HEADING)
 @inlined
 def slip_towards_lane(points: Array, lane: Records, vehicle: Records) -> float:
     """Sine of the slip angle that keeps a vehicle on the lane that it follows (where `station` and `lateral` are)."""
-    ahead = value_near(points, lane, vehicle.segment, 3, vehicle.station + vehicle.speed * TAU_PURSUIT)
+    return slip_towards(points, lane, vehicle, vehicle.segment, vehicle.station, vehicle.lateral - vehicle.to_right)
+
+
+@inlined
+def slip_towards(points: Array, lane: Records, vehicle: Records, segment: int, station: float, off: float) -> float:
+    """Sine of the slip angle that brings a vehicle to a lane.
+
+    Args:
+        points: of all lanes.
+        lane: the lane.
+        vehicle: the vehicle.
+        segment: of the lane that is closest to it.
+        station: of the vehicle along the lane [m].
+        off: how far to the right of its place across the lane it is [m].
+    """
+    ahead = value_near(points, lane, segment, 3, station + vehicle.speed * TAU_PURSUIT)
     speed = not_zero(vehicle.speed)
-    back = -KP_LATERAL * (vehicle.lateral - vehicle.to_right) / speed
+    back = -KP_LATERAL * off / speed
     if back >= STEEP:
         back = LARGEST_HEADING
     elif back <= -STEEP:
