@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from dorothie_gym.envs.measuring import progress_on_path, write_waypoints
 from dorothie_gym.world.car.path import Path
 from dorothie_gym.world.town.model import Array
 from dorothie_gym.world.world import World
@@ -22,25 +23,24 @@ class Bearings:
 
     Attributes:
         pose: estimate (x, y, heading) [m, m, rad].
+        x: of it, as a plain number [m]; `y` likewise.
+        cosine: of the angle by which the estimated heading is off; `sine` likewise.
         progress: where on its planned path the car believes itself to be [m].
     """
 
     def __init__(self, world: World) -> None:
         car, planner = world.car, world.planner
         self.pose = world.localizer.pose
-        self._true = (float(car.position[0]), float(car.position[1]))
-        self._x, self._y = float(self.pose[0]), float(self.pose[1])
-        turn = float(self.pose[2]) - float(car.heading)
-        self._cos, self._sin = math.cos(turn), math.sin(turn)
+        self.x, self.y, heading = self.pose.tolist()
+        true_x, true_y = car.position.tolist()
+        turn = heading - float(car.heading)
+        self.cosine, self.sine = math.cos(turn), math.sin(turn)
         self._path: Path = planner.path
-        error = math.hypot(self._x - self._true[0], self._y - self._true[1])
-        self.progress, _ = self._path.project(self._x, self._y, planner.s, SEARCH + 2.0 * error)
+        error = math.hypot(self.x - true_x, self.y - true_y)
+        self.progress: float = progress_on_path(
+            self._path.s, self._path.points, self.x, self.y, planner.s, SEARCH + 2.0 * error
+        )
         self._ahead = self.progress - planner.s
-
-    def seen(self, x: float, y: float) -> tuple[float, float]:
-        """Where on the map something seems to be that is seen at a true place [m]."""
-        dx, dy = x - self._true[0], y - self._true[1]
-        return self._x + dx * self._cos - dy * self._sin, self._y + dx * self._sin + dy * self._cos
 
     def way_left(self, distance: float) -> float:
         """How far something on the path seems to be [m] that is `distance` ahead of where the car is."""
@@ -48,12 +48,12 @@ class Bearings:
 
     def waypoints(self, count: int, spacing: float) -> Array:
         """Points of the planned path ahead of where the car believes itself to be (count, 2) [m]."""
-        return np.array([self._point(self.progress + (k + 1) * spacing) for k in range(count)])
+        table = np.zeros((count, 2))
+        self.write_waypoints(table, spacing)
+        return table
 
-    def _point(self, s: float) -> tuple[float, float]:
-        if s >= 0.0:
-            return self._path.position_at(min(s, self._path.length))
+    def write_waypoints(self, table: Array, spacing: float) -> None:
+        """Writes `waypoints` into a table (count, 2)."""
+        path = self._path
         # before its start, which is where the car truly was when it was laid, the path goes on straight
-        x, y = self._path.position_at(0.0)
-        heading = self._path.heading_at(0.0)
-        return x + s * math.cos(heading), y + s * math.sin(heading)
+        write_waypoints(path.s, path.points, path.heading_at(0.0), self.progress, spacing, table)

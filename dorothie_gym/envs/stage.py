@@ -13,6 +13,8 @@ from dorothie_gym.dialogue import Conversation, ExchangeTracker, Span, Utterance
 from dorothie_gym.envs.adversary import Adversary
 from dorothie_gym.envs.beliefs import Beliefs
 from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.envs.masks import Masks
+from dorothie_gym.envs.prospect import Prospect
 from dorothie_gym.envs.scenario import Scenario
 from dorothie_gym.envs.views import Moment, Views
 from dorothie_gym.ontology import (
@@ -90,7 +92,9 @@ class Stage:
         self._conversation = Conversation(config.words_per_second, limits.spans)
         self._exchanges = ExchangeTracker()
         self._words = np.random.default_rng(word_seed)
-        self._views = Views(self.world, scenario, self.task, self.beliefs, limits, config.observe_acts)
+        prospect = Prospect(self.world)
+        self._views = Views(self.world, scenario, self.task, self.beliefs, limits, config.observe_acts, prospect)
+        self._masks = Masks(self.world, self.task, limits, prospect)
         self._moment = self._new_moment([], "")
         self._statuses = [self.task.status(i) for i in range(len(scenario.storyboard.subgoals))]
         self.events: list[Event] = []
@@ -118,9 +122,17 @@ class Stage:
         self.trail.append(self._car_place())
         return self._rewards(self._reached() - reached, self.world.collisions - collisions, spoken)
 
+    def observations(self) -> dict[str, Observation]:
+        """What the roles observe now."""
+        return self._views.observe(self._moment)
+
     def observe(self, role: Role) -> Observation:
         """What a role observes now."""
-        return self._views.observe(role, self._moment)
+        return self.observations()[str(role)]
+
+    def mask(self, role: Role) -> dict[str, Any]:
+        """Which actions of a role would not be refused now."""
+        return self._masks.mask(role)
 
     def end(self, reason: str) -> None:
         """Closes the session."""

@@ -194,6 +194,14 @@ class World:
         bodies = self.actors.bodies(self.car.position, CLEAR_SIGHT)
         return self._perception.perceive(bodies, float(x), float(y), self.visibility, self.frame)
 
+    def seen(self) -> Array:
+        """The same in numbers (n, 9): key, kind, x, y [m], heading [rad], length, width [m], speed [m/s], height [m]."""
+        rows = [
+            (body.key, body.kind.value, body.x, body.y, body.heading, body.length, body.width, body.speed, body.height)
+            for body in self.perceived()
+        ]
+        return np.array(rows, dtype=np.float64).reshape(-1, 9)
+
     def _note_hazard(self, hazard: Hazard | None, brake: float) -> None:
         """Logs when the car begins to stop for something, and when it goes on."""
         free = self.driver.allowed_speed(None)
