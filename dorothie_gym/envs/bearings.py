@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
-import numpy as np
+from numpy.typing import NDArray
 
-from dorothie_gym.envs.measuring import progress_on_path, write_waypoints
-from dorothie_gym.world.car.path import Path
+from dorothie_gym.envs.measuring import write_objects, write_path
 from dorothie_gym.world.town.model import Array
 from dorothie_gym.world.world import World
 
@@ -16,44 +16,55 @@ SEARCH = 6.0
 
 
 class Bearings:
-    """Places told from the estimated pose.
+    """Places told from the true and from the estimated pose.
 
     What the car sees is relative to the car, so on the map it is as far off as the car itself; what is on the map lies
     where the map says, and how far it is follows from the estimate.
 
     Attributes:
         pose: estimate (x, y, heading) [m, m, rad].
-        x: of it, as a plain number [m]; `y` likewise.
-        cosine: of the angle by which the estimated heading is off; `sine` likewise.
-        progress: where on its planned path the car believes itself to be [m].
+        progress: where on its planned path the car believes itself to be [m]; where it is until `write_path`.
     """
 
     def __init__(self, world: World) -> None:
         car, planner = world.car, world.planner
         self.pose = world.localizer.pose
-        self.x, self.y, heading = self.pose.tolist()
-        true_x, true_y = car.position.tolist()
-        turn = heading - float(car.heading)
-        self.cosine, self.sine = math.cos(turn), math.sin(turn)
-        self._path: Path = planner.path
-        error = math.hypot(self.x - true_x, self.y - true_y)
-        self.progress: float = progress_on_path(
-            self._path.s, self._path.points, self.x, self.y, planner.s, SEARCH + 2.0 * error
-        )
-        self._ahead = self.progress - planner.s
+        self._x, self._y, self._heading = self.pose.tolist()
+        self._true_x, self._true_y = car.position.tolist()
+        self._true_heading = float(car.heading)
+        self._path, self._near = planner.path, planner.s
+        self.progress = self._near
+
+    def write_path(
+        self, spacing: float, waypoints: Array, path_lanes: NDArray[Any], believed_waypoints: Array
+    ) -> None:  # fmt: skip
+        """Writes what is shown of the planned path.
+
+        Args:
+            spacing: of the waypoints along the path [m].
+            waypoints: points ahead of where the car is (n, 2) [m].
+            path_lanes: lanes from there on (n,), as one more than their numbers.
+            believed_waypoints: points ahead of where it believes itself to be (n, 2) [m]. Before its start, which is
+                where the car truly was when it was laid, the path goes on straight.
+        """
+        path = self._path
+        error = math.hypot(self._x - self._true_x, self._y - self._true_y)
+        self.progress = write_path(
+            path.s, path.points, path.lanes, float(path.headings[0]), self._near, spacing,
+            self._x, self._y, SEARCH + 2.0 * error, waypoints, path_lanes, believed_waypoints,
+        )  # fmt: skip
+
+    def write_objects(self, seen: Array, objects: Array, believed: Array) -> None:
+        """Writes bodies (rows of `World.seen`) where they are into one table, and where they are believed into another.
+
+        Distance and bearing in both are those from the car.
+        """
+        turn = self._heading - self._true_heading
+        write_objects(
+            seen, self._true_x, self._true_y, self._true_heading,
+            self._x, self._y, math.cos(turn), math.sin(turn), objects, believed,
+        )  # fmt: skip
 
     def way_left(self, distance: float) -> float:
         """How far something on the path seems to be [m] that is `distance` ahead of where the car is."""
-        return max(distance - self._ahead, 0.0)
-
-    def waypoints(self, count: int, spacing: float) -> Array:
-        """Points of the planned path ahead of where the car believes itself to be (count, 2) [m]."""
-        table = np.zeros((count, 2))
-        self.write_waypoints(table, spacing)
-        return table
-
-    def write_waypoints(self, table: Array, spacing: float) -> None:
-        """Writes `waypoints` into a table (count, 2)."""
-        path = self._path
-        # before its start, which is where the car truly was when it was laid, the path goes on straight
-        write_waypoints(path.s, path.points, path.heading_at(0.0), self.progress, spacing, table)
+        return max(distance - (self.progress - self._near), 0.0)

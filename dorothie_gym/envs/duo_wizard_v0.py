@@ -23,6 +23,8 @@ from dorothie_gym.tasks import StoryboardTemplate, load_template
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.town import Town, load_town
 
+_AGENTS = {str(role): role for role in ROLES}
+
 
 class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
     """Three agents talk while a car drives through a town.
@@ -143,7 +145,7 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
         self._cycles = 0
         self.agents = list(self.possible_agents)
         observations = self._stage.observations()
-        infos = {str(role): self._info(role, {}) for role in ROLES}
+        infos = self._infos({role: {} for role in ROLES})
         if self.render_mode == "human":
             self.render()
         return observations, infos
@@ -169,10 +171,10 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
         if not self.agents:
             return {}, {}, {}, {}, {}
         decoded = {}
-        for role, decode in self._decoders.items():
-            if role not in actions:
-                raise ValueError(f"the action of {role} is missing; it is needed from {', '.join(self.agents)}")
-            decoded[role] = decode(actions[role])
+        for agent, role in _AGENTS.items():
+            if agent not in actions:
+                raise ValueError(f"the action of {agent} is missing; it is needed from {', '.join(self.agents)}")
+            decoded[role] = self._decoders[role](actions[agent])
         terms = stage.play(decoded)
         self._cycles += 1
         out_of_time = (
@@ -184,10 +186,10 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
         if terminated or truncated:
             stage.end("arrived" if terminated else "out of time")
         observations = stage.observations()
-        infos = {str(role): self._info(role, terms[role]) for role in ROLES}
-        rewards = {str(role): float(sum(terms[role].values())) for role in ROLES}
-        terminations = {agent: terminated for agent in self.agents}
-        truncations = {agent: truncated for agent in self.agents}
+        infos = self._infos(terms)
+        rewards = {agent: float(sum(terms[role].values())) for agent, role in _AGENTS.items()}
+        terminations = dict.fromkeys(self.agents, terminated)
+        truncations = dict.fromkeys(self.agents, truncated)
         if terminated or truncated:
             self.agents = []
         if self.render_mode == "human":
@@ -252,12 +254,18 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
         """How the session stands, in JSON types."""
         return self.stage.summary()
 
-    def _info(self, role: Role, terms: Mapping[str, float]) -> dict[str, Any]:
+    def _infos(self, terms: Mapping[Role, Mapping[str, float]]) -> dict[str, dict[str, Any]]:
+        """What else an agent is told; everything in it is the taker's own."""
+        stage = self.stage
+        infractions = stage.infractions
         return {
-            "action_mask": self.stage.mask(role),
-            "reward_terms": dict(terms),
-            "refused": list(self.stage.refused[role]),
-            "infractions": self.stage.infractions,
+            agent: {
+                "action_mask": stage.mask(role),
+                "reward_terms": dict(terms[role]),
+                "refused": list(stage.refused[role]),
+                "infractions": dict(infractions),
+            }
+            for agent, role in _AGENTS.items()
         }
 
 

@@ -14,6 +14,7 @@ from dorothie_gym.ontology import SPEED_STEP, ExceptionKind, PhysicalAction, Rol
 from dorothie_gym.spaces import SpaceLimits, action_space
 from dorothie_gym.tasks import TaskState
 from dorothie_gym.world.car.driver import MAX_CRUISE, MIN_CRUISE
+from dorothie_gym.world.car.lanes import SIDES
 from dorothie_gym.world.town import LinkType
 from dorothie_gym.world.world import World
 
@@ -56,66 +57,75 @@ class Masks:
             if "plan" in sheet.form:
                 sheet.form["plan"][:, len(town.junctions) + 1 :] = 0
             self._sheets[role] = sheet
-        angle = self._sheets[Role.CO_WIZARD].form["angle"]
-        angle[:] = 0
-        angle[180] = 1
         self._sheets[Role.AD_WIZARD].form["exception"][:] = 0
         self._sheets[Role.AD_WIZARD].form["exception"][[int(kind) for kind in EVERY_TIME]] = 1
-        self._version = -1
+        self._state: tuple[Any, ...] = ()  # of the car, and what there is in the town, that the forms are of
+        self._there = (-1, -1)
+        self._beside: dict[int, tuple[bool, ...]] = {}  # whether a lane has one to its left, and to its right
 
     def mask(self, role: Role) -> dict[str, Any]:
         """The mask of a role's action space now; it is its taker's to change."""
-        if role is Role.AD_WIZARD:
-            self._note_task()
+        if role is Role.CO_WIZARD:
+            self._note_car()
+        elif role is Role.AD_WIZARD:
+            self._note_town()
         fields: dict[str, Any] = {**self._sheets[role].copy(), **self._unmasked[role]}
         if role is Role.CO_WIZARD:
-            self._write_physical(fields["physical"], fields["angle"])
             fields["plan"] = tuple(fields["plan"])
-        elif role is Role.AD_WIZARD:
-            self._write_props(fields["exception"])
         return fields
 
-    def _write_physical(self, physical: Mask, angle: Mask) -> None:
-        """What the car may be told to do (`physical`), and with which angles."""
-        world, planner = self._world, self._world.planner
-        speed = float(world.car.speed)
-        left, right = planner.may_switch(LinkType.LANE_CHANGE_LEFT), planner.may_switch(LinkType.LANE_CHANGE_RIGHT)
+    def _note_car(self) -> None:
+        """What the car may be told to do, and with which angles, when anything that this depends on has changed."""
+        planner, speed, cruise = self._world.planner, float(self._world.car.speed), self._world.driver.cruise
+        state = planner.path, planner.s, planner.held, planner.manoeuvre, planner.roadblock, speed, cruise
+        if state == self._state:
+            return
+        self._state = state
+        form = self._sheets[Role.CO_WIZARD].form
+        physical, angle = form["physical"], form["angle"]
+        lane = planner.lane
+        busy = planner.in_manoeuvre or self._world.town.lanes[lane].in_junction
+        beside_left, beside_right = self._lanes_beside(lane)
+        left = not busy and beside_left and planner.may_switch(LinkType.LANE_CHANGE_LEFT)
+        right = not busy and beside_right and planner.may_switch(LinkType.LANE_CHANGE_RIGHT)
         committed = planner.is_committed(speed)
-        exits = () if committed else self._prospect.options.exits
-        busy = planner.in_manoeuvre or world.town.lanes[planner.lane].in_junction
-        held, cruise = planner.held, world.driver.cruise
-        physical[PhysicalAction.LANE_FOLLOW] = (
-            not busy and not committed and (held or planner.manoeuvre[0] is not None)
-        )
+        exits = () if committed else self._prospect.options().exits
+        leaves = not busy and not committed and (planner.held or planner.manoeuvre[0] is not None)
+        physical[PhysicalAction.LANE_FOLLOW] = leaves
         physical[PhysicalAction.LANE_SWITCH] = left or right
-        physical[PhysicalAction.U_TURN] = not busy and planner.may_turn_round(speed)
+        # a U-turn begins on the leftmost lane
+        physical[PhysicalAction.U_TURN] = not busy and not beside_left and planner.may_turn_round(speed)
         physical[PhysicalAction.J_TURN] = bool(exits)
-        physical[PhysicalAction.STOP] = not held
-        physical[PhysicalAction.START] = held
+        physical[PhysicalAction.STOP] = not planner.held
+        physical[PhysicalAction.START] = planner.held
         physical[PhysicalAction.SPEED_CHANGE] = MIN_CRUISE + SPEED_STEP <= cruise or cruise <= MAX_CRUISE - SPEED_STEP
-        planned = None if held else planner.turn_ahead
+        planned = None if planner.held else planner.turn_ahead
+        angle[:] = 0
+        angle[180] = 1
         for way in exits:
             angle[way.angle + 180] = way.angle != planned
-        if left:
-            angle[90 + 180] = 1
-        if right:
-            angle[-90 + 180] = 1
+        for side, possible in ((90, left), (-90, right)):
+            angle[side + 180] |= possible
 
-    def _note_task(self) -> None:
-        """What may be done with the task, when that has changed."""
-        task = self._task
-        if task.version == self._version:
+    def _lanes_beside(self, lane: int) -> tuple[bool, ...]:
+        found = self._beside.get(lane)
+        if found is None:
+            town = self._world.town
+            found = self._beside[lane] = tuple(town.neighbour(lane, side) is not None for side in SIDES)
+        return found
+
+    def _note_town(self) -> None:
+        """What the Ad-Wizard may do with props and the task, when those have changed."""
+        task, props = self._task, len(self._world.actors.props)
+        if (task.version, props) == self._there:
             return
-        self._version = task.version
+        self._there = task.version, props
         form = self._sheets[Role.AD_WIZARD].form["exception"]
+        form[ExceptionKind.PLACE_PROP] = props < self._limits.props
+        form[ExceptionKind.MOVE_PROP] = form[ExceptionKind.DELETE_PROP] = props > 0
         form[ExceptionKind.TASK_TRIGGER] = bool(task.possible_triggers())
         form[ExceptionKind.TASK_DELETE] = bool(task.possible_deletions())
         form[ExceptionKind.TASK_CHANGE] = bool(task.possible_changes())
-
-    def _write_props(self, exception: Mask) -> None:
-        count = len(self._world.actors.props)
-        exception[ExceptionKind.PLACE_PROP] = count < self._limits.props
-        exception[ExceptionKind.MOVE_PROP] = exception[ExceptionKind.DELETE_PROP] = count > 0
 
 
 def _shape(space: spaces.Space[Any]) -> Shape | None:

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from dorothie_gym.world.network.compiled import compiled
 from dorothie_gym.world.town.model import Array
 
@@ -23,6 +26,37 @@ def _index_at(s: Array, at: float) -> int:
         else:
             low = middle + 1
     return max(low - 1, 0)
+
+
+@compiled
+def next_choice(lanes: NDArray[np.int64], here: int, chooses: NDArray[np.bool_]) -> int:
+    """Number of the last point of a path that is on the next lane with a choice at its end; -1 if there is none.
+
+    Args:
+        lanes: of the points of the path (n,).
+        here: point of the path to begin with.
+        chooses: of each lane of the town.
+    """
+    for k in range(here, len(lanes)):
+        if chooses[lanes[k]]:
+            for last in range(len(lanes) - 1, k, -1):  # the lane may come again, round a block
+                if lanes[last] == lanes[k]:
+                    return last
+            return k
+    return -1
+
+
+@compiled
+def write_lanes(lanes: NDArray[np.int64], here: int, table: NDArray[np.int64]) -> None:
+    """Writes the lanes of a path from a point of it on, each once, in order, as one more than their numbers."""
+    row, last = 0, -1
+    for k in range(here, len(lanes)):
+        if row == len(table):
+            return
+        if lanes[k] != last:
+            last = lanes[k]
+            table[row] = last + 1
+            row += 1
 
 
 @compiled
@@ -120,3 +154,44 @@ def write_objects(
         objects[row, 1], objects[row, 2] = seen[row, 2], seen[row, 3]
         believed[row, 1] = believed_x + dx * cosine - dy * sine
         believed[row, 2] = believed_y + dx * sine + dy * cosine
+
+
+@compiled
+def write_path(
+    s: Array,
+    points: Array,
+    lanes: NDArray[np.int64],
+    heading: float,
+    near: float,
+    spacing: float,
+    x: float,
+    y: float,
+    window: float,
+    waypoints: Array,
+    path_lanes: NDArray[np.int64],
+    believed_waypoints: Array,
+) -> float:
+    """Writes what is shown of a path, as it is and as it seems from a believed position, in one call.
+
+    Args:
+        s: see above.
+        points: see above.
+        lanes: of the points (n,).
+        heading: of the path at its start [rad].
+        near: where on the path the car is [m].
+        spacing: of the waypoints [m].
+        x: where the car believes itself to be [m].
+        y: where the car believes itself to be [m].
+        window: how far from `near` that may be [m].
+        waypoints: `write_waypoints` from where the car is.
+        path_lanes: `write_lanes` from where the car is.
+        believed_waypoints: `write_waypoints` from where it believes itself to be.
+
+    Returns:
+        Where on the path the car believes itself to be [m].
+    """
+    progress = progress_on_path(s, points, x, y, near, window)
+    write_waypoints(s, points, heading, near, spacing, waypoints)
+    write_lanes(lanes, _index_at(s, near), path_lanes)
+    write_waypoints(s, points, heading, progress, spacing, believed_waypoints)
+    return progress

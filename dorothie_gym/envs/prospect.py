@@ -1,4 +1,4 @@
-"""What lies ahead of the car on its planned path: lanes, and the next junction where there is a choice."""
+"""What lies ahead of the car on its planned path: the next junction where there is a choice."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dorothie_gym.envs.measuring import next_choice
 from dorothie_gym.spaces import ExitColumn
 from dorothie_gym.world.car.path import Path
-from dorothie_gym.world.town import Exit, Town
+from dorothie_gym.world.town import Exit
 from dorothie_gym.world.town.model import Array
 from dorothie_gym.world.world import World
 
@@ -19,91 +20,57 @@ class Options(NamedTuple):
     Attributes:
         exits: ways on, from right to left.
         rows: the same as rows of `ExitColumn` (n, 6), the distance still to be filled in.
-        at: place of the junction on the path [m].
+        distance: to the junction along the path [m].
     """
 
     exits: tuple[Exit, ...]
     rows: Array
-    at: float
+    distance: float
 
 
 NO_OPTIONS = Options((), np.zeros((0, len(ExitColumn))), 0.0)
 
 
 class Prospect:
-    """The path ahead of the car in a session; looked at anew when there is another path.
-
-    The answers are those of `LocalPlanner.lanes_ahead` and `LocalPlanner.exits`.
-    """
+    """The path ahead of the car in a session; its answers are those of the planner (`LocalPlanner`)."""
 
     def __init__(self, world: World) -> None:
-        self._planner, self._town = world.planner, world.town
-        self._numbers = {junction.id: k for k, junction in enumerate(world.town.junctions)}
+        town = self._town = world.town
+        self._planner = world.planner
+        self._numbers = {junction.id: k for k, junction in enumerate(town.junctions)}
         self._rows: dict[int, Array] = {}
-        self._path: Path | None = None
-        self._starts: list[int] = []
-        self._lanes: list[int] = []
+        self._path: Path | None = None  # of which, and of where on it, the options are known
+        self._s = 0.0
         self._options = NO_OPTIONS
-        self._holds = range(0)  # stretches from which these are the next options
+        # lanes outside junctions at whose end a turn has to be chosen
+        self._chooses = np.array([not lane.in_junction and _is_choice(town.exits(lane.id)) for lane in town.lanes])
 
-    @property
-    def lanes(self) -> list[int]:
-        """Lanes of the path from here on, each once, in order."""
-        return self._lanes[self._stretch() :]
-
-    @property
     def options(self) -> Options:
         """Turn options at the next junction with a choice; none where the path comes to none."""
-        stretch = self._stretch()
-        if stretch not in self._holds:
-            self._options, until = self._next_options(stretch)
-            self._holds = range(stretch, until + 1)
+        planner = self._planner
+        if planner.path is not self._path or planner.s != self._s:
+            self._path, self._s = planner.path, planner.s
+            self._options = self._find(planner.path, planner.s)
         return self._options
 
-    def _stretch(self) -> int:
-        """Number of the stretch of the path, all of one lane, that the car is on."""
-        planner = self._planner
-        if planner.path is not self._path:
-            path = self._path = planner.path
-            starts = (np.flatnonzero(path.lanes[1:] != path.lanes[:-1]) + 1).tolist()
-            self._starts = [0, *starts]
-            self._lanes = path.lanes[self._starts].tolist()
-            self._holds = range(0)
-        k = self._path.index_at(planner.s)
-        stretch = len(self._starts) - 1
-        while self._starts[stretch] > k:
-            stretch -= 1
-        return stretch
-
-    def _next_options(self, stretch: int) -> tuple[Options, int]:
-        """The options at the next choice, and the last stretch from which they are the next."""
-        path = self._planner.path
-        for k in range(stretch, len(self._lanes)):
-            lane = self._town.lanes[self._lanes[k]]
-            if lane.in_junction or not is_choice(self._town, lane.id):
-                continue
-            # the lane may come again, round a block: its last point on the path counts
-            last = len(self._lanes) - 1 - self._lanes[::-1].index(lane.id)
-            point = (self._starts[last + 1] if last + 1 < len(self._starts) else len(path.s)) - 1
-            left = lane.length - float(path.stations[point])
-            return Options(self._town.exits(lane.id), self._rows_of(lane.id), float(path.s[point]) + left), k
-        return NO_OPTIONS, len(self._lanes)
+    def _find(self, path: Path, s: float) -> Options:
+        point = next_choice(path.lanes, path.index_at(s), self._chooses)
+        if point < 0:
+            return NO_OPTIONS
+        lane = int(path.lanes[point])
+        left = self._town.lanes[lane].length - float(path.stations[point])
+        return Options(self._town.exits(lane), self._rows_of(lane), float(path.s[point]) + left - s)
 
     def _rows_of(self, lane: int) -> Array:
-        if lane not in self._rows:
-            self._rows[lane] = np.array(
-                [
-                    (1.0, way.angle, 0.0, way.lane, self._town.lanes[way.lane].street, self._number(way))
-                    for way in self._town.exits(lane)
-                ]
-            )
-        return self._rows[lane]
+        rows = self._rows.get(lane)
+        if rows is None:
+            rows = self._rows[lane] = np.array([self._row(way) for way in self._town.exits(lane)])
+        return rows
 
-    def _number(self, way: Exit) -> int:
-        return self._numbers.get(way.junction_id, -1)
+    def _row(self, way: Exit) -> tuple[float, ...]:
+        street = self._town.lanes[way.lane].street
+        return 1.0, way.angle, 0.0, way.lane, street, self._numbers.get(way.junction_id, -1)
 
 
-def is_choice(town: Town, lane: int) -> bool:
-    """Whether a turn has to be chosen at the end of a lane."""
-    exits = town.exits(lane)
+def _is_choice(exits: tuple[Exit, ...]) -> bool:
     return len(exits) > 1 and any(way.junction_id >= 0 for way in exits)

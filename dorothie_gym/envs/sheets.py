@@ -39,10 +39,10 @@ class Sheet:
         arrays = spaces.Box | spaces.MultiDiscrete | spaces.MultiBinary
         return cls({name: (f.dtype, f.shape) for name, f in space.spaces.items() if isinstance(f, arrays)})
 
-    def copy(self) -> dict[str, NDArray[Any]]:
+    def copy(self) -> dict[str, Any]:
         """The arrays, by name: new ones that hold what the form holds."""
         return self._arrays(self._block.copy())
 
     def _arrays(self, block: NDArray[np.uint8]) -> dict[str, NDArray[Any]]:
-        record = np.ndarray((), self._layout, block)  # type: ignore[call-overload]
+        record = np.ndarray((), self._layout, block)
         return {name: record[name] for name in self._names}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +11,10 @@ from numpy.typing import NDArray
 from dorothie_gym.dialogue import Utterance
 from dorothie_gym.envs.bearings import Bearings
 from dorothie_gym.envs.beliefs import Beliefs
-from dorothie_gym.envs.measuring import write_objects, write_waypoints
 from dorothie_gym.envs.prospect import Prospect
 from dorothie_gym.envs.scenario import Scenario
 from dorothie_gym.envs.sheets import Sheet
-from dorothie_gym.ontology import GoalStatus, Role, Sensor, encode_slots
+from dorothie_gym.ontology import LABELS, GoalStatus, Role, Sensor, encode_slots
 from dorothie_gym.spaces import (
     ExitColumn,
     LandmarkColumn,
@@ -82,9 +80,11 @@ class Views:
             role: Sheet.of_space(observation_space(role, limits, observe_acts))
             for role in (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD)
         }
+        self._agents = [str(role) for role in self._sheets]
         self._participant = self._sheets[Role.PARTICIPANT]
         self._co_wizard = self._sheets[Role.CO_WIZARD]
         self._ad_wizard = self._sheets[Role.AD_WIZARD]
+        self._numbers = [np.int64(number) for number in range(max(limits.lanes, len(LABELS)))]  # made once
         self._story = plain_text(scenario.storyboard.story, STORY_LENGTH)
         self._tasks = ""
         self._weather: tuple[float, ...] = ()
@@ -95,12 +95,20 @@ class Views:
     def observe(self, moment: Moment) -> dict[str, Observation]:
         """The observations of the three roles, each in its observation space."""
         self._note_changes()
-        views = {str(role): self._view(sheet) for role, sheet in self._sheets.items()}
-        participant, co_wizard, ad_wizard = views.values()
-        motion = np.int64(self.motion())
-        lights = np.int64(self._world.lights)
-        self._write_true_places(participant, ad_wizard)
-        self._write_believed_places(co_wizard, participant["objects"])
+        participant, co_wizard, ad_wizard = views = [sheet.copy() for sheet in self._sheets.values()]
+        time, speed = self._world.time, self._world.car.speed
+        for view in views:
+            view["time"][0], view["speed"][0] = time, speed
+        bearings = Bearings(self._world)
+        motion = self._numbers[self.motion()]
+        lights = self._numbers[self._world.lights]
+        self._write_true_place(participant, ad_wizard)
+        self._write_believed_place(co_wizard, bearings.pose)
+        bearings.write_path(
+            WAYPOINT_SPACING, ad_wizard["waypoints"], ad_wizard["path_lanes"], co_wizard["waypoints"]
+        )  # fmt: skip
+        bearings.write_objects(self._world.seen(), participant["objects"], co_wizard["objects"])
+        self._write_exits(co_wizard["exits"], bearings)
         participant["lights"] = co_wizard["lights"] = lights
         co_wizard["motion"] = ad_wizard["motion"] = motion
         participant["story"] = ad_wizard["story"] = self._story
@@ -109,10 +117,10 @@ class Views:
         participant["speaking"][0] = moment.speaking[Role.PARTICIPANT]
         co_wizard["speaking"][0] = moment.speaking[Role.CO_WIZARD]
         self._write_driving(co_wizard)
-        self._write_plans(ad_wizard)
+        self._write_props(ad_wizard["props"])
         self._write_heard(Role.CO_WIZARD, moment, participant, ad_wizard)
         self._write_heard(Role.PARTICIPANT, moment, co_wizard, ad_wizard)
-        return views
+        return dict(zip(self._agents, views, strict=True))
 
     def motion(self) -> Motion:
         """What the car is about."""
@@ -170,43 +178,30 @@ class Views:
 
     # --- what is new each time --------------------------------------------------------------------------------------
 
-    def _view(self, sheet: Sheet) -> Observation:
-        view: Observation = sheet.copy()
-        view["time"][0] = self._world.time
-        view["speed"][0] = self._world.car.speed
-        return view
-
-    def _write_true_places(self, participant: Observation, ad_wizard: Observation) -> None:
+    def _write_true_place(self, participant: Observation, ad_wizard: Observation) -> None:
         """Where the car is; both know it."""
         car, planner = self._world.car, self._world.planner
-        lane, station = np.int64(planner.lane), planner.station
-        x, y = car.position.tolist()
-        for view in (participant, ad_wizard):
-            view["pose"][:] = x, y, car.heading
-            view["lane"] = lane
-            view["station"][0] = station
+        participant["pose"][:2], participant["pose"][2] = car.position, car.heading
+        ad_wizard["pose"][:] = participant["pose"]
+        participant["lane"] = ad_wizard["lane"] = self._numbers[planner.lane]
+        participant["station"][0] = ad_wizard["station"][0] = planner.station
 
-    def _write_believed_places(self, view: Observation, objects: Table) -> None:
-        """Where the Co-Wizard takes the car and all else to be; and into `objects`, where those are that are seen."""
+    def _write_believed_place(self, view: Observation, pose: Table) -> None:
+        """Where the Co-Wizard takes the car to be."""
         world = self._world
-        car, bearings = world.car, Bearings(world)
-        view["pose"][:] = bearings.pose
+        view["pose"][:] = pose
         view["pose_covariance"][:] = world.localizer.covariance
-        index = world.network.get_closest_lane_index(bearings.pose, float(bearings.pose[2]), height=float(car.height))
+        index = world.network.get_closest_lane_index(pose, float(pose[2]), height=float(world.car.height))
         lane = world.network.get_lane(index)
-        view["lane"] = np.int64(lane.town_lane.id)
-        view["station"][0] = min(max(lane.local_coordinates(bearings.pose)[0], 0.0), lane.length)
-        bearings.write_waypoints(view["waypoints"], WAYPOINT_SPACING)
-        x, y = car.position.tolist()
-        write_objects(
-            world.seen(), x, y, float(car.heading),
-            bearings.x, bearings.y, bearings.cosine, bearings.sine, objects, view["objects"],
-        )  # fmt: skip
-        options = self._prospect.options
-        rows = options.rows[: self._limits.exits]
+        view["lane"] = self._numbers[lane.town_lane.id]
+        view["station"][0] = min(max(lane.local_coordinates(pose)[0], 0.0), lane.length)
+
+    def _write_exits(self, table: Table, bearings: Bearings) -> None:
+        options = self._prospect.options()
+        rows = options.rows[: len(table)]
         if len(rows):
-            view["exits"][: len(rows)] = rows
-            view["exits"][: len(rows), ExitColumn.DISTANCE] = bearings.way_left(options.at - world.planner.s)
+            table[: len(rows)] = rows
+            table[: len(rows), ExitColumn.DISTANCE] = bearings.way_left(options.distance)
 
     def _write_driving(self, view: Observation) -> None:
         """What the car is told to do, and does."""
@@ -214,21 +209,14 @@ class Views:
         manoeuvre, angle = world.planner.manoeuvre
         hazard = world.hazard
         view["cruise_speed"][0] = world.driver.cruise
-        view["manoeuvre"] = np.int64(manoeuvre or 0)
+        view["manoeuvre"] = self._numbers[manoeuvre or 0]
         view["manoeuvre_angle"][0] = angle
-        view["hazard"] = np.int64(hazard.kind.value if hazard is not None else 0)
+        view["hazard"] = self._numbers[hazard.kind.value if hazard is not None else 0]
         if hazard is not None:
             view["hazard_distance"][0] = max(hazard.gap, 0.0)
 
-    def _write_plans(self, view: Observation) -> None:
-        """Where the car is going to be, and what stands in the town."""
-        planner = self._world.planner
-        path = planner.path
-        write_waypoints(path.s, path.points, 0.0, planner.s, WAYPOINT_SPACING, view["waypoints"])
-        ahead = self._prospect.lanes[: self._limits.plan]
-        view["path_lanes"][: len(ahead)] = ahead
-        view["path_lanes"][: len(ahead)] += 1
-        for row, prop in zip(view["props"], self._world.actors.props, strict=False):
+    def _write_props(self, table: Table) -> None:
+        for row, prop in zip(table, self._world.actors.props, strict=False):
             row[:] = _PROP_NUMBERS[prop.kind], prop.position[0], prop.position[1], prop.heading
 
     def _write_heard(self, speaker: Role, moment: Moment, *views: Observation) -> None:

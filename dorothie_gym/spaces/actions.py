@@ -152,11 +152,8 @@ class CoWizardAction:
     @classmethod
     def read(cls, reader: FieldReader) -> CoWizardAction:
         """The same from the fields."""
-        physical = reader.integer("physical")
-        mental = reader.integer("mental")
-        angle, up = reader.integer("angle"), reader.integer("up")
+        physical, mental, angle, up, landmark, status, lane, metres = reader.integers(_CO_WIZARD_NUMBERS)
         plan, goals = reader.numbers("plan"), reader.flags("goals")
-        landmark, status, place = reader.integer("landmark"), reader.integer("status"), _read_place(reader)
         speech = _read_speech(reader)
         if not physical and not mental and speech is None:
             return _INACTION
@@ -169,7 +166,7 @@ class CoWizardAction:
                 goals=tuple(LANDMARKS[i] for i, marked in enumerate(goals) if marked),
                 landmark=LANDMARKS[landmark],
                 status=STATUSES[status],
-                place=place,
+                place=Place(lane=lane, metres=metres),
             )
             if mental
             else None,
@@ -230,22 +227,31 @@ class AdWizardAction:
     @classmethod
     def read(cls, reader: FieldReader) -> AdWizardAction:
         """The same from the fields."""
+        numbers, message = reader.integers(_AD_WIZARD_NUMBERS), reader.text("message")
+        if not any(numbers) and not message:
+            return _INTACT
+        exception, weather, share, prop, item, lane, metres, count, extent, sensor, on = numbers
         return cls(
-            exception=EXCEPTIONS[reader.integer("exception")],
-            weather=WEATHER[reader.integer("weather")],
-            share=reader.integer("share") / (PERCENT - 1),
-            prop=PROPS[reader.integer("prop")],
-            item=reader.integer("item"),
-            place=_read_place(reader),
-            count=reader.integer("count"),
-            extent=reader.integer("extent"),
-            sensor=SENSORS[reader.integer("sensor")],
-            on=bool(reader.integer("on")),
-            message=reader.text("message"),
+            exception=EXCEPTIONS[exception],
+            weather=WEATHER[weather],
+            share=share / (PERCENT - 1),
+            prop=PROPS[prop],
+            item=item,
+            place=Place(lane=lane, metres=metres),
+            count=count,
+            extent=extent,
+            sensor=SENSORS[sensor],
+            on=bool(on),
+            message=message,
         )
 
 
-_SILENCE, _INACTION = ParticipantAction(), CoWizardAction()
+_CO_WIZARD_NUMBERS = ("physical", "mental", "angle", "up", "landmark", "status", "lane", "metres")
+_AD_WIZARD_NUMBERS = (
+    "exception", "weather", "share", "prop", "item", "lane", "metres", "count", "extent", "sensor", "on",
+)  # fmt: skip
+
+_SILENCE, _INACTION, _INTACT = ParticipantAction(), CoWizardAction(), AdWizardAction()
 """What most decisions are, made once."""
 
 RoleAction: TypeAlias = ParticipantAction | CoWizardAction | AdWizardAction
@@ -355,11 +361,6 @@ def _fields(role: Role, limits: SpaceLimits) -> FieldTable:
     return FieldTable(action_space(role, limits))
 
 
-def _read_place(reader: FieldReader) -> Place:
-    lane, metres = reader.integer("lane"), reader.integer("metres")
-    return Place(lane=lane, metres=metres) if lane or metres else _ORIGIN
-
-
 def _read_speech(reader: FieldReader) -> Speech | None:
     move, slots, text = reader.integer("move"), reader.flags("slots"), reader.text("utterance")
     return None if move == NO_MOVE else Speech(act=_act(move, slots), text=text)
@@ -368,6 +369,3 @@ def _read_speech(reader: FieldReader) -> Speech | None:
 @lru_cache(maxsize=4096)
 def _act(move: int, slots: bytes) -> DialogueAct:
     return DialogueAct(move=DialogueMove(move), slots=decode_slots(slots))
-
-
-_ORIGIN = Place()

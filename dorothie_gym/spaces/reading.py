@@ -6,7 +6,8 @@ else is looked at again by the checks that find the words for what is wrong.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import operator
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -75,6 +76,16 @@ class FieldReader:
             raise ValueError(f"field {name!r} is {value!r}; it must be a whole number in {low}..{high}")
         return int(value)
 
+    def integers(self, names: Sequence[str]) -> list[int]:
+        """Several whole numbers, each in its range."""
+        ranges, action = self._table.ranges, self._action
+        found = []
+        for name in names:
+            low, high = ranges[name]
+            value = action[name]
+            found.append(value if type(value) is int and low <= value <= high else self.integer(name))
+        return found
+
     def numbers(self, name: str) -> list[int]:
         """Whole numbers of an array, each from 0 to its greatest."""
         shape, tops = self._table.shapes[name], self._table.tops[name]
@@ -85,7 +96,7 @@ class FieldReader:
                 f"it must hold whole numbers in shape {shape}"
             )
         found: list[int] = value.ravel().tolist()
-        if min(found) < 0 or any(number > top for number, top in zip(found, tops, strict=True)):
+        if min(found) < 0 or (max(found) > min(tops) and any(map(operator.gt, found, tops))):
             raise ValueError(f"field {name!r} has a value outside 0..{max(tops)}")
         return found
 

@@ -195,7 +195,7 @@ class World:
         return self._perception.perceive(bodies, float(x), float(y), self.visibility, self.frame)
 
     def seen(self) -> Array:
-        """The same in numbers (n, 9): key, kind, x, y [m], heading [rad], length, width [m], speed [m/s], height [m]."""
+        """The same in numbers (n, 9): key, kind, x, y, heading, length, width, speed, height [m, rad, m/s]."""
         rows = [
             (body.key, body.kind.value, body.x, body.y, body.heading, body.length, body.width, body.speed, body.height)
             for body in self.perceived()

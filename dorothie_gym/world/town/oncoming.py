@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -43,9 +43,8 @@ SAMPLING = 4.0
 """Lanes near a lane are found by points about this far apart [m], on short ones up to twice as far."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Oncoming:
-    """The place on the oncoming lane that lies across from a place on a lane."""
+class Oncoming(NamedTuple):
+    """The place on the oncoming lane that lies across from a place on a lane: station and distance in metres."""
 
     lane: int
     station: float
@@ -72,18 +71,20 @@ class OncomingLanes:
 
     def at(self, lane_id: int, station: float) -> Oncoming | None:
         """The oncoming place, or None: in a junction, from a lane that is not the leftmost, or with nothing there."""
-        lane = self._town.lanes[lane_id]
-        if lane.in_junction or self._town.neighbour(lane_id, LinkType.LANE_CHANGE_LEFT) is not None:
-            return None
         candidates = self._near.get(lane_id)
         if candidates is None:
             candidates = self._near[lane_id] = self._lanes_near(lane_id)
+        if not len(candidates):
+            return None
         table = self._table
-        other, there, gap = _across(table.points, table.offsets, table.ends, lane_id, station, candidates)
-        return Oncoming(lane=other, station=there, gap=gap) if other >= 0 else None
+        found = Oncoming(*_across(table.points, table.offsets, table.ends, lane_id, station, candidates))
+        return found if found.lane >= 0 else None
 
     def _lanes_near(self, lane_id: int) -> IntArray:
-        """Lanes outside junctions that come near enough to a lane to be oncoming anywhere along it, by their ids."""
+        """Lanes outside junctions that come near enough to a lane to be oncoming somewhere along it, by their ids."""
+        lane = self._town.lanes[lane_id]
+        if lane.in_junction or self._town.neighbour(lane_id, LinkType.LANE_CHANGE_LEFT) is not None:
+            return np.empty(0, dtype=np.int64)
         reach = math.hypot(MAX_GAP, MAX_OFFSET) + 2 * SAMPLING  # points are at most two samplings apart
         near = self._tree.query_ball_point(self._points[self._owners == lane_id], reach)
         return np.unique(self._owners[np.unique(np.concatenate(near)).astype(np.int64)])
