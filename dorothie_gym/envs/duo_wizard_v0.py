@@ -260,7 +260,7 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
         infractions = stage.infractions
         return {
             agent: {
-                "action_mask": stage.mask(role),
+                "action_mask": stage.masks.mask(role),
                 "reward_terms": dict(terms[role]),
                 "refused": list(stage.refused[role]),
                 "infractions": dict(infractions),

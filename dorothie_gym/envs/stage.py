@@ -37,7 +37,6 @@ from dorothie_gym.spaces import (
     Physical,
     RoleAction,
     SpaceLimits,
-    Speech,
     plain_text,
 )
 from dorothie_gym.spaces.limits import UTTERANCE_LENGTH
@@ -78,6 +77,7 @@ class Stage:
         world: where it happens.
         task: how far the storyboard has been played.
         beliefs: what the Co-Wizard said it believes.
+        masks: which actions would not be refused now.
         events: what happened in the last decision.
         refused: reasons for the refusals of the last decision, by role.
         said: all utterances that were heard so far.
@@ -99,7 +99,7 @@ class Stage:
         self._words = np.random.default_rng(word_seed)
         prospect = Prospect(self.world)
         self._views = Views(self.world, scenario, self.task, self.beliefs, limits, config.observe_acts, prospect)
-        self._masks = Masks(self.world, self.task, limits, prospect)
+        self.masks = Masks(self.world, self.task, limits, prospect)
         self._moment = self._new_moment([], "")
         self._statuses = [self.task.status(i) for i in range(len(scenario.storyboard.subgoals))]
         self.events: list[Event] = []
@@ -137,10 +137,6 @@ class Stage:
     def observe(self, role: Role) -> Observation:
         """What a role observes now."""
         return self.observations()[str(role)]
-
-    def mask(self, role: Role) -> dict[str, Any]:
-        """Which actions of a role would not be refused now."""
-        return self._masks.mask(role)
 
     def end(self, reason: str) -> None:
         """Closes the session."""
@@ -184,14 +180,11 @@ class Stage:
         speech = action.speech
         if speech is None:
             return False
-        text = speech.text.strip() or plain_text(self._word(role, speech), UTTERANCE_LENGTH)
+        text = speech.text.strip() or plain_text(word_act(speech.act, role, self._words), UTTERANCE_LENGTH)
         reason = self._conversation.say(role, Span(text, speech.act), self.world.time)
         if reason is not None:
             self._refuse(role, "speech", reason)
         return reason is None
-
-    def _word(self, role: Role, speech: Speech) -> str:
-        return word_act(speech.act, role, self._words)
 
     def _play_co_wizard(self, action: RoleAction) -> None:
         assert isinstance(action, CoWizardAction)
