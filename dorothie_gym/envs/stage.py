@@ -65,7 +65,6 @@ _WORLD_EVENTS = {
     WorldEventKind.OFF_ROAD: EventType.OFF_ROAD,
     WorldEventKind.WRONG_WAY: EventType.WRONG_WAY,
 }
-
 _INFRACTIONS = tuple((kind.value, kind) for kind in INFRACTION_KINDS)
 
 
