@@ -212,15 +212,8 @@ NODE = np.dtype(
 """A body in the list of a lane, ordered by station."""
 
 CLOCK = np.dtype(
-    [
-        ("time", "f8"),
-        ("frame", "i8"),
-        ("collisions", "i8"),
-        ("run_over", "i8"),
-        ("random", "i8"),
-        ("towed", "i8"),
-        ("keys", "i8"),
-    ],
+    [("time", "f8"), ("frame", "i8"), ("collisions", "i8"), ("run_over", "i8"), ("random", "i8"), ("towed", "i8"),
+     ("keys", "i8")],
     align=True,
 )
 """What a world counts: time [s], substeps, collisions of vehicles, pedestrians touched, vehicles towed, keys given."""
