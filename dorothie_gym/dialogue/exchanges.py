@@ -111,6 +111,7 @@ class ExchangeTracker:
             raise ValueError(f"patience must be positive, not {patience}")
         self.patience = patience
         self.exchanges: list[Exchange] = []
+        self._waiting: dict[int, Exchange] = {}  # those that are open, by their ids
 
     def update(self, utterance: Utterance) -> tuple[int, ...]:
         """Places every act of a delivered utterance.
@@ -139,14 +140,14 @@ class ExchangeTracker:
 
     def tick(self, now: float) -> None:
         """Abandons the exchanges that have waited too long at `now` [s]; an Explain owed no answer and is fulfilled."""
-        for exchange in self.exchanges:
-            if exchange.state is ExchangeState.OPEN and now - exchange.end > self.patience:
+        for exchange in list(self._waiting.values()):
+            if now - exchange.end > self.patience:
                 optional = exchange.move is DialogueMove.EXPLAIN and not exchange.confused
-                exchange.state = ExchangeState.FULFILLED if optional else ExchangeState.ABANDONED
+                self._close(exchange, ExchangeState.FULFILLED if optional else ExchangeState.ABANDONED)
 
     def open(self) -> list[Exchange]:
         """Returns the exchanges that still wait for an answer, oldest first."""
-        return [exchange for exchange in self.exchanges if exchange.state is ExchangeState.OPEN]
+        return sorted(self._waiting.values(), key=lambda exchange: exchange.id)
 
     def _initiate(self, utterance: Utterance, move: DialogueMove, opened: Exchange | None) -> Exchange:
         if opened is not None:
@@ -166,7 +167,7 @@ class ExchangeTracker:
             return last
         exchange = self._begin(utterance, move)
         exchange.unprompted = True
-        exchange.state = ExchangeState.FULFILLED
+        self._close(exchange, ExchangeState.FULFILLED)
         return exchange
 
     def _awaiting(self, utterance: Utterance, move: DialogueMove) -> Exchange | None:
@@ -185,11 +186,17 @@ class ExchangeTracker:
             exchange.confused = False
         else:
             exchange.confused = False
-            exchange.state = ExchangeState.FULFILLED
+            self._close(exchange, ExchangeState.FULFILLED)
             return
         exchange.state = ExchangeState.OPEN
+        self._waiting[exchange.id] = exchange
+
+    def _close(self, exchange: Exchange, state: ExchangeState) -> None:
+        exchange.state = state
+        self._waiting.pop(exchange.id, None)
 
     def _begin(self, utterance: Utterance, move: DialogueMove) -> Exchange:
         exchange = Exchange(len(self.exchanges), utterance.speaker, move, utterance.start, utterance.end)
         self.exchanges.append(exchange)
+        self._waiting[exchange.id] = exchange
         return exchange

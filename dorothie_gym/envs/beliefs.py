@@ -54,6 +54,7 @@ class Beliefs:
         goals: landmarks that the Co-Wizard is heading for.
         guesses: places it marked last, by the landmark's name.
         places: where hidden landmarks are by all that was marked and said, by name.
+        version: counts the changes of `places`.
     """
 
     def __init__(self, town: Town, scenario: Scenario) -> None:
@@ -61,6 +62,7 @@ class Beliefs:
         self.goals: tuple[LandmarkName, ...] = ()
         self.guesses: dict[LandmarkName, Guess] = {}
         self.places: dict[LandmarkName, PlaceEstimate] = {}
+        self.version = 0
         self._topic: LandmarkName | None = None  # the hidden landmark that was last spoken of
         self._said: dict[LandmarkName, set[frozenset[LandmarkName | StreetName]]] = {}
 
@@ -86,6 +88,7 @@ class Beliefs:
         self.guesses[name] = Guess(lane, station)
         if last != self.guesses[name]:  # the same mark again says nothing new
             self.places[name] = refined(self.places.get(name), PlaceEstimate.of(place, error), drift=MARK)
+            self.version += 1
 
     def hear(self, speaker: Role, acts: Sequence[DialogueAct]) -> None:
         """Takes in what was said of places of hidden landmarks."""
@@ -118,6 +121,7 @@ class Beliefs:
                 estimate = about(estimate, points, sigma)
         if estimate is not None:
             self.places[self._topic] = estimate
+            self.version += 1
 
     def goal_places(self, known: dict[LandmarkName, list[GoalAhead]]) -> list[GoalAhead]:
         """Places where the car is expected to stop.

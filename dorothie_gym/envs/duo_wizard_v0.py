@@ -14,15 +14,16 @@ from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from dorothie_gym.envs.config import EnvConfig
-from dorothie_gym.envs.masks import Masks
 from dorothie_gym.envs.scenario import Scenario, draw_scenario
 from dorothie_gym.envs.stage import ROLES, Stage
 from dorothie_gym.ontology import Role
 from dorothie_gym.sessions import Event, SessionHeader
-from dorothie_gym.spaces import SpaceLimits, action_space, decode_action, observation_space
+from dorothie_gym.spaces import ActionDecoder, SpaceLimits, action_space, observation_space
 from dorothie_gym.tasks import StoryboardTemplate, load_template
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.town import Town, load_town
+
+_AGENTS = {str(role): role for role in ROLES}
 
 
 class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
@@ -103,10 +104,10 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
             str(role): deepcopy(observation_space(role, self.limits, self.config.observe_acts)) for role in ROLES
         }
         self.action_spaces = {str(role): deepcopy(action_space(role, self.limits)) for role in ROLES}
+        self._decoders = {role: ActionDecoder(role, self.limits) for role in ROLES}
         self._network = TownNetwork(self.town)
         self._seeds = np.random.default_rng()
         self._stage: Stage | None = None
-        self._masks: Masks | None = None
         self._cycles = 0
         self._painter: Any = None
 
@@ -141,11 +142,10 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
         elif not isinstance(scenario, Scenario):
             raise ValueError(f"option 'scenario' is a {type(scenario).__name__}; it must be a Scenario")
         self._stage = Stage(self.town, self._network, scenario, self.config, self.limits)
-        self._masks = Masks(self._stage.world, self._stage.task, self.limits)
         self._cycles = 0
         self.agents = list(self.possible_agents)
-        observations = {str(role): self._stage.observe(role) for role in ROLES}
-        infos = {str(role): self._info(role, {}) for role in ROLES}
+        observations = self._stage.observations()
+        infos = self._infos({role: {} for role in ROLES})
         if self.render_mode == "human":
             self.render()
         return observations, infos
@@ -171,10 +171,10 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
         if not self.agents:
             return {}, {}, {}, {}, {}
         decoded = {}
-        for role in ROLES:
-            if str(role) not in actions:
-                raise ValueError(f"the action of {role} is missing; it is needed from {', '.join(self.agents)}")
-            decoded[role] = decode_action(role, actions[str(role)], self.limits)
+        for agent, role in _AGENTS.items():
+            if agent not in actions:
+                raise ValueError(f"the action of {agent} is missing; it is needed from {', '.join(self.agents)}")
+            decoded[role] = self._decoders[role](actions[agent])
         terms = stage.play(decoded)
         self._cycles += 1
         out_of_time = (
@@ -185,11 +185,11 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
         terminated, truncated = stage.task.done, out_of_time and not stage.task.done
         if terminated or truncated:
             stage.end("arrived" if terminated else "out of time")
-        observations = {str(role): stage.observe(role) for role in ROLES}
-        infos = {str(role): self._info(role, terms[role]) for role in ROLES}
-        rewards = {str(role): float(sum(terms[role].values())) for role in ROLES}
-        terminations = {agent: terminated for agent in self.agents}
-        truncations = {agent: truncated for agent in self.agents}
+        observations = stage.observations()
+        infos = self._infos(terms)
+        rewards = {agent: float(sum(terms[role].values())) for agent, role in _AGENTS.items()}
+        terminations = dict.fromkeys(self.agents, terminated)
+        truncations = dict.fromkeys(self.agents, truncated)
         if terminated or truncated:
             self.agents = []
         if self.render_mode == "human":
@@ -254,13 +254,18 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
         """How the session stands, in JSON types."""
         return self.stage.summary()
 
-    def _info(self, role: Role, terms: Mapping[str, float]) -> dict[str, Any]:
-        assert self._masks is not None
+    def _infos(self, terms: Mapping[Role, Mapping[str, float]]) -> dict[str, dict[str, Any]]:
+        """What else an agent is told; everything in it is the taker's own."""
+        stage = self.stage
+        infractions = stage.infractions
         return {
-            "action_mask": self._masks.mask(role),
-            "reward_terms": dict(terms),
-            "refused": list(self.stage.refused[role]),
-            "infractions": self.stage.infractions,
+            agent: {
+                "action_mask": stage.masks.mask(role),
+                "reward_terms": dict(terms[role]),
+                "refused": list(stage.refused[role]),
+                "infractions": dict(infractions),
+            }
+            for agent, role in _AGENTS.items()
         }
 
 

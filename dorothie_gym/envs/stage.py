@@ -13,6 +13,8 @@ from dorothie_gym.dialogue import Conversation, ExchangeTracker, Span, Utterance
 from dorothie_gym.envs.adversary import Adversary
 from dorothie_gym.envs.beliefs import Beliefs
 from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.envs.masks import Masks
+from dorothie_gym.envs.prospect import Prospect
 from dorothie_gym.envs.scenario import Scenario
 from dorothie_gym.envs.views import Moment, Views
 from dorothie_gym.ontology import (
@@ -35,7 +37,6 @@ from dorothie_gym.spaces import (
     Physical,
     RoleAction,
     SpaceLimits,
-    Speech,
     plain_text,
 )
 from dorothie_gym.spaces.limits import UTTERANCE_LENGTH
@@ -49,6 +50,9 @@ from dorothie_gym.world.world import World
 ROLES = (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD)
 """The agents, in the order in which they are listed."""
 
+_SIGNS = ((Role.PARTICIPANT, 1.0), (Role.CO_WIZARD, 1.0), (Role.AD_WIZARD, -1.0))
+"""The Ad-Wizard gets the opposite of what the others share."""
+
 STANDING = 0.1
 """Slower than this the car stands [m/s]."""
 
@@ -61,6 +65,7 @@ _WORLD_EVENTS = {
     WorldEventKind.OFF_ROAD: EventType.OFF_ROAD,
     WorldEventKind.WRONG_WAY: EventType.WRONG_WAY,
 }
+_INFRACTIONS = tuple((kind.value, kind) for kind in INFRACTION_KINDS)
 
 
 class Stage:
@@ -71,6 +76,7 @@ class Stage:
         world: where it happens.
         task: how far the storyboard has been played.
         beliefs: what the Co-Wizard said it believes.
+        masks: which actions would not be refused now.
         events: what happened in the last decision.
         refused: reasons for the refusals of the last decision, by role.
         said: all utterances that were heard so far.
@@ -90,7 +96,9 @@ class Stage:
         self._conversation = Conversation(config.words_per_second, limits.spans)
         self._exchanges = ExchangeTracker()
         self._words = np.random.default_rng(word_seed)
-        self._views = Views(self.world, scenario, self.task, self.beliefs, limits, config.observe_acts)
+        prospect = Prospect(self.world)
+        self._views = Views(self.world, scenario, self.task, self.beliefs, limits, config.observe_acts, prospect)
+        self.masks = Masks(self.world, self.task, limits, prospect)
         self._moment = self._new_moment([], "")
         self._statuses = [self.task.status(i) for i in range(len(scenario.storyboard.subgoals))]
         self.events: list[Event] = []
@@ -99,6 +107,9 @@ class Stage:
         self.messages: list[tuple[float, str]] = []
         self.trail: list[tuple[float, float]] = [self._car_place()]
         self.counts = {"utterances": 0, "acts": 0, "physical_actions": 0, "exceptions": 0, "refusals": 0}
+        self._waypoints = [(*landmark.waypoint, landmark.index) for landmark in scenario.storyboard.landmarks]
+        self._time_reward = config.rewards.time / config.decision_frequency
+        self._known_reached = (-1, 0)  # version of the task, and how many of its live subgoals are reached
         self._outcome: dict[str, Any] | None = None
 
     # --- a decision -------------------------------------------------------------------------------------------------
@@ -118,9 +129,13 @@ class Stage:
         self.trail.append(self._car_place())
         return self._rewards(self._reached() - reached, self.world.collisions - collisions, spoken)
 
+    def observations(self) -> dict[str, Observation]:
+        """What the roles observe now."""
+        return self._views.observe(self._moment)
+
     def observe(self, role: Role) -> Observation:
         """What a role observes now."""
-        return self._views.observe(role, self._moment)
+        return self.observations()[str(role)]
 
     def end(self, reason: str) -> None:
         """Closes the session."""
@@ -130,12 +145,13 @@ class Stage:
     @property
     def success(self) -> bool:
         """Whether every live subgoal was reached, the destination last, without a collision of the car's own making."""
-        return self.task.done and self.task.success and self.world.collisions == 0
+        return self.world.collisions == 0 and self.task.done and self.task.success
 
     @property
     def infractions(self) -> dict[str, int]:
         """How often each rule of the road was broken so far, collisions of whosever making among them."""
-        return {kind.value: self.world.reports.infractions[kind] for kind in INFRACTION_KINDS}
+        counts = self.world.reports.infractions
+        return {name: counts.get(kind, 0) for name, kind in _INFRACTIONS}
 
     # --- what the roles do ------------------------------------------------------------------------------------------
 
@@ -163,14 +179,11 @@ class Stage:
         speech = action.speech
         if speech is None:
             return False
-        text = speech.text.strip() or plain_text(self._word(role, speech), UTTERANCE_LENGTH)
+        text = speech.text.strip() or plain_text(word_act(speech.act, role, self._words), UTTERANCE_LENGTH)
         reason = self._conversation.say(role, Span(text, speech.act), self.world.time)
         if reason is not None:
             self._refuse(role, "speech", reason)
         return reason is None
-
-    def _word(self, role: Role, speech: Speech) -> str:
-        return word_act(speech.act, role, self._words)
 
     def _play_co_wizard(self, action: RoleAction) -> None:
         assert isinstance(action, CoWizardAction)
@@ -240,9 +253,9 @@ class Stage:
         if self.world.car.speed > STANDING:
             return
         x, y = self._car_place()
-        for landmark in self.scenario.storyboard.landmarks:
-            if math.hypot(landmark.waypoint[0] - x, landmark.waypoint[1] - y) <= ARRIVAL_DISTANCE:
-                for i in self.task.arrive(landmark.index):
+        for place_x, place_y, landmark in self._waypoints:
+            if abs(place_x - x) <= ARRIVAL_DISTANCE and math.hypot(place_x - x, place_y - y) <= ARRIVAL_DISTANCE:
+                for i in self.task.arrive(landmark):
                     self._log_subgoal(i, "arrival")
                 self._note_statuses("arrival", log=False)
 
@@ -296,23 +309,27 @@ class Stage:
 
     def _rewards(self, reached: int, collisions: int, spoken: Mapping[Role, bool]) -> dict[Role, dict[str, float]]:
         weights = self.config.rewards
-        shared = {
-            "subgoal": weights.subgoal * reached,
-            "success": weights.success * self.success,
-            "collision": weights.collision * collisions,
-            "time": weights.time / self.config.decision_frequency,
-        }
+        subgoal, success = weights.subgoal * reached, weights.success * self.success
+        collision, time = weights.collision * collisions, self._time_reward
         terms = {}
-        for role in ROLES:
-            sign = -1.0 if role is Role.AD_WIZARD else 1.0
-            terms[role] = {name: sign * value for name, value in shared.items()}
-            terms[role]["refusal"] = weights.refusal * len(self.refused[role])
-            if role is not Role.AD_WIZARD:
+        for role, sign in _SIGNS:
+            terms[role] = {
+                "subgoal": sign * subgoal,
+                "success": sign * success,
+                "collision": sign * collision,
+                "time": sign * time,
+                "refusal": weights.refusal * len(self.refused[role]),
+            }
+            if role in spoken:
                 terms[role]["talk"] = weights.talk * spoken[role]
         return terms
 
     def _reached(self) -> int:
-        return sum(self.task.reached(i) for i in self.task.live)
+        version, reached = self._known_reached
+        if version != self.task.version:
+            reached = sum(self.task.reached(i) for i in self.task.live)
+            self._known_reached = self.task.version, reached
+        return reached
 
     def _refuse(self, role: Role, action: str, reason: str) -> None:
         self.refused[role].append(f"{action}: {reason}")
@@ -326,7 +343,8 @@ class Stage:
         self.events.append(Event(frame=at, type=kind, source=source, flagged=flagged, data=dict(data)))
 
     def _car_place(self) -> tuple[float, float]:
-        return float(self.world.car.position[0]), float(self.world.car.position[1])
+        x, y = self.world.car.position.tolist()
+        return x, y
 
     # --- what is kept -----------------------------------------------------------------------------------------------
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,21 +11,21 @@ from numpy.typing import NDArray
 from dorothie_gym.dialogue import Utterance
 from dorothie_gym.envs.bearings import Bearings
 from dorothie_gym.envs.beliefs import Beliefs
+from dorothie_gym.envs.prospect import Prospect
 from dorothie_gym.envs.scenario import Scenario
-from dorothie_gym.ontology import LABELS, GoalStatus, LandmarkName, Role, Sensor, WeatherParameter, encode_slots
+from dorothie_gym.envs.sheets import Sheet
+from dorothie_gym.ontology import LABELS, GoalStatus, Role, Sensor, encode_slots
 from dorothie_gym.spaces import (
-    NO_MOVE,
     ExitColumn,
-    GuessColumn,
     LandmarkColumn,
     Motion,
-    ObjectColumn,
     Observation,
-    PropColumn,
     SpaceLimits,
     SubgoalColumn,
+    observation_space,
     plain_text,
 )
+from dorothie_gym.spaces.actions import NO_MOVE
 from dorothie_gym.spaces.limits import MESSAGE_LENGTH, STORY_LENGTH
 from dorothie_gym.spaces.observations import MAX_UTTERANCE
 from dorothie_gym.tasks import Landmark, TaskState
@@ -38,6 +36,9 @@ Table = NDArray[np.float64]
 
 WAYPOINT_SPACING = 5.0
 """Distance between the planned waypoints shown [m]."""
+
+_SENSORS = tuple(Sensor)
+_PROP_NUMBERS = {kind: 1.0 + k for k, kind in enumerate(PROP_KINDS)}
 
 
 @dataclass(kw_only=True)
@@ -56,7 +57,11 @@ class Moment:
 
 
 class Views:
-    """Observations of a session."""
+    """Observations of a session.
+
+    Each role has a sheet whose form holds what is the same in most decisions: what never changes is written once, what
+    changes now and then when it does. Copies of it are filled in with the rest and handed out.
+    """
 
     def __init__(
         self,
@@ -66,104 +71,56 @@ class Views:
         beliefs: Beliefs,
         limits: SpaceLimits,
         observe_acts: bool,
+        prospect: Prospect | None = None,
     ) -> None:
-        self._world, self._scenario, self._task, self._beliefs = world, scenario, task, beliefs
+        self._world, self._task, self._beliefs = world, task, beliefs
         self._limits, self._observe_acts = limits, observe_acts
-        names = np.zeros(limits.streets, dtype=np.int64)
-        names[: len(scenario.street_names)] = [name.value for name in scenario.street_names]
-        self._street_names = names
-        landmarks = scenario.storyboard.landmarks[: limits.landmarks]
-        self._all_landmarks = self._landmark_table(landmarks, limits.landmarks)
-        self._known_landmarks = self._landmark_table([m for m in landmarks if not m.hidden], limits.landmarks)
-        self._hidden = np.zeros(limits.landmarks, dtype=np.int8)
-        self._hidden[: len(landmarks)] = [m.hidden for m in landmarks]
+        self._prospect = prospect or Prospect(world)
+        self._sheets = {
+            role: Sheet.of_space(observation_space(role, limits, observe_acts))
+            for role in (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD)
+        }
+        self._agents = [str(role) for role in self._sheets]
+        self._participant = self._sheets[Role.PARTICIPANT]
+        self._co_wizard = self._sheets[Role.CO_WIZARD]
+        self._ad_wizard = self._sheets[Role.AD_WIZARD]
+        self._numbers = [np.int64(number) for number in range(max(limits.lanes, len(LABELS)))]  # made once
         self._story = plain_text(scenario.storyboard.story, STORY_LENGTH)
+        self._tasks = ""
+        self._weather: tuple[float, ...] = ()
+        self._faults: tuple[Sensor, ...] = ()
+        self._versions = (-1, -1)
+        self._write_what_stays(scenario)
 
-    def observe(self, role: Role, moment: Moment) -> Observation:
-        """The observation of a role, in its observation space."""
-        build = {
-            Role.PARTICIPANT: self._participant,
-            Role.CO_WIZARD: self._co_wizard,
-            Role.AD_WIZARD: self._ad_wizard,
-        }[role]
-        return {**self._common(), **build(moment)}
-
-    def _common(self) -> Observation:
-        world = self._world
-        return {
-            "time": np.array([world.time]),
-            "speed": np.array([float(world.car.speed)]),
-            "weather": np.array([world.weather.values[p] for p in WeatherParameter]),
-            "street_names": self._street_names.copy(),
-        }
-
-    def _participant(self, moment: Moment) -> Observation:
-        tasks = "\n".join(self._task.description(i) for i in self._task.live)
-        return {
-            **self._true_place(),
-            "landmarks": self._all_landmarks.copy(),
-            "objects": self._objects(),
-            "lights": np.int64(self._world.lights),
-            "subgoals": self._subgoals(permissions=False),
-            "story": self._story,
-            "tasks": plain_text(tasks, STORY_LENGTH),
-            "message": plain_text(moment.message, MESSAGE_LENGTH),
-            "speaking": np.array([moment.speaking[Role.PARTICIPANT]]),
-            **self._heard(Role.CO_WIZARD, moment),
-        }
-
-    def _co_wizard(self, moment: Moment) -> Observation:
-        world = self._world
-        bearings = Bearings(world)
-        pose = bearings.pose
-        network = world.network
-        index = network.get_closest_lane_index(pose[:2], float(pose[2]), height=float(world.car.height))
-        lane = network.get_lane(index)
-        station = min(max(lane.local_coordinates(pose[:2])[0], 0.0), lane.length)
-        manoeuvre, angle = world.planner.manoeuvre
-        hazard = world.hazard
-        return {
-            "pose": pose.copy(),
-            "pose_covariance": world.localizer.covariance.copy(),
-            "lane": np.int64(lane.town_lane.id),
-            "station": np.array([float(station)]),
-            "landmarks": self._known_landmarks.copy(),
-            "cruise_speed": np.array([world.driver.cruise]),
-            "lights": np.int64(world.lights),
-            "motion": np.int64(self.motion()),
-            "hazard": np.int64(hazard.kind.value if hazard is not None else 0),
-            "hazard_distance": np.array([max(hazard.gap, 0.0) if hazard is not None else 0.0], dtype=np.float64),
-            "manoeuvre": np.int64(manoeuvre or 0),
-            "manoeuvre_angle": np.array([float(angle)]),
-            "waypoints": bearings.waypoints(self._limits.waypoints, WAYPOINT_SPACING),
-            "exits": self._exits(bearings),
-            "objects": self._objects(bearings),
-            "guesses": self._guesses(),
-            "speaking": np.array([moment.speaking[Role.CO_WIZARD]]),
-            **self._heard(Role.PARTICIPANT, moment),
-        }
-
-    def _ad_wizard(self, moment: Moment) -> Observation:
-        path = np.zeros(self._limits.plan, dtype=np.int64)
-        ahead = self._world.planner.lanes_ahead[: self._limits.plan]
-        path[: len(ahead)] = [lane + 1 for lane in ahead]
-        faults = self._world.faults
-        return {
-            **self._true_place(),
-            "landmarks": self._all_landmarks.copy(),
-            "motion": np.int64(self.motion()),
-            "hidden": self._hidden.copy(),
-            "subgoals": self._subgoals(permissions=True),
-            "story": self._story,
-            "waypoints": self._waypoints(),
-            "path_lanes": path,
-            "props": self._props(),
-            "sensors": np.array([sensor in faults for sensor in Sensor], dtype=np.int8),
-            **self._heard(Role.PARTICIPANT, moment),
-            **self._heard(Role.CO_WIZARD, moment),
-        }
-
-    # --- parts ------------------------------------------------------------------------------------------------------
+    def observe(self, moment: Moment) -> dict[str, Observation]:
+        """The observations of the three roles, each in its observation space."""
+        self._note_changes()
+        participant, co_wizard, ad_wizard = views = [sheet.copy() for sheet in self._sheets.values()]
+        time, speed = self._world.time, self._world.car.speed
+        for view in views:
+            view["time"][0], view["speed"][0] = time, speed
+        bearings = Bearings(self._world)
+        motion = self._numbers[self.motion()]
+        lights = self._numbers[self._world.lights]
+        self._write_true_place(participant, ad_wizard)
+        self._write_believed_place(co_wizard, bearings.pose)
+        bearings.write_path(
+            WAYPOINT_SPACING, ad_wizard["waypoints"], ad_wizard["path_lanes"], co_wizard["waypoints"]
+        )  # fmt: skip
+        bearings.write_objects(self._world.seen(), participant["objects"], co_wizard["objects"])
+        self._write_exits(co_wizard["exits"], bearings)
+        participant["lights"] = co_wizard["lights"] = lights
+        co_wizard["motion"] = ad_wizard["motion"] = motion
+        participant["story"] = ad_wizard["story"] = self._story
+        participant["tasks"] = self._tasks
+        participant["message"] = plain_text(moment.message, MESSAGE_LENGTH) if moment.message else ""
+        participant["speaking"][0] = moment.speaking[Role.PARTICIPANT]
+        co_wizard["speaking"][0] = moment.speaking[Role.CO_WIZARD]
+        self._write_driving(co_wizard)
+        self._write_props(ad_wizard["props"])
+        self._write_heard(Role.CO_WIZARD, moment, participant, ad_wizard)
+        self._write_heard(Role.PARTICIPANT, moment, co_wizard, ad_wizard)
+        return dict(zip(self._agents, views, strict=True))
 
     def motion(self) -> Motion:
         """What the car is about."""
@@ -176,106 +133,140 @@ class Views:
             return Motion.WAITING
         return Motion.DRIVING
 
-    def _true_place(self) -> Observation:
-        car, planner = self._world.car, self._world.planner
-        return {
-            "pose": np.array([car.position[0], car.position[1], car.heading], dtype=np.float64),
-            "lane": np.int64(planner.lane),
-            "station": np.array([planner.station]),
-        }
+    # --- what seldom changes ----------------------------------------------------------------------------------------
 
-    def _landmark_table(self, landmarks: Sequence[Landmark], rows: int) -> Table:
-        table = np.zeros((rows, len(LandmarkColumn)))
-        for k, landmark in enumerate(landmarks):
-            table[k] = (
-                landmark.name.value,
-                *landmark.position,
-                landmark.lane,
-                landmark.station,
-                landmark.street,
-            )
-        return table
+    def _write_what_stays(self, scenario: Scenario) -> None:
+        landmarks = scenario.storyboard.landmarks[: self._limits.landmarks]
+        known = [landmark for landmark in landmarks if not landmark.hidden]
+        write_landmarks(self._participant.form["landmarks"], landmarks)
+        write_landmarks(self._ad_wizard.form["landmarks"], landmarks)
+        write_landmarks(self._co_wizard.form["landmarks"], known)
+        self._ad_wizard.form["hidden"][: len(landmarks)] = [landmark.hidden for landmark in landmarks]
+        for sheet in self._sheets.values():
+            sheet.form["street_names"][: len(scenario.street_names)] = [name.value for name in scenario.street_names]
+            for name, array in sheet.form.items():
+                if name.endswith("_moves"):
+                    array[:] = NO_MOVE
 
-    def _subgoals(self, *, permissions: bool) -> Table:
-        task = self._task
-        table = np.zeros((self._limits.subgoals, len(SubgoalColumn)))
-        triggers, deletions, changes = task.possible_triggers(), task.possible_deletions(), task.possible_changes()
-        for i, subgoal in enumerate(task.storyboard.subgoals[: self._limits.subgoals]):
-            live = i in task.live
-            shown = live or permissions or task.status(i) is GoalStatus.ABANDONED
-            if not shown:
-                continue  # not yet triggered: the participant does not know of it
-            row = table[i]
-            row[SubgoalColumn.LIVE] = live
-            row[SubgoalColumn.LANDMARK] = task.landmark_of(i)
-            row[SubgoalColumn.STATUS] = task.status(i).value
-            row[SubgoalColumn.REACHED] = task.reached(i)
-            row[SubgoalColumn.ALLOWED] = task.allowed(i)
-            row[SubgoalColumn.AFTER] = sum(1 << k for k in subgoal.after)
-            if permissions:
-                row[SubgoalColumn.CAN_TRIGGER] = i in triggers
-                row[SubgoalColumn.CAN_DELETE] = i in deletions
-                row[SubgoalColumn.CAN_CHANGE] = i in changes
-        return table
+    def _note_changes(self) -> None:
+        """Brings the forms up to date."""
+        weather = tuple(self._world.weather.values.values())
+        if weather != self._weather:
+            self._weather = weather
+            for sheet in self._sheets.values():
+                sheet.form["weather"][:] = weather
+        faults = tuple(self._world.faults)
+        if faults != self._faults:
+            self._faults = faults
+            self._ad_wizard.form["sensors"][:] = [sensor in faults for sensor in _SENSORS]
+        versions = self._task.version, self._beliefs.version
+        if versions != self._versions:
+            self._versions = versions
+            self._write_tasks()
+            self._write_guesses(self._co_wizard.form["guesses"])
 
-    def _objects(self, bearings: Bearings | None = None) -> Table:
-        """Bodies that are perceived; where `bearings` are given, around the estimated pose and not the true one."""
-        car = self._world.car
-        table = np.zeros((self._limits.objects, len(ObjectColumn)))
-        for row, body in zip(table, self._world.perceived(), strict=False):
-            dx, dy = body.x - float(car.position[0]), body.y - float(car.position[1])
-            bearing = math.atan2(dy, dx) - float(car.heading)
-            x, y = bearings.seen(body.x, body.y) if bearings is not None else (body.x, body.y)
-            row[:] = (
-                body.kind.value,
-                x,
-                y,
-                math.hypot(dx, dy),
-                (bearing + math.pi) % (2 * math.pi) - math.pi,
-                body.length,
-                body.width,
-                body.speed,
-            )
-        return table
+    def _write_tasks(self) -> None:
+        self._tasks = plain_text("\n".join(self._task.description(i) for i in self._task.live), STORY_LENGTH)
+        for sheet, permissions in ((self._participant, False), (self._ad_wizard, True)):
+            write_subgoals(sheet.form["subgoals"], self._task, permissions=permissions)
 
-    def _waypoints(self) -> Table:
-        planner = self._world.planner
-        table = np.zeros((self._limits.waypoints, 2))
-        for k, row in enumerate(table):
-            row[:] = planner.path.position_at(min(planner.s + (k + 1) * WAYPOINT_SPACING, planner.path.length))
-        return table
-
-    def _exits(self, bearings: Bearings) -> Table:
-        town = self._world.town
-        exits, distance = self._world.planner.exits()
-        distance = bearings.way_left(distance)
-        table = np.zeros((self._limits.exits, len(ExitColumn)))
-        numbers = {junction.id: k for k, junction in enumerate(town.junctions)}
-        for row, way in zip(table, exits, strict=False):
-            row[:] = (1.0, way.angle, distance, way.lane, town.lanes[way.lane].street, numbers.get(way.junction_id, -1))
-        return table
-
-    def _guesses(self) -> Table:
-        table = np.zeros((len(LandmarkName), len(GuessColumn)))
+    def _write_guesses(self, table: Table) -> None:
+        table[:] = 0.0
         for name, guess in self._beliefs.places.items():
             (xx, xy), (_, yy) = guess.covariance
             table[name.value] = (1.0, *guess.mean, xx, yy, xy)
-        return table
 
-    def _props(self) -> Table:
-        table = np.zeros((self._limits.props, len(PropColumn)))
+    # --- what is new each time --------------------------------------------------------------------------------------
+
+    def _write_true_place(self, participant: Observation, ad_wizard: Observation) -> None:
+        """Where the car is; both know it."""
+        car, planner = self._world.car, self._world.planner
+        participant["pose"][:2], participant["pose"][2] = car.position, car.heading
+        ad_wizard["pose"][:] = participant["pose"]
+        participant["lane"] = ad_wizard["lane"] = self._numbers[planner.lane]
+        participant["station"][0] = ad_wizard["station"][0] = planner.station
+
+    def _write_believed_place(self, view: Observation, pose: Table) -> None:
+        """Where the Co-Wizard takes the car to be."""
+        world = self._world
+        view["pose"][:] = pose
+        view["pose_covariance"][:] = world.localizer.covariance
+        index = world.network.get_closest_lane_index(pose, float(pose[2]), height=float(world.car.height))
+        lane = world.network.get_lane(index)
+        view["lane"] = self._numbers[lane.town_lane.id]
+        view["station"][0] = min(max(lane.local_coordinates(pose)[0], 0.0), lane.length)
+
+    def _write_exits(self, table: Table, bearings: Bearings) -> None:
+        options = self._prospect.options()
+        rows = options.rows[: len(table)]
+        if len(rows):
+            table[: len(rows)] = rows
+            table[: len(rows), ExitColumn.DISTANCE] = bearings.way_left(options.distance)
+
+    def _write_driving(self, view: Observation) -> None:
+        """What the car is told to do, and does."""
+        world = self._world
+        manoeuvre, angle = world.planner.manoeuvre
+        hazard = world.hazard
+        view["cruise_speed"][0] = world.driver.cruise
+        view["manoeuvre"] = self._numbers[manoeuvre or 0]
+        view["manoeuvre_angle"][0] = angle
+        view["hazard"] = self._numbers[hazard.kind.value if hazard is not None else 0]
+        if hazard is not None:
+            view["hazard_distance"][0] = max(hazard.gap, 0.0)
+
+    def _write_props(self, table: Table) -> None:
         for row, prop in zip(table, self._world.actors.props, strict=False):
-            row[:] = (1 + PROP_KINDS.index(prop.kind), prop.position[0], prop.position[1], prop.heading)
-        return table
+            row[:] = _PROP_NUMBERS[prop.kind], prop.position[0], prop.position[1], prop.heading
 
-    def _heard(self, speaker: Role, moment: Moment) -> Observation:
+    def _write_heard(self, speaker: Role, moment: Moment, *views: Observation) -> None:
         utterance = moment.heard.get(speaker)
-        fields: dict[str, Any] = {f"{speaker}_text": plain_text(utterance.text, MAX_UTTERANCE) if utterance else ""}
-        if self._observe_acts:
-            moves = np.full(self._limits.spans, NO_MOVE, dtype=np.int64)
-            slots = np.zeros((self._limits.spans, len(LABELS)), dtype=np.int8)
-            for k, act in enumerate(utterance.acts[: self._limits.spans] if utterance else ()):
-                moves[k] = int(act.move)
-                slots[k] = encode_slots(act.slots)
-            fields[f"{speaker}_moves"], fields[f"{speaker}_slots"] = moves, slots
-        return fields
+        if utterance is None:
+            for view in views:
+                view[_TEXT[speaker]] = ""
+            return
+        text = plain_text(utterance.text, MAX_UTTERANCE)
+        for view in views:
+            view[_TEXT[speaker]] = text
+            if self._observe_acts:
+                for k, act in enumerate(utterance.acts[: self._limits.spans]):
+                    view[f"{speaker}_moves"][k] = int(act.move)
+                    view[f"{speaker}_slots"][k] = encode_slots(act.slots)
+
+
+_TEXT = {role: f"{role}_text" for role in Role}
+
+
+def write_landmarks(table: Table, landmarks: Sequence[Landmark]) -> None:
+    """Writes landmarks as rows of `LandmarkColumn`."""
+    for row, landmark in zip(table, landmarks, strict=False):
+        row[LandmarkColumn.NAME] = landmark.name.value
+        row[LandmarkColumn.X], row[LandmarkColumn.Y] = landmark.position
+        row[LandmarkColumn.LANE], row[LandmarkColumn.STATION] = landmark.lane, landmark.station
+        row[LandmarkColumn.STREET] = landmark.street
+
+
+def write_subgoals(table: Table, task: TaskState, *, permissions: bool) -> None:
+    """Writes the subgoals as rows of `SubgoalColumn`.
+
+    Args:
+        table: all of its rows are written.
+        task: the task as it stands.
+        permissions: whether those that wait for their trigger show, and what may be done with each.
+    """
+    table[:] = 0.0
+    triggers, deletions, changes = task.possible_triggers(), task.possible_deletions(), task.possible_changes()
+    for i, (row, subgoal) in enumerate(zip(table, task.storyboard.subgoals, strict=False)):
+        live = i in task.live
+        if not (live or permissions or task.status(i) is GoalStatus.ABANDONED):
+            continue  # not yet triggered: the participant does not know of it
+        row[SubgoalColumn.LIVE] = live
+        row[SubgoalColumn.LANDMARK] = task.landmark_of(i)
+        row[SubgoalColumn.STATUS] = task.status(i).value
+        row[SubgoalColumn.REACHED] = task.reached(i)
+        row[SubgoalColumn.ALLOWED] = task.allowed(i)
+        row[SubgoalColumn.AFTER] = sum(1 << k for k in subgoal.after)
+        if permissions:
+            row[SubgoalColumn.CAN_TRIGGER] = i in triggers
+            row[SubgoalColumn.CAN_DELETE] = i in deletions
+            row[SubgoalColumn.CAN_CHANGE] = i in changes

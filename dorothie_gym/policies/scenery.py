@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -73,24 +74,34 @@ def street_of(observation: Mapping[str, Any], town: Town, lane: int) -> StreetNa
 
 def read_landmarks(observation: Mapping[str, Any], town: Town) -> tuple[SeenLandmark, ...]:
     """The rows of `landmarks` in use."""
+    return _landmarks(_bytes(observation["landmarks"]), tuple(observation["street_names"].tolist()), town)
+
+
+@lru_cache(maxsize=64)
+def _landmarks(table: bytes, street_names: tuple[int, ...], town: Town) -> tuple[SeenLandmark, ...]:
     column = LandmarkColumn
     return tuple(
         SeenLandmark(
             row=k,
             name=LandmarkName(int(row[column.NAME])),
-            x=float(row[column.X]),
-            y=float(row[column.Y]),
+            x=row[column.X],
+            y=row[column.Y],
             lane=int(row[column.LANE]),
-            station=float(row[column.STATION]),
-            street=street_of(observation, town, int(row[column.LANE])),
+            station=row[column.STATION],
+            street=street_of({"street_names": street_names}, town, int(row[column.LANE])),
         )
-        for k, row in enumerate(observation["landmarks"])
+        for k, row in enumerate(_rows(table, len(column)))
         if row[column.NAME] > 0
     )
 
 
 def read_subgoals(observation: Mapping[str, Any]) -> tuple[SeenSubgoal, ...]:
     """All rows of `subgoals`, those that are not in use as well: they are not live."""
+    return _subgoals(_bytes(observation["subgoals"]))
+
+
+@lru_cache(maxsize=256)
+def _subgoals(table: bytes) -> tuple[SeenSubgoal, ...]:
     column = SubgoalColumn
     return tuple(
         SeenSubgoal(
@@ -104,8 +115,18 @@ def read_subgoals(observation: Mapping[str, Any]) -> tuple[SeenSubgoal, ...]:
             can_delete=bool(row[column.CAN_DELETE]),
             can_change=bool(row[column.CAN_CHANGE]),
         )
-        for k, row in enumerate(observation["subgoals"])
+        for k, row in enumerate(_rows(table, len(column)))
     )
+
+
+def _bytes(table: Any) -> bytes:
+    """A table as what answers are remembered by: from one decision to the next most tables are the same."""
+    return np.asarray(table, dtype=np.float64).tobytes()
+
+
+def _rows(table: bytes, columns: int) -> list[list[float]]:
+    rows: list[list[float]] = np.frombuffer(table).reshape(-1, columns).tolist()
+    return rows
 
 
 def read_objects(observation: Mapping[str, Any]) -> tuple[SeenObject, ...]:

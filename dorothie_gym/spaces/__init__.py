@@ -2,6 +2,7 @@
 
 from dorothie_gym.spaces.actions import (
     NO_MOVE,
+    ActionDecoder,
     ActionDict,
     AdWizardAction,
     CoWizardAction,
@@ -32,6 +33,7 @@ from dorothie_gym.spaces.text import plain_text
 
 __all__ = [
     "NO_MOVE",
+    "ActionDecoder",
     "ActionDict",
     "AdWizardAction",
     "CoWizardAction",

@@ -6,7 +6,7 @@ dict raises `ValueError` naming the field. Whether a well-formed action is legal
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, ClassVar, TypeAlias
@@ -38,6 +38,7 @@ from dorothie_gym.spaces.limits import (
     UTTERANCE_LENGTH,
     SpaceLimits,
 )
+from dorothie_gym.spaces.reading import FieldReader, FieldTable
 
 NO_MOVE = len(DialogueMove)
 """Value of `move` that says nothing."""
@@ -47,6 +48,7 @@ SENSORS = tuple(Sensor)
 WEATHER = tuple(WeatherParameter)
 LANDMARKS = tuple(LandmarkName)
 STATUSES = tuple(GoalStatus)
+EXCEPTIONS = tuple(ExceptionKind(value) for value in range(len(ExceptionKind)))
 
 ActionDict: TypeAlias = dict[str, Any]
 
@@ -81,8 +83,13 @@ class ParticipantAction:
     @classmethod
     def decode(cls, action: Mapping[str, Any], limits: SpaceLimits) -> ParticipantAction:
         """Reads a dict; raises `ValueError` naming the field that is wrong."""
-        reader = _Reader(action, action_space(cls.role, limits))
-        return cls(speech=reader.speech())
+        return cls.read(FieldReader(action, _fields(cls.role, limits)))
+
+    @classmethod
+    def read(cls, reader: FieldReader) -> ParticipantAction:
+        """The same from the fields."""
+        speech = _read_speech(reader)
+        return cls(speech=speech) if speech is not None else _SILENCE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,22 +147,26 @@ class CoWizardAction:
     @classmethod
     def decode(cls, action: Mapping[str, Any], limits: SpaceLimits) -> CoWizardAction:
         """Reads a dict; raises `ValueError` naming the field that is wrong."""
-        reader = _Reader(action, action_space(cls.role, limits))
-        physical = reader.integer("physical")
-        mental = reader.integer("mental")
-        angle, up = reader.integer("angle"), reader.integer("up")
-        plan, goals = reader.array("plan"), reader.array("goals")
-        landmark, status, place = reader.integer("landmark"), reader.integer("status"), reader.place()
+        return cls.read(FieldReader(action, _fields(cls.role, limits)))
+
+    @classmethod
+    def read(cls, reader: FieldReader) -> CoWizardAction:
+        """The same from the fields."""
+        physical, mental, angle, up, landmark, status, lane, metres = reader.integers(_CO_WIZARD_NUMBERS)
+        plan, goals = reader.numbers("plan"), reader.flags("goals")
+        speech = _read_speech(reader)
+        if not physical and not mental and speech is None:
+            return _INACTION
         return cls(
-            speech=reader.speech(),
+            speech=speech,
             physical=Physical(action=PhysicalAction(physical), angle=angle, up=bool(up)) if physical else None,
             mental=Mental(
                 action=MentalAction(mental),
-                plan=tuple(int(j) - 1 for j in plan if j > 0),
-                goals=tuple(LANDMARKS[i] for i in np.flatnonzero(goals)),
+                plan=tuple(j - 1 for j in plan if j > 0),
+                goals=tuple(LANDMARKS[i] for i, marked in enumerate(goals) if marked),
                 landmark=LANDMARKS[landmark],
                 status=STATUSES[status],
-                place=place,
+                place=Place(lane=lane, metres=metres),
             )
             if mental
             else None,
@@ -211,21 +222,37 @@ class AdWizardAction:
     @classmethod
     def decode(cls, action: Mapping[str, Any], limits: SpaceLimits) -> AdWizardAction:
         """Reads a dict; raises `ValueError` naming the field that is wrong."""
-        reader = _Reader(action, action_space(cls.role, limits))
+        return cls.read(FieldReader(action, _fields(cls.role, limits)))
+
+    @classmethod
+    def read(cls, reader: FieldReader) -> AdWizardAction:
+        """The same from the fields."""
+        numbers, message = reader.integers(_AD_WIZARD_NUMBERS), reader.text("message")
+        if not any(numbers) and not message:
+            return _INTACT
+        exception, weather, share, prop, item, lane, metres, count, extent, sensor, on = numbers
         return cls(
-            exception=ExceptionKind(reader.integer("exception")),
-            weather=WEATHER[reader.integer("weather")],
-            share=reader.integer("share") / (PERCENT - 1),
-            prop=PROPS[reader.integer("prop")],
-            item=reader.integer("item"),
-            place=reader.place(),
-            count=reader.integer("count"),
-            extent=reader.integer("extent"),
-            sensor=SENSORS[reader.integer("sensor")],
-            on=bool(reader.integer("on")),
-            message=reader.text("message"),
+            exception=EXCEPTIONS[exception],
+            weather=WEATHER[weather],
+            share=share / (PERCENT - 1),
+            prop=PROPS[prop],
+            item=item,
+            place=Place(lane=lane, metres=metres),
+            count=count,
+            extent=extent,
+            sensor=SENSORS[sensor],
+            on=bool(on),
+            message=message,
         )
 
+
+_CO_WIZARD_NUMBERS = ("physical", "mental", "angle", "up", "landmark", "status", "lane", "metres")
+_AD_WIZARD_NUMBERS = (
+    "exception", "weather", "share", "prop", "item", "lane", "metres", "count", "extent", "sensor", "on",
+)  # fmt: skip
+
+_SILENCE, _INACTION, _INTACT = ParticipantAction(), CoWizardAction(), AdWizardAction()
+"""What most decisions are, made once."""
 
 RoleAction: TypeAlias = ParticipantAction | CoWizardAction | AdWizardAction
 
@@ -234,14 +261,27 @@ _CLASSES: dict[Role, type[ParticipantAction] | type[CoWizardAction] | type[AdWiz
 }
 
 
+class ActionDecoder:
+    """Reads the actions of a role; for who reads many, as everything that depends on the role is looked up once."""
+
+    def __init__(self, role: Role, limits: SpaceLimits) -> None:
+        """Looks up what the fields may hold."""
+        self.role = role
+        self._fields, self._read = _fields(role, limits), _CLASSES[role].read
+
+    def __call__(self, action: Mapping[str, Any]) -> RoleAction:
+        """Reads an action; raises `ValueError` naming the role and the field that is wrong."""
+        if type(action) is not dict and not isinstance(action, Mapping):
+            raise ValueError(f"action of {self.role}: expected a dict, got {type(action).__name__}")
+        try:
+            return self._read(FieldReader(action, self._fields))
+        except ValueError as error:
+            raise ValueError(f"action of {self.role}: {error}") from None
+
+
 def decode_action(role: Role, action: Mapping[str, Any], limits: SpaceLimits) -> RoleAction:
     """Reads the action of a role; raises `ValueError` naming the role and the field that is wrong."""
-    if not isinstance(action, Mapping):
-        raise ValueError(f"action of {role}: expected a dict, got {type(action).__name__}")
-    try:
-        return _CLASSES[role].decode(action, limits)
-    except ValueError as error:
-        raise ValueError(f"action of {role}: {error}") from None
+    return ActionDecoder(role, limits)(action)
 
 
 def noop(role: Role, limits: SpaceLimits) -> ActionDict:
@@ -316,57 +356,16 @@ def _encode_place(place: Place) -> ActionDict:
     return {"lane": place.lane, "metres": place.metres}
 
 
-class _Reader:
-    """Takes fields out of an action dict, checking each against its space."""
+@lru_cache(maxsize=64)
+def _fields(role: Role, limits: SpaceLimits) -> FieldTable:
+    return FieldTable(action_space(role, limits))
 
-    def __init__(self, action: Mapping[str, Any], space: spaces.Dict) -> None:
-        self._action, self._space = action, space
-        missing = [name for name in space if name not in action]
-        unknown = [str(name) for name in action if name not in space.spaces]
-        if missing:
-            raise ValueError(f"field {missing[0]!r} is missing; the fields are {', '.join(space)}")
-        if unknown:
-            raise ValueError(f"field {unknown[0]!r} is unknown; the fields are {', '.join(space)}")
 
-    def integer(self, name: str) -> int:
-        space = self._space[name]
-        assert isinstance(space, spaces.Discrete)
-        value = self._action[name]
-        low, high = int(space.start), int(space.start + space.n) - 1
-        if not isinstance(value, int | np.integer | np.ndarray) or isinstance(value, bool) or np.ndim(value) != 0:
-            raise ValueError(f"field {name!r} is {value!r}; it must be a whole number in {low}..{high}")
-        if np.asarray(value).dtype.kind not in "iu" or not low <= int(value) <= high:
-            raise ValueError(f"field {name!r} is {value!r}; it must be a whole number in {low}..{high}")
-        return int(value)
+def _read_speech(reader: FieldReader) -> Speech | None:
+    move, slots, text = reader.integer("move"), reader.flags("slots"), reader.text("utterance")
+    return None if move == NO_MOVE else Speech(act=_act(move, slots), text=text)
 
-    def array(self, name: str) -> Sequence[int]:
-        space, value = self._space[name], np.asarray(self._action[name])
-        if value.shape != space.shape or value.dtype.kind not in "iub":
-            raise ValueError(
-                f"field {name!r} has shape {value.shape} and type {value.dtype}; "
-                f"it must hold whole numbers in shape {space.shape}"
-            )
-        top = space.nvec - 1 if isinstance(space, spaces.MultiDiscrete) else np.ones(value.shape, dtype=np.int64)
-        if np.any(value < 0) or np.any(value > top):
-            raise ValueError(f"field {name!r} has a value outside 0..{int(np.max(top))}")
-        return [int(v) for v in value]
 
-    def text(self, name: str) -> str:
-        space, value = self._space[name], self._action[name]
-        assert isinstance(space, spaces.Text)
-        if not isinstance(value, str):
-            raise ValueError(f"field {name!r} is a {type(value).__name__}; it must be a text")
-        if len(value) > space.max_length:
-            raise ValueError(f"field {name!r} has {len(value)} characters; at most {space.max_length} are taken")
-        if wrong := sorted({c for c in value if c not in space.character_set}):
-            raise ValueError(f"field {name!r} has characters that the space does not: {''.join(wrong)!r}")
-        return value
-
-    def place(self) -> Place:
-        return Place(lane=self.integer("lane"), metres=self.integer("metres"))
-
-    def speech(self) -> Speech | None:
-        move, slots, text = self.integer("move"), self.array("slots"), self.text("utterance")
-        if move == NO_MOVE:
-            return None
-        return Speech(act=DialogueAct(move=DialogueMove(move), slots=decode_slots(slots)), text=text)
+@lru_cache(maxsize=4096)
+def _act(move: int, slots: bytes) -> DialogueAct:
+    return DialogueAct(move=DialogueMove(move), slots=decode_slots(slots))

@@ -15,6 +15,11 @@ class TaskState:
     A subgoal is live unless it waits for its trigger or has been deleted. The last live subgoal of the storyboard's
     list is the destination: it is reached after all others, and ends the task. A subgoal that is triggered and stands
     behind it in the list becomes the destination in its place. `after` binds by live subgoals only.
+
+    Attributes:
+        storyboard: what is played.
+        live: subgoals that are part of the task now, reached ones included, in the storyboard's order.
+        version: counts the changes: while it is the same, all else is.
     """
 
     def __init__(self, storyboard: Storyboard) -> None:
@@ -24,11 +29,8 @@ class TaskState:
         self._deleted = [False] * count
         self._changed = [False] * count
         self._reached = [False] * count
-
-    @property
-    def live(self) -> tuple[int, ...]:
-        """Subgoals that are part of the task now, reached ones included, in the storyboard's order."""
-        return tuple(i for i, waits in enumerate(self._waiting) if not waits and not self._deleted[i])
+        self.version = 0
+        self.live = self._find_live()
 
     @property
     def destination(self) -> int:
@@ -93,6 +95,7 @@ class TaskState:
         completed: list[int] = []
         while here := [i for i in self.live if self.landmark_of(i) == landmark and self.allowed(i)]:
             self._reached[here[0]] = True
+            self._note_change()
             completed.append(here[0])
         return completed
 
@@ -100,16 +103,19 @@ class TaskState:
         """Adds a subgoal that waits for its trigger; raises `StoryboardError` with the reason if it must not."""
         self._require(i, self._refuse_trigger)
         self._waiting[i] = False
+        self._note_change()
 
     def delete(self, i: int) -> None:
         """Deletes a live subgoal; raises `StoryboardError` with the reason if it must not."""
         self._require(i, self._refuse_delete)
         self._deleted[i] = True
+        self._note_change()
 
     def change(self, i: int) -> None:
         """Gives a live subgoal its other description and place; raises `StoryboardError` if it must not."""
         self._require(i, self._refuse_change)
         self._changed[i] = True
+        self._note_change()
 
     def possible_triggers(self) -> tuple[int, ...]:
         """Subgoals that `trigger` would accept now."""
@@ -122,6 +128,13 @@ class TaskState:
     def possible_changes(self) -> tuple[int, ...]:
         """Subgoals that `change` would accept now."""
         return self._accepted(self._refuse_change)
+
+    def _note_change(self) -> None:
+        self.version += 1
+        self.live = self._find_live()
+
+    def _find_live(self) -> tuple[int, ...]:
+        return tuple(i for i, waits in enumerate(self._waiting) if not waits and not self._deleted[i])
 
     def _accepted(self, refuse: Callable[[int], str | None]) -> tuple[int, ...]:
         return tuple(i for i in range(len(self.storyboard.subgoals)) if refuse(i) is None)

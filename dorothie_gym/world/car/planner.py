@@ -269,22 +269,22 @@ class LocalPlanner:
 
     def _plan_u_turn(self, speed: float) -> tuple[Oncoming, float] | str:
         """Where a U-turn would lead and the station where it would begin, or why there can be none."""
-        if self.in_manoeuvre or self._town.lanes[self.lane].in_junction:
+        lane, station = self._town.lanes[self.lane], self.station
+        if self.in_manoeuvre or lane.in_junction:
             return "the car is in the middle of a manoeuvre"
-        lane = self._town.lanes[self.lane]
-        begin = self.station + LEAD * (speed > 0.5) + max(0.0, speed**2 - U_TURN_SPEED**2) / (2 * BRAKING)
-        oncoming = self._oncoming.at(self.lane, min(begin, lane.length))
+        begin = station + LEAD * (speed > 0.5) + max(0.0, speed**2 - U_TURN_SPEED**2) / (2 * BRAKING)
+        oncoming = self._oncoming.at(lane.id, min(begin, lane.length))
         if oncoming is not None:
             # just behind a junction: go on a little, so that the turn ends before the oncoming lane does
             short = LANDING - (self._town.lanes[oncoming.lane].length - oncoming.station)
             if short > 0.0:
                 begin += short
-                oncoming = self._oncoming.at(self.lane, min(begin, lane.length))
+                oncoming = self._oncoming.at(lane.id, min(begin, lane.length))
         if oncoming is None:
-            if self._town.neighbour(self.lane, LinkType.LANE_CHANGE_LEFT) is not None:
+            if self._town.neighbour(lane.id, LinkType.LANE_CHANGE_LEFT) is not None:
                 return "a U-turn begins on the leftmost lane"
             return "there is no oncoming lane beside this one"
-        if speed > 0.5 and begin - self.station + U_TURN_REACH > self.roadblock:
+        if speed > 0.5 and begin - station + U_TURN_REACH > self.roadblock:
             return "the car is too fast to turn round before the roadblock"
         if begin > lane.length + 0.5:
             return "there is no room left to turn round"

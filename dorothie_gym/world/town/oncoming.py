@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from dorothie_gym.world.town.model import LinkType, Town
+from dorothie_gym.world.network.compiled import compiled
+from dorothie_gym.world.network.polyline import (
+    HEADING,
+    HEIGHT,
+    STATION,
+    IntArray,
+    LaneTable,
+    X,
+    Y,
+    local_coordinates,
+    position,
+    value_at,
+)
+from dorothie_gym.world.town.model import Array, LinkType, Town
 
 MAX_GAP = 13.0
 """Largest distance between the lanes' centre lines [m]: a median is crossed, a park is not."""
@@ -16,13 +30,21 @@ MAX_GAP = 13.0
 MAX_HEIGHT = 1.0
 """Largest difference of height [m]."""
 
-MIN_OPPOSITION = np.radians(150.0)
+MIN_OPPOSITION = math.radians(150.0)
 """Smallest difference of direction [rad]."""
 
+MIN_GAP = 1.0
+"""Smallest distance between the centre lines [m]."""
 
-@dataclass(frozen=True, kw_only=True)
-class Oncoming:
-    """The place on the oncoming lane that lies across from a place on a lane."""
+MAX_OFFSET = 3.0
+"""Farthest along the lane that the closest place of the other may be [m]: beyond, that one has ended."""
+
+SAMPLING = 4.0
+"""Lanes near a lane are found by points about this far apart [m], on short ones up to twice as far."""
+
+
+class Oncoming(NamedTuple):
+    """The place on the oncoming lane that lies across from a place on a lane: station and distance in metres."""
 
     lane: int
     station: float
@@ -34,39 +56,66 @@ class OncomingLanes:
 
     def __init__(self, town: Town) -> None:
         self._town = town
+        self._table = LaneTable.of(town.lanes)
         owners, points = [], []
         for lane in town.lanes:
             if lane.in_junction:
                 continue
-            for station in np.linspace(0.0, lane.length, max(2, int(lane.length / 4.0) + 1)):
+            for station in np.linspace(0.0, lane.length, max(2, int(lane.length / SAMPLING) + 1)):
                 points.append(lane.position(float(station)))
                 owners.append(lane.id)
         self._owners = np.array(owners)
-        self._tree = cKDTree(np.array(points))
+        self._points = np.array(points)
+        self._tree = cKDTree(self._points)
+        self._near: dict[int, IntArray] = {}
 
     def at(self, lane_id: int, station: float) -> Oncoming | None:
         """The oncoming place, or None: in a junction, from a lane that is not the leftmost, or with nothing there."""
+        candidates = self._near.get(lane_id)
+        if candidates is None:
+            candidates = self._near[lane_id] = self._lanes_near(lane_id)
+        if not len(candidates):
+            return None
+        table = self._table
+        found = Oncoming(*_across(table.points, table.offsets, table.ends, lane_id, station, candidates))
+        return found if found.lane >= 0 else None
+
+    def _lanes_near(self, lane_id: int) -> IntArray:
+        """Lanes outside junctions that come near enough to a lane to be oncoming somewhere along it, by their ids."""
         lane = self._town.lanes[lane_id]
         if lane.in_junction or self._town.neighbour(lane_id, LinkType.LANE_CHANGE_LEFT) is not None:
-            return None
-        position, heading = lane.position(station), lane.heading_at(station)
-        best: Oncoming | None = None
-        near = self._tree.query_ball_point(position, MAX_GAP + 3.0)
-        for other_id in sorted({int(self._owners[k]) for k in near}):
-            other = self._town.lanes[other_id]
-            there, _ = other.project(position)
-            point = other.position(there)
-            turn = abs((other.heading_at(there) - heading + np.pi) % (2 * np.pi) - np.pi)
-            dx, dy = float(point[0] - position[0]), float(point[1] - position[1])
-            across = -dx * np.sin(heading) + dy * np.cos(heading)  # positive right
-            along = dx * np.cos(heading) + dy * np.sin(heading)
-            if turn < MIN_OPPOSITION or not -MAX_GAP <= across < -1.0 or abs(along) > 3.0:
-                continue
-            if abs(other.height_at(there) - lane.height_at(station)) > MAX_HEIGHT:
-                continue
-            if best is None or -across < best.gap:
-                best = Oncoming(lane=other_id, station=there, gap=float(-across))
-        return best
+            return np.empty(0, dtype=np.int64)
+        reach = math.hypot(MAX_GAP, MAX_OFFSET) + 2 * SAMPLING  # points are at most two samplings apart
+        near = self._tree.query_ball_point(self._points[self._owners == lane_id], reach)
+        return np.unique(self._owners[np.unique(np.concatenate(near)).astype(np.int64)])
+
+
+@compiled
+def _across(
+    points: Array, offsets: IntArray, ends: Array, lane: int, station: float, candidates: IntArray
+) -> tuple[int, float, float]:
+    """The closest of some lanes that is oncoming at a place of a lane (-1: none), the station on it, and the gap."""
+    x, y = position(points, offsets, ends, lane, station, 0.0)
+    heading = value_at(points, offsets, lane, HEADING, station)
+    height = value_at(points, offsets, lane, HEIGHT, station)
+    c, n = math.cos(heading), math.sin(heading)
+    found, at, least = -1, 0.0, math.inf
+    for other in candidates:
+        there, _ = local_coordinates(points, offsets, ends, other, x, y)
+        there = min(max(there, 0.0), points[offsets[other + 1] - 1, STATION])
+        turn = value_at(points, offsets, other, HEADING, there) - heading
+        if abs((turn + math.pi) % (2 * math.pi) - math.pi) < MIN_OPPOSITION:
+            continue
+        dx = value_at(points, offsets, other, X, there) - x
+        dy = value_at(points, offsets, other, Y, there) - y
+        across, along = dy * c - dx * n, dx * c + dy * n  # positive right
+        if not -MAX_GAP <= across < -MIN_GAP or abs(along) > MAX_OFFSET:
+            continue
+        if abs(value_at(points, offsets, other, HEIGHT, there) - height) > MAX_HEIGHT:
+            continue
+        if -across < least:
+            found, at, least = other, there, -across
+    return found, at, least
 
 
 @lru_cache(maxsize=16)

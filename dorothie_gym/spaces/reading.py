@@ -1,0 +1,123 @@
+"""Takes the fields out of an action dict, checking each against its space.
+
+What a space allows is looked up once (`FieldTable`). What is plainly right passes with a few comparisons; everything
+else is looked at again by the checks that find the words for what is wrong.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+_ONE_BYTE = "bB?"
+"""Codes of the array types whose bytes are the numbers themselves."""
+
+_FLAGS = b"\0\1"
+
+
+class FieldTable:
+    """What the fields of an action space may hold.
+
+    Attributes:
+        names: of all fields, in the order of the space.
+        ranges: least and greatest value of each whole number.
+        shapes: of each array of numbers.
+        tops: greatest value of each of its entries, in one row.
+        texts: most characters of each text, and those that it may have.
+    """
+
+    def __init__(self, space: spaces.Dict) -> None:
+        self.names = tuple(space)
+        self.known = frozenset(space)
+        self.ranges: dict[str, tuple[int, int]] = {}
+        self.shapes: dict[str, tuple[int, ...]] = {}
+        self.tops: dict[str, list[int]] = {}
+        self.texts: dict[str, tuple[int, frozenset[str]]] = {}
+        for name, field in space.spaces.items():
+            if isinstance(field, spaces.Discrete):
+                self.ranges[name] = int(field.start), int(field.start + field.n) - 1
+            elif isinstance(field, spaces.MultiDiscrete):
+                self.shapes[name], self.tops[name] = field.shape, (field.nvec - 1).ravel().tolist()
+            elif isinstance(field, spaces.MultiBinary):
+                self.shapes[name], self.tops[name] = field.shape, [1] * int(np.prod(field.shape))
+            elif isinstance(field, spaces.Text):
+                self.texts[name] = field.max_length, frozenset(field.character_set)
+
+
+class FieldReader:
+    """Reads the fields of one action."""
+
+    __slots__ = ("_action", "_table")
+
+    def __init__(self, action: Mapping[str, Any], table: FieldTable) -> None:
+        """Takes an action; raises `ValueError` if a field is missing or unknown."""
+        self._action, self._table = action, table
+        if action.keys() != table.known:
+            fields = ", ".join(table.names)
+            missing = [name for name in table.names if name not in action]
+            if missing:
+                raise ValueError(f"field {missing[0]!r} is missing; the fields are {fields}")
+            unknown = [str(name) for name in action if name not in table.known]
+            raise ValueError(f"field {unknown[0]!r} is unknown; the fields are {fields}")
+
+    def integer(self, name: str) -> int:
+        """A whole number in its range."""
+        low, high = self._table.ranges[name]
+        value = self._action[name]
+        if type(value) is int and low <= value <= high:
+            return value
+        if not isinstance(value, int | np.integer | np.ndarray) or isinstance(value, bool) or np.ndim(value) != 0:
+            raise ValueError(f"field {name!r} is {value!r}; it must be a whole number in {low}..{high}")
+        if np.asarray(value).dtype.kind not in "iu" or not low <= int(value) <= high:
+            raise ValueError(f"field {name!r} is {value!r}; it must be a whole number in {low}..{high}")
+        return int(value)
+
+    def integers(self, names: Sequence[str]) -> list[int]:
+        """Several whole numbers, each in its range."""
+        ranges, action = self._table.ranges, self._action
+        found = []
+        for name in names:
+            low, high = ranges[name]
+            value = action[name]
+            found.append(value if type(value) is int and low <= value <= high else self.integer(name))
+        return found
+
+    def numbers(self, name: str) -> list[int]:
+        """Whole numbers of an array, each from 0 to its greatest."""
+        shape, tops = self._table.shapes[name], self._table.tops[name]
+        value = np.asarray(self._action[name])
+        if value.shape != shape or value.dtype.kind not in "iub":
+            raise ValueError(
+                f"field {name!r} has shape {value.shape} and type {value.dtype}; "
+                f"it must hold whole numbers in shape {shape}"
+            )
+        found: list[int] = value.ravel().tolist()
+        if min(found) < 0 or (max(found) > min(tops) and any(map(operator.gt, found, tops))):
+            raise ValueError(f"field {name!r} has a value outside 0..{max(tops)}")
+        return found
+
+    def flags(self, name: str) -> bytes:
+        """The entries of an array of 0 and 1, a byte each."""
+        value = self._action[name]
+        if type(value) is np.ndarray and value.shape == self._table.shapes[name] and value.dtype.char in _ONE_BYTE:
+            raw = value.tobytes()
+            if not raw.translate(None, _FLAGS):
+                return raw
+        return bytes(self.numbers(name))
+
+    def text(self, name: str) -> str:
+        """A text of the characters that the space has, not too long."""
+        length, characters = self._table.texts[name]
+        value = self._action[name]
+        if not isinstance(value, str):
+            raise ValueError(f"field {name!r} is a {type(value).__name__}; it must be a text")
+        if len(value) > length:
+            raise ValueError(f"field {name!r} has {len(value)} characters; at most {length} are taken")
+        if not characters.issuperset(value):
+            wrong = "".join(sorted(set(value) - characters))
+            raise ValueError(f"field {name!r} has characters that the space does not: {wrong!r}")
+        return value
