@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dorothie_gym.world.crosswalks import BRAKING, REACTION, ROOM, STANDING
 from dorothie_gym.world.crosswalks import SIGHT as VEHICLES_SIGHT
 from dorothie_gym.world.kernel.compiling import compiled, inlined
-from dorothie_gym.world.kernel.footways import ASIDE
+from dorothie_gym.world.kernel.footways import ASIDE, find_segment
 from dorothie_gym.world.kernel.lights import light
 from dorothie_gym.world.kernel.pacing import AHEAD, LEVEL, walk_towards
 from dorothie_gym.world.kernel.randomness import draw
@@ -31,7 +31,7 @@ REST = 5.0
 PLACES, PLACES_APART = 3, 0.7
 """People wait beside one another in so many places, this far apart [m] ..."""
 
-FROM_KERB = 0.6
+FROM_KERB = 0.9
 """... and this far from the kerb [m]."""
 
 READY = 1.0
@@ -118,10 +118,7 @@ def _leave(town: TownArrays, walker: Records) -> None:
     """Walks on along the pavement where one has been waiting, or come to."""
     crossing = town.crossings[walker.crossing]
     walker.walk, walker.station = crossing.walk[walker.mouth], crossing.station[walker.mouth]
-    way = town.walks[walker.walk]
-    walker.segment = way.first
-    while walker.segment < way.last - 1 and town.walk_points[walker.segment + 1, 2] <= walker.station:
-        walker.segment += 1
+    find_segment(town, walker)
     walker.direction = 1.0 if draw(walker) < 0.5 else -1.0
     walker.state, walker.crossing, walker.waited = Walk.WALKING, NOBODY, -REST
 

@@ -103,6 +103,7 @@ LANE = np.dtype(
         ("place", "i4"),  # of a connector: its place among those of its junction
         ("relation", "i4"),  # of a connector: where its row of `relations` begins
         ("control", "i4"),  # `Control`
+        ("cycling", "b1"),  # whether cyclists ride on it: it is slow, and one may go on without coming to a fast one
         ("programme", "i4"), ("slot", "i4"),  # light programme, and the place of its light in it
         ("sibling", "i4"), ("siblings", "i4"),  # rows of `siblings`
         ("passage", "i4"), ("passages", "i4"),  # rows of `passages`

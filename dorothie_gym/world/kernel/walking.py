@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.world.kernel.compiling import compiled, inlined
 from dorothie_gym.world.kernel.crossing import comes_to_crosswalk, cross, wait
-from dorothie_gym.world.kernel.footways import enter_next, locate, place_beside, side_kept
+from dorothie_gym.world.kernel.footways import enter_next, find_segment, locate, place_beside, side_kept
 from dorothie_gym.world.kernel.pacing import AHEAD, note_progress, walk_towards
 from dorothie_gym.world.kernel.records import NOBODY, Footway, Records, Walk
 from dorothie_gym.world.kernel.straying import steps_out, stray
@@ -97,7 +97,7 @@ def place_walker(town: TownArrays, walker: Records) -> None:
     walker.state, walker.crossing, walker.crashed, walker.mouth = Walk.WALKING, NOBODY, False, 0
     walker.waited, walker.staying, walker.crash_age, walker.far = 0.0, 0.0, 0.0, 0.0
     way = town.walks[walker.walk]
-    walker.segment = way.first
+    find_segment(town, walker)
     walker.x, walker.y, walker.cos, walker.sin = place_beside(town, walker, walker.station, side_kept(way))
     locate(town, walker)
     walker.heading = math.atan2(walker.sin, walker.cos)

@@ -29,7 +29,7 @@ CORNER_WIDTH = 1.4
 BOWS = 0.0, 2.0, -2.0, 4.0, -4.0, 6.0, -6.0
 """How far to a side of the straight line such ways are tried [m]: round the outside of a bend they lead in a bow."""
 
-CLEARANCE = 0.45
+CLEARANCE = 0.8
 """How far from the lanes' edges the middles of these ways keep [m]."""
 
 STREET_HALF_WIDTH = 0.8
