@@ -11,7 +11,7 @@ from dorothie_gym.world.town.model import Array
 if TYPE_CHECKING:
     from dorothie_gym.world.kernel.town_arrays import TownArrays
 
-ASIDE = 0.45
+ASIDE = 0.4
 """How far to the right of the middle one walks [m]: those who come towards one pass by."""
 
 FROM_EDGE = 0.4

@@ -30,8 +30,8 @@ SPACE = 0.55
 SIZE = 0.5
 """Length and width of somebody [m], `Pedestrian.LENGTH`."""
 
-MARGIN = 0.25
-"""Nobody steps aside beyond this distance from the edge of the way [m]: half of somebody's width."""
+MARGIN = 0.4
+"""Nobody steps aside beyond this distance from the edge of the way [m]: cars that turn cut corners."""
 
 SIGHT = 4.0
 """Others who are further away are not looked at [m]."""

@@ -148,12 +148,14 @@ def _link(town: Town, lanes: Records) -> NDArray[np.int32]:
 def _find_cycling(lanes: Records, neighbours: NDArray[np.int32]) -> None:
     """Notes on which lanes cyclists ride: on slow ones, unless all ways on lead to faster ones, as from ramps."""
     lanes.cycling = lanes.limit <= CYCLIST_ROADS
-    before = -1
-    while before != (before := int(lanes.cycling.sum())):
-        for lane in lanes[lanes.cycling & (lanes.successors > 0)]:
+    changed = True
+    while changed:
+        changed = False
+        for number in np.flatnonzero(lanes.cycling & (lanes.successors > 0)):
+            lane = lanes[number]
             after = neighbours[lane.successor : lane.successor + lane.successors]
             if not lanes.cycling[after].any():
-                lanes.cycling[lanes.rank == lane.rank] = False
+                lane.cycling, changed = False, True
 
 
 def _relate(town: Town, lanes: Records, rules: RightOfWay) -> NDArray[np.uint8]:

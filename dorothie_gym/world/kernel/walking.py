@@ -26,6 +26,9 @@ PACE = 5
 BLOCKED = 3.0
 """Who has been kept from walking on for this long turns round [s]."""
 
+CORNER = 0.5
+"""One turns the corner this far before the end of a footway [m]."""
+
 
 @inlined
 def walk(town: TownArrays, world: WorldArrays, dt: float) -> None:
@@ -73,7 +76,7 @@ def _stroll(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
     walker = world.pedestrians[p]
     lateral = locate(town, walker)
     way = town.walks[walker.walk]
-    if walker.station >= way.length if walker.direction > 0.0 else walker.station <= 0.0:
+    if walker.station > way.length - CORNER if walker.direction > 0.0 else walker.station < CORNER:
         enter_next(town, walker)
         lateral = locate(town, walker)
         way = town.walks[walker.walk]
