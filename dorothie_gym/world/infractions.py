@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.world.compiling import allocating
 from dorothie_gym.world.config import FRAME_RATE
 from dorothie_gym.world.junctions import AT_LINE, STANDING
-from dorothie_gym.world.network.compiled import compiled
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.network.polyline import IntArray, local_coordinates, value_at
 from dorothie_gym.world.town.lights import LightColour
@@ -234,7 +234,7 @@ class InfractionWatch:
         )  # fmt: skip
 
 
-@compiled
+@allocating
 def _survey(
     points: Array, offsets: IntArray, ends: Array, boxes: Array, connectors: NDArray[np.bool_],
     x: float, y: float, heading: float, height: float,

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from dorothie_gym.world.network.compiled import compiled
+from dorothie_gym.world.compiling import allocating
 from dorothie_gym.world.town.model import Array
 
 SCALE_SIGMA = 0.02
@@ -34,7 +34,7 @@ DRAWS = 4
 """Normal numbers that a frame takes: of the bias, the gyro, the slip and the skid."""
 
 
-@compiled
+@allocating
 def dead_reckon(
     track: Array, draws: Array, dt: float, true_scale: float, true_bias: float,
     heading: float, scale: float, bias: float,

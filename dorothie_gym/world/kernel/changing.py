@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.following import following_acceleration, free_acceleration, wanted_gap
 from dorothie_gym.world.kernel.lanes import project
 from dorothie_gym.world.kernel.order import around

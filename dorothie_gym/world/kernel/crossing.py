@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.crosswalks import BRAKING, REACTION, ROOM, STANDING
 from dorothie_gym.world.crosswalks import SIGHT as VEHICLES_SIGHT
-from dorothie_gym.world.kernel.compiling import compiled, inlined
 from dorothie_gym.world.kernel.footways import ASIDE, find_segment
 from dorothie_gym.world.kernel.lights import light
 from dorothie_gym.world.kernel.pacing import AHEAD, LEVEL, walk_towards
@@ -74,9 +74,9 @@ def wait(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
     if abs(walker.x - x) > READY or abs(walker.y - y) > READY:
         ready = False
     else:
-        ready = _may_step(town, world, crossing, crossing.length / walker.pace)
+        ready = _may_step(town, world, crossing, (crossing.length + AHEAD) / walker.pace)
     if ready:
-        walker.state, walker.waited = Walk.CROSSING, 0.0
+        walker.state, walker.waited, walker.speed = Walk.CROSSING, 0.0, 0.0
         _advance(crossing, walker)
     elif walker.waited > GIVES_UP:
         _leave(town, walker)
@@ -120,7 +120,7 @@ def _leave(town: TownArrays, walker: Records) -> None:
     walker.walk, walker.station = crossing.walk[walker.mouth], crossing.station[walker.mouth]
     find_segment(town, walker)
     walker.direction = 1.0 if draw(walker) < 0.5 else -1.0
-    walker.state, walker.crossing, walker.waited = Walk.WALKING, NOBODY, -REST
+    walker.state, walker.crossing, walker.waited, walker.speed = Walk.WALKING, NOBODY, -REST, 0.0
 
 
 @compiled

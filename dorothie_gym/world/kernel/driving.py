@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.junctions import CRITICAL_GAP, HARDEST_BRAKING
 from dorothie_gym.world.kernel.changing import change_lanes
-from dorothie_gym.world.kernel.compiling import compiled, inlined
 from dorothie_gym.world.kernel.following import brake_to, following_acceleration, free_acceleration
 from dorothie_gym.world.kernel.junctions import announce, forget, note, request
 from dorothie_gym.world.kernel.motion import slip_towards_lane

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.lanes import project
 from dorothie_gym.world.kernel.parameters import AFTER_END, CYCLIST_FROM_EDGE, PLANNED
 from dorothie_gym.world.kernel.randomness import choose

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.collisions import collide
-from dorothie_gym.world.kernel.compiling import compiled, inlined
 from dorothie_gym.world.kernel.driving import drive
 from dorothie_gym.world.kernel.lanes import closest_lane, value_near
 from dorothie_gym.world.kernel.motion import move, slip_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.footways import place_beside
 from dorothie_gym.world.kernel.lanes import value_near
 from dorothie_gym.world.kernel.lights import light

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.crossing import comes_to_crosswalk, cross, wait
 from dorothie_gym.world.kernel.footways import enter_next, find_segment, locate, place_beside, side_kept
 from dorothie_gym.world.kernel.pacing import AHEAD, note_progress, walk_towards
