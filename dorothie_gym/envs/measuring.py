@@ -11,11 +11,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.world.network.compiled import compiled
+from dorothie_gym.world.compiling import allocating
 from dorothie_gym.world.town.model import Array
 
 
-@compiled
+@allocating
 def _index_at(s: Array, at: float) -> int:
     """Number of the point at or before a distance along the path."""
     low, high = 0, len(s)
@@ -28,7 +28,7 @@ def _index_at(s: Array, at: float) -> int:
     return max(low - 1, 0)
 
 
-@compiled
+@allocating
 def next_choice(lanes: NDArray[np.int64], here: int, chooses: NDArray[np.bool_]) -> int:
     """Number of the last point of a path that is on the next lane with a choice at its end; -1 if there is none.
 
@@ -46,7 +46,7 @@ def next_choice(lanes: NDArray[np.int64], here: int, chooses: NDArray[np.bool_])
     return -1
 
 
-@compiled
+@allocating
 def write_lanes(lanes: NDArray[np.int64], here: int, table: NDArray[np.int64]) -> None:
     """Writes the lanes of a path from a point of it on, each once, in order, as one more than their numbers."""
     row, last = 0, -1
@@ -59,7 +59,7 @@ def write_lanes(lanes: NDArray[np.int64], here: int, table: NDArray[np.int64]) -
             row += 1
 
 
-@compiled
+@allocating
 def progress_on_path(s: Array, points: Array, x: float, y: float, near: float, window: float) -> float:
     """Distance along a path [m] of its closest place to a position, looked for around a known place.
 
@@ -88,7 +88,7 @@ def progress_on_path(s: Array, points: Array, x: float, y: float, near: float, w
     return answer
 
 
-@compiled
+@allocating
 def write_waypoints(s: Array, points: Array, heading: float, start: float, spacing: float, table: Array) -> None:
     """Writes points of a path ahead of a place on it.
 
@@ -114,7 +114,7 @@ def write_waypoints(s: Array, points: Array, heading: float, start: float, spaci
         table[row, 1] = points[k, 1] + t * (points[k + 1, 1] - points[k, 1])
 
 
-@compiled
+@allocating
 def write_objects(
     seen: Array,
     x: float,
@@ -156,7 +156,7 @@ def write_objects(
         believed[row, 2] = believed_y + dx * sine + dy * cosine
 
 
-@compiled
+@allocating
 def write_path(
     s: Array,
     points: Array,

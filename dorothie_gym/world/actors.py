@@ -25,9 +25,9 @@ from dorothie_gym.world.kernel.parameters import CYCLIST_SHARE, CYCLIST_SPEEDS
 from dorothie_gym.world.kernel.plan import may_cycle
 from dorothie_gym.world.kernel.populating import SPEEDS
 from dorothie_gym.world.kernel.records import NOBODY
-from dorothie_gym.world.pedestrians import KERB
 from dorothie_gym.world.kernel.towing import is_free
 from dorothie_gym.world.network.road import TownRoad
+from dorothie_gym.world.pedestrians import KERB
 from dorothie_gym.world.town.model import Array
 
 MORE = 8

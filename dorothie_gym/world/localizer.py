@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from dorothie_gym.world.compiling import compiled
 from dorothie_gym.world.config import FRAME_RATE
-from dorothie_gym.world.kernel.compiling import compiled
 from dorothie_gym.world.odometry import BIAS_SIGMA, DRAWS, SCALE_SIGMA, STATES, measure, reckon
 from dorothie_gym.world.town.model import Array
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from dorothie_gym.world.kernel.compiling import compiled
+from dorothie_gym.world.compiling import compiled
 from dorothie_gym.world.town.model import Array
 
 SCALE_SIGMA = 0.02

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dorothie_gym.world.network.compiled import compiled
+from dorothie_gym.world.compiling import allocating
 
 CLEAR_SIGHT = 80.0
 """How far bodies are perceived on a clear day [m]."""
@@ -105,13 +105,13 @@ def daylight(altitude: float, cloudiness: float) -> float:
     return float(clear * (1.0 - 0.75 * cloudiness**3.4))
 
 
-@compiled
+@allocating
 def transmission(fog: float, fog_start: float, rain: float, distance: float) -> float:
     """Share of the contrast that the air leaves over a distance [m]; the rest as in `Visibility`."""
     return math.exp(-fog * max(distance - fog_start, 0.0) - rain * distance)
 
 
-@compiled
+@allocating
 def gain(
     fog: float, fog_start: float, rain: float, light: float, lamps: float, clarity: float, distance: float
 ) -> float:
@@ -123,7 +123,7 @@ def gain(
     return clarity * air * min(1.0, math.sqrt(light / FULL_LIGHT))
 
 
-@compiled
+@allocating
 def signal(gain: float, distance: float) -> float:
     """Signal S of something at a distance [m], 1 at the edge of sight on a clear day, by its gain."""
     nearness = CLEAR_SIGHT / max(distance, 1.0)

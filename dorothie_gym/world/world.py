@@ -196,7 +196,7 @@ class World:
         ]  # fmt: skip
 
     def seen(self) -> Array:
-        """The same in numbers (n, 9): key, class, x, y [m], heading [rad], length, width [m], speed [m/s], height [m]."""
+        """The same in numbers (n, 9), columns `perception.BODY` [m, rad, m/s]."""
         arrays = self.actors.arrays
         self._perception.open(arrays.eye, self.visibility)
         table = np.empty((len(arrays.seen), len(BODY)))

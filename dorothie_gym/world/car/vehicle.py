@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -14,14 +15,9 @@ from dorothie_gym.world.town.model import Array
 
 
 class Car(Vehicle):
-    """Vehicle number 0 of a world (`kernel.Kind.DRIVEN`), for reading; whoever writes to it moves it.
+    """Vehicle number 0 of a world (`kernel.Kind.DRIVEN`), as it was when the world was last stepped.
 
-    Attributes:
-        position: (2,) of its middle [m]; what is read is a copy.
-        heading: [rad].
-        speed: [m/s].
-        height: of the road under it [m].
-        control: what the actuators were told last.
+    Whoever sets its position, heading or speed moves it.
     """
 
     MAX_SPEED = 40.0
@@ -29,7 +25,14 @@ class Car(Vehicle):
     def __init__(self, road: TownRoad, holder: Any) -> None:
         """Shows the first vehicle of `holder.arrays`, which may be replaced by others with more room."""
         self._holder = holder
+        self.refresh()
         super().__init__(road, self.position, self.heading, self.speed)
+
+    def refresh(self) -> None:
+        """Looks again where the car is."""
+        row = self._row
+        self._position = np.array((row["x"], row["y"]))
+        self._heading, self._speed, self._height = float(row["heading"]), float(row["speed"]), float(row["height"])
 
     @property
     def _row(self) -> Any:
@@ -38,34 +41,39 @@ class Car(Vehicle):
 
     @property
     def position(self) -> Array:
-        row = self._row
-        return np.array((row["x"], row["y"]))
+        """Of its middle (2,) [m]."""
+        return self._position
 
     @position.setter
     def position(self, place: Array) -> None:
-        row = self._row
-        row["x"], row["y"] = place
+        self._row["x"], self._row["y"] = place
+        self.refresh()
 
     @property
     def heading(self) -> float:
-        return float(self._row["heading"])
+        """[rad]."""
+        return self._heading
 
     @heading.setter
     def heading(self, heading: float) -> None:
         row = self._row
-        row["heading"], row["cos"], row["sin"] = heading, np.cos(heading), np.sin(heading)
+        row["heading"], row["cos"], row["sin"] = heading, math.cos(heading), math.sin(heading)
+        self.refresh()
 
     @property
     def speed(self) -> float:
-        return float(self._row["speed"])
+        """[m/s]."""
+        return self._speed
 
     @speed.setter
     def speed(self, speed: float) -> None:
         self._row["speed"] = speed
+        self.refresh()
 
     @property
     def height(self) -> float:
-        return float(self._row["height"])
+        """Of the road under it [m]."""
+        return self._height
 
     @property
     def control(self) -> Control:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from dorothie_gym.world.kernel.compiling import inlined
+from dorothie_gym.world.compiling import inlined
 from dorothie_gym.world.kernel.records import Records
 from dorothie_gym.world.wind import (
     AIR_DENSITY,

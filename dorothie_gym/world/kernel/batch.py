@@ -8,7 +8,7 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from dorothie_gym.world.kernel.compiling import WITHOUT_COUNTS, concurrent
+from dorothie_gym.world.compiling import WITHOUT_COUNTS, concurrent
 from dorothie_gym.world.kernel.stepping import step
 from dorothie_gym.world.kernel.town_arrays import TownArrays
 from dorothie_gym.world.kernel.world_arrays import WorldArrays

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.world.compiling import allocating
 from dorothie_gym.world.kernel.records import ENTRY, Records
-from dorothie_gym.world.network.compiled import compiled
 from dorothie_gym.world.network.polyline import closest_on_segment
 from dorothie_gym.world.town.model import Array
 
@@ -61,7 +61,7 @@ def build_cells(points: Array, lanes: Records) -> Cells:
     return Cells(low, np.ascontiguousarray(np.stack((starts, stops), axis=-1)), entries)
 
 
-@compiled
+@allocating
 def _list_lanes(
     points: Array,
     lanes: Records,
@@ -96,7 +96,7 @@ def _list_lanes(
                     cursors[row, column] += 1
 
 
-@compiled
+@allocating
 def _stretch(points: Array, first: int, last: int, x: float, y: float) -> tuple[int, int]:
     """First and last segment that can be closest from within the cell around a place; -1 where the lane is far away."""
     radius = CELL * math.sqrt(0.5)
@@ -117,7 +117,7 @@ def _stretch(points: Array, first: int, last: int, x: float, y: float) -> tuple[
     return low, high
 
 
-@compiled
+@allocating
 def _write(entry: Records, points: Array, lane: int, first: int, last: int) -> None:
     low = high = points[first, 3]
     for k in range(first, last + 2):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.following import following_acceleration, free_acceleration, wanted_gap
 from dorothie_gym.world.kernel.lanes import project
 from dorothie_gym.world.kernel.order import around
@@ -21,7 +21,7 @@ from dorothie_gym.world.kernel.parameters import (
     LANE_CHANGE_DELAY,
     LANE_CHANGE_GAIN,
 )
-from dorothie_gym.world.kernel.plan import may_cycle, take
+from dorothie_gym.world.kernel.plan import take
 from dorothie_gym.world.kernel.records import Kind, Records
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def _consider(town: TownArrays, world: WorldArrays, i: int, lane: Records, side:
 def _move_over(town: TownArrays, world: WorldArrays, i: int, lane: Records) -> None:
     """A cyclist changes to the lane to the right, if there is one where it may ride and room on it, and to no other."""
     vehicle = world.vehicles[i]
-    if lane.right < 0 or not may_cycle(town.lanes[lane.right]) or town.lanes[lane.right].successors == 0:
+    if lane.right < 0 or not town.lanes[lane.right].cycling or town.lanes[lane.right].successors == 0:
         return
     station, _, _ = project(town, lane.right, vehicle.x, vehicle.y)
     _, ahead, _, behind = around(town, world, lane.right, station, i)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.events import log
 from dorothie_gym.world.kernel.records import PEDESTRIAN_CLASS, STATIC, VEHICLES, EventCode, Kind, Records, Walk
 from dorothie_gym.world.network.ahead import LEVEL

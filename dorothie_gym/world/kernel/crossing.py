@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.crosswalks import BRAKING, REACTION, ROOM, STANDING
 from dorothie_gym.world.crosswalks import SIGHT as VEHICLES_SIGHT
-from dorothie_gym.world.kernel.compiling import compiled, inlined
-from dorothie_gym.world.kernel.footways import ASIDE
+from dorothie_gym.world.kernel.footways import ASIDE, find_segment
 from dorothie_gym.world.kernel.lights import light
 from dorothie_gym.world.kernel.pacing import AHEAD, LEVEL, walk_towards
 from dorothie_gym.world.kernel.randomness import draw
@@ -31,7 +31,7 @@ REST = 5.0
 PLACES, PLACES_APART = 3, 0.7
 """People wait beside one another in so many places, this far apart [m] ..."""
 
-FROM_KERB = 0.6
+FROM_KERB = 0.9
 """... and this far from the kerb [m]."""
 
 READY = 1.0
@@ -74,9 +74,9 @@ def wait(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
     if abs(walker.x - x) > READY or abs(walker.y - y) > READY:
         ready = False
     else:
-        ready = _may_step(town, world, crossing, crossing.length / walker.pace)
+        ready = _may_step(town, world, crossing, (crossing.length + AHEAD) / walker.pace)
     if ready:
-        walker.state, walker.waited = Walk.CROSSING, 0.0
+        walker.state, walker.waited, walker.speed = Walk.CROSSING, 0.0, 0.0
         _advance(crossing, walker)
     elif walker.waited > GIVES_UP:
         _leave(town, walker)
@@ -118,12 +118,9 @@ def _leave(town: TownArrays, walker: Records) -> None:
     """Walks on along the pavement where one has been waiting, or come to."""
     crossing = town.crossings[walker.crossing]
     walker.walk, walker.station = crossing.walk[walker.mouth], crossing.station[walker.mouth]
-    way = town.walks[walker.walk]
-    walker.segment = way.first
-    while walker.segment < way.last - 1 and town.walk_points[walker.segment + 1, 2] <= walker.station:
-        walker.segment += 1
+    find_segment(town, walker)
     walker.direction = 1.0 if draw(walker) < 0.5 else -1.0
-    walker.state, walker.crossing, walker.waited = Walk.WALKING, NOBODY, -REST
+    walker.state, walker.crossing, walker.waited, walker.speed = Walk.WALKING, NOBODY, -REST, 0.0
 
 
 @compiled

@@ -6,9 +6,9 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.world.car.planner import SWEEP_STEP
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.junctions import CRITICAL_GAP, HARDEST_BRAKING
 from dorothie_gym.world.kernel.changing import change_lanes
-from dorothie_gym.world.kernel.compiling import compiled, inlined
 from dorothie_gym.world.kernel.following import brake_to, following_acceleration, free_acceleration
 from dorothie_gym.world.kernel.junctions import announce, forget, note, request
 from dorothie_gym.world.kernel.lanes import project
@@ -98,8 +98,7 @@ def _acceleration(town: TownArrays, world: WorldArrays, i: int) -> float:
         left = begin - 0.5 * vehicle.length - LINE_GAP
         if left < vehicle.speed * vehicle.speed / (2.0 * STOP_BRAKING) + ASKING:
             stop = min(stop, brake_to(vehicle.speed, left))
-    if world.car[0].sweeping and vehicle.kind != Kind.DRIVEN:
-        stop = min(stop, _give_way_to_turning(town, world, vehicle))
+    stop = min(stop, _give_way_to_turning(town, world, vehicle))
     return min(found, stop, _approach(town, world, i, junction, line, front, gap))
 
 
@@ -107,6 +106,8 @@ def _acceleration(town: TownArrays, world: WorldArrays, i: int) -> float:
 def _give_way_to_turning(town: TownArrays, world: WorldArrays, vehicle: Records) -> float:
     """Acceleration that stops a vehicle before the way of the car that turns round [m/s^2]; inf where it is clear."""
     car, other = world.car[0], world.vehicles[0]
+    if not car.sweeping:
+        return math.inf
     dx, dy = other.x - vehicle.x, other.y - vehicle.y
     if dx * dx + dy * dy > CROSSING_SIGHT * CROSSING_SIGHT or abs(other.height - vehicle.height) > LEVEL:
         return math.inf

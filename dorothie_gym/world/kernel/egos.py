@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.world.compiling import compiled, concurrent
 from dorothie_gym.world.kernel.batch import world_of
-from dorothie_gym.world.kernel.compiling import compiled, concurrent
 from dorothie_gym.world.kernel.kinematics import View, observe
 from dorothie_gym.world.kernel.meta import NOTHING, control, decide, move, speed_along, take_helm
 from dorothie_gym.world.kernel.records import Records

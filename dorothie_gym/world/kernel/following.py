@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.parameters import (
     ACC_MAX,
     CLOSING,

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.records import Records
 from dorothie_gym.world.town.model import Array
 
 if TYPE_CHECKING:
     from dorothie_gym.world.kernel.town_arrays import TownArrays
 
-ASIDE = 0.45
+ASIDE = 0.4
 """How far to the right of the middle one walks [m]: those who come towards one pass by."""
 
 FROM_EDGE = 0.4
@@ -37,11 +37,11 @@ def locate(town: TownArrays, walker: Records) -> float:
     if along > points[k + 1, 2] - points[k, 2]:
         while k < way.last - 1 and along > points[k + 1, 2] - points[k, 2]:
             k += 1
-            along = _along(points, k, walker.x, walker.y)
+            along = max(_along(points, k, walker.x, walker.y), 0.0)
     else:
         while k > way.first and along < 0.0:
             k -= 1
-            along = _along(points, k, walker.x, walker.y)
+            along = min(_along(points, k, walker.x, walker.y), points[k + 1, 2] - points[k, 2])
     walker.segment, walker.station = k, points[k, 2] + along
     length = points[k + 1, 2] - points[k, 2]
     walker.height = points[k, 4] + min(max(along / length, 0.0), 1.0) * (points[k + 1, 4] - points[k, 4])
@@ -54,6 +54,16 @@ def _along(points: Array, k: int, x: float, y: float) -> float:
     """How far along a segment a place is [m]."""
     dx, dy = points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
     return float(((x - points[k, 0]) * dx + (y - points[k, 1]) * dy) / (points[k + 1, 2] - points[k, 2]))
+
+
+@inlined
+def find_segment(town: TownArrays, walker: Records) -> None:
+    """Finds the segment of a pedestrian's footway that its station is on."""
+    way, points = town.walks[walker.walk], town.walk_points
+    k = way.first
+    while k < way.last - 1 and points[k + 1, 2] <= walker.station:
+        k += 1
+    walker.segment = k
 
 
 @compiled

@@ -15,8 +15,8 @@ from dorothie_gym.world.car.driver import (
     WALKING_SPEED,
 )
 from dorothie_gym.world.car.planner import BEGUN, BRAKING
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.air import drift
-from dorothie_gym.world.kernel.compiling import compiled, inlined
 from dorothie_gym.world.kernel.course import advance, heading_at, point_at, take_lanes
 from dorothie_gym.world.kernel.events import log
 from dorothie_gym.world.kernel.junctions import note

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.junctions import (
     AT_LINE,
     COMFORTABLE_BRAKING,
@@ -22,7 +23,6 @@ from dorothie_gym.world.junctions import (
     START,
     UNUSED,
 )
-from dorothie_gym.world.kernel.compiling import compiled, inlined
 from dorothie_gym.world.kernel.lights import light
 from dorothie_gym.world.kernel.parameters import AFTER_END, CLOSED
 from dorothie_gym.world.kernel.records import NOBODY, Colour, Control, Kind, Records, Relation, Wait

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.lanes import project
 from dorothie_gym.world.kernel.parameters import CAR_LENGTH, MAX_SPEED
 from dorothie_gym.world.kernel.records import Kind, Walk

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.cells import CELL, REACH, SLACK, TURNED
-from dorothie_gym.world.kernel.compiling import compiled, inlined
 from dorothie_gym.world.kernel.records import NOBODY, Records
 from dorothie_gym.world.network.grid import SAME_LEVEL
 from dorothie_gym.world.town.model import Array

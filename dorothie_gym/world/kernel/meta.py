@@ -14,7 +14,7 @@ from highway_env.vehicle.controller import ControlledVehicle
 from highway_env.vehicle.kinematics import Vehicle
 from numpy.typing import NDArray
 
-from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.lanes import project, value_near
 from dorothie_gym.world.kernel.motion import slip_towards, steering_angle
 from dorothie_gym.world.kernel.parameters import AFTER_END, CAR_LENGTH, MAX_SPEED

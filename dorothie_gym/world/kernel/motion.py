@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.following import not_zero
 from dorothie_gym.world.kernel.lanes import value_near, wrapped
 from dorothie_gym.world.kernel.parameters import (

@@ -19,7 +19,7 @@ from dorothie_gym.world.car.hazards import (
     TIGHT_GAP,
 )
 from dorothie_gym.world.car.path import SPACING
-from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.course import point_at
 from dorothie_gym.world.kernel.records import STATIC, Records
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.records import NOBODY, Kind, Records
 from dorothie_gym.world.network.ahead import HORIZON, MARGIN
 

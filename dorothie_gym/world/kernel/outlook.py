@@ -9,8 +9,8 @@ from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.world.car.hazards import HEIGHT_MARGIN
 from dorothie_gym.world.car.path import U_TURN_REACH
 from dorothie_gym.world.car.planner import BEGUN, BRAKING
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.junctions import CRITICAL_GAP, HARDEST_BRAKING
-from dorothie_gym.world.kernel.compiling import compiled, inlined
 from dorothie_gym.world.kernel.course import point_at
 from dorothie_gym.world.kernel.driving import STEP_AHEAD, STEP_PAST
 from dorothie_gym.world.kernel.junctions import announce, close, request

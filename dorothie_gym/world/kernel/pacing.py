@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.records import Kind, Records, Walk
 from dorothie_gym.world.pedestrians import ELBOW_ROOM, PERSONAL_SPACE
 
@@ -22,7 +22,7 @@ AVOIDING = 1.6
 """Within this distance people step out of each other's way [m] ..."""
 
 BESIDE = 0.05
-"""... to the right, unless the other one is further than this to the right [m]."""
+"""... to the right, unless the other one is further than this to the right of the middle of the way [m]."""
 
 SPACE = 0.55
 """And never come closer than this, from middle to middle [m]."""
@@ -30,8 +30,8 @@ SPACE = 0.55
 SIZE = 0.5
 """Length and width of somebody [m], `Pedestrian.LENGTH`."""
 
-MARGIN = 0.25
-"""Nobody steps aside beyond this distance from the edge of the way [m]: half of somebody's width."""
+MARGIN = 0.4
+"""Nobody steps aside beyond this distance from the edge of the way [m]: cars that turn cut corners."""
 
 SIGHT = 4.0
 """Others who are further away are not looked at [m]."""
@@ -82,7 +82,7 @@ def walk_towards(
     if distance < ARRIVED:
         return True
     step = min(walker.pace * time, distance)
-    dx, dy = _past_others(world, p, dx / distance, dy / distance)
+    dx, dy = _past_others(world, p, dx / distance, dy / distance, cos, sin, lateral)
     aside = lateral + (dy * cos - dx * sin) * step
     if abs(aside) > max(half - MARGIN, 0.0) and abs(aside) > abs(lateral):
         # along the edge of the way instead
@@ -99,8 +99,14 @@ def walk_towards(
 
 
 @inlined
-def _past_others(world: WorldArrays, p: int, cos: float, sin: float) -> tuple[float, float]:
-    """Direction that leads past those who are in the way: away from them, and rather to the right."""
+def _past_others(
+    world: WorldArrays, p: int, cos: float, sin: float, way_cos: float, way_sin: float, lateral: float
+) -> tuple[float, float]:
+    """Direction that leads past those who are in the way, on the side of the way on which there is more room.
+
+    So those who come towards one, who keep to their right, are passed on the right, and those who are slower on the
+    left. The arguments are as of `walk_towards`, the first direction is the one to the place.
+    """
     walker = world.pedestrians[p]
     x, y = cos, sin
     for q in range(len(world.pedestrians)):
@@ -109,6 +115,8 @@ def _past_others(world: WorldArrays, p: int, cos: float, sin: float) -> tuple[fl
         if abs(dx) > AVOIDING or abs(dy) > AVOIDING or q == p or other.state == Walk.EMPTY:
             continue
         push = _push(dx, dy, 0.0, cos, sin)
+        if lateral + dy * way_cos - dx * way_sin > BESIDE:
+            push = -push
         x, y = x - push * sin, y + push * cos
     for q in range(len(world.props)):
         prop = world.props[q]
@@ -116,6 +124,8 @@ def _past_others(world: WorldArrays, p: int, cos: float, sin: float) -> tuple[fl
         if abs(dx) > SIGHT or abs(dy) > SIGHT or not prop.present:
             continue
         push = _push(dx, dy, 0.5 * (max(prop.length, prop.width) - SIZE), cos, sin)
+        if lateral + dy * way_cos - dx * way_sin > BESIDE:
+            push = -push
         x, y = x - push * sin, y + push * cos
     length = math.sqrt(x * x + y * y)  # at least 1: whoever is avoided is avoided sideways
     return x / length, y / length
@@ -123,12 +133,11 @@ def _past_others(world: WorldArrays, p: int, cos: float, sin: float) -> tuple[fl
 
 @inlined
 def _push(dx: float, dy: float, radius: float, cos: float, sin: float) -> float:
-    """How much to the right something in the way makes one step aside; less than 0: to the left."""
+    """How much something in the way makes one step aside, 0 to 1."""
     gap = math.sqrt(dx * dx + dy * dy) - radius
     if gap > AVOIDING or dx * cos + dy * sin < 0.0:
         return 0.0
-    push = (AVOIDING - gap) / AVOIDING
-    return -push if dy * cos - dx * sin > BESIDE else push
+    return (AVOIDING - gap) / AVOIDING
 
 
 @inlined

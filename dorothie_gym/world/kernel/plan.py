@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.lanes import project
-from dorothie_gym.world.kernel.parameters import AFTER_END, CYCLIST_FROM_EDGE, CYCLIST_ROADS, PLANNED
+from dorothie_gym.world.kernel.parameters import AFTER_END, CYCLIST_FROM_EDGE, PLANNED
 from dorothie_gym.world.kernel.randomness import choose
 from dorothie_gym.world.kernel.records import Kind, Records
 from dorothie_gym.world.network.ahead import HORIZON
@@ -32,12 +32,6 @@ def keep_side(vehicle: Records, lane: Records) -> None:
     """A cyclist keeps to the right edge of its lane, cars to its middle."""
     if vehicle.kind == Kind.CYCLIST:
         vehicle.to_right = max(lane.half_width - CYCLIST_FROM_EDGE, 0.0)
-
-
-@inlined
-def may_cycle(lane: Records) -> bool:
-    """Whether cyclists ride on a lane."""
-    return bool(lane.limit <= CYCLIST_ROADS)
 
 
 @inlined
@@ -79,26 +73,13 @@ def _drawn(town: TownArrays, vehicle: Records, last: Records) -> int:
     streets = 0
     if vehicle.kind == Kind.CYCLIST:
         for k in range(last.successor, last.successor + last.successors):
-            streets += _leads_along_streets(town, town.neighbours[k])
+            streets += town.lanes[town.neighbours[k]].cycling
     if streets == 0:
         return int(town.neighbours[last.successor + choose(vehicle, last.successors)])
     left = choose(vehicle, streets)
     for k in range(last.successor, last.successor + last.successors):
-        if _leads_along_streets(town, town.neighbours[k]):
+        if town.lanes[town.neighbours[k]].cycling:
             if left == 0:
                 return int(town.neighbours[k])
             left -= 1
     return int(town.neighbours[last.successor])
-
-
-@compiled
-def _leads_along_streets(town: TownArrays, number: int) -> bool:
-    """Whether cyclists may ride on a lane and, if that crosses a junction, behind it."""
-    lane = town.lanes[number]
-    if not may_cycle(lane):
-        return False
-    if lane.junction >= 0:
-        for k in range(lane.successor, lane.successor + lane.successors):
-            if not may_cycle(town.lanes[town.neighbours[k]]):
-                return False
-    return True

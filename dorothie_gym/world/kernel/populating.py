@@ -12,7 +12,6 @@ from dorothie_gym.world.kernel.parameters import (
     CYCLIST_SHARE,
     CYCLIST_SPEEDS,
 )
-from dorothie_gym.world.kernel.plan import may_cycle
 from dorothie_gym.world.kernel.records import NOBODY, PEDESTRIAN, Footway, Kind, Walk
 from dorothie_gym.world.kernel.towing import is_clear_of_people, is_free
 from dorothie_gym.world.kernel.town_arrays import TownArrays
@@ -54,13 +53,14 @@ def _add_traffic(
     network: TownNetwork, town: TownArrays, world: WorldArrays, rng: np.random.Generator, vehicles: int, cyclists: float
 ) -> None:
     room = min(vehicles, int((world.vehicles.kind == Kind.EMPTY).sum()))
-    kinds = np.where(rng.random(room) < cyclists, Kind.CYCLIST, Kind.CAR)
+    rideable = town.lanes.cycling & (town.lanes.right < 0) & (town.lanes.junction < 0)
+    kinds = np.where(rng.random(room) < cyclists * rideable.any(), Kind.CYCLIST, Kind.CAR)
     count = 0
     for lane, station in free_places(network.town, rng, TRIES * vehicles):
         if count == room:
             return
         kind = Kind(kinds[count])
-        if kind is Kind.CYCLIST and not (town.lanes[lane].right < 0 and may_cycle(town.lanes[lane])):
+        if kind is Kind.CYCLIST and not rideable[lane]:
             continue
         if is_free(town, world, lane, station, int(NOBODY), CLEAR_OF_CAR):
             speeds = CYCLIST_SPEEDS if kind is Kind.CYCLIST else SPEEDS

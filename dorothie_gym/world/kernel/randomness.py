@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from dorothie_gym.world.kernel.compiling import compiled
+from dorothie_gym.world.compiling import compiled
 
 MASK = 0xFFFFFFFF
 

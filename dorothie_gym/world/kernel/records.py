@@ -119,6 +119,7 @@ LANE = np.dtype(
         ("place", "i4"),  # of a connector: its place among those of its junction
         ("relation", "i4"),  # of a connector: where its row of `relations` begins
         ("control", "i4"),  # `Control`
+        ("cycling", "b1"),  # whether cyclists ride on it: it is slow, and one may go on without coming to a fast one
         ("programme", "i4"), ("slot", "i4"),  # light programme, and the place of its light in it
         ("sibling", "i4"), ("siblings", "i4"),  # rows of `siblings`
         ("passage", "i4"), ("passages", "i4"),  # rows of `passages`
@@ -262,7 +263,7 @@ CAR = np.dtype(
         ("stop_at", "f8"),  # where it has to stop, infinite where the path does not end [m]
         ("runs", "i4"), ("run", "i4"),  # lanes of the path one after another: how many, and the one that it is on
         ("run_lane", "i4", (PLANNED,)), ("run_first", "i4", (PLANNED,)),  # and the first point on each
-        ("action", "i4"), ("action_end", "f8"),  # manoeuvre that is prepared or driven, a `PhysicalAction`, or 0; its end
+        ("action", "i4"), ("action_end", "f8"),  # manoeuvre, a `PhysicalAction` or 0, and where it ends [m]
         ("cruise", "f8"),  # desired speed [m/s]
         ("held", "b1"), ("hold_speed", "f8"),  # whether it stops by command, and how fast it still is then; -1 for none
         ("goals", "i4"), ("goal", "f8", (GOALS,)),  # places along the path to come up to slowly [m]
@@ -272,10 +273,10 @@ CAR = np.dtype(
         ("friction", "f8"),  # share of the dry road's grip
         ("wind", "f8"), ("wind_heading", "f8"), ("wind_phase", "f8", (3,)),  # strength in [0, 1], where to, gusts
         ("roadblock", "f8"),  # how far ahead of its middle a prop is seen on the path [m], or infinite
-        ("sweeping", "b1"), ("sweep_first", "i4"), ("sweep_last", "i4"),  # points that it has still to pass turning round
+        ("sweeping", "b1"), ("sweep_first", "i4"), ("sweep_last", "i4"),  # points still to be passed turning round
         ("closed", "i4", (CLOSED,)), ("closed_at", "f8", (CLOSED,)),  # junctions that it needs to turn round, and when
-        ("kind", "i4"), ("gap", "f8"), ("ahead_speed", "f8"), ("other", "i4"),  # what limits its speed: an `ObjectClass`
-        ("tight", "b1"), ("line", "b1"),  # or 0, its gap [m], speed [m/s] and key; see `car.hazards.Hazard`
+        ("kind", "i4"), ("gap", "f8"), ("ahead_speed", "f8"), ("other", "i4"),  # what limits its speed: `ObjectClass`
+        ("tight", "b1"), ("line", "b1"),  # or 0, gap [m], speed [m/s], key; whether in a manoeuvre, or for a line
         ("hazard", "i4"), ("hazard_gap", "f8"), ("hazard_key", "i4"),  # what it stops for: as `kind`, 0 for nothing
         ("hazard_since", "i8"), ("hazard_seen", "i8"),  # frames
         ("stopped_until", "i8"), ("collision_stop", "i8"),  # frames for which it stands after a collision

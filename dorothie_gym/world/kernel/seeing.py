@@ -9,9 +9,9 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.config import FRAME_RATE
 from dorothie_gym.world.kernel.collisions import WALKER_SIZE
-from dorothie_gym.world.kernel.compiling import compiled, inlined
 from dorothie_gym.world.kernel.records import Group, Kind, Records, Walk
 from dorothie_gym.world.town.model import Array
 from dorothie_gym.world.visibility import CLEAR_SIGHT, SHORTEST_SIGHT, gain, signal

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.collisions import collide
-from dorothie_gym.world.kernel.compiling import compiled, inlined
 from dorothie_gym.world.kernel.driving import drive
 from dorothie_gym.world.kernel.events import trace
 from dorothie_gym.world.kernel.guiding import guide

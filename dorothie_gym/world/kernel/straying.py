@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.junctions import CRITICAL_GAP
-from dorothie_gym.world.kernel.compiling import compiled, inlined
 from dorothie_gym.world.kernel.following import brake_to
 from dorothie_gym.world.kernel.footways import closest_walk
 from dorothie_gym.world.kernel.lanes import project
@@ -87,7 +87,7 @@ def stray(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
         _arrive(town, walker)
         return
     if walker.mouth == BACK and gone <= 0.0:
-        walker.state, walker.waited = Walk.WALKING, 0.0
+        walker.state, walker.waited, walker.speed = Walk.WALKING, 0.0, 0.0
         return
     onward = 1.0 if walker.mouth == OVER else -1.0
     ahead = gone + onward * AHEAD

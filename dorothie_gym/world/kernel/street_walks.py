@@ -84,7 +84,7 @@ def _beside(points: Array, lane: Records) -> Array | None:
     count = int((lane.length - 2.0 * FROM_ENDS) / WALK_STEP) + 1
     if lane.right >= 0 or lane.junction >= 0 or (count - 1) * WALK_STEP < SHORTEST_WALK:
         return None
-    return _offset(points, lane, FROM_ENDS + WALK_STEP * np.arange(count), 1.0)
+    return _offset(points, lane, np.linspace(FROM_ENDS, FROM_ENDS + (count - 1) * WALK_STEP, count), 1.0)
 
 
 def _offset(points: Array, lane: Records, stations: Array, side: float) -> Array:

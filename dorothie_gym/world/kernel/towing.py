@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.footways import place_beside
 from dorothie_gym.world.kernel.lanes import value_near
 from dorothie_gym.world.kernel.lights import light
@@ -23,7 +23,7 @@ from dorothie_gym.world.kernel.parameters import (
     TOW_FACING,
     TOW_STUCK,
 )
-from dorothie_gym.world.kernel.plan import keep_side, may_cycle, take
+from dorothie_gym.world.kernel.plan import keep_side, take
 from dorothie_gym.world.kernel.randomness import choose, draw
 from dorothie_gym.world.kernel.records import NOBODY, Colour, Footway, Kind, Records, Walk
 from dorothie_gym.world.kernel.walking import place_walker
@@ -128,7 +128,7 @@ def _bring_back(town: TownArrays, world: WorldArrays, i: int) -> None:
         lane = town.lanes[number]
         if lane.junction >= 0 or lane.length < SHORTEST or draw(vehicle) * USUAL_LENGTH > lane.length:
             continue
-        if vehicle.kind == Kind.CYCLIST and not (lane.right < 0 and may_cycle(lane)):
+        if vehicle.kind == Kind.CYCLIST and not (lane.right < 0 and lane.cycling):
             continue
         station = CAR_LENGTH + draw(vehicle) * (lane.length - 2.0 * CAR_LENGTH)
         if is_free(town, world, number, station, i, OUT_OF_SIGHT):

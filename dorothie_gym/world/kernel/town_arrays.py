@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.world.kernel.cells import build_cells
-from dorothie_gym.world.kernel.parameters import CAR_LENGTH
+from dorothie_gym.world.kernel.parameters import CAR_LENGTH, CYCLIST_ROADS
 from dorothie_gym.world.kernel.records import LANE, NOBODY, PROGRAMME, SIBLING, Colour, Control, Records, Relation
 from dorothie_gym.world.kernel.walkways import build_walkways
 from dorothie_gym.world.network.network import TownNetwork
@@ -102,6 +102,7 @@ def _build(network: TownNetwork) -> TownArrays:
     for lane in town.lanes:
         _describe(lanes[lane.id], lane, network.row(network.index_of(lane.id)), network.table)
     neighbours = _link(town, lanes)
+    _find_cycling(lanes, neighbours)
     relations = _relate(town, lanes, right_of_way(town))
     siblings = _siblings(town, lanes)
     programmes, phase_ends, colours = _lights(town, lanes)
@@ -144,6 +145,19 @@ def _link(town: Town, lanes: Records) -> NDArray[np.int32]:
             beside = town.neighbour(lane.id, side)
             record[name] = NOBODY if beside is None else beside
     return np.array(pool, dtype=np.int32)
+
+
+def _find_cycling(lanes: Records, neighbours: NDArray[np.int32]) -> None:
+    """Notes on which lanes cyclists ride: on slow ones, unless all ways on lead to faster ones, as from ramps."""
+    lanes.cycling = lanes.limit <= CYCLIST_ROADS
+    changed = True
+    while changed:
+        changed = False
+        for number in np.flatnonzero(lanes.cycling & (lanes.successors > 0)):
+            lane = lanes[number]
+            after = neighbours[lane.successor : lane.successor + lane.successors]
+            if not lanes.cycling[after].any():
+                lane.cycling, changed = False, True
 
 
 def _relate(town: Town, lanes: Records, rules: RightOfWay) -> NDArray[np.uint8]:

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym.world.kernel.compiling import compiled, inlined
+from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.crossing import comes_to_crosswalk, cross, wait
-from dorothie_gym.world.kernel.footways import enter_next, locate, place_beside, side_kept
+from dorothie_gym.world.kernel.footways import enter_next, find_segment, locate, place_beside, side_kept
 from dorothie_gym.world.kernel.pacing import AHEAD, note_progress, walk_towards
 from dorothie_gym.world.kernel.records import NOBODY, Footway, Records, Walk
 from dorothie_gym.world.kernel.straying import steps_out, stray
@@ -25,6 +25,9 @@ PACE = 5
 
 BLOCKED = 3.0
 """Who has been kept from walking on for this long turns round [s]."""
+
+CORNER = 0.5
+"""One turns the corner this far before the end of a footway [m]."""
 
 
 @inlined
@@ -73,7 +76,7 @@ def _stroll(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
     walker = world.pedestrians[p]
     lateral = locate(town, walker)
     way = town.walks[walker.walk]
-    if walker.station >= way.length if walker.direction > 0.0 else walker.station <= 0.0:
+    if walker.station > way.length - CORNER if walker.direction > 0.0 else walker.station < CORNER:
         enter_next(town, walker)
         lateral = locate(town, walker)
         way = town.walks[walker.walk]
@@ -97,7 +100,7 @@ def place_walker(town: TownArrays, walker: Records) -> None:
     walker.state, walker.crossing, walker.crashed, walker.mouth = Walk.WALKING, NOBODY, False, 0
     walker.waited, walker.staying, walker.crash_age, walker.far = 0.0, 0.0, 0.0, 0.0
     way = town.walks[walker.walk]
-    walker.segment = way.first
+    find_segment(town, walker)
     walker.x, walker.y, walker.cos, walker.sin = place_beside(town, walker, walker.station, side_kept(way))
     locate(town, walker)
     walker.heading = math.atan2(walker.sin, walker.cos)

@@ -29,7 +29,7 @@ CORNER_WIDTH = 1.4
 BOWS = 0.0, 2.0, -2.0, 4.0, -4.0, 6.0, -6.0
 """How far to a side of the straight line such ways are tried [m]: round the outside of a bend they lead in a bow."""
 
-CLEARANCE = 0.45
+CLEARANCE = 0.8
 """How far from the lanes' edges the middles of these ways keep [m]."""
 
 STREET_HALF_WIDTH = 0.8
@@ -81,7 +81,7 @@ def build_walkways(network: TownNetwork, lanes: Records) -> Walkways:
     streets = street_walks(network.table.points, lanes, town, edges)
     rows = ways + [street.points for street in streets]
     firsts = np.concatenate(([0], np.cumsum([len(row) for row in rows]))).astype(int)
-    walks = np.zeros(max(len(rows), 1), dtype=WALKWAY).view(np.recarray)
+    walks: Records = np.zeros(max(len(rows), 1), dtype=WALKWAY).view(np.recarray)
     walks.next_walk = walks.lane = NOBODY
     for k, row in enumerate(rows):
         walks[k].first, walks[k].last, walks[k].length = firsts[k], firsts[k + 1] - 1, row[-1, 2]
@@ -276,10 +276,10 @@ def _lights(town: Town, lanes: Records, crossings: Records, passages: Records) -
     heeded: list[int] = []
     for k, crossing in enumerate(crossings):
         crossing.light = len(heeded)
-        for lane in sorted(passing[k]):
-            dx, dy = town.lanes[lane].points[-1, :2] - (crossing.x[0], crossing.y[0])
+        for source in sorted(passing[k]):
+            dx, dy = town.lanes[source].points[-1, :2] - (crossing.x[0], crossing.y[0])
             along, aside = dx * crossing.cos + dy * crossing.sin, abs(dy * crossing.cos - dx * crossing.sin)
-            if lanes[lane].programme >= 0 and aside < HEEDED and 0.0 < along < crossing.length:
-                heeded.append(lane)
+            if lanes[source].programme >= 0 and aside < HEEDED and 0.0 < along < crossing.length:
+                heeded.append(source)
         crossing.lights = len(heeded) - crossing.light
     return np.array(heeded, dtype=np.int32)

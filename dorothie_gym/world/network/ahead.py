@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from dorothie_gym.world.network.compiled import compiled
+from dorothie_gym.world.compiling import allocating
 from dorothie_gym.world.network.network import LaneIndex, TownNetwork
 from dorothie_gym.world.network.polyline import WIDTH, IntArray, LaneTable, local_coordinates, value_at
 from dorothie_gym.world.town.model import Array
@@ -129,7 +129,7 @@ def lane_zones(table: LaneTable) -> Array:
     return np.hstack((table.boxes[:, :2] - reach, table.boxes[:, 2:] + reach))
 
 
-@compiled
+@allocating
 def neighbours_on(
     points: Array,
     offsets: IntArray,

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from dorothie_gym.world.network.compiled import compiled
+from dorothie_gym.world.compiling import allocating
 from dorothie_gym.world.network.polyline import IntArray, LaneTable, closest_on_segment, distance, value_at
 from dorothie_gym.world.town.model import Array
 
@@ -59,7 +59,7 @@ class GridIndex:
         return int(row)
 
 
-@compiled
+@allocating
 def _list_lanes(points: Array, offsets: IntArray, x0: float, y0: float, cursors: IntArray, entries: IntArray) -> None:
     """Count the lanes of each cell in `cursors`; if there are `entries`, write them where the cursors stand."""
     rows, columns = cursors.shape
@@ -86,7 +86,7 @@ def _list_lanes(points: Array, offsets: IntArray, x0: float, y0: float, cursors:
                         cursors[row, column] += 1
 
 
-@compiled
+@allocating
 def _out_of_question(boxes: Array, lane: int, x: float, y: float, best: float) -> bool:
     """Whether the bounding box of a lane alone is farther away than the best lane."""
     dx = max(boxes[lane, 0] - x, x - boxes[lane, 2], 0.0)
@@ -94,7 +94,7 @@ def _out_of_question(boxes: Array, lane: int, x: float, y: float, best: float) -
     return math.sqrt(dx * dx + dy * dy) * (1.0 - 1e-9) - SLACK > best
 
 
-@compiled
+@allocating
 def _closest(
     points: Array,
     offsets: IntArray,

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.world.network.compiled import compiled
+from dorothie_gym.world.compiling import allocating
 from dorothie_gym.world.town.model import Array, Lane
 
 IntArray = NDArray[np.int64]
@@ -56,7 +56,7 @@ class LaneTable(NamedTuple):
         )
 
 
-@compiled
+@allocating
 def closest_on_segment(points: Array, k: int, x: float, y: float) -> tuple[float, float]:
     """Closest place of the segment from point k to k + 1: its share of the segment, and its squared distance [m^2]."""
     ax, ay = points[k, 0], points[k, 1]
@@ -67,7 +67,7 @@ def closest_on_segment(points: Array, k: int, x: float, y: float) -> tuple[float
     return t, ex * ex + ey * ey
 
 
-@compiled
+@allocating
 def local_coordinates(
     points: Array, offsets: IntArray, ends: Array, row: int, x: float, y: float
 ) -> tuple[float, float]:
@@ -100,7 +100,7 @@ def local_coordinates(
     return station, lateral if side >= 0.0 else -lateral
 
 
-@compiled
+@allocating
 def value_at(points: Array, offsets: IntArray, row: int, column: int, station: float) -> float:
     """A column of the table at a station, linear between the points and constant beyond the ends."""
     low, high = offsets[row], offsets[row + 1] - 1
@@ -118,7 +118,7 @@ def value_at(points: Array, offsets: IntArray, row: int, column: int, station: f
     return float(points[low, column] + t * (points[high, column] - points[low, column]))
 
 
-@compiled
+@allocating
 def position(
     points: Array, offsets: IntArray, ends: Array, row: int, station: float, lateral: float
 ) -> tuple[float, float]:
@@ -136,7 +136,7 @@ def position(
     return x - lateral * math.sin(heading), y + lateral * math.cos(heading)
 
 
-@compiled
+@allocating
 def distance(
     points: Array, offsets: IntArray, ends: Array, row: int, x: float, y: float, heading: float, weight: float
 ) -> tuple[float, float]:
@@ -153,7 +153,7 @@ def distance(
     return cost, station
 
 
-@compiled
+@allocating
 def positions(points: Array, offsets: IntArray, ends: Array, row: int, stations: Array, lateral: float) -> Array:
     """`position` at many stations (n,): (n, 2) [m]."""
     found = np.empty((len(stations), 2))
@@ -162,7 +162,7 @@ def positions(points: Array, offsets: IntArray, ends: Array, row: int, stations:
     return found
 
 
-@compiled
+@allocating
 def local_coordinates_many(points: Array, offsets: IntArray, ends: Array, row: int, places: Array) -> Array:
     """`local_coordinates` of many world positions (n, 2): (n, 2) [m]."""
     found = np.empty((len(places), 2))

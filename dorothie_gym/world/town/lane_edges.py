@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +49,7 @@ class LaneEdges:
 
     def free(self, places: Array, margin: float) -> NDArray[np.bool_]:
         """Which places (n, 3) keep off all lanes of their height by a margin [m]."""
-        near = self._tree.query_ball_point(places[:, :2], self._widest + margin, return_sorted=False)
+        near: Any = self._tree.query_ball_point(places[:, :2], self._widest + margin, return_sorted=False)
         counts = np.fromiter((len(discs) for discs in near), dtype=np.int64, count=len(places))
         free = np.ones(len(places), dtype=bool)
         if not counts.any():

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from dorothie_gym.world.network.compiled import compiled
+from dorothie_gym.world.compiling import allocating
 from dorothie_gym.world.network.polyline import (
     HEADING,
     HEIGHT,
@@ -90,7 +90,7 @@ class OncomingLanes:
         return np.unique(self._owners[np.unique(np.concatenate(near)).astype(np.int64)])
 
 
-@compiled
+@allocating
 def _across(
     points: Array, offsets: IntArray, ends: Array, lane: int, station: float, candidates: IntArray
 ) -> tuple[int, float, float]:

@@ -10,8 +10,8 @@ from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.world.car.driver import write_path
 from dorothie_gym.world.car.path import Path, follow
 from dorothie_gym.world.kernel import empty_world, town_arrays
-from dorothie_gym.world.kernel.obstacles import bodies_ahead, room, safe_speed
 from dorothie_gym.world.kernel.editing import add_car
+from dorothie_gym.world.kernel.obstacles import bodies_ahead, room, safe_speed
 from dorothie_gym.world.town import Lane
 from tests.world.driving import network
 from tests.world.network.towns import lane

@@ -14,14 +14,18 @@ from tests.world.network.towns import find_town
 TEN_SECONDS = """
 import hashlib
 from dorothie_gym.ontology import PropKind
-from dorothie_gym.world.kernel import add_prop, empty_world, populate, step, town_arrays
+from dorothie_gym.world.kernel import Walk, add_prop, add_street_walker, empty_world, populate, step, town_arrays
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.town import load_town
 network = TownNetwork(load_town("brookside"))
 town = town_arrays(network)
-world = empty_world(town, vehicles=8, pedestrians=4, seed=5)
+world = empty_world(town, vehicles=8, pedestrians=6, seed=5)
 populate(network, town, world, seed=5, vehicles=8, pedestrians=4, cyclists=0.2)
 add_prop(network, town, world, PropKind.STREET_BARRIER, 0, 20.0)
+for lane in (0, 5):
+    walker = world.pedestrians[add_street_walker(network, town, world, lane, 30.0)]
+    walker.state, walker.far = Walk.STRAYING, 10.2
+world.vehicles[1].crashed = world.pedestrians[0].crashed = True  # who comes back elsewhere
 step(town, world, 300, 1 / 30)
 assert world.vehicles.odometer.max() > 30.0
 print(hashlib.sha256(world.tobytes()).hexdigest())

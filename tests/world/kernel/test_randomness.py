@@ -1,13 +1,16 @@
 import numpy as np
 
-from dorothie_gym.world.kernel import empty_world, town_arrays
+from dorothie_gym.world.kernel import add_vehicle, empty_world, town_arrays
 from dorothie_gym.world.kernel.randomness import choose, draw
 from dorothie_gym.world.network.network import TownNetwork
 from tests.world.network.towns import straight_town
 
 
 def body(seed: int):
-    return empty_world(town_arrays(TownNetwork(straight_town())), vehicles=1, pedestrians=0, seed=seed).vehicles[0]
+    arrays = town_arrays(TownNetwork(straight_town()))
+    world = empty_world(arrays, vehicles=1, pedestrians=0, seed=seed)
+    add_vehicle(arrays, world, 0, 20.0, desired=8.0)
+    return world.vehicles[0]
 
 
 def test_numbers_are_marsaglias():

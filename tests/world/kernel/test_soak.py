@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dorothie_gym.world.kernel import Kind, Walk, empty_world, populate, step, town_arrays
+from dorothie_gym.world.kernel import Kind, Walk, add_street_walker, empty_world, populate, step, town_arrays
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.town import LightColour
 from tests.world.kernel.states import DT
@@ -13,11 +13,13 @@ OFF = 2.5
 """Farther from the middle of the closest lane than this a vehicle has left the road [m]."""
 
 
-def soak(name, *, minutes, seed, vehicles=60, pedestrians=40):
+def soak(name, *, minutes, seed, vehicles=60, pedestrians=40, strollers=20):
     network = TownNetwork(find_town(name))
     town, lights = town_arrays(network), network.town.light
-    world = empty_world(town, vehicles=vehicles, pedestrians=pedestrians, seed=seed)
+    world = empty_world(town, vehicles=vehicles, pedestrians=pedestrians + strollers, seed=seed)
     populate(network, town, world, seed=seed, vehicles=vehicles, pedestrians=pedestrians)
+    for lane in np.flatnonzero(town.lanes.junction < 0).tolist():
+        add_street_walker(network, town, world, lane, 0.4 * float(town.lanes[lane].length))
     there = world.vehicles.kind != Kind.EMPTY
     assert there.sum() > 0.7 * vehicles
     fleet, lengths, lit = world.vehicles, town.lanes.length, town.lanes.programme >= 0
@@ -38,14 +40,16 @@ def soak(name, *, minutes, seed, vehicles=60, pedestrians=40):
     return int(world.clock[0].collisions), int(world.clock[0].run_over)
 
 
-@pytest.mark.parametrize("name", ["brookside", "millbrook"])
+@pytest.mark.parametrize("name", ["brookside", "millbrook", "midtown", "northgate", "Town02.xodr"])
 def test_nobody_gets_stuck_or_crashes_in_two_minutes(name):
     assert soak(name, minutes=2, seed=6, vehicles=40) == (0, 0)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
-@pytest.mark.parametrize("name", ["brookside", "millbrook", "Town01.xodr", "Town02.xodr", "Town05.xodr"])
+@pytest.mark.parametrize(
+    "name", ["brookside", "millbrook", "midtown", "northgate", "Town01.xodr", "Town02.xodr", "Town05.xodr"]
+)
 def test_a_crowd_drives_for_ten_minutes(name, seed):
     collisions, run_over = soak(name, minutes=10, seed=seed)
     assert collisions <= 1 and run_over <= 1

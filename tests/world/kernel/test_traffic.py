@@ -31,17 +31,6 @@ def test_vehicle_takes_a_bend_no_faster_than_comfort_allows():
     assert fastest == pytest.approx(np.sqrt(CURVE_ACCELERATION * 30.0), rel=0.05)
 
 
-def test_cyclist_keeps_to_the_right_and_is_slow():
-    network = TownNetwork(straight_town(lanes=1))
-    arrays = town_arrays(network)
-    world = empty_world(arrays, vehicles=1, pedestrians=0)
-    add_vehicle(arrays, world, 0, 20.0, kind=Kind.CYCLIST, desired=9.0)
-    step(arrays, world, 600, DT)
-    cyclist = world.vehicles[0]
-    assert 4.0 < cyclist.speed < 4.6 and cyclist.width < 1.0
-    assert 0.8 < cyclist.own_lateral < 1.4
-
-
 def test_car_stays_behind_a_cyclist_on_a_single_lane():
     network = TownNetwork(straight_town(lanes=1, roads=5))
     arrays = town_arrays(network)
@@ -160,5 +149,5 @@ def test_world_without_room_refuses_one_more():
         add_vehicle(arrays, world, 0, 10.0, desired=8.0)
     with pytest.raises(ValueError, match="room for 0 props"):
         add_prop(network, arrays, world, PropKind.TREE, 0, 10.0)
-    with pytest.raises(ValueError, match="no footway 0"):
-        add_pedestrian(arrays, world, 0, 1.0, pace=1.2)
+    with pytest.raises(ValueError, match="no footway 99"):
+        add_pedestrian(arrays, world, 99, 1.0, pace=1.2)

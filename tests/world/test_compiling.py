@@ -4,20 +4,36 @@ import sys
 import warnings
 
 import numba
+import numpy as np
 import pytest
 
-from dorothie_gym.world.network.compiled import compiled
+from dorothie_gym.world.compiling import allocating, compiled, inlined
 
 
-def test_function_is_compiled_and_cached_where_numba_can_write():
-    @compiled
+@pytest.mark.parametrize("kind", [allocating, compiled, inlined])
+def test_function_is_compiled_and_cached_where_numba_can_write(kind):
+    @kind
     def double(x: float) -> float:
         return 2 * x
 
     assert double(2.5) == 5.0
 
 
-def test_unwritable_cache_falls_back_with_one_warning(monkeypatch):
+def test_function_that_makes_arrays_needs_counts():
+    def made(count):
+        return np.zeros(count)
+
+    def made_without_counts(count):  # another one, as both would have the same place in the cache
+        return np.zeros(count)
+
+    assert allocating(made)(2).tolist() == [0.0, 0.0]
+    if not numba.config.DISABLE_JIT:
+        with pytest.raises(numba.core.errors.NumbaError):
+            compiled(made_without_counts)(2)
+
+
+@pytest.mark.parametrize("kind", [allocating, compiled, inlined])
+def test_unwritable_cache_falls_back_with_one_warning(monkeypatch, kind):
     njit = numba.njit
 
     def refusing(*args, cache=False, **options):
@@ -28,12 +44,13 @@ def test_unwritable_cache_falls_back_with_one_warning(monkeypatch):
     monkeypatch.setattr(numba, "njit", refusing)
     monkeypatch.setattr(sys.modules[compiled.__module__], "_warned", False)
     with pytest.warns(RuntimeWarning, match="NUMBA_CACHE_DIR") as caught:
-        half = compiled(lambda x: x / 2)
+        half = kind(lambda x: x / 2)
     assert len(caught) == 1
     assert half(3.0) == 1.5
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         compiled(lambda x: x)
+        allocating(lambda x: x)
 
 
 def test_other_errors_of_numba_are_not_hidden(monkeypatch):
