@@ -14,7 +14,7 @@ from dorothie_gym.envs.beliefs import Beliefs
 from dorothie_gym.envs.prospect import Prospect
 from dorothie_gym.envs.scenario import Scenario
 from dorothie_gym.envs.sheets import Sheet
-from dorothie_gym.ontology import LABELS, GoalStatus, Role, Sensor, encode_slots
+from dorothie_gym.ontology import LABELS, GoalStatus, PropKind, Role, Sensor, encode_slots
 from dorothie_gym.spaces import (
     ExitColumn,
     LandmarkColumn,
@@ -29,7 +29,6 @@ from dorothie_gym.spaces.actions import NO_MOVE
 from dorothie_gym.spaces.limits import MESSAGE_LENGTH, STORY_LENGTH
 from dorothie_gym.spaces.observations import MAX_UTTERANCE
 from dorothie_gym.tasks import Landmark, TaskState
-from dorothie_gym.world.props import PROP_KINDS
 from dorothie_gym.world.world import World
 
 Table = NDArray[np.float64]
@@ -38,7 +37,7 @@ WAYPOINT_SPACING = 5.0
 """Distance between the planned waypoints shown [m]."""
 
 _SENSORS = tuple(Sensor)
-_PROP_NUMBERS = {kind: 1.0 + k for k, kind in enumerate(PROP_KINDS)}
+_PROP_NUMBERS = {kind: 1.0 + k for k, kind in enumerate(PropKind)}
 
 
 @dataclass(kw_only=True)

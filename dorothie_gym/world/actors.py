@@ -21,13 +21,14 @@ from dorothie_gym.world.kernel import (
     populate,
     remove_prop,
 )
+from dorothie_gym.world.kernel.gait import (
+    KERB,
+)
 from dorothie_gym.world.kernel.parameters import CYCLIST_SHARE, CYCLIST_SPEEDS
-from dorothie_gym.world.kernel.plan import may_cycle
 from dorothie_gym.world.kernel.populating import SPEEDS
 from dorothie_gym.world.kernel.records import NOBODY
 from dorothie_gym.world.kernel.towing import is_free
 from dorothie_gym.world.network.road import TownRoad
-from dorothie_gym.world.pedestrians import KERB
 from dorothie_gym.world.town.model import Array
 
 MORE = 8
@@ -85,7 +86,7 @@ class Actors:
         town = self._town_arrays
         if not is_free(town, self.arrays, lane, float(station), int(NOBODY), float(distance)):
             return False
-        cycles = bool(town.lanes[lane].right < 0 and may_cycle(town.lanes[lane])) and self._rng.random() < CYCLIST_SHARE
+        cycles = bool(town.lanes[lane].right < 0 and town.lanes[lane].cycling) and self._rng.random() < CYCLIST_SHARE
         kind, speeds = (Kind.CYCLIST, CYCLIST_SPEEDS) if cycles else (Kind.CAR, SPEEDS)
         self._make_room(vehicles=1)
         add_vehicle(town, self.arrays, lane, station, kind=kind, desired=float(self._rng.uniform(*speeds)))

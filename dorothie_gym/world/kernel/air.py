@@ -27,4 +27,4 @@ def drift(car: Records, time: float, heading: float, speed: float) -> float:
     angle = car.wind_heading - heading
     across, along = wind * math.sin(angle), wind * math.cos(angle) - speed
     force = AIR_DENSITY / 2.0 * FRONTAL_AREA * SIDE_FORCE * math.sqrt(across * across + along * along) * across
-    return force / CORNERING_STIFFNESS
+    return float(force / CORNERING_STIFFNESS)

@@ -6,18 +6,33 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.world.compiling import compiled, inlined
-from dorothie_gym.world.crosswalks import BRAKING, REACTION, ROOM, STANDING
-from dorothie_gym.world.crosswalks import SIGHT as VEHICLES_SIGHT
 from dorothie_gym.world.kernel.footways import ASIDE, find_segment
+from dorothie_gym.world.kernel.gait import (
+    PATIENCE,
+)
 from dorothie_gym.world.kernel.lights import light
 from dorothie_gym.world.kernel.pacing import AHEAD, LEVEL, walk_towards
 from dorothie_gym.world.kernel.randomness import draw
 from dorothie_gym.world.kernel.records import NOBODY, Colour, Kind, Records, Walk
-from dorothie_gym.world.pedestrians import PATIENCE
 
 if TYPE_CHECKING:
     from dorothie_gym.world.kernel.town_arrays import TownArrays
     from dorothie_gym.world.kernel.world_arrays import WorldArrays
+
+REACTION = 1.0
+"""People count on drivers to brake after this time [s] ..."""
+
+BRAKING = 3.0
+"""... no harder than this [m/s^2] ..."""
+
+ROOM = 4.0
+"""... and to stop this far before the crosswalk's middle line at the latest, measured from the front [m]."""
+
+STANDING = 0.3
+"""Slower than this a vehicle stands [m/s]."""
+
+VEHICLES_SIGHT = 60.0
+"""How far people look for those who drive [m]."""
 
 CROSSING_SHARE = 0.35
 """How often somebody who passes a crosswalk wants to cross."""

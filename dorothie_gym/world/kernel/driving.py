@@ -7,8 +7,17 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.world.car.planner import SWEEP_STEP
 from dorothie_gym.world.compiling import compiled, inlined
-from dorothie_gym.world.junctions import CRITICAL_GAP, HARDEST_BRAKING
 from dorothie_gym.world.kernel.changing import change_lanes
+from dorothie_gym.world.kernel.conduct import (
+    ASKING,
+    CRITICAL_GAP,
+    CROSSING_MARGIN,
+    CROSSING_SIGHT,
+    CURVE_BRAKING,
+    HARDEST_BRAKING,
+    LINE_GAP,
+    STOP_BRAKING,
+)
 from dorothie_gym.world.kernel.following import brake_to, following_acceleration, free_acceleration
 from dorothie_gym.world.kernel.junctions import announce, forget, note, request
 from dorothie_gym.world.kernel.lanes import project
@@ -19,7 +28,6 @@ from dorothie_gym.world.kernel.plan import extend, follow_road
 from dorothie_gym.world.kernel.records import NOBODY, Kind, Records, Wait, Walk
 from dorothie_gym.world.kernel.straying import give_way_to_strayers
 from dorothie_gym.world.network.ahead import HORIZON, LEVEL
-from dorothie_gym.world.traffic import ASKING, CROSSING_MARGIN, CROSSING_SIGHT, CURVE_BRAKING, LINE_GAP, STOP_BRAKING
 
 if TYPE_CHECKING:
     from dorothie_gym.world.kernel.town_arrays import TownArrays

@@ -8,6 +8,10 @@ import numpy as np
 
 from dorothie_gym.ontology import PropKind
 from dorothie_gym.world.kernel.footways import closest_walk
+from dorothie_gym.world.kernel.gait import (
+    KERB,
+    WALKING_SPEED,
+)
 from dorothie_gym.world.kernel.order import rebuild
 from dorothie_gym.world.kernel.parameters import (
     CAR_LENGTH,
@@ -23,7 +27,7 @@ from dorothie_gym.world.kernel.town_arrays import TownArrays
 from dorothie_gym.world.kernel.walking import place_walker
 from dorothie_gym.world.kernel.world_arrays import CAR_KEY, WorldArrays
 from dorothie_gym.world.network.network import TownNetwork
-from dorothie_gym.world.pedestrians import KERB, WALKING_SPEED, rightmost
+from dorothie_gym.world.town.beside import rightmost
 
 BESIDE = 1.0
 """A way beside a street is walked on where it is this close [m]."""

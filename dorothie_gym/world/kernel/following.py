@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from dorothie_gym.world.compiling import compiled, inlined
+from dorothie_gym.world.kernel.conduct import STOP_BRAKING
 from dorothie_gym.world.kernel.parameters import (
     ACC_MAX,
     CLOSING,
@@ -12,7 +13,6 @@ from dorothie_gym.world.kernel.parameters import (
     STANDING_GAP,
     TIME_WANTED,
 )
-from dorothie_gym.world.traffic import STOP_BRAKING
 
 
 @inlined

@@ -112,7 +112,7 @@ def _free_speed(world: WorldArrays) -> float:
         if left >= -1.0:
             beyond = max(left - APPROACH_DISTANCE, 0.0)
             speed = min(speed, math.sqrt(APPROACH_SPEED * APPROACH_SPEED + 2.0 * PROFILE_BRAKING * beyond))
-    return speed
+    return float(speed)
 
 
 @inlined

@@ -10,7 +10,7 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.world.compiling import compiled, inlined
-from dorothie_gym.world.junctions import (
+from dorothie_gym.world.kernel.conduct import (
     AT_LINE,
     COMFORTABLE_BRAKING,
     CRITICAL_GAP,
@@ -18,6 +18,10 @@ from dorothie_gym.world.junctions import (
     HARDEST_BRAKING,
     LAPSE,
     OVER_LINE,
+    ROOM_BEHIND,
+    ROOM_EACH,
+    ROOM_SIGHT,
+    SLOW,
     SNEAKING,
     STANDING,
     START,
@@ -26,7 +30,6 @@ from dorothie_gym.world.junctions import (
 from dorothie_gym.world.kernel.lights import light
 from dorothie_gym.world.kernel.parameters import AFTER_END, CLOSED
 from dorothie_gym.world.kernel.records import NOBODY, Colour, Control, Kind, Records, Relation, Wait
-from dorothie_gym.world.traffic import ROOM_BEHIND, ROOM_EACH, ROOM_SIGHT, SLOW
 
 if TYPE_CHECKING:
     from dorothie_gym.world.kernel.town_arrays import TownArrays

@@ -10,7 +10,7 @@ from dorothie_gym.world.car.hazards import HEIGHT_MARGIN
 from dorothie_gym.world.car.path import U_TURN_REACH
 from dorothie_gym.world.car.planner import BEGUN, BRAKING
 from dorothie_gym.world.compiling import compiled, inlined
-from dorothie_gym.world.junctions import CRITICAL_GAP, HARDEST_BRAKING
+from dorothie_gym.world.kernel.conduct import CRITICAL_GAP, HARDEST_BRAKING
 from dorothie_gym.world.kernel.course import point_at
 from dorothie_gym.world.kernel.driving import STEP_AHEAD, STEP_PAST
 from dorothie_gym.world.kernel.junctions import announce, close, request
@@ -247,5 +247,5 @@ def _place_towards(town: TownArrays, world: WorldArrays, lanes: int, body: Recor
         if math.cos(heading - body.heading) < FACING:
             continue
         if lane.junction < 0 or other.claim == number or other.inside == number:
-            return station + world.starts[k]
+            return float(station + world.starts[k])
     return math.inf

@@ -6,8 +6,11 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.world.compiling import compiled, inlined
+from dorothie_gym.world.kernel.gait import (
+    ELBOW_ROOM,
+    PERSONAL_SPACE,
+)
 from dorothie_gym.world.kernel.records import Kind, Records, Walk
-from dorothie_gym.world.pedestrians import ELBOW_ROOM, PERSONAL_SPACE
 
 if TYPE_CHECKING:
     from dorothie_gym.world.kernel.world_arrays import WorldArrays

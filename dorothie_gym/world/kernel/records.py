@@ -63,16 +63,23 @@ class Relation(enum.IntEnum):
 
 
 class Wait(enum.IntEnum):
-    """Why a vehicle may not enter a junction; `world.junctions.Wait` explains them."""
+    """Why a vehicle may not enter a junction."""
 
     NOT = 0
     LIGHT = 1
+    """Its light is red, or yellow and it can stop."""
     STOP_SIGN = 2
+    """It has not come to a stand at its stop sign."""
     GIVING_WAY = 3
+    """Somebody comes who has priority."""
     TURN = 4
+    """Somebody else has been waiting for longer."""
     OCCUPIED = 5
+    """Somebody is on a path that crosses its own."""
     CLOSED = 6
+    """The car turns round in the junction."""
     NO_ROOM = 7
+    """There is no room behind the junction."""
 
 
 class Group(enum.IntEnum):
@@ -306,8 +313,7 @@ EVENT = np.dtype(
 )  # fmt: skip
 """Something that happened to the car: an `EventCode`, with the class, key and number of the counterpart."""
 
-TRACE = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "brake", "lane", "height", "turning",
-         "offset")
+TRACE = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "brake", "lane", "height", "turning", "offset")
 """Columns of the way of the car."""
 
 CLOCK = np.dtype(

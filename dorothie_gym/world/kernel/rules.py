@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.config import FRAME_RATE
-from dorothie_gym.world.junctions import AT_LINE, STANDING
 from dorothie_gym.world.kernel.cells import CELL, REACH, SLACK
+from dorothie_gym.world.kernel.conduct import AT_LINE, STANDING
 from dorothie_gym.world.kernel.lanes import closest_segment, coordinates, value_near
 from dorothie_gym.world.kernel.records import NOBODY, Records
 from dorothie_gym.world.town.model import Array

@@ -6,15 +6,19 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.world.compiling import compiled, inlined
-from dorothie_gym.world.junctions import CRITICAL_GAP
+from dorothie_gym.world.kernel.conduct import ASKING, CRITICAL_GAP
 from dorothie_gym.world.kernel.following import brake_to
 from dorothie_gym.world.kernel.footways import closest_walk
+from dorothie_gym.world.kernel.gait import (
+    CROSSING_RATE,
+    PATIENCE,
+    SAFE_DISTANCE,
+    SAFE_TIME,
+)
 from dorothie_gym.world.kernel.lanes import project
 from dorothie_gym.world.kernel.pacing import AHEAD, LEVEL, walk_towards
 from dorothie_gym.world.kernel.randomness import draw
 from dorothie_gym.world.kernel.records import Footway, Kind, Records, Walk
-from dorothie_gym.world.pedestrians import CROSSING_RATE, PATIENCE, SAFE_DISTANCE, SAFE_TIME
-from dorothie_gym.world.traffic import ASKING
 
 if TYPE_CHECKING:
     from dorothie_gym.world.kernel.town_arrays import TownArrays

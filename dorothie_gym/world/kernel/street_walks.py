@@ -7,16 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dorothie_gym.world.kernel.records import Records
-from dorothie_gym.world.pedestrians import (
+from dorothie_gym.world.kernel.gait import (
     FROM_ENDS,
     FROM_JUNCTION,
     KERB,
     SHORTEST_WALK,
     WALK_STEP,
-    leftmost,
-    rightmost,
 )
+from dorothie_gym.world.kernel.records import Records
+from dorothie_gym.world.town.beside import leftmost, rightmost
 from dorothie_gym.world.town.lane_edges import LaneEdges
 from dorothie_gym.world.town.model import Array, Town
 from dorothie_gym.world.town.oncoming import oncoming_lanes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import weakref
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.world.kernel.cells import build_cells
+from dorothie_gym.world.kernel.conduct import CURVE_ACCELERATION
 from dorothie_gym.world.kernel.parameters import CAR_LENGTH, CYCLIST_ROADS
 from dorothie_gym.world.kernel.records import LANE, NOBODY, PROGRAMME, SIBLING, Colour, Control, Records, Relation
 from dorothie_gym.world.kernel.walkways import build_walkways
@@ -17,7 +19,6 @@ from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.network.polyline import LaneTable
 from dorothie_gym.world.town.model import Array, Lane, LinkType, SignalKind, Town
 from dorothie_gym.world.town.right_of_way import RightOfWay, right_of_way
-from dorothie_gym.world.traffic import curve_speed
 
 SIDE_BY_SIDE = 2.5
 """Two vehicles whose middles are this far apart across their lanes pass one another [m]: they are 2 m wide."""
@@ -130,6 +131,13 @@ def _describe(record: Records, lane: Lane, row: int, table: LaneTable) -> None:
     record.rank = row
     for name in ("left", "right", "junction", "exit", "programme", "place"):
         record[name] = NOBODY
+
+
+def curve_speed(lane: Lane) -> float:
+    """Speed at which the tightest bend of a lane is driven, at most its limit [m/s]."""
+    bend = np.abs(np.diff(lane.headings) / np.diff(lane.stations))
+    tightest = float(np.convolve(bend, np.full(3, 1 / 3), mode="same").max()) if len(bend) >= 3 else float(bend.max())
+    return min(lane.speed_limit, math.sqrt(CURVE_ACCELERATION / max(tightest, 1e-4)))
 
 
 def _link(town: Town, lanes: Records) -> NDArray[np.int32]:

@@ -103,8 +103,13 @@ def _same(array: Any) -> Any:
 
 
 def empty_world(
-    town: TownArrays, *, vehicles: int, pedestrians: int, props: int = PROPS, seed: int | np.random.SeedSequence = 0,
-    driven: bool = False
+    town: TownArrays,
+    *,
+    vehicles: int,
+    pedestrians: int,
+    props: int = PROPS,
+    seed: int | np.random.SeedSequence = 0,
+    driven: bool = False,
 ) -> WorldArrays:
     """A world with room for some bodies and nobody in it.
 

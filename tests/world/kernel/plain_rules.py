@@ -10,7 +10,7 @@ import numpy as np
 from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.world.config import FRAME_RATE
 from dorothie_gym.world.infractions import Breach, Infraction
-from dorothie_gym.world.junctions import AT_LINE, STANDING
+from dorothie_gym.world.kernel.conduct import AT_LINE, STANDING
 from dorothie_gym.world.kernel.rules import AGAINST, FORGET, LEVEL, NEARBY, OFF_ROAD, OVER
 from dorothie_gym.world.network.lane import PolylineLane
 from dorothie_gym.world.network.network import TownNetwork

@@ -13,8 +13,11 @@ from dorothie_gym.world.kernel import (
     step,
     town_arrays,
 )
+from dorothie_gym.world.kernel.gait import (
+    FROM_JUNCTION,
+    KERB,
+)
 from dorothie_gym.world.network.network import TownNetwork
-from dorothie_gym.world.pedestrians import FROM_JUNCTION, KERB
 from dorothie_gym.world.town import Town
 from tests.world.kernel.states import DT
 from tests.world.network.towns import find_town, lane, town

@@ -16,8 +16,8 @@ from dorothie_gym.world.kernel import (
     step,
     town_arrays,
 )
+from dorothie_gym.world.kernel.conduct import CURVE_ACCELERATION
 from dorothie_gym.world.network.network import TownNetwork
-from dorothie_gym.world.traffic import CURVE_ACCELERATION
 from tests.world.kernel.states import DT, Pose, kernel_world
 from tests.world.network.towns import curve_town, find_town, straight_town
 
