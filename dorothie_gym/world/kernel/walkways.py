@@ -92,7 +92,7 @@ def build_walkways(network: TownNetwork, lanes: Records) -> Walkways:
     walks.lane[len(ways) : len(rows)] = [street.lane for street in streets]
     for (walk, end), (after, which) in corners.onward.items():
         walks[walk].next_walk[end], walks[walk].next_end[end] = after, which
-    crossings, mouths = _crossings(network, walks)
+    crossings, mouths = _crossings(network, walks, pavements)
     passages = _passages(town, lanes, crossings)
     heeded = _lights(town, lanes, crossings, passages)
     points = np.concatenate(rows) if rows else np.zeros((1, 6))
@@ -178,12 +178,14 @@ def _way_on(places: Array, one: int, others: Sequence[int], edges: LaneEdges) ->
     return None
 
 
-def _crossings(network: TownNetwork, walks: Records) -> tuple[Records, Records]:
+def _crossings(network: TownNetwork, walks: Records, pavements: Sequence[Array]) -> tuple[Records, Records]:
     town = network.town
     found: list[tuple[Array, list[tuple[float, int, float]]]] = []
-    for crosswalk in town.crosswalks:
+    owners = np.repeat(np.arange(len(pavements)), [len(rows) for rows in pavements])
+    rows = np.concatenate([each[:, :3] for each in pavements] or [np.zeros((1, 3))])
+    for crosswalk in town.crosswalks if pavements else ():
         ends = _ends(network, crosswalk)
-        sides = [_nearest_walk(town.sidewalks, end) for end in ends]
+        sides = [_nearest_walk(rows, owners, end) for end in ends]
         if all(side[0] < KERB_REACH for side in sides):
             found.append((ends, sides))
     crossings = np.zeros(max(len(found), 1), dtype=CROSSING).view(np.recarray)
@@ -217,18 +219,22 @@ def _ends(network: TownNetwork, crosswalk: Crosswalk) -> Array:
     return ends
 
 
-def _nearest_walk(sidewalks: Sequence[Sidewalk], place: Array) -> tuple[float, int, float]:
-    """Distance [m], number and station [m] of the closest pavement."""
-    found = []
-    for k, walk in enumerate(sidewalks):
-        a, d = walk.points[:-1, :2], np.diff(walk.points[:, :2], axis=0)
-        squared = np.maximum((d * d).sum(axis=1), 1e-12)
-        share = np.clip(((place - a) * d).sum(axis=1) / squared, 0.0, 1.0)
-        gaps = np.linalg.norm(a + share[:, None] * d - place, axis=1)
-        at = int(gaps.argmin())
-        lengths = np.sqrt((d * d).sum(axis=1))
-        found.append((float(gaps[at]), k, float(lengths[:at].sum() + share[at] * lengths[at])))
-    return min(found, default=(math.inf, NOBODY, 0.0))
+def _nearest_walk(rows: Array, owners: NDArray[np.int64], place: Array) -> tuple[float, int, float]:
+    """Distance [m], number and station [m] of the closest pavement.
+
+    Args:
+        rows: x, y, station of all points of all pavements.
+        owners: number of the pavement of each.
+        place: (2,) [m].
+    """
+    a, d = rows[:-1], np.diff(rows, axis=0)
+    squared = np.maximum(d[:, 0] * d[:, 0] + d[:, 1] * d[:, 1], 1e-12)
+    share = np.clip(((place - a[:, :2]) * d[:, :2]).sum(axis=1) / squared, 0.0, 1.0)
+    nearest = a + share[:, None] * d
+    gaps = np.hypot(nearest[:, 0] - place[0], nearest[:, 1] - place[1])
+    gaps[owners[1:] != owners[:-1]] = math.inf  # from one pavement to the next there is nothing
+    at = int(gaps.argmin())
+    return float(gaps[at]), int(owners[at]), float(nearest[at, 2])
 
 
 def _at(walk: Sidewalk, station: float) -> Array:
