@@ -101,6 +101,11 @@ class InfractionWatch:
                 found.append(self._beside_lanes(breach, number, station, frame + k, poses[k]))
         return found
 
+    def wait(self, first: int, last: int) -> None:
+        """Lets the car stand between two frames: what it has been doing wrong until then it goes on doing."""
+        marks = self._arrays.last
+        marks[marks == first] = last
+
     def _at_line(self, line: int, frame: int, pose: Array) -> list[Breach]:
         """The breach of passing a line, if it is one: at a stop sign without a stand, or at a red light."""
         kind, signal = self._lines.signals[line]

@@ -16,21 +16,25 @@ class Perception:
         self._seed = int(rng.integers(1 << 63))
         self._opened: tuple[Records, Visibility] | None = None
 
-    def open(self, eyes: Records, visibility: Visibility) -> None:
+    def open(self, eyes: Records, visibility: Visibility) -> bool:
         """Lets eyes see as well as visibility allows now, with this one's errors.
 
         Args:
             eyes: `records.EYE` (1,), written.
             visibility: air and light.
+
+        Returns:
+            Whether that was anything new.
         """
         if self._opened is not None and self._opened[0] is eyes and self._opened[1] is visibility:
-            return
+            return False
         self._opened = eyes, visibility
         view = visibility
         eyes[0] = (
             self._seed, view.sight, view.fog, view.fog_start, view.rain, view.light, view.lamps, view.clarity,
             view.is_clear,
         )  # fmt: skip
+        return True
 
 
 BODY = "key", "kind", "x", "y", "heading", "length", "width", "speed", "height"

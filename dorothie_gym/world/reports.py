@@ -82,14 +82,18 @@ class Reports:
         }  # fmt: skip
         self.add(kind, frame, **place, key=key, other=None if other is None else other.label, **data)
 
-    def close(self, poses: Array, frame: int) -> list[WorldEvent]:
+    def close(self, poses: Array, frame: int, *, stood: bool = False) -> list[WorldEvent]:
         """Looks for breaches on the car's way since the last call, and returns all that has been reported since.
 
         Args:
             poses: of the car before the way and after each of its frames (n + 1, 6), columns as in `kernel.rules`.
             frame: that of the last of them.
+            stood: whether it stood all the time; then they are not looked at.
         """
-        for breach in self._watch.look(poses, frame - len(poses) + 1):
+        first = frame - len(poses) + 1
+        if stood:
+            self._watch.wait(first, frame)
+        for breach in () if stood else self._watch.look(poses, first):
             self.infraction(
                 WorldEventKind(breach.kind.value), breach.frame, lane=breach.lane, station=breach.station,
                 x=breach.x, y=breach.y, key=breach.key, other=breach.other,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from dorothie_gym.ontology import ObjectClass, PhysicalAction, Sensor, WeatherParameter
@@ -14,7 +16,7 @@ from dorothie_gym.world.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
 from dorothie_gym.world.kernel import WorldArrays, empty_world, step, town_arrays
 from dorothie_gym.world.kernel.editing import add_car
 from dorothie_gym.world.kernel.parameters import FRAMES
-from dorothie_gym.world.kernel.records import TRACE, EventCode
+from dorothie_gym.world.kernel.records import TRACE, EventCode, plain
 from dorothie_gym.world.kernel.seeing import look_around
 from dorothie_gym.world.localizer import Localizer
 from dorothie_gym.world.network.network import TownNetwork
@@ -97,6 +99,8 @@ class World:
             float(self.car.position[0]), float(self.car.position[1]), float(self.car.heading),
             np.random.default_rng(locate_seed),
         )  # fmt: skip
+        self._record_of: WorldArrays | None = None
+        self._own_record: Any = None
         self.lights = False
         self.faults: dict[Sensor, int] = {}
         self.frame = 0
@@ -113,39 +117,52 @@ class World:
 
     def step(self, frames: int) -> list[WorldEvent]:
         """Lets the world run for a number of physics frames; returns what happened to the car."""
-        poses = np.empty((frames + 1, 6))
-        poses[0] = self._pose()
+        poses, before = np.empty((frames + 1, 6)), self._pose()
+        poses[0] = before
         parts = [self._run(min(FRAMES, frames - first)) for first in range(0, frames, FRAMES)]
         trace = parts[0] if len(parts) == 1 else np.concatenate(parts)
         self.frames, self.offsets = trace[:, : len(FRAME_COLUMNS)], trace[:, -1]
         poses[1:] = trace[:, _POSE]
         self.localizer.localize(poses, self.frame - frames, gps_from=self.faults.get(Sensor.GPS, 0))
-        self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
-        return self.reports.close(poses, self.frame)
+        if self.faults:
+            self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
+        stood = self.car.speed == 0.0 and before[:4] == (*self.car.position.tolist(), self.car.heading, 0.0)
+        return self.reports.close(poses, self.frame, stood=stood)
 
     def _run(self, frames: int) -> Array:
         """Steps all bodies by no more than `FRAMES` substeps; returns the car's way (frames, 12)."""
-        arrays = self.actors.arrays
+        arrays, record = self.actors.arrays, self._record
         self.planner.extend(self.car.speed)
-        self.driver.brief(arrays)
+        self.driver.brief(arrays, record)
         self._tell_weather(arrays)
         step(self._arrays, arrays, frames, 1.0 / FRAME_RATE)
-        self.driver.debrief(arrays)
+        self.driver.debrief(record)
+        self.car.refresh()
         self.frame += frames
-        self._report(arrays)
-        return np.array(arrays.trace[:frames])
+        if record["events"]:
+            self._report(arrays)
+        return arrays.trace[:frames].copy()
+
+    @property
+    def _record(self) -> Any:
+        """What drives the car, `kernel.records.CAR`."""
+        if self._record_of is not self.actors.arrays:
+            self._record_of = self.actors.arrays
+            self._own_record = plain(self._record_of.car)[0]
+        return self._own_record
 
     def _tell_weather(self, arrays: WorldArrays) -> None:
-        """Writes what the weather does to grip, sight and course into the world's arrays."""
-        self._perception.open(arrays.eye, self.visibility)
-        car = arrays.car.view(np.ndarray)[0]
-        car["friction"] = self.weather.friction
-        car["wind"] = self.weather.above_clear(WeatherParameter.WIND_INTENSITY)
-        car["wind_heading"], car["wind_phase"] = self.wind.heading, self.wind.phases
+        """Writes what the weather does to grip, sight and course into the world's arrays, where it has changed."""
+        visibility = self.visibility  # another one after any change of the weather
+        if self._perception.open(arrays.eye, visibility):
+            car = self._record
+            car["friction"] = self.weather.friction
+            car["wind"] = self.weather.above_clear(WeatherParameter.WIND_INTENSITY)
+            car["wind_heading"], car["wind_phase"] = self.wind.heading, self.wind.phases
 
     def _report(self, arrays: WorldArrays) -> None:
         """Takes over what happened to the car."""
-        for event in arrays.events[: int(arrays.car["events"][0])]:
+        for event in arrays.events[: int(self._record["events"])]:
             frame, kind = int(event.frame), ObjectClass(int(event.kind))
             if event.code == EventCode.HAZARD_STOP:
                 distance = round(float(event.value), 2)
@@ -163,21 +180,22 @@ class World:
     @property
     def hazard(self) -> Hazard | None:
         """What the car is braking or standing for, or None."""
-        car = self.actors.arrays.car.view(np.ndarray)[0]
-        kind = int(car["hazard"])
-        return Hazard(kind=ObjectClass(kind), gap=float(car["hazard_gap"])) if kind else None
+        kind = int(self._record["hazard"])
+        return Hazard(kind=ObjectClass(kind), gap=float(self._record["hazard_gap"])) if kind else None
 
     @property
     def collisions(self) -> int:
         """Collisions of the car's own making."""
-        return int(self.actors.arrays.car["collisions"][0])
+        return int(self._record["collisions"])
 
     # --- perception -------------------------------------------------------------------------------------------------
 
     @property
     def visibility(self) -> Visibility:
         """How well the car sees now, by weather, light and faults of the view."""
-        clarity = min((CLARITY[sensor] for sensor in CLARITY if self._is_faulty(sensor, self.frame)), default=1.0)
+        clarity = 1.0
+        if self.faults:
+            clarity = min((CLARITY[sensor] for sensor in CLARITY if self._is_faulty(sensor, self.frame)), default=1.0)
         return self.weather.visibility(lights=self.lights, clarity=clarity)
 
     @property
@@ -205,8 +223,8 @@ class World:
     def _pose(self) -> tuple[float, float, float, float, float, bool]:
         """Of the car, in the columns of `kernel.rules`."""
         turning = self.planner.manoeuvre[0] is PhysicalAction.U_TURN and self.planner.in_manoeuvre
-        x, y = self.car.position
-        return float(x), float(y), float(self.car.heading), float(self.car.speed), self.car.height, turning
+        x, y = self.car.position.tolist()
+        return x, y, self.car.heading, self.car.speed, self.car.height, turning
 
     # --- faults -----------------------------------------------------------------------------------------------------
 

@@ -12,6 +12,7 @@ import numpy as np
 from dorothie_gym.ontology import SPEED_STEP
 from dorothie_gym.world.car.path import Path
 from dorothie_gym.world.car.planner import U_TURN_SPEED, LocalPlanner
+from dorothie_gym.world.kernel.records import plain
 from dorothie_gym.world.town.model import Array
 
 KMH = 1 / 3.6
@@ -90,7 +91,7 @@ def write_path(arrays: Any, path: Path, s: float, speeds: Array) -> float:
     Returns:
         Where the stretch ends [m].
     """
-    car, table = arrays.car.view(np.ndarray)[0], arrays.path.view(np.ndarray)
+    car, table = plain(arrays.car)[0], plain(arrays.path)
     first = path.index_at(s - BEHIND)
     cut = slice(first, first + len(table))
     lanes, headings = path.lanes[cut], path.headings[cut]
@@ -137,9 +138,14 @@ class Driver:
         self.goals = tuple(goals)
         self._told = None
 
-    def brief(self, arrays: Any) -> None:
-        """Writes what the car is to do into the arrays of a world (`kernel.WorldArrays`), before it is stepped."""
-        planner, car = self.planner, arrays.car.view(np.ndarray)[0]
+    def brief(self, arrays: Any, car: Any) -> None:
+        """Writes what the car is to do into the arrays of a world, before it is stepped.
+
+        Args:
+            arrays: `kernel.WorldArrays`.
+            car: their `kernel.records.CAR`.
+        """
+        planner = self.planner
         if planner.path is not self._told:
             self._tell(arrays, car, anew=True)
         elif self._told_until < min(planner.s + AHEAD, planner.path.length):
@@ -149,9 +155,8 @@ class Driver:
         car["action_end"] = planner.manoeuvre_end
         car["cruise"], car["held"] = self.cruise * KMH, planner.held
 
-    def debrief(self, arrays: Any) -> None:
-        """Takes over where the car is, after the world was stepped."""
-        car = arrays.car.view(np.ndarray)[0]
+    def debrief(self, car: Any) -> None:
+        """Takes over where the car is, after the world was stepped; see `brief`."""
         self.planner.note(float(car["s"]), float(car["offset"]), float(car["roadblock"]))
 
     def _tell(self, arrays: Any, car: Any, *, anew: bool) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from highway_env.vehicle.kinematics import Vehicle
 
 from dorothie_gym.world.car.control import Control
+from dorothie_gym.world.kernel.records import plain
 from dorothie_gym.world.kernel.world_arrays import WorldArrays
 from dorothie_gym.world.network.road import TownRoad
 from dorothie_gym.world.town.model import Array
@@ -25,6 +26,10 @@ class Car(Vehicle):
     def __init__(self, road: TownRoad, holder: Any) -> None:
         """Shows the first vehicle of `holder.arrays`, which may be replaced by others with more room."""
         self._holder = holder
+        self._row_of: Any = None
+        self._heading: float
+        self._speed: float
+        self._height: float
         self.refresh()
         super().__init__(road, self.position, self.heading, self.speed)
 
@@ -32,12 +37,14 @@ class Car(Vehicle):
         """Looks again where the car is."""
         row = self._row
         self._position = np.array((row["x"], row["y"]))
-        self._heading, self._speed, self._height = float(row["heading"]), float(row["speed"]), float(row["height"])
+        self._heading, self._speed, self._height = row["heading"].item(), row["speed"].item(), row["height"].item()
 
     @property
     def _row(self) -> Any:
         arrays: WorldArrays = self._holder.arrays
-        return arrays.vehicles.view(np.ndarray)[0]
+        if arrays is not self._row_of:
+            self._row_of, self._own_row = arrays, plain(arrays.vehicles)[0]
+        return self._own_row
 
     @property
     def position(self) -> Array:
@@ -78,7 +85,7 @@ class Car(Vehicle):
     @property
     def control(self) -> Control:
         """What the actuators were told last."""
-        car = self._holder.arrays.car.view(np.ndarray)[0]
+        car = plain(self._holder.arrays.car)[0]
         return Control(throttle=float(car["throttle"]), steer=float(car["steer"]), brake=float(car["brake"]))
 
     def on_state_update(self) -> None:

@@ -23,6 +23,11 @@ U_TURN = int(PhysicalAction.U_TURN.value)
 Records: TypeAlias = Any
 """An array of records; mypy knows no types of their fields."""
 
+def plain(records: Records) -> Any:
+    """The same records as an array whose fields are read by name only, which is several times faster in Python."""
+    return records.view(np.dtype((np.void, records.dtype)), np.ndarray)
+
+
 NOBODY: Any = np.int64(-1)
 """No lane, node or body. For a plain number numba would compile its readers twice: for this value, and for others."""
 
