@@ -216,7 +216,7 @@ class World:
     def seen(self) -> Array:
         """The same in numbers (n, 9), columns `perception.BODY` [m, rad, m/s]."""
         arrays = self.actors.arrays
-        self._perception.open(arrays.eye, self.visibility)
+        self._tell_weather(arrays)
         table = np.empty((len(arrays.seen), len(BODY)))
         return table[: look_around(arrays, self.frame, table)]
 
