@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from dorothie_gym.world.town.model import LinkType, Town
+from dorothie_gym.world.town.model import Array, LinkType, Town
 
 MAX_GAP = 13.0
 """Largest distance between the lanes' centre lines [m]: a median is crossed, a park is not."""
@@ -41,8 +40,9 @@ class OncomingLanes:
             for station in np.linspace(0.0, lane.length, max(2, int(lane.length / 4.0) + 1)):
                 points.append(lane.position(float(station)))
                 owners.append(lane.id)
-        self._owners = np.array(owners)
-        self._tree = cKDTree(np.array(points))
+        places = np.array(points).reshape(-1, 2)
+        order = np.argsort(places[:, 0], kind="stable")
+        self._owners, self._places = np.array(owners, dtype=np.intp)[order], places[order]
 
     def at(self, lane_id: int, station: float) -> Oncoming | None:
         """The oncoming place, or None: in a junction, from a lane that is not the leftmost, or with nothing there."""
@@ -51,8 +51,7 @@ class OncomingLanes:
             return None
         position, heading = lane.position(station), lane.heading_at(station)
         best: Oncoming | None = None
-        near = self._tree.query_ball_point(position, MAX_GAP + 3.0)
-        for other_id in sorted({int(self._owners[k]) for k in near}):
+        for other_id in self._near(position, MAX_GAP + 3.0):
             other = self._town.lanes[other_id]
             there, _ = other.project(position)
             point = other.position(there)
@@ -67,6 +66,15 @@ class OncomingLanes:
             if best is None or -across < best.gap:
                 best = Oncoming(lane=other_id, station=there, gap=float(-across))
         return best
+
+    def _near(self, position: Array, radius: float) -> list[int]:
+        """Lanes of which a point is no further away [m], in order."""
+        # a search in one direction is enough, and scipy.spatial would take longer to import than all questions together
+        x = self._places[:, 0]
+        band = slice(*np.searchsorted(x, (position[0] - radius, position[0] + radius)))
+        east, south = (self._places[band] - position).T
+        near = self._owners[band][east * east + south * south <= radius * radius]
+        return [int(lane) for lane in np.unique(near)]
 
 
 @lru_cache(maxsize=16)
