@@ -24,6 +24,7 @@ def main(
     charts: Annotated[Path | None, typer.Option(help="folder for charts, bench_NAME.png")] = None,
 ) -> None:
     """Measures one after another; leave the machine alone meanwhile."""
+    RESULTS.mkdir(exist_ok=True)
     for name in names or list(BENCHMARKS):
         if name not in BENCHMARKS:
             raise typer.BadParameter(f"{name} is none of {', '.join(BENCHMARKS)}")

@@ -78,7 +78,7 @@ def measure(
     pedestrians: int = 20,
     seed: int = 0,
     decisions: int = 400,
-    stock_steps: int = 5,
+    stock_steps: int = 20,
     sumo_substeps: int = 3000,
     repeats: int = 7,
     progress: Progress = quiet,
