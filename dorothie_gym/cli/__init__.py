@@ -1,4 +1,4 @@
-"""The command line: `dorothie-gym run`, `towns`, `storyboards` and `evaluate`."""
+"""The command line: `dorothie-gym run`, `towns`, `storyboards`, `evaluate` and `bench`."""
 
 from dorothie_gym.cli.app import app, main
 

@@ -7,7 +7,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from dorothie_gym.world.compiling import allocating
 from dorothie_gym.world.network.polyline import (
@@ -66,7 +65,6 @@ class OncomingLanes:
                 owners.append(lane.id)
         self._owners = np.array(owners)
         self._points = np.array(points)
-        self._tree = cKDTree(self._points)
         self._near: dict[int, IntArray] = {}
 
     def at(self, lane_id: int, station: float) -> Oncoming | None:
@@ -86,8 +84,11 @@ class OncomingLanes:
         if lane.in_junction or self._town.neighbour(lane_id, LinkType.LANE_CHANGE_LEFT) is not None:
             return np.empty(0, dtype=np.int64)
         reach = math.hypot(MAX_GAP, MAX_OFFSET) + 2 * SAMPLING  # points are at most two samplings apart
-        near = self._tree.query_ball_point(self._points[self._owners == lane_id], reach)
-        return np.unique(self._owners[np.unique(np.concatenate(near)).astype(np.int64)])
+        own = self._points[self._owners == lane_id]
+        around = ((self._points >= own.min(axis=0) - reach) & (self._points <= own.max(axis=0) + reach)).all(axis=1)
+        gaps = self._points[around][:, None] - own[None, :]
+        near = (np.square(gaps).sum(axis=2) <= reach * reach).any(axis=1)
+        return np.unique(self._owners[around][near]).astype(np.int64)
 
 
 @allocating

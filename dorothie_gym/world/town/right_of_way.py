@@ -12,7 +12,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
-from scipy.spatial.distance import cdist
 
 from dorothie_gym.world.town.model import Array, Lane, LaneLink, LinkType, SignalKind, Town
 
@@ -159,12 +158,20 @@ def _meetings(lanes: Sequence[Lane]) -> Iterator[tuple[int, int, bool]]:
     turning = np.array([abs(lane.headings[-1] - lane.headings[0]) > TURN for lane in lanes])
     for k in range(len(lanes) - 1):
         rest = slice(k + 1, len(lanes))
-        gaps = cdist(swept[k], circles[first[k + 1] :]).min(axis=0)
+        gaps = _gaps(circles[first[k + 1] :], swept[k])
         nearest = np.minimum.reduceat(gaps, first[rest] - first[k + 1])
         clearance = np.where(turning[rest] | turning[k], TURNING_CLEARANCE, CLEARANCE)
         meets = (nearest < clearance) & (np.abs(heights[rest] - heights[k]) <= HEIGHT)
         for other in np.flatnonzero(meets) + k + 1:
             yield lanes[k].id, lanes[int(other)].id, bool(nearest[other - k - 1] < CLEARANCE)
+
+
+def _gaps(points: Array, others: Array) -> Array:
+    """For each point (n, 2) the distance to the nearest of some others (m, 2) [m]: (n,)."""
+    east = points[:, None, 0] - others[:, 0]
+    south = points[:, None, 1] - others[:, 1]
+    gaps: Array = np.sqrt((east * east + south * south).min(axis=1))
+    return gaps
 
 
 def _swept(lane: Lane) -> Array:

@@ -1,0 +1,189 @@
+"""Steps a second of `DuoWizardEnv`, against highway-env's `intersection-v0` and, where it is installed, SUMO."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+from dorothie_gym.bench.timing import Progress, cores, in_turns, machine, quiet, rounded
+from dorothie_gym.bench.workers import Worker
+from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.envs.stage import ROLES
+from dorothie_gym.spaces import noop
+from dorothie_gym.world.config import FRAME_RATE, WorldConfig
+
+if TYPE_CHECKING:
+    from dorothie_gym.world.stock import StockIntersection
+
+WARM_UP = 60
+"""Decisions before anything is measured: 30 s."""
+
+DAY = 86400.0
+"""No session ends by time while it is measured [s]."""
+
+ENV, STOCK, SUMO = "DuoWizardEnv", "intersection-v0", "SUMO"
+
+WITHOUT_SUMO = "SUMO is not installed; pip install 'dorothie-gym[sumo]' brings it"
+
+_CLOCKS: dict[str, Callable[[], float]] = {"cpu": time.process_time, "wall": time.perf_counter}
+
+
+class Session:
+    """A session in which nobody does anything: three agents are observed in full, and the car follows its road.
+
+    Args:
+        town: name or file.
+        vehicles: of the traffic, as many as fit.
+        pedestrians: people on foot.
+        seed: of the session.
+    """
+
+    def __init__(self, town: str, vehicles: int, pedestrians: int, seed: int) -> None:
+        world = WorldConfig(vehicles=vehicles, pedestrians=pedestrians)
+        self.env = DuoWizardEnv(town, config=EnvConfig(world=world, max_seconds=DAY))
+        self._actions = {str(role): noop(role, self.env.limits) for role in ROLES}
+        self.env.reset(seed=seed)
+        self.seconds(WARM_UP, time.process_time)
+
+    def seconds(self, decisions: int, clock: Callable[[], float]) -> float:
+        """Lets it go on; returns what the steps took by a clock, beginnings of sessions left out [s]."""
+        spent = 0.0
+        while decisions > 0:
+            if not self.env.agents:
+                self.env.reset()
+            start = clock()
+            while decisions > 0 and self.env.agents:
+                self.env.step(self._actions)
+                decisions -= 1
+            spent += clock() - start
+        return spent
+
+
+def prepare(town: str, vehicles: int, pedestrians: int, seed: int, decisions: int) -> Callable[[], float]:
+    """Work for a process of its own: so many decisions, in seconds of the clock on the wall."""
+    session = Session(town, vehicles, pedestrians, seed)
+    return partial(session.seconds, decisions, time.perf_counter)
+
+
+def measure(
+    town: str = "northgate",
+    *,
+    vehicles: int = 30,
+    pedestrians: int = 20,
+    seed: int = 0,
+    decisions: int = 400,
+    stock_steps: int = 20,
+    sumo_substeps: int = 3000,
+    repeats: int = 7,
+    progress: Progress = quiet,
+) -> dict[str, Any]:
+    """Measures all in turns: what has one thread in CPU seconds, two processes in seconds of the clock on the wall.
+
+    Args:
+        town: name or file.
+        vehicles: as many as fit; 0 to 200.
+        pedestrians: 0 to 200.
+        seed: of the session.
+        decisions: steps in a repeat, of half a second of simulated time each.
+        stock_steps: steps of `intersection-v0` in a repeat.
+        sumo_substeps: of SUMO in a repeat.
+        repeats: how often each is measured.
+        progress: is told what is being done.
+
+    Raises:
+        TownError: there is no such town, or its file is wrong.
+        WorkerError: a process that measures has ended before its time.
+    """
+    # imported here: a process that only drives needs none of the references
+    from dorothie_gym.world.stock import StockIntersection
+
+    progress("town", 0.0)
+    session = Session(town, vehicles, pedestrians, seed)
+    lanes = session.env.town.lanes
+    world = session.env.stage.world
+    stock = StockIntersection(seed)
+    substeps = round(FRAME_RATE / session.env.config.decision_frequency)
+    with ExitStack() as stack:
+        works: dict[str, Callable[[], float]] = {
+            ENV: lambda: session.seconds(decisions, time.process_time) / decisions,
+            STOCK: partial(_stock_seconds, stock, stock_steps),
+        }
+        sumo = find_spec("libsumo") is not None and find_spec("sumo") is not None
+        if sumo:
+            progress("SUMO", 0.0)
+            length = sum(lane.length for lane in lanes)
+            settings = {"lanes": len(lanes), "length": length, "vehicles": vehicles, "seed": seed}
+            worker = stack.enter_context(Worker("sumo", **settings, substeps=sumo_substeps))
+            worker.wait()
+            works[SUMO] = lambda: worker.run() / sumo_substeps
+        stack.callback(stock.close)
+        timings = in_turns(works, repeats, lambda doing, share: progress(doing, 0.7 * share))
+    scaling = _two_processes(town, vehicles, pedestrians, seed, decisions, repeats, progress)
+    ours, theirs = timings[ENV], timings[STOCK]
+    seconds = ours.rate * substeps / FRAME_RATE
+    return {
+        "town": session.env.town.name,
+        "lanes": len(lanes),
+        "vehicles": len(world.actors.vehicles),
+        "pedestrians": len(world.actors.pedestrians),
+        "seed": seed,
+        "substeps_per_step": substeps,
+        "steps_per_second": rounded(ours.rate),
+        "best": rounded(ours.best),
+        "spread": ours.spread,
+        "simulated_seconds_per_second": rounded(seconds),
+        "stock_steps_per_second": rounded(theirs.rate),
+        "stock_spread": theirs.spread,
+        "stock_simulated_seconds_per_second": rounded(theirs.rate * stock.seconds_per_step),
+        "ratio": rounded(seconds / (theirs.rate * stock.seconds_per_step)),
+        "sumo_substeps_per_second": rounded(timings[SUMO].rate) if sumo else None,
+        "sumo_spread": timings[SUMO].spread if sumo else None,
+        "sumo_missing": None if sumo else WITHOUT_SUMO,
+        "two_processes_scaling": scaling,
+        "repeats": repeats,
+        "machine": machine(),
+    }
+
+
+def _stock_seconds(stock: StockIntersection, steps: int) -> float:
+    """CPU time of a step of highway-env's environment; beginnings of episodes are left out [s]."""
+    spent = 0.0
+    for _ in range(steps):
+        stock.prepare()
+        start = time.process_time()
+        stock.step()
+        spent += time.process_time() - start
+    return spent / steps
+
+
+def _two_processes(
+    town: str, vehicles: int, pedestrians: int, seed: int, decisions: int, repeats: int, progress: Progress
+) -> float | None:  # fmt: skip
+    """How many times as much two processes do as one; None where there is one core only."""
+    if cores() < 2:
+        return None
+    progress("two processes", 0.7)
+    with ExitStack() as stack:
+        one, other = (
+            stack.enter_context(
+                Worker("env", town=town, vehicles=vehicles, pedestrians=pedestrians, seed=seed + k, decisions=decisions)
+            )
+            for k in range(2)
+        )
+        one.wait()
+        other.wait()
+        ratios = []
+        for turn in range(repeats):
+            progress("two processes", 0.7 + 0.3 * turn / repeats)
+            alone = one.run(), other.run()
+            one.go()
+            other.go()
+            together = one.seconds(), other.seconds()
+            ratios.append(sum(a / t for a, t in zip(alone, together, strict=True)))
+    return round(statistics.median(ratios), 3)

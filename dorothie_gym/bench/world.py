@@ -1,0 +1,149 @@
+"""Substeps a second of a world with everything on, against highway-env's own road on the same plan."""
+
+from __future__ import annotations
+
+import tracemalloc
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from dorothie_gym.bench.timing import Progress, cpu_seconds, in_turns, machine, quiet, rounded
+from dorothie_gym.ontology import PropKind
+from dorothie_gym.world.config import FRAME_RATE
+from dorothie_gym.world.kernel import (
+    Kind,
+    TownArrays,
+    Walk,
+    WorldArrays,
+    add_prop,
+    empty_world,
+    populate,
+    step,
+    town_arrays,
+)
+from dorothie_gym.world.network import TownNetwork
+from dorothie_gym.world.town import load_town
+
+SUBSTEPS = 15
+"""Substeps in a call: a decision of half a second."""
+
+WARM_UP = 900
+"""Substeps before anything is measured: 30 s, in which traffic forms queues at the lights."""
+
+FROM_PROPS = 20.0
+"""Props are placed no closer than this to any vehicle [m]."""
+
+KERNEL, STOCK = "compiled kernel", "highway-env's road"
+
+_COPIES = 8
+
+
+def measure(
+    town: str = "northgate",
+    *,
+    vehicles: int = 30,
+    pedestrians: int = 20,
+    props: int = 4,
+    seed: int = 0,
+    calls: int = 600,
+    stock_substeps: int = 6,
+    repeats: int = 7,
+    progress: Progress = quiet,
+) -> dict[str, Any]:
+    """Measures both in turns, in CPU seconds.
+
+    Args:
+        town: name or file.
+        vehicles: as many as fit, a tenth of them cyclists.
+        pedestrians: people on foot.
+        props: in the middle of lanes with another lane beside.
+        seed: of places and wishes.
+        calls: calls of the kernel in a repeat, of 15 substeps each.
+        stock_substeps: of highway-env's road in a repeat.
+        repeats: how often each is measured.
+        progress: is told what is being done.
+
+    Raises:
+        TownError: there is no such town, or its file is wrong.
+    """
+    progress("town", 0.0)
+    network = TownNetwork(load_town(town))
+    arrays = town_arrays(network)
+    world = crowd(network, arrays, vehicles=vehicles, pedestrians=pedestrians, props=props, seed=seed)
+    progress("warming up", 0.0)
+    step(arrays, world, WARM_UP, 1.0 / FRAME_RATE)
+    timings = in_turns(
+        {
+            KERNEL: lambda: cpu_seconds(partial(_run, arrays, world, calls)) / (calls * SUBSTEPS),
+            STOCK: _stock_work(network, world, stock_substeps),
+        },
+        repeats,
+        progress,
+    )
+    kernel, stock = timings[KERNEL], timings[STOCK]
+    kinds = world.vehicles.kind
+    return {
+        "town": network.town.name,
+        "lanes": len(network.town.lanes),
+        "vehicles": int((kinds != Kind.EMPTY).sum()),
+        "cyclists": int((kinds == Kind.CYCLIST).sum()),
+        "pedestrians": int((world.pedestrians.state != Walk.EMPTY).sum()),
+        "props": int(world.props.present.sum()),
+        "seed": seed,
+        "substeps_per_second": rounded(kernel.rate),
+        "best": rounded(kernel.best),
+        "spread": kernel.spread,
+        "stock_substeps_per_second": rounded(stock.rate),
+        "stock_best": rounded(stock.best),
+        "stock_spread": stock.spread,
+        "ratio": rounded(stock.median / kernel.median),
+        "bytes_per_world": bytes_per_world(world),
+        "repeats": repeats,
+        "machine": machine(),
+    }
+
+
+def crowd(
+    network: TownNetwork, arrays: TownArrays, *, vehicles: int, pedestrians: int, props: int, seed: int
+) -> WorldArrays:  # fmt: skip
+    """A world with everything on: cars and cyclists, people, lights and signs, and props for the traffic to pass."""
+    world = empty_world(arrays, vehicles=vehicles, pedestrians=pedestrians, props=props, seed=seed)
+    populate(network, arrays, world, seed=seed, vehicles=vehicles, pedestrians=pedestrians)
+    lanes = network.town.lanes
+    wide = [k for k, lane in enumerate(arrays.lanes) if lane.junction < 0 and max(lane.left, lane.right) >= 0]
+    placed = 0
+    for lane in np.random.default_rng(seed).permutation(wide).tolist():
+        if placed == props:
+            break
+        station = 0.5 * lanes[lane].length
+        x, y = lanes[lane].position(station)
+        if np.hypot(world.vehicles.x - x, world.vehicles.y - y).min(initial=np.inf) > FROM_PROPS:
+            add_prop(network, arrays, world, PropKind.TRAFFIC_CONE, lane, station)
+            placed += 1
+    return world
+
+
+def bytes_per_world(world: WorldArrays) -> int:
+    """Memory that one more such world takes in the same town, Python's own objects included [bytes]."""
+    tracemalloc.start()
+    try:
+        before = tracemalloc.get_traced_memory()[0]
+        copies = [world.copy() for _ in range(_COPIES)]
+        return (tracemalloc.get_traced_memory()[0] - before) // len(copies)
+    finally:
+        tracemalloc.stop()
+
+
+def _run(arrays: TownArrays, world: WorldArrays, calls: int) -> None:
+    for _ in range(calls):
+        step(arrays, world, SUBSTEPS, 1.0 / FRAME_RATE)
+
+
+def _stock_work(network: TownNetwork, world: WorldArrays, substeps: int) -> Callable[[], float]:
+    # imported here: highway-env is slow to import, and nothing else of this module needs it
+    from dorothie_gym.world.stock import run_stock, stock_road
+
+    road = stock_road(network, world)
+    return lambda: cpu_seconds(partial(run_stock, road, substeps, 1.0 / FRAME_RATE)) / substeps

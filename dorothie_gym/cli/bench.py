@@ -1,0 +1,210 @@
+"""`dorothie-gym bench world|env|vector|import`: how fast all is, each against its reference in the same run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+import typer
+
+from dorothie_gym.cli.optional import OWN_NAME, PictureCommand
+from dorothie_gym.cli.output import INTERRUPTED, check_picture, fail, print_json, stderr, stdout, told_plainly
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from dorothie_gym.bench.report import Report
+
+Measure: TypeAlias = Callable[[Callable[[str, float], None]], dict[str, Any]]
+"""Measures, and tells how far it is."""
+
+
+_UsageError: Any = typer.BadParameter.__base__
+"""click's `UsageError`, which is in click itself or in typer's own copy, as the version has it."""
+
+
+class BenchCommand(PictureCommand):
+    """A command whose bad options are told in one line."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parses, and exits with 2 where an option is not as it must be."""
+        try:
+            return super().parse_args(ctx, args)
+        except _UsageError as error:
+            fail(" ".join(error.format_message().split()))
+
+
+bench = typer.Typer(
+    help="Measure speeds, each against its reference in the same run: the world, the environment of three agents, many "
+    "worlds at once, and how soon all is there.",
+    no_args_is_help=True,
+)
+
+Town = Annotated[str, typer.Option(metavar="NAME|FILE", help="A town's name, or a file (.xodr, .yaml).")]
+Vehicles = Annotated[int, typer.Option(min=0, max=200, help="Vehicles, as many as fit; a few are cyclists.")]
+Pedestrians = Annotated[int, typer.Option(min=0, max=200, help="People on foot.")]
+Seed = Annotated[int, typer.Option(min=0, help="Of places and wishes.")]
+Repeats = Annotated[int, typer.Option(min=1, max=99, help="How often each is measured; the median counts.")]
+Picture = Annotated[
+    Path | None, typer.Option(help="Draw a chart into this PNG file; without a file, into one named after the command.")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")]
+
+
+@bench.command(cls=BenchCommand)
+def world(
+    town: Town = "northgate",
+    vehicles: Vehicles = 30,
+    pedestrians: Pedestrians = 20,
+    props: Annotated[int, typer.Option(min=0, max=16, help="Props on lanes that have another lane beside.")] = 4,
+    seed: Seed = 0,
+    repeats: Repeats = 7,
+    picture: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Substeps a second of a world with everything on, against highway-env's own road on the same plan."""
+
+    def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
+        from dorothie_gym.bench.world import measure
+
+        settings: dict[str, Any] = {"vehicles": vehicles, "pedestrians": pedestrians, "props": props, "seed": seed}
+        return measure(town, **settings, repeats=repeats, progress=progress)
+
+    _bench("world", measured, picture, as_json)
+
+
+@bench.command(cls=BenchCommand)
+def env(
+    town: Town = "northgate",
+    vehicles: Vehicles = 30,
+    pedestrians: Pedestrians = 20,
+    seed: Seed = 0,
+    repeats: Repeats = 7,
+    picture: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Steps a second of the environment of three agents, against highway-env's intersection-v0 and SUMO."""
+
+    def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
+        from dorothie_gym.bench.env import measure
+
+        settings: dict[str, Any] = {"vehicles": vehicles, "pedestrians": pedestrians, "seed": seed}
+        return measure(town, **settings, repeats=repeats, progress=progress)
+
+    _bench("env", measured, picture, as_json)
+
+
+@bench.command(cls=BenchCommand)
+def vector(
+    town: Town = "northgate",
+    worlds: Annotated[int, typer.Option(min=1, max=4096, help="Worlds that are stepped in one call.")] = 64,
+    vehicles: Vehicles = 30,
+    pedestrians: Pedestrians = 20,
+    threads: Annotated[int, typer.Option(min=2, max=256, help="Threads that are compared with one.")] = 2,
+    repeats: Annotated[int, typer.Option(min=2, max=99, help="How often each is measured; the median counts.")] = 9,
+    picture: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Many worlds in one call, on several threads against one, and Gymnasium's ways of many environments."""
+
+    def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
+        from dorothie_gym.bench.timing import machine
+        from dorothie_gym.bench.vector import measure
+
+        progress("threads and environments", 0.0)
+        settings: dict[str, Any] = {"vehicles": vehicles, "pedestrians": pedestrians, "threads": threads}
+        return {**measure(town, worlds=worlds, **settings, repeats=repeats), "machine": machine()}
+
+    _bench("vector", measured, picture, as_json)
+
+
+@bench.command("import", cls=BenchCommand)
+def importing(repeats: Repeats = 7, picture: Picture = None, as_json: AsJson = False) -> None:
+    """How soon the package and a first environment are there, against importing highway-env."""
+
+    def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
+        from dorothie_gym.bench.importing import measure
+
+        return measure(repeats=repeats, progress=progress)
+
+    _bench("import", measured, picture, as_json)
+
+
+def _bench(name: str, measure: Measure, picture: Path | None, as_json: bool) -> None:
+    """Measures, and shows what came of it."""
+    if picture == Path(OWN_NAME):
+        picture = Path(f"bench_{name}.png")
+    if picture is not None:
+        check_picture(picture)
+    try:
+        with told_plainly(), _progress() as progress:
+            figures = measure(progress)
+    except KeyboardInterrupt:
+        stderr().print("Interrupted; a benchmark that is cut short says nothing.", soft_wrap=True)
+        raise typer.Exit(INTERRUPTED) from None
+    if as_json:
+        print_json(figures)
+    if as_json and picture is None:
+        return
+    from dorothie_gym.bench import report as reports
+
+    report: Report = getattr(reports, f"{name}_report")(figures)
+    if not as_json:
+        _show(report)
+    if picture is not None:
+        from dorothie_gym.bench.chart import draw
+
+        draw(report, picture)
+        if not as_json:
+            stdout().print(f"Chart: {picture}", markup=False, soft_wrap=True)
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str, float], None]]:
+    """A bar on standard error while that is a terminal, which goes when all is done."""
+    console = stderr()
+    if not console.is_terminal:
+        yield lambda doing, share: None
+        return
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("measuring {task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        bar = progress.add_task("", total=1.0)
+        yield lambda doing, share: progress.update(bar, description=doing, completed=share)
+
+
+def _show(report: Report) -> None:
+    console = stdout()
+    console.print(report.title, style="bold", markup=False)
+    console.print(report.setting, style="dim", markup=False)
+    console.print(_table(report))
+    console.print(report.headline[0].upper() + report.headline[1:] + ".", style="bold", markup=False)
+    for note in report.notes:
+        console.print(note[0].upper() + note[1:] + ".", markup=False)
+    console.print(report.machine, style="dim", markup=False)
+
+
+def _table(report: Report) -> Table:
+    from rich.table import Table
+
+    from dorothie_gym.bench.report import number
+
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column("", style="bold")
+    table.add_column(report.unit, justify="right")
+    best, spread = any(row.best is not None for row in report.rows), any(row.spread is not None for row in report.rows)
+    if best:
+        table.add_column("best", justify="right")
+    if spread:
+        table.add_column("spread", justify="right")
+    for row in report.rows:
+        cells = [row.label, number(row.value)]
+        if best:
+            cells.append("" if row.best is None else number(row.best))
+        if spread:
+            cells.append("" if row.spread is None else f"{row.spread:.1%}")
+        table.add_row(*cells)
+    return table
