@@ -32,6 +32,11 @@ def place(lane: int, metres: float, kind: ExceptionKind = ExceptionKind.PLACE_PR
     return AdWizardAction(exception=kind, place=Place(lane=lane, metres=round(metres)), **fields)
 
 
+def crowd_of(world: World, kind: ExceptionKind) -> list[Any]:
+    """Those of whom an exception brings more."""
+    return list(world.actors.vehicles if kind is ExceptionKind.SPAWN_VEHICLES else world.actors.pedestrians)
+
+
 def free_place(world: World, adversary: Adversary) -> AdWizardAction:
     for lane in world.town.lanes:
         for metres in range(30, int(lane.length) - 8, 5):
@@ -160,12 +165,12 @@ def test_fault_ends_by_itself_after_half_a_minute() -> None:
 @pytest.mark.parametrize("kind", [ExceptionKind.SPAWN_VEHICLES, ExceptionKind.SPAWN_PEDESTRIANS])
 def test_spawning_tells_how_many_came_and_keeps_away_from_the_car(kind: ExceptionKind) -> None:
     world, adversary = adversary_in()
-    crowd = world.actors.vehicles if kind is ExceptionKind.SPAWN_VEHICLES else world.actors.pedestrians
     lane = max((lane for lane in world.town.lanes if not lane.in_junction), key=lambda lane: lane.length)
     assert adversary.carry_out(place(lane.id, 20, kind)) == "nobody was to come: count is 0"
     outcome = adversary.carry_out(place(lane.id, lane.length / 2, kind, count=8, extent=80))
     assert isinstance(outcome, dict)
     assert outcome["asked"] == 8
+    crowd = crowd_of(world, kind)
     assert 0 < outcome["count"] == len(crowd) <= 8
     least = FROM_CAR if kind is ExceptionKind.SPAWN_VEHICLES else 7.0
     assert min(np.hypot(*(one.position - world.car.position)) for one in crowd) >= least
@@ -178,7 +183,6 @@ def test_spawning_tells_how_many_came_and_keeps_away_from_the_car(kind: Exceptio
 @pytest.mark.parametrize("kind", [ExceptionKind.SPAWN_VEHICLES, ExceptionKind.SPAWN_PEDESTRIANS])
 def test_as_many_are_spawned_as_fit_and_then_nobody(kind: ExceptionKind, extent: int) -> None:
     world, adversary = adversary_in("midtown")
-    crowd = world.actors.vehicles if kind is ExceptionKind.SPAWN_VEHICLES else world.actors.pedestrians
     far = [lane for lane in world.town.lanes if np.hypot(*(lane.position(40.0) - world.car.position)) > 120.0]
     lane = max((lane for lane in far if not lane.in_junction), key=lambda lane: lane.length)
     counts, outcome = [], adversary.carry_out(place(lane.id, lane.length / 2, kind, count=16, extent=extent))
@@ -186,6 +190,7 @@ def test_as_many_are_spawned_as_fit_and_then_nobody(kind: ExceptionKind, extent:
         counts.append(outcome["count"])
         outcome = adversary.carry_out(place(lane.id, lane.length / 2, kind, count=16, extent=extent))
     assert outcome in ("there is no room for anybody in the rectangle", "there are 30 of them in the town already")
+    crowd = crowd_of(world, kind)
     assert sum(counts) == len(crowd)
     assert len(crowd) >= {5: 1, 15: 2, 40: 6}[extent]
     for one, other in itertools.combinations(crowd, 2):  # some stand in the tunnel, others above it

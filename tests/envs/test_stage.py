@@ -20,6 +20,7 @@ from dorothie_gym.spaces import (
     noop,
 )
 from dorothie_gym.world.config import WorldConfig
+from tests.world.forcing import blind
 
 ALONE = EnvConfig(world=WorldConfig(vehicles=0, pedestrians=0))
 
@@ -123,9 +124,9 @@ def test_infractions_are_events_and_counted_in_info_and_summary(env: DuoWizardEn
     *_, infos = step(env)
     assert set(infos["participant"]["infractions"].values()) == {0}
     world = env.stage.world
-    world._lookout.look = lambda *_: None  # type: ignore[method-assign]
     lane = world.town.lanes[world.planner.lane]
     prop = world.actors.add_prop(PropKind.STREET_BARRIER, lane.id, min(world.planner.station + 8.0, lane.length - 1.0))
+    blind(world)
     events = []
     for _ in range(20):
         *_, infos = step(env)

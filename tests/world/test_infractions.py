@@ -1,18 +1,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 
 from dorothie_gym.ontology import ObjectClass, PhysicalAction, PropKind
 from dorothie_gym.world.boxes import Box, boxes_touch
-from dorothie_gym.world.car.control import Control
 from dorothie_gym.world.config import WorldConfig
 from dorothie_gym.world.infractions import Breach, Infraction, InfractionWatch
-from dorothie_gym.world.junctions import JunctionControl
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.reports import INFRACTION_KINDS, WorldEvent, WorldEventKind
 from dorothie_gym.world.town import Town
@@ -20,8 +16,7 @@ from dorothie_gym.world.town.model import Array, SignalKind
 from dorothie_gym.world.world import World
 from tests.world.crossings import across, crossing, lit_crossing, way_in, way_out
 from tests.world.driving import ALONE, long_lane, network, run, world_at
-
-Hand = Callable[[World], Control]
+from tests.world.forcing import TOO_LATE, blind, park, straight_street, swerve
 
 
 def world_in(town: Town, lane: int, station: float, config: WorldConfig = ALONE) -> World:
@@ -32,31 +27,19 @@ def infractions(events: list[WorldEvent]) -> list[WorldEvent]:
     return [event for event in events if event.kind in INFRACTION_KINDS]
 
 
-def drive_by_hand(world: World, hand: Hand) -> None:
-    """From now on the car does what `hand` says, whatever its planner thinks."""
-    world.driver.control = lambda *_args, **_fields: hand(world)  # type: ignore[method-assign]
-
-
-def blind(world: World) -> None:
-    """From now on the car brakes for nobody."""
-    world._lookout.look = lambda *_: None  # type: ignore[method-assign]
-
-
-def lawless(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(JunctionControl, "request", lambda *_args, **_fields: None)
-
-
-def straight_on(throttle: float = 0.5, steer: float = 0.0) -> Hand:
-    return lambda world: Control(throttle=throttle, steer=steer, brake=0.0)
+def too_late_for_the_line(town: Town) -> World:
+    """A car that comes from the south, goes straight on, and is too fast to stop before the crossing."""
+    world = world_in(town, way_in("s"), town.lanes[way_in("s")].length - TOO_LATE)
+    assert world.planner.command(PhysicalAction.J_TURN, 0, 0.0) is None
+    world.car.speed = 12.0
+    return world
 
 
 # --- lights and signs ---------------------------------------------------------------------------------------------
 
 
-def test_running_a_red_light_is_told_once_with_place_and_light(monkeypatch: pytest.MonkeyPatch) -> None:
-    world = world_in(lit_crossing("ew"), way_in("s"), 60.0)
-    lawless(world, monkeypatch)
-    world.planner.command(PhysicalAction.J_TURN, 0, 0.0)
+def test_running_a_red_light_is_told_once_with_place_and_light() -> None:
+    world = too_late_for_the_line(lit_crossing("ew"))
     events = infractions(run(world, 20.0))
     assert [event.kind for event in events] == [WorldEventKind.RED_LIGHT]
     data = events[0].data
@@ -76,11 +59,10 @@ def test_car_that_obeys_its_light_breaks_no_rule(first: str) -> None:
 
 
 @pytest.mark.parametrize("obeys", [True, False])
-def test_stop_sign_asks_for_a_stand(obeys: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    world = world_in(crossing({"s": SignalKind.STOP}), way_in("s"), 60.0)
-    if not obeys:
-        lawless(world, monkeypatch)
-    world.planner.command(PhysicalAction.J_TURN, 0, 0.0)
+def test_stop_sign_asks_for_a_stand(obeys: bool) -> None:
+    town = crossing({"s": SignalKind.STOP})
+    world = world_in(town, way_in("s"), 60.0) if obeys else too_late_for_the_line(town)
+    world.planner.command(PhysicalAction.J_TURN, 0, float(world.car.speed))
     events = infractions(run(world, 30.0))
     assert world.planner.lane == way_out("n")
     assert [event.kind for event in events] == ([] if obeys else [WorldEventKind.STOP_SIGN])
@@ -89,11 +71,15 @@ def test_stop_sign_asks_for_a_stand(obeys: bool, monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.parametrize("kind", [SignalKind.YIELD, SignalKind.SPEED])
-def test_nobody_has_to_stand_at_other_signs(kind: SignalKind, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nobody_has_to_stand_at_other_signs(kind: SignalKind) -> None:
     world = world_in(crossing({"s": kind}), way_in("s"), 60.0)
-    lawless(world, monkeypatch)
     world.planner.command(PhysicalAction.J_TURN, 0, 0.0)
-    assert infractions(run(world, 25.0)) == []
+    world.car.speed = slowest = 8.0
+    for _ in range(20):
+        assert infractions(world.step(15)) == []
+        slowest = min(slowest, float(world.car.speed))
+    assert world.planner.lane == way_out("n")
+    assert slowest > 1.0
 
 
 def way(
@@ -183,23 +169,18 @@ def test_road_ends_half_a_metre_outside_of_its_lanes(beside: float, off: bool) -
 
 
 def test_driving_into_the_field_is_told_once_and_anew_after_coming_back() -> None:
-    town = network("brookside").town
-    lane = long_lane(town)
-    world = world_at("brookside", lane, 30.0)
-    drive_by_hand(world, straight_on(0.6, steer=0.1))
-    events = infractions(run(world, 4.0))
-    assert [event.kind for event in events if event.kind is not WorldEventKind.WRONG_WAY] == [WorldEventKind.OFF_ROAD]
-    event = next(event for event in events if event.kind is WorldEventKind.OFF_ROAD)
-    x, y = event.data["x"], event.data["y"]
-    half = town.lanes[event.data["lane"]].width_at(event.data["station"]) / 2
-    assert 0.5 < abs(town.lanes[event.data["lane"]].project(np.array([x, y]))[1]) - half < 1.0
-    start = town.lanes[lane]
-    world.car.position, world.car.heading, world.car.speed = start.position(30.0), start.heading_at(30.0), 0.0
-    drive_by_hand(world, straight_on(0.0))
-    assert infractions(run(world, 2.0)) == []
-    drive_by_hand(world, straight_on(0.6, steer=0.1))
-    again = [event.kind for event in infractions(run(world, 4.0))]
-    assert again.count(WorldEventKind.OFF_ROAD) == 1
+    town = straight_street()
+    world = world_in(town, 0, 30.0)
+    for _ in range(2):
+        swerve(world)
+        events = infractions(run(world, 8.0))
+        assert [event.kind for event in events] == [WorldEventKind.OFF_ROAD]
+        data = events[0].data
+        assert data["lane"] == 0
+        assert 0.5 < town.lanes[0].project(np.array([data["x"], data["y"]]))[1] - 2.0 < 1.0
+        assert data["station"] == pytest.approx(data["x"], abs=0.01)
+        assert abs(world.planner.offset) < 0.3  # back in its lane
+    assert world.reports.infractions[WorldEventKind.OFF_ROAD] == 2
 
 
 def test_driving_on_the_left_is_wrong_and_turning_round_is_not() -> None:
@@ -208,7 +189,6 @@ def test_driving_on_the_left_is_wrong_and_turning_round_is_not() -> None:
     assert infractions(run(world, 15.0)) == []
     assert world.planner.lane != long_lane(world.town)
     world.car.heading += math.pi  # now it looks back, against its lane
-    drive_by_hand(world, straight_on())
     (event,) = infractions(run(world, 1.5))
     assert event.kind is WorldEventKind.WRONG_WAY
     assert event.data["lane"] == world.planner.lane
@@ -275,8 +255,8 @@ def meet(one: list[complex], other: list[complex]) -> bool:
 @pytest.mark.parametrize("kind", list(PropKind))
 def test_running_into_a_prop_is_the_cars_fault_and_names_the_prop(kind: PropKind) -> None:
     world = world_at("brookside", long_lane(network("brookside").town), 2.0)
-    blind(world)
     prop = world.actors.add_prop(kind, world.planner.lane, 40.0)
+    blind(world)
     events = infractions(run(world, 12.0))
     assert [event.kind for event in events] == [WorldEventKind.COLLISION]
     data = events[0].data
@@ -286,40 +266,62 @@ def test_running_into_a_prop_is_the_cars_fault_and_names_the_prop(kind: PropKind
     assert world.collisions == 1
 
 
-def standing_vehicle(world: World, station: float, lateral: float = 0.0) -> Any:
-    lane = world.town.lanes[world.planner.lane]
-    assert world.actors.add_vehicle(lane.id, station, distance=5.0)
-    vehicle = world.actors.vehicles[-1]
-    vehicle.position = lane.position(station, lateral)
-    vehicle.act = lambda action=None: vehicle.action.update(acceleration=0.0, steering=0.0)  # type: ignore[method-assign]
-    return vehicle
+def test_running_into_what_appears_too_close_is_told_though_the_car_brakes() -> None:
+    world = world_in(straight_street(), 0, 30.0)
+    world.car.speed = 10.0
+    prop = world.actors.add_prop(PropKind.STREET_BARRIER, 0, 38.0)  # 10 m/s need 6 m to stop at the very best
+    (event,) = infractions(run(world, 4.0))
+    assert (event.kind, event.data["key"]) == (WorldEventKind.COLLISION, prop.key)
+    assert 1.0 < event.data["speed"] < 8.0
+    assert event.data["own_fault"] is True
 
 
 def test_running_into_a_vehicle_names_it_and_stops_both() -> None:
     world = world_at("brookside", long_lane(network("brookside").town), 2.0)
-    vehicle = standing_vehicle(world, 40.0)
+    vehicle = park(world, 30.0, speed=2.0)
     blind(world)
-    (event,) = infractions(run(world, 6.0))
+    events: list[WorldEvent] = []
+    speeds = []
+    for _ in range(240):
+        events += infractions(world.step(1))
+        if events:
+            speeds.append((float(world.car.speed), vehicle.speed))
+    (event,) = events
     assert (event.data["key"], event.data["other"]) == (vehicle.key, ObjectClass.VEHICLES.label)
     assert event.data["own_fault"] is True
-    assert vehicle.speed == 0.0
+    assert event.data["speed"] > 3.0
+    assert speeds[0] == (0.0, 0.0)
+    assert vehicle.crashed
+
+
+def test_who_is_touched_on_foot_is_told_once() -> None:
+    world = world_at("brookside", long_lane(network("brookside").town), 2.0)
+    assert world.actors.add_pedestrian(world.planner.lane, 30.0)
+    (walker,) = world.actors.pedestrians
+    walker.position = world.town.lanes[world.planner.lane].position(30.0)
+    walker.record.pace = 0.0
+    blind(world)
+    (event,) = infractions(run(world, 7.0))
+    assert (event.data["key"], event.data["other"]) == (walker.key, ObjectClass.PEDESTRIAN.label)
+    assert event.data["own_fault"] is True
 
 
 def test_passing_close_by_is_no_collision() -> None:
     for gap, hit in ((0.1, False), (-0.1, True)):
         world = world_in(crossing(), way_in("s"), 2.0)
-        standing_vehicle(world, 40.0, lateral=world.car.WIDTH + gap)
+        park(world, 40.0, lateral=world.car.WIDTH + gap)
         blind(world)
         world.planner.command(PhysicalAction.J_TURN, 0, 0.0)
-        assert bool(infractions(run(world, 6.0))) == hit, gap
+        assert bool(infractions(run(world, 8.0))) == hit, gap
+        assert world.planner.station > 50.0 or hit
 
 
 def test_being_run_into_from_behind_is_not_the_cars_fault() -> None:
     world = world_in(crossing(), way_in("s"), 40.0)
     world.planner.command(PhysicalAction.STOP, 0, 0.0)
-    vehicle = standing_vehicle(world, 20.0)
-    vehicle.speed = 8.0
+    vehicle = park(world, 20.0, speed=8.0)
     (event,) = infractions(run(world, 4.0))
+    assert event.data["key"] == vehicle.key
     assert event.data["own_fault"] is False
     assert event.data["speed"] == 0.0
     assert world.collisions == 0
@@ -328,11 +330,10 @@ def test_being_run_into_from_behind_is_not_the_cars_fault() -> None:
 def test_a_crash_of_others_beside_the_car_is_not_the_cars() -> None:
     world = world_at("brookside", long_lane(network("brookside").town), 40.0)
     world.planner.command(PhysicalAction.STOP, 0, 0.0)
-    one, other = standing_vehicle(world, 60.0), standing_vehicle(world, 80.0)
+    one, other = park(world, 60.0), park(world, 80.0)
     lane = world.town.lanes[world.planner.lane]
     one.position, other.position = lane.position(46.0, -1.0), lane.position(46.5, 1.0)  # a metre before the car
     other.heading += 0.5
-    blind(world)
     world.step(15)
     assert one.crashed
     assert other.crashed

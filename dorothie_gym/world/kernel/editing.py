@@ -206,7 +206,9 @@ def move_prop(
     prop.heading, prop.height = town_lane.heading_at(station), town_lane.height_at(station)
     prop.cos, prop.sin = math.cos(prop.heading), math.sin(prop.heading)
     prop.lane = NOBODY
-    for k, (reached, at) in enumerate(_reached(network, town, prop)[:4]):
+    prop.lane[0], prop.station[0] = lane, station
+    others = [place for place in _reached(network, town, prop) if place[0] != lane]
+    for k, (reached, at) in enumerate(others[: len(prop.lane) - 1], start=1):
         prop.lane[k], prop.station[k] = reached, at
     rebuild(town, world)
 
