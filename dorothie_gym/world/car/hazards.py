@@ -12,10 +12,6 @@ LOOKAHEAD = 45.0
 SIDE_MARGIN = 0.35
 """Room kept beside the car [m]."""
 
-MANOEUVRE_MARGIN = 0.75
-"""The same in a lane switch or U-turn [m]: where the curvature of a U-turn changes sign the car leaves its line by up
-to 0.67 m, because the bicycle's course cannot turn at once."""
-
 HEIGHT_MARGIN = 2.5
 """Things further above or below are on another road [m]."""
 

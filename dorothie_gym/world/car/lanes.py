@@ -36,6 +36,9 @@ ANOTHER_WAY = 15.0
 LEAD = 1.0
 """Room that a manoeuvre leaves to the car before it begins [m]."""
 
+STOPPING = 3.0
+"""Deceleration of a car that finds somebody beside it before a lane switch [m/s^2]."""
+
 WAITING_ROOM = 4.5
 """A lane switch ends this far before the end of a lane at which the car may have to wait [m]."""
 
@@ -205,7 +208,8 @@ class Lanes:
             room = max((end - at) / changes - LEAD, 2.0)
             distance = min(max(MIN_SWITCH, SWITCH_TIME * speed), room)
             spare = (lane.length - at) - changes * (distance + LEAD)
-            lead = LEAD if k == 0 else min(max(spare, LEAD), SETTLE)
+            # the first one is announced in time to stop before it, should others be beside the car
+            lead = LEAD + speed**2 / (2 * STOPPING) if k == 0 else min(max(spare, LEAD), SETTLE)
             begin = min(at + lead, lane.length - distance)
             if begin > at + 1e-3:
                 pieces.append(follow(lane, at, begin))

@@ -20,6 +20,9 @@ SNEAKING = 2.0
 START = 1.2
 """Time from a stand at the line until the front is over it [s]."""
 
+CYCLIST_START = 2.6
+"""The same for a cyclist, who accelerates by 1 m/s^2 [s]."""
+
 AT_LINE = 3.5
 """Who stands with its front this close before the line stands at it [m]."""
 

@@ -14,6 +14,7 @@ from dorothie_gym.world.kernel.conduct import (
     AT_LINE,
     COMFORTABLE_BRAKING,
     CRITICAL_GAP,
+    CYCLIST_START,
     GIVING_WAY_PATIENCE,
     HARDEST_BRAKING,
     LAPSE,
@@ -214,7 +215,8 @@ def _may_sneak(town: TownArrays, world: WorldArrays, vehicle: Records, now: floa
         return False
     if let_in:
         return True
-    return bool(light(town, world, vehicle.approach_lane, now + START) == Colour.YELLOW)
+    start = CYCLIST_START if vehicle.kind == Kind.CYCLIST else START
+    return bool(light(town, world, vehicle.approach_lane, now + start) == Colour.YELLOW)
 
 
 @compiled

@@ -11,7 +11,6 @@ from dorothie_gym.world.car.hazards import (
     HEIGHT_MARGIN,
     LINE_GAP,
     LOOKAHEAD,
-    MANOEUVRE_MARGIN,
     REACTION,
     ROADBLOCK_GAP,
     SIDE_MARGIN,
@@ -28,6 +27,9 @@ if TYPE_CHECKING:
 
 INSTANTS, INSTANT = 4, 0.5
 """Moving bodies are looked for on the path now and at three more times, so far apart [s]."""
+
+WIDEST = 2.5
+"""No corner of the car sweeps farther from its path than this [m]: in a U-turn it is 2.4 m."""
 
 MOVING = 0.2
 """Slower than this a body is where it is [m/s]."""
@@ -99,7 +101,7 @@ def bodies_ahead(world: WorldArrays, seen: int) -> float:
         body = world.seen[n]
         if math.sqrt(body.distance2) > far + 2.0 * abs(body.speed) + body.length:
             continue
-        k, gap, along = _meet(world, body, last, tight)
+        k, gap, along = _meet(world, body, last)
         if k < 0:
             continue
         if body.kind == STATIC and k <= near:
@@ -109,7 +111,7 @@ def bodies_ahead(world: WorldArrays, seen: int) -> float:
 
 
 @compiled
-def _meet(world: WorldArrays, body: Records, last: int, tight: bool) -> tuple[int, float, float]:
+def _meet(world: WorldArrays, body: Records, last: int) -> tuple[int, float, float]:
     """The first place of the path where the car would touch a body, now or where it is heading.
 
     The path is not longer than its points say: those that are closer together than the body is away are skipped.
@@ -118,9 +120,9 @@ def _meet(world: WorldArrays, body: Records, last: int, tight: bool) -> tuple[in
         Number of the point (-1 for none), gap from the car's nose [m], and the body's speed along the path [m/s].
     """
     car, vehicle, path = world.car[0], world.vehicles[0], world.path
-    margin = 0.5 * vehicle.width + (MANOEUVRE_MARGIN if tight else SIDE_MARGIN)
     radius = 0.5 * math.sqrt(body.length * body.length + body.width * body.width)
-    reach = math.sqrt((radius + margin) * (radius + margin) + (radius + SPACING) * (radius + SPACING))
+    side = radius + WIDEST + SIDE_MARGIN
+    reach = math.sqrt(side * side + (radius + SPACING) * (radius + SPACING))
     for instant in range(INSTANTS if body.speed > MOVING else 1):
         way = instant * INSTANT * body.speed
         x, y = body.x + way * body.cos, body.y + way * body.sin
@@ -134,10 +136,12 @@ def _meet(world: WorldArrays, body: Records, last: int, tight: bool) -> tuple[in
                 continue
             parallel = abs(body.cos * point.cos + body.sin * point.sin)
             square = abs(body.sin * point.cos - body.cos * point.sin)
-            half_width = 0.5 * (body.width * parallel + body.length * square) + margin
+            half_width = 0.5 * (body.width * parallel + body.length * square) + SIDE_MARGIN
             half_length = 0.5 * (body.length * parallel + body.width * square)
             along = dx * point.cos + dy * point.sin
-            touches = abs(dy * point.cos - dx * point.sin) <= half_width and abs(along) <= half_length + SPACING
+            across = dy * point.cos - dx * point.sin
+            swept = half_width + (point.right if across > 0.0 else point.left)
+            touches = abs(across) <= swept and abs(along) <= half_length + SPACING
             # who goes along the path is where it is now
             if touches and abs(point.height - body.height) <= HEIGHT_MARGIN and (instant == 0 or square >= CROSSING):
                 gap = point.s - car.s + along - half_length - 0.5 * vehicle.length

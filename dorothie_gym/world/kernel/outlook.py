@@ -35,7 +35,7 @@ STANDING = 0.1
 """Slower than this the car stands [m/s]."""
 
 BEFORE_MANOEUVRE = 15.0
-"""How far before a lane switch or U-turn the car looks whether others are in its way [m]."""
+"""How far before it would have to brake for a lane switch or U-turn it looks whether others are in its way [m]."""
 
 IN_LINE, FACING = 2.0, 0.5
 """Who is no farther beside a lane than this [m], and heads along it by this cosine, comes along it."""
@@ -170,9 +170,10 @@ def _gap_to_traffic(town: TownArrays, world: WorldArrays, seen: int, blocked: bo
         if turning and not blocked:
             _close_junctions(town, world, start)
         return math.inf, 0
-    while start < car.points and not path[start].manoeuvre and path[start].s - car.s <= BEFORE_MANOEUVRE:
+    reach = BEFORE_MANOEUVRE + vehicle.speed * vehicle.speed / (2.0 * BRAKING)
+    while start < car.points and not path[start].manoeuvre and path[start].s - car.s <= reach:
         start += 1
-    if start >= car.points or not path[start].manoeuvre or path[start].s - car.s > BEFORE_MANOEUVRE:
+    if start >= car.points or not path[start].manoeuvre or path[start].s - car.s > reach:
         return math.inf, 0
     ahead = path[start].s - car.s
     target = int(path[start].lane)

@@ -71,7 +71,7 @@ GOALS = 16
 CLOSED = 4
 """Most junctions that a car turns round in at once."""
 
-POINTS = 256
+POINTS = 208
 """Most points of the car's path that the loops look at: 1 m apart, half a metre in U-turns."""
 
 EVENTS = 64

@@ -23,6 +23,7 @@ U_TURN = int(PhysicalAction.U_TURN.value)
 Records: TypeAlias = Any
 """An array of records; mypy knows no types of their fields."""
 
+
 def plain(records: Records) -> Any:
     """The same records as an array whose fields are read by name only, which is several times faster in Python."""
     return records.view(np.dtype((np.void, records.dtype)), np.ndarray)
@@ -261,6 +262,7 @@ POINT = np.dtype(
         ("x", "f8"), ("y", "f8"), ("heading", "f8"), ("cos", "f8"), ("sin", "f8"), ("height", "f8"),
         ("station", "f8"),  # along its lane [m]; during a U-turn where that ends
         ("speed", "f8"),  # that curves, limits and the path's end allow [m/s]
+        ("left", "f8"), ("right", "f8"),  # how far the car's corners sweep to either side of the path [m]
         ("lane", "i4"),
         ("manoeuvre", "b1"),  # whether the path is off the lanes' middles here: lane switch or U-turn
     ],
