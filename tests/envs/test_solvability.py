@@ -111,6 +111,51 @@ def play_driving(name: str, seed: int, seconds: float) -> tuple[int, int]:
     return put, env.summary()["exceptions"]
 
 
+def play_session_at_random(seed: int, seconds: float) -> tuple[int, int]:
+    """Everybody does anything that the masks allow; the Ad-Wizard half of the time where it hurts most.
+
+    Returns:
+        How many exceptions took effect, and how many decisions there were props in the town.
+    """
+    rng = np.random.default_rng([seed, 11])
+    name = TOWNS[seed % len(TOWNS)]
+    crowd = WorldConfig(vehicles=int(rng.integers(12)), pedestrians=int(rng.integers(8)))
+    env = DuoWizardEnv(name, config=EnvConfig(max_seconds=seconds, world=crowd))
+    scripted = {role: make_policy("scripted", role, env.limits) for role in AGENT_ROLES[: 2 * (seed % 2)]}
+    states = {role: policy.initial_state(seed, env.town) for role, policy in scripted.items()}
+    for k, agent in enumerate(env.possible_agents):
+        env.action_space(agent).seed(seed + k)
+    observations, infos = env.reset(seed=seed)
+    blocked = 0
+    while env.agents:
+        actions = {agent: env.action_space(agent).sample(mask=infos[agent]["action_mask"]) for agent in env.agents}
+        for role, policy in scripted.items():
+            actions[str(role)], states[role] = policy.step(observations[str(role)], states[role])
+        if rng.random() < 0.5:
+            actions[str(Role.AD_WIZARD)] = random_action(env.stage.world, rng).encode(env.limits)
+        observations, _, _, _, infos = env.step(actions)
+        world = env.stage.world
+        assert np.isfinite(world.frames).all()
+        if world.actors.props:
+            blocked += 1
+            assert unreachable(world) == set(), f"{name}, seed {seed}, {world.time} s"
+    return env.summary()["exceptions"], blocked
+
+
+@pytest.mark.parametrize("seed", [0, 2, 3, 4, 8, 10])
+def test_session_in_which_everybody_acts_at_random_stays_solvable(seed: int) -> None:
+    exceptions, blocked = play_session_at_random(seed, 10.0)
+    assert exceptions >= 2
+    assert blocked > 0
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_a_hundred_sessions_in_which_everybody_acts_at_random_stay_solvable() -> None:
+    played = [play_session_at_random(seed, 30.0) for seed in range(1000, 1100)]
+    assert sum(blocked > 0 for _, blocked in played) >= 60
+
+
 @pytest.mark.parametrize("name", ["brookside", "midtown"])
 def test_car_that_stands_can_drive_to_every_place_whatever_is_put(name: str) -> None:
     assert sum(play_standing(name, seed, 40) for seed in range(2)) >= 4

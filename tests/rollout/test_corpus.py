@@ -22,7 +22,8 @@ def test_sessions_are_played_once_and_kept(cache: Path, monkeypatch: pytest.Monk
     folder = default_corpus(seeds=(3, 4), config=SHORT)
     assert [session.header.seed for session in load_sessions(folder)] == [3, 4]
     assert all(session.complete for session in load_sessions(folder))
-    assert [path.name for path in cache.iterdir()] == [folder.name], "nothing else is left behind"
+    left = {path.name for path in cache.iterdir()} - {"towns"}  # towns are kept there too, by whoever loads one first
+    assert left == {folder.name}, "nothing else is left behind"
     monkeypatch.setattr(corpus, "play_session", lambda *args, **kwargs: pytest.fail("played again"))
     assert default_corpus(seeds=(3, 4), config=SHORT) == folder
 

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
 from dorothie_gym.ontology import ObjectClass, PropKind, Sensor, WeatherParameter
 from dorothie_gym.world.car.hazards import Body
+from dorothie_gym.world.kernel import Kind
+from dorothie_gym.world.kernel.records import EYE, PEDESTRIAN, PROP, SEEN, VEHICLE, Records
+from dorothie_gym.world.kernel.seeing import see
 from dorothie_gym.world.perception import Perception, detection_probability, position_error
 from dorothie_gym.world.visibility import CLEAR_SIGHT, Visibility
 from dorothie_gym.world.weather import Weather
@@ -22,43 +26,72 @@ def body(x: float, y: float = 0.0, key: int = 7) -> Body:
     return Body(key=key, kind=ObjectClass.VEHICLES, x=x, y=y, heading=0.0, length=5.0, width=2.0, speed=3.0, height=0.0)
 
 
-def seer(seed: int = 0) -> Perception:
-    return Perception(np.random.default_rng(seed))
+class Eyes:
+    """Somebody at the origin who looks at vehicles."""
+
+    def __init__(self, seed: int = 0) -> None:
+        self._perception = Perception(np.random.default_rng(seed))
+        self._eye = records(1, EYE)
+
+    def look(self, bodies: Sequence[Body], view: Visibility, frame: int, x: float = 0.0) -> list[Body]:
+        """What is perceived of bodies from a place on the x axis."""
+        vehicles, seen = records(len(bodies), VEHICLE), records(len(bodies), SEEN)
+        for vehicle, thing in zip(vehicles, bodies, strict=True):
+            vehicle.kind, vehicle.key, vehicle.x, vehicle.y = Kind.CAR, thing.key, thing.x, thing.y
+            vehicle.heading, vehicle.speed, vehicle.height = thing.heading, thing.speed, thing.height
+            vehicle.length, vehicle.width = thing.length, thing.width
+        self._perception.open(self._eye, view)
+        count = see(vehicles, NO_PEDESTRIANS, NO_PROPS, seen, self._eye[0], x, 0.0, frame, -1)
+        return [
+            Body(
+                key=int(each.key), kind=ObjectClass(int(each.kind)), x=float(each.x), y=float(each.y),
+                heading=float(each.heading), length=float(each.length), width=float(each.width),
+                speed=float(each.speed), height=float(each.height),
+            )
+            for each in seen[:count]
+        ]  # fmt: skip
+
+
+def records(count: int, kind: np.dtype[np.void]) -> Records:
+    return np.zeros(count, dtype=kind).view(np.recarray)
+
+
+NO_PEDESTRIANS, NO_PROPS = records(0, PEDESTRIAN), records(0, PROP)
 
 
 def test_on_a_clear_noon_everything_is_seen_where_it_is() -> None:
     bodies = [body(10.0, key=1), body(79.0, key=2)]
-    assert seer().perceive(bodies, 0.0, 0.0, Weather().visibility(lights=False), 0) == bodies
+    assert Eyes().look(bodies, Weather().visibility(lights=False), 0) == bodies
 
 
 def test_what_is_seen_does_not_depend_on_who_asks_or_how_often() -> None:
     bodies = [body(x, key=int(x)) for x in (20.0, 33.0, 50.0, 70.0)]
-    eyes = seer()
-    first = eyes.perceive(bodies, 0.0, 0.0, FOG, 400)
-    eyes.perceive(bodies[:2], 3.0, 0.0, FOG, 900)
-    assert eyes.perceive(bodies, 0.0, 0.0, FOG, 400) == first
-    assert seer().perceive(bodies, 0.0, 0.0, FOG, 400) == first
-    assert seer(1).perceive(bodies, 0.0, 0.0, FOG, 400) != first
-    alone = eyes.perceive([bodies[1]], 0.0, 0.0, FOG, 400)
+    eyes = Eyes()
+    first = eyes.look(bodies, FOG, 400)
+    eyes.look(bodies[:2], FOG, 900, x=3.0)
+    assert eyes.look(bodies, FOG, 400) == first
+    assert Eyes().look(bodies, FOG, 400) == first
+    assert Eyes(1).look(bodies, FOG, 400) != first
+    alone = eyes.look([bodies[1]], FOG, 400)
     assert alone == [thing for thing in first if thing.key == bodies[1].key]
 
 
 def test_far_things_are_missed_as_often_as_the_formula_says() -> None:
-    distance, eyes = FOG.sight + 8.0, seer()
-    seen = [bool(eyes.perceive([body(distance, key=key)], 0.0, 0.0, FOG, 15 * key)) for key in range(4000)]
+    distance, eyes = FOG.sight + 8.0, Eyes()
+    seen = [bool(eyes.look([body(distance, key=key)], FOG, 15 * key)) for key in range(4000)]
     expected = detection_probability(FOG, distance)
     assert 0.1 < expected < 0.9
     assert np.mean(seen) == pytest.approx(expected, abs=0.03)
 
 
 def test_things_within_sight_are_never_missed() -> None:
-    eyes = seer()
-    assert all(eyes.perceive([body(FOG.sight - 0.1, key=key)], 0.0, 0.0, FOG, key) for key in range(500))
+    eyes = Eyes()
+    assert all(eyes.look([body(FOG.sight - 0.1, key=key)], FOG, key) for key in range(500))
 
 
 def test_errors_of_place_have_the_spread_of_the_formula_and_are_cut_off() -> None:
-    distance, eyes = FOG.sight - 1.0, seer()
-    seen = [eyes.perceive([body(distance, key=key)], 0.0, 0.0, FOG, 0)[0] for key in range(4000)]
+    distance, eyes = FOG.sight - 1.0, Eyes()
+    seen = [eyes.look([body(distance, key=key)], FOG, 0)[0] for key in range(4000)]
     away, aside = position_error(FOG, distance)
     errors = np.array([(thing.x - distance, thing.y) for thing in seen])
     # a normal distribution whose tails are set to two standard deviations has 0.96 of its spread
@@ -69,7 +102,7 @@ def test_errors_of_place_have_the_spread_of_the_formula_and_are_cut_off() -> Non
 
 def test_things_are_told_by_where_they_seem_to_be_nearest_first() -> None:
     bodies = [body(x, key=int(10 * x)) for x in np.arange(20.0, 78.0, 0.5)]
-    seen = seer().perceive(bodies, 0.0, 0.0, FOG, 0)
+    seen = Eyes().look(bodies, FOG, 0)
     distances = [math.hypot(thing.x, thing.y) for thing in seen]
     assert distances == sorted(distances)
     assert len(seen) > 10

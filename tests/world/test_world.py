@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from dorothie_gym.ontology import ObjectClass, PhysicalAction, PropKind, Sensor, WeatherParameter
+from dorothie_gym.world.bodies import Pedestrian
 from dorothie_gym.world.config import WorldConfig
-from dorothie_gym.world.pedestrians import Pedestrian
+from dorothie_gym.world.kernel import Footway, Walk, town_arrays
 from dorothie_gym.world.places import free_places
 from dorothie_gym.world.reports import WorldEventKind
 from dorothie_gym.world.town import LinkType
 from dorothie_gym.world.world import World
 from tests.world.driving import PROPS, long_lane, network, run, world_at
+from tests.world.forcing import park
 
 
 def stops_before_a_prop(world: World, station: float, kind: PropKind) -> list[WorldEventKind]:
@@ -75,29 +77,41 @@ def test_hazard_stop_and_its_end_are_each_told_once_with_their_reason() -> None:
 def test_car_stops_behind_a_standing_vehicle() -> None:
     town = network("brookside").town
     world = world_at("brookside", long_lane(town), 2.0)
-    assert world.actors.add_vehicle(world.planner.lane, 70.0, distance=10.0)
-    vehicle = world.actors.vehicles[0]
-    vehicle.act = lambda: vehicle.action.update(acceleration=0.0, steering=0.0)  # type: ignore[method-assign]
+    vehicle = park(world, 70.0)
     run(world, 14.0)
     assert world.car.speed < 0.05
     assert world.collisions == 0
     assert 1.5 < math.hypot(*(vehicle.position - world.car.position)) - 5.0 < 5.0
 
 
+def across(world: World, walker: Pedestrian) -> float:
+    """How far it is from a pedestrian's kerb to the one on the other side [m]."""
+    return float(town_arrays(world.network).walk_points[walker.record.segment, 5])
+
+
+def step_out(world: World, walker: Pedestrian) -> None:
+    """Lets somebody beside a street cross it at once, whoever comes."""
+    record = walker.record
+    record.state, record.far = Walk.STRAYING, across(world, walker)
+    assert record.far > 6.0
+
+
 def test_car_stops_for_a_crossing_pedestrian() -> None:
     town = network("brookside").town
     world = world_at("brookside", long_lane(town), 2.0)
     assert world.actors.add_pedestrian(world.planner.lane, 45.0)
-    walker = world.actors.pedestrians[0]
-    walker._stretch = (44.0, 46.0)
+    (walker,) = world.actors.pedestrians
+    walker.record.pace = 0.01  # stays there until the car comes
     slowest, events = 40.0, []
     for _ in range(40):
         events += world.step(15)
-        if walker._far == walker._home and world.planner.station > 26.0:
-            walker._target = walker._far = -6.0  # steps out 19 m before the car
-        if walker._far != walker._home:
+        if walker.record.pace < 1.0 and world.planner.station > 26.0:
+            walker.record.pace = 1.3
+            step_out(world, walker)  # 19 m before the car
+        if walker.state is Walk.STRAYING:
             slowest = min(slowest, float(world.car.speed))
     assert slowest < 3.0
+    assert walker.state is Walk.WALKING and not walker.crashed
     assert world.collisions == 0
     assert not any(event.kind is WorldEventKind.COLLISION for event in events)
 
@@ -119,55 +133,79 @@ def test_pedestrians_walk_on_no_lane() -> None:
         for _ in range(60):
             world.step(15)
             for walker in world.actors.pedestrians:
-                if abs(walker._lateral - walker._home) > 0.1:
+                if walker.state is Walk.STRAYING:
                     continue  # crossing
                 lane = roads.get_lane(roads.get_closest_lane_index(walker.position, height=walker.height))
                 station, lateral = lane.local_coordinates(walker.position)
                 assert abs(lateral) > lane.width_at(station) / 2
+        assert min(walker.odometer for walker in world.actors.pedestrians) > 20.0
 
 
-def test_pedestrian_does_not_walk_into_a_car() -> None:
-    town = network("brookside").town
-    world = world_at("brookside", long_lane(town), 2.0)
+def car_that_stands_beside_somebody(behind: float) -> tuple[World, Pedestrian]:
+    """A car by command at a stand, and somebody at the kerb `behind` its nose [m] who crosses the road now."""
+    world = world_at("brookside", long_lane(network("brookside").town), 40.0)
     world.planner.command(PhysicalAction.STOP, 0, 0.0)
-    lane = town.lanes[world.planner.lane]
-    walker = Pedestrian(world.road, lane.id, 20.0, stretch=(4.0, 60.0), key=99, rng=np.random.default_rng(0))
-    world.road.objects.append(walker)
-    world.actors.pedestrians.append(walker)
-    walker._target = walker._far = -6.0
-    walker._station = 3.0
-    run(world, 20.0)
-    assert not world.car.crashed
-    assert not walker.crashed
+    lane = world.town.lanes[world.planner.lane]
+    assert world.actors.add_pedestrian(lane.id, 60.0)
+    (walker,) = world.actors.pedestrians
+    station = lane.project(walker.position)[0] + behind - world.car.LENGTH / 2
+    world.car.position, world.car.heading = lane.position(station), lane.heading_at(station)
+    step_out(world, walker)
+    return world, walker
+
+
+@pytest.mark.parametrize("behind", [-1.0, 1.0, 3.0])
+def test_pedestrian_does_not_walk_into_a_car(behind: float) -> None:
+    world, walker = car_that_stands_beside_somebody(behind)
+    lane = world.town.lanes[world.planner.lane]
+    kerb = nearest = float(lane.project(walker.position)[1])
+    for _ in range(40):
+        world.step(15)
+        nearest = min(nearest, float(lane.project(walker.position)[1]))
+        assert not walker.crashed
+        assert not world.car.crashed
+        if walker.state is Walk.WALKING:
+            break
+    if behind > 0.0:
+        assert 1.0 < nearest < 2.3 < kerb  # it came up to the car, and went back
+        assert lane.project(walker.position)[1] == pytest.approx(kerb, abs=0.5)
+    else:
+        assert nearest < -lane.width_at(60.0)  # before the car the way is free
 
 
 @pytest.mark.parametrize("name", ["brookside", "Town05"])
 def test_who_crosses_a_road_comes_to_its_far_kerb(name: str) -> None:
     roads = network(name)
-    site = roads.town.sites[0]
-    world = world_at(name, site.lane, site.station, WorldConfig(vehicles=0, pedestrians=0))
-    beside_lanes(world, 40)
-    for walker in world.actors.pedestrians:
-        walker._lateral = walker._target = walker._home - world.actors._across(walker)
-        walker._place()
-        lane = roads.get_lane(roads.get_closest_lane_index(walker.position, height=walker.height))
-        station, lateral = lane.local_coordinates(walker.position)
-        assert abs(lateral) > lane.width_at(station) / 2, f"{walker.position} is on lane {lane.town_lane.id}"
+    town = town_arrays(roads)
+    crossings = 0
+    for way in town.walks[town.walks.kind == Footway.STREET]:
+        points = town.walk_points[way.first : way.last + 1]
+        for here, there in zip(points, points[1:], strict=False):
+            far = min(here[5], there[5])
+            if far <= 0.0:
+                continue
+            middle, along = (here + there) / 2, (there - here)[:2]
+            left = np.array((along[1], -along[0])) / np.hypot(*along)
+            place = middle[:2] + far * left
+            lane = roads.get_lane(roads.get_closest_lane_index(place, height=middle[4]))
+            station, lateral = lane.local_coordinates(place)
+            assert abs(lateral) > lane.width_at(station) / 2, f"{place} is on lane {lane.town_lane.id}"
+            crossings += 1
+    assert crossings > 100
 
 
 def test_pedestrian_who_stands_close_to_a_car_steps_away_from_it() -> None:
-    town = network("brookside").town
-    world = world_at("brookside", long_lane(town), 12.0)
-    world.planner.command(PhysicalAction.STOP, 0, 0.0)
-    lane = town.lanes[world.planner.lane]
-    walker = Pedestrian(world.road, lane.id, 15.0, stretch=(4.0, 60.0), key=99, rng=np.random.default_rng(0))
-    world.road.objects.append(walker)
-    world.actors.pedestrians.append(walker)
-    walker._station, walker._lateral, walker._target = 15.1, 0.0, walker._home  # 0.35 m before the car's nose
-    walker._place()
-    run(world, 8.0)
-    assert abs(walker._lateral - walker._home) < 0.1
-    assert not walker.crashed
+    world, walker = car_that_stands_beside_somebody(-0.6)
+    lane = world.town.lanes[world.planner.lane]
+    station = lane.project(walker.position)[0]
+    walker.position = lane.position(station)  # 0.35 m before the car's nose
+    for _ in range(16):
+        world.step(15)
+        assert not walker.crashed
+        if walker.state is Walk.WALKING:
+            break
+    assert walker.state is Walk.WALKING  # on either side
+    assert abs(lane.project(walker.position)[1]) > lane.width_at(station) / 2
 
 
 @pytest.mark.parametrize("frames", [1, 15, 300])

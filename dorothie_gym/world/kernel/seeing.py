@@ -170,7 +170,7 @@ def _glimpse(
         return body_x, body_y, True
     distance = math.sqrt(distance2)
     left = gain(eye.fog, eye.fog_start, eye.rain, eye.light, eye.lamps, eye.clarity, distance)
-    state = _stirred(_stirred(_stirred(0, int(eye.seed)), key), frame // GLANCE)
+    state = _stirred(_stirred(_stirred(0, int(eye.seed)), key), int(frame) // GLANCE)
     if distance > eye.sight:
         state = _signed(state + _GOLDEN)
         if _share(_mixed(state)) >= detection_chance(signal(left, distance)):
