@@ -12,6 +12,7 @@ import numpy as np
 from dorothie_gym.ontology import SPEED_STEP
 from dorothie_gym.world.car.path import Path
 from dorothie_gym.world.car.planner import U_TURN_SPEED, LocalPlanner
+from dorothie_gym.world.kernel.course import find_sides
 from dorothie_gym.world.kernel.parameters import CAR_LENGTH, CAR_WIDTH
 from dorothie_gym.world.kernel.records import plain
 from dorothie_gym.world.town.model import Array
@@ -59,34 +60,6 @@ BEHIND, AHEAD = 12.0, 150.0
 """Stretch of path that the compiled world is told at least, behind and ahead of the car [m]."""
 
 
-def _smooth(values: Array) -> Array:
-    """Running mean of three (n,): where pieces of path meet single points are off."""
-    return np.convolve(np.pad(values, 1, mode="edge"), np.full(3, 1 / 3), mode="valid")
-
-
-def swept_sides(curvatures: Array, length: float, width: float) -> tuple[Array, Array]:
-    """How far a car comes to the left and to the right of its middle's path, by its corners (n,) each [m].
-
-    highway-env's bicycle moves along its heading plus a slip angle b with sin(b) = length / 2 * curvature: it turns
-    about a point beside its rear axle, and its front points outwards. So of a circle of radius R the rear end is the
-    innermost, R cos(b) - width / 2 from the centre, and the outer front corner the outermost.
-
-    Args:
-        curvatures: of the path, positive to the right (n,) [1/m].
-        length: of the car [m].
-        width: of the car [m].
-    """
-    bend = np.abs(curvatures)
-    sine = np.minimum(bend * length / 2, 1.0)
-    cosine = np.sqrt(1.0 - sine**2)
-    inside = width / 2 + bend * (length / 2) ** 2 / (1.0 + cosine)
-    across, along = (length * sine + width * cosine) / 2, (length * cosine - width * sine) / 2
-    # sqrt((R + across)^2 + along^2) - R, written so that it holds for a straight path
-    root = np.sqrt((1.0 + bend * across) ** 2 + (bend * along) ** 2)
-    outside = (2.0 * across + bend * (across**2 + along**2)) / (1.0 + root)
-    return np.where(curvatures > 0.0, outside, inside), np.where(curvatures > 0.0, inside, outside)
-
-
 def speed_profile(path: Path, stop_at: float | None) -> Array:
     """Speed that curves, limits and the end of a path allow at each of its points (n,) [m/s].
 
@@ -94,7 +67,7 @@ def speed_profile(path: Path, stop_at: float | None) -> Array:
         path: the path.
         stop_at: where the car has to stop [m], or None.
     """
-    bend = _smooth(np.abs(path.curvatures))
+    bend = np.convolve(np.pad(np.abs(path.curvatures), 1, mode="edge"), np.full(3, 1 / 3), mode="valid")
     squared = np.minimum(path.limits**2, LATERAL_ACCELERATION / np.maximum(bend, 1e-4))
     if path.manoeuvre.any():
         tight = path.manoeuvre & (bend > 0.1)
@@ -129,7 +102,7 @@ def write_path(arrays: Any, path: Path, s: float, speeds: Array) -> float:
     rows["heading"], rows["cos"], rows["sin"] = headings, np.cos(headings), np.sin(headings)
     rows["height"], rows["station"], rows["speed"] = path.heights[cut], path.stations[cut], speeds[cut]
     rows["lane"], rows["manoeuvre"] = lanes, path.manoeuvre[cut]
-    rows["left"], rows["right"] = swept_sides(_smooth(path.curvatures[cut]), CAR_LENGTH, CAR_WIDTH)
+    find_sides(arrays.path, len(lanes), CAR_LENGTH, CAR_WIDTH)
     starts = np.concatenate(([0], 1 + np.flatnonzero(lanes[1:] != lanes[:-1])))[: len(car["run_lane"])]
     car["runs"], car["run"] = len(starts), -1
     car["run_lane"][: len(starts)], car["run_first"][: len(starts)] = lanes[starts], starts

@@ -208,8 +208,11 @@ class Lanes:
             room = max((end - at) / changes - LEAD, 2.0)
             distance = min(max(MIN_SWITCH, SWITCH_TIME * speed), room)
             spare = (lane.length - at) - changes * (distance + LEAD)
-            # the first one is announced in time to stop before it, should others be beside the car
-            lead = LEAD + speed**2 / (2 * STOPPING) if k == 0 else min(max(spare, LEAD), SETTLE)
+            if k == 0:  # announced in time to stop before it, should others be beside the car
+                most = max(end - at - changes * (distance + LEAD), 0.0)
+                lead = LEAD + min(speed**2 / (2 * STOPPING), most)
+            else:
+                lead = min(max(spare, LEAD), SETTLE)
             begin = min(at + lead, lane.length - distance)
             if begin > at + 1e-3:
                 pieces.append(follow(lane, at, begin))

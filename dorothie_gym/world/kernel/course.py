@@ -12,6 +12,9 @@ from dorothie_gym.world.kernel.records import Records
 if TYPE_CHECKING:
     from dorothie_gym.world.kernel.world_arrays import WorldArrays
 
+WIDEST = 2.5
+"""No corner of the car comes farther from its path than this [m]: in a U-turn it is 2.4 m."""
+
 WINDOW = 6.0
 """The car is looked for this far before and behind the place where it was [m]."""
 
@@ -62,6 +65,35 @@ def advance(world: WorldArrays, vehicle: Records) -> None:
     car.s, car.offset = s, offset
     car.at = point_at(world, s)
     take_lanes(world, vehicle)
+
+
+@compiled
+def find_sides(path: Records, count: int, length: float, width: float) -> None:
+    """Finds out how far a car comes to the left and to the right of its middle's path, by its corners.
+
+    highway-env's bicycle moves along its heading plus a slip angle, and turns by the sine of that over half its length:
+    where the path begins to bend its heading follows by and by, and in a long bend its front points outwards. A corner
+    that is `along` before or behind the middle is off a path of curvature k by k / 2 along^2 more.
+
+    Args:
+        path: `records.POINT`, read and written; the car enters it along its direction.
+        count: of its points.
+        length: of the car [m].
+        width: of the car [m].
+    """
+    off = 0.0  # heading of the car to the right of the path [rad]
+    for k in range(count):
+        bend = 0.0
+        if k > 0:
+            way, turn = path[k].s - path[k - 1].s, path[k].heading - path[k - 1].heading
+            off -= turn
+            off -= math.sin(off) * min(way / (0.5 * length), 1.0)
+            bend = turn / way
+        sine, cosine = abs(math.sin(off)), math.cos(off)
+        across, along = 0.5 * (length * sine + width * cosine), 0.5 * (length * cosine - width * sine)
+        more = 0.5 * bend * along * along
+        path[k].left = min(max(across + more, 0.5 * width), WIDEST)
+        path[k].right = min(max(across - more, 0.5 * width), WIDEST)
 
 
 @inlined

@@ -19,7 +19,7 @@ from dorothie_gym.world.car.hazards import (
 )
 from dorothie_gym.world.car.path import SPACING
 from dorothie_gym.world.compiling import compiled, inlined
-from dorothie_gym.world.kernel.course import point_at
+from dorothie_gym.world.kernel.course import WIDEST, point_at
 from dorothie_gym.world.kernel.records import STATIC, Records
 
 if TYPE_CHECKING:
@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 
 INSTANTS, INSTANT = 4, 0.5
 """Moving bodies are looked for on the path now and at three more times, so far apart [s]."""
-
-WIDEST = 2.5
-"""No corner of the car sweeps farther from its path than this [m]: in a U-turn it is 2.4 m."""
 
 MOVING = 0.2
 """Slower than this a body is where it is [m/s]."""
