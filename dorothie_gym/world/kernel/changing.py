@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from dorothie_gym.world.kernel.town_arrays import TownArrays
     from dorothie_gym.world.kernel.world_arrays import WorldArrays
 
+GIVING_UP = 1.0
+"""Who changes lanes and has to stand for this long before it is over there gives it up [s]: by now others may come."""
+
 
 @inlined
 def change_lanes(town: TownArrays, world: WorldArrays, i: int) -> None:
@@ -35,8 +38,10 @@ def change_lanes(town: TownArrays, world: WorldArrays, i: int) -> None:
     vehicle = world.vehicles[i]
     if vehicle.lane != vehicle.plan[0]:
         lane = town.lanes[vehicle.lane]
-        if (lane.left == vehicle.plan[0] or lane.right == vehicle.plan[0]) and _is_taken(world, i):
-            take(town, vehicle, int(vehicle.lane))
+        if lane.left == vehicle.plan[0] or lane.right == vehicle.plan[0]:
+            held_up = vehicle.standing > GIVING_UP and lane.successors > 0
+            if held_up or _is_taken(world, i):
+                take(town, vehicle, int(vehicle.lane))
         return
     if vehicle.timer <= LANE_CHANGE_DELAY:
         return

@@ -114,10 +114,9 @@ def _reason_to_wait(town: TownArrays, world: WorldArrays, i: int, k: int, now: f
         return Wait.LIGHT
     if _has_to_stop(town, own):
         return Wait.STOP_SIGN
-    if not has_room(town, world, i, k):
-        own.since = math.inf  # whoever cannot leave the junction keeps nobody waiting
-        return Wait.NO_ROOM
     own.since = min(own.since, now)
+    if not has_room(town, world, i, k):
+        return Wait.NO_ROOM
     if _is_closed(town, world, i, now):
         return Wait.CLOSED
     return _others(town, world, i, now)
@@ -229,13 +228,22 @@ def _comes_first(town: TownArrays, other: Records, own: Records, meeting: int, n
     """Whether one who waits goes before another by the time of waiting; priority is none of it, but patience is."""
     if other.since >= own.since or now - other.asked >= LAPSE:
         return False
-    if other.wait == Wait.LIGHT or other.wait == Wait.STOP_SIGN or other.wait == Wait.NO_ROOM:
+    if other.wait == Wait.LIGHT or other.wait == Wait.STOP_SIGN:
         return False
+    if other.wait == Wait.NO_ROOM:  # keeps nobody waiting but those who would take the room that it waits for
+        return _have_one_exit(town, other, own)
     if now - other.since > GIVING_WAY_PATIENCE:
         return True
     if other.wait == Wait.GIVING_WAY or meeting == Relation.WAITS:
         return False
     return bool(relation(town, town.lanes[other.approach], own.approach) != Relation.WAITS)
+
+
+@inlined
+def _have_one_exit(town: TownArrays, one: Records, other: Records) -> bool:
+    """Whether two who announced themselves leave the junction on the same lane."""
+    exit = town.lanes[one.approach].exit
+    return bool(exit >= 0 and exit == town.lanes[other.approach].exit)
 
 
 @compiled

@@ -1,8 +1,9 @@
 """Who is on which lane: for every lane the list of bodies on it, ordered by station, made anew each substep.
 
 A vehicle is in the list of the lane that is closest and, where that is another one, of the lane that it follows; while
-it changes lanes, of that one as soon as highway-env counts it as on it. A prop is in the lists of all lanes that it
-reaches into.
+it changes lanes, of that one as soon as highway-env counts it as on it. One that follows the closest lane, but stands
+or drives so far askew or aside that nobody could pass it on the lane beside, is in the list of that one. A prop is in
+the lists of all lanes that it reaches into.
 """
 
 from __future__ import annotations
@@ -14,12 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.world.compiling import compiled, inlined
+from dorothie_gym.world.kernel.lanes import project
+from dorothie_gym.world.kernel.parameters import CAR_WIDTH
 from dorothie_gym.world.kernel.records import NOBODY, Kind, Records
 from dorothie_gym.world.network.ahead import HORIZON, MARGIN
 
 if TYPE_CHECKING:
     from dorothie_gym.world.kernel.town_arrays import TownArrays
     from dorothie_gym.world.kernel.world_arrays import WorldArrays
+
+PASSING = 0.5 * CAR_WIDTH + 0.2
+"""Whoever reaches closer to the middle of a lane than this is in the way of cars there [m]."""
 
 
 @inlined
@@ -35,8 +41,13 @@ def rebuild(town: TownArrays, world: WorldArrays) -> None:
         if vehicle.kind == Kind.EMPTY:
             continue
         _list_vehicle(nodes, heads, vehicle, i, 2 * i, vehicle.lane, vehicle.own_station)
-        if vehicle.lane != vehicle.plan[0] and _is_on_followed(town, vehicle):
-            _list_vehicle(nodes, heads, vehicle, i, 2 * i + 1, vehicle.plan[0], vehicle.station)
+        if vehicle.lane != vehicle.plan[0]:
+            if _is_on_followed(town, vehicle):
+                _list_vehicle(nodes, heads, vehicle, i, 2 * i + 1, vehicle.plan[0], vehicle.station)
+        elif town.lanes[vehicle.lane].left >= 0 or town.lanes[vehicle.lane].right >= 0:
+            reach = _reach_aside(town, vehicle)
+            if abs(vehicle.own_lateral) + reach > town.lanes[vehicle.lane].half_width:
+                _list_beside(town, nodes, heads, vehicle, i, reach)
     for p in range(len(world.props)):
         prop = world.props[p]
         if prop.present:
@@ -56,6 +67,29 @@ def _is_on_followed(town: TownArrays, vehicle: Records) -> bool:
     if not beside and vehicle.kind != Kind.DRIVEN:  # which may turn round, across both
         return True  # one lane leads into the other, or they cross in a junction
     return bool(abs(vehicle.lateral) <= town.lanes[vehicle.plan[0]].half_width + MARGIN)
+
+
+@inlined
+def _reach_aside(town: TownArrays, vehicle: Records) -> float:
+    """How far a vehicle's outline reaches to either side of its middle, across the lane that it follows [m]."""
+    here, there = town.points[vehicle.segment], town.points[vehicle.segment + 1]
+    across = abs(vehicle.sin * (there[0] - here[0]) - vehicle.cos * (there[1] - here[1])) / (there[2] - here[2])
+    return float(0.5 * vehicle.width + 0.5 * vehicle.length * across)
+
+
+@compiled
+def _list_beside(
+    town: TownArrays, nodes: Records, heads: NDArray[np.int32], vehicle: Records, body: int, reach: float
+) -> None:
+    """Lists a vehicle on the lane beside into which it reaches so far that nobody passes it there."""
+    lane = town.lanes[vehicle.lane]
+    for side in (lane.left, lane.right):
+        if side < 0:
+            continue
+        station, lateral, _ = project(town, side, vehicle.x, vehicle.y)
+        if abs(lateral) < reach + PASSING and 0.0 <= station <= town.lanes[side].length:
+            _list_vehicle(nodes, heads, vehicle, body, 2 * body + 1, side, station)
+            return
 
 
 @inlined

@@ -134,9 +134,14 @@ def _describe(record: Records, lane: Lane, row: int, table: LaneTable) -> None:
 
 
 def curve_speed(lane: Lane) -> float:
-    """Speed at which the tightest bend of a lane is driven, at most its limit [m/s]."""
-    bend = np.abs(np.diff(lane.headings) / np.diff(lane.stations))
-    tightest = float(np.convolve(bend, np.full(3, 1 / 3), mode="same").max()) if len(bend) >= 3 else float(bend.max())
+    """Speed at which the tightest bend of a lane is driven, at most its limit [m/s].
+
+    A bend is taken over three stretches between points: the last one of a lane may be as short as a few centimetres.
+    """
+    turned, lengths = np.abs(np.diff(lane.headings)), np.diff(lane.stations)
+    window = np.ones(min(3, len(lengths)))
+    bends = np.convolve(turned, window, mode="valid") / np.convolve(lengths, window, mode="valid")
+    tightest = float(bends.max())
     return min(lane.speed_limit, math.sqrt(CURVE_ACCELERATION / max(tightest, 1e-4)))
 
 
