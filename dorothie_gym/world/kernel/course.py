@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.parameters import PLANNED
+from dorothie_gym.world.kernel.plan import locate
 from dorothie_gym.world.kernel.records import Records
 
 if TYPE_CHECKING:
+    from dorothie_gym.world.kernel.town_arrays import TownArrays
     from dorothie_gym.world.kernel.world_arrays import WorldArrays
 
 WIDEST = 2.5
@@ -42,7 +44,7 @@ def heading_at(world: WorldArrays, s: float) -> float:
 
 
 @compiled
-def advance(world: WorldArrays, vehicle: Records) -> None:
+def advance(town: TownArrays, world: WorldArrays, vehicle: Records) -> None:
     """Finds the closest place of the path around the last one: distance along it, and from it (positive right)."""
     path, car = world.path, world.car[0]
     last = int(car.points) - 1
@@ -64,7 +66,7 @@ def advance(world: WorldArrays, vehicle: Records) -> None:
             offset = math.sqrt(gap) if dx * oy - dy * ox >= 0.0 else -math.sqrt(gap)
     car.s, car.offset = s, offset
     car.at = point_at(world, s)
-    take_lanes(world, vehicle)
+    take_lanes(town, world, vehicle)
 
 
 @compiled
@@ -97,8 +99,8 @@ def find_sides(path: Records, count: int, length: float, width: float) -> None:
 
 
 @inlined
-def take_lanes(world: WorldArrays, vehicle: Records) -> None:
-    """The lanes of the path from the car's place on become the vehicle's plan."""
+def take_lanes(town: TownArrays, world: WorldArrays, vehicle: Records) -> None:
+    """The lanes of the path from the car's place on become the vehicle's plan, and it is found on the first of them."""
     car = world.car[0]
     r = 0
     while r + 1 < car.runs and car.run_first[r + 1] <= car.at:
@@ -108,6 +110,7 @@ def take_lanes(world: WorldArrays, vehicle: Records) -> None:
         vehicle.planned = min(int(car.runs) - r, PLANNED)
         for k in range(vehicle.planned):
             vehicle.plan[k] = car.run_lane[r + k]
+        locate(town, vehicle)
 
 
 @inlined

@@ -54,14 +54,14 @@ BACK = 1.4
 def guide(town: TownArrays, world: WorldArrays, dt: float) -> None:
     """Sets acceleration and slip angle of the car for a substep of `dt` [s]."""
     car, vehicle, clock = world.car[0], world.vehicles[0], world.clock[0]
-    take_lanes(world, vehicle)
+    take_lanes(town, world, vehicle)
     note(town, vehicle, clock.time)
     seen = see(
         world.vehicles, world.pedestrians, world.props, world.seen, world.eye[0],
         vehicle.x, vehicle.y, clock.frame, 0,
     )  # fmt: skip
     look(town, world, seen)
-    advance(world, vehicle)
+    advance(town, world, vehicle)
     if car.s >= car.action_end:
         car.action = 0
     free = _free_speed(world)

@@ -37,6 +37,9 @@ STANDING = 0.1
 BEFORE_MANOEUVRE = 15.0
 """How far before it would have to brake for a lane switch or U-turn it looks whether others are in its way [m]."""
 
+SLOWEST = 1.0
+"""Speed at which a car comes to a place at least [m/s]."""
+
 IN_LINE, FACING = 2.0, 0.5
 """Who is no farther beside a lane than this [m], and heads along it by this cosine, comes along it."""
 
@@ -188,6 +191,7 @@ def _gap_to_traffic(town: TownArrays, world: WorldArrays, seen: int, blocked: bo
             behind = 8.0 + 5.0 * max(body.speed, TURN_ROUND_SPEED)
         else:
             behind = 8.0 + 3.0 * max(body.speed - vehicle.speed, 0.0)
+            station += body.speed * ahead / max(vehicle.speed, SLOWEST)  # where it is when the car comes there
         if -behind < station - meeting < 9.0:
             return max(ahead, 0.0), int(body.key)
     # asked for last: those who wait before the junction have to go first
