@@ -55,8 +55,9 @@ ASKING = 9.5
 LINE_GAP = 1.0
 """Room that is left before a line [m]."""
 
-ROOM_BEHIND = 9.0
-"""Free lane that a vehicle wants behind a junction before it enters [m]."""
+ROOM_BEHIND = 10.5
+"""Free lane that a vehicle wants behind a junction before it enters: its length, the distance that it keeps when it
+stands, and what it takes to have left the junction [m]."""
 
 ROOM_SIGHT = 60.0
 """How far from the start of the lane behind a junction others count who may come to a stand on it [m]."""

@@ -46,8 +46,8 @@ def announce(vehicle: Records, lane: int, connector: int, distance: float, now: 
     if vehicle.approach != connector or vehicle.approach_lane != lane:
         if vehicle.approach < 0 or vehicle.approach_lane != lane:
             vehicle.stood = False
-        vehicle.approach, vehicle.approach_lane = connector, lane
-        vehicle.since, vehicle.asked, vehicle.wait = math.inf, -math.inf, Wait.NOT
+            vehicle.since, vehicle.asked = math.inf, -math.inf
+        vehicle.approach, vehicle.approach_lane, vehicle.wait = connector, lane, Wait.NOT
     vehicle.distance, vehicle.seen = distance, now
     if vehicle.speed < STANDING and distance < AT_LINE:
         vehicle.stood = True
@@ -300,7 +300,7 @@ def has_room(town: TownArrays, world: WorldArrays, i: int, k: int) -> bool:
         n = world.heads[own.plan[k]]
         while n >= 0:
             node = world.nodes[n]
-            if node.body != i and node.station > -AFTER_END:
+            if node.body != i and (node.station > -AFTER_END or _follows(world, node.body, own.plan[k])):
                 if node.speed <= SLOW:
                     slow = start + node.station - node.half_length
                     break
@@ -313,6 +313,12 @@ def has_room(town: TownArrays, world: WorldArrays, i: int, k: int) -> bool:
     return before == 0 or not closed or start > ROOM_EACH * (before + 0.5)
 
 
+@inlined
+def _follows(world: WorldArrays, body: int, lane: int) -> bool:
+    """Whether a body is a vehicle that follows a lane."""
+    return bool(body < len(world.vehicles) and world.vehicles[body].plan[0] == lane)
+
+
 @compiled
 def _heading_to(town: TownArrays, world: WorldArrays, i: int, exit: int) -> int:
     """How many others were let into the junction who will leave it on a lane."""
@@ -323,7 +329,7 @@ def _heading_to(town: TownArrays, world: WorldArrays, i: int, exit: int) -> int:
             continue
         if other.claim >= 0 and town.lanes[other.claim].exit == exit:
             count += 1
-        # who has left it is on the lane already
+        # who follows the lane is in its list already
         if other.inside >= 0 and town.lanes[other.inside].exit == exit and other.plan[0] != exit:
             count += 1
     return count

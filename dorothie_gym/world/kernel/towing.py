@@ -83,10 +83,14 @@ def tow(town: TownArrays, world: WorldArrays, dt: float, turning: bool = False) 
 
 @compiled
 def _may_go(town: TownArrays, world: WorldArrays, vehicle: Records) -> bool:
-    """Whether no light holds a vehicle up, neither itself nor in a queue."""
-    for k in range(1, int(vehicle.planned)):
-        if town.lanes[vehicle.plan[k]].junction >= 0:
-            return light(town, world, vehicle.plan[k - 1], world.clock[0].time) == Colour.GREEN
+    """Whether no light holds a vehicle up: neither itself nor in a queue, which may reach back through junctions."""
+    now = world.clock[0].time
+    # a short one follows its connector before its front is over the line
+    if vehicle.approach >= 0 and town.lanes[vehicle.approach_lane].programme >= 0:
+        return light(town, world, vehicle.approach_lane, now) == Colour.GREEN
+    for k in range(int(vehicle.planned)):
+        if town.lanes[vehicle.plan[k]].programme >= 0:
+            return light(town, world, vehicle.plan[k], now) == Colour.GREEN
     return True
 
 
