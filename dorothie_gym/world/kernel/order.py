@@ -41,13 +41,7 @@ def rebuild(town: TownArrays, world: WorldArrays) -> None:
         if vehicle.kind == Kind.EMPTY:
             continue
         _list_vehicle(nodes, heads, vehicle, i, 2 * i, vehicle.lane, vehicle.own_station)
-        if vehicle.lane != vehicle.plan[0]:
-            if _is_on_followed(town, vehicle):
-                _list_vehicle(nodes, heads, vehicle, i, 2 * i + 1, vehicle.plan[0], vehicle.station)
-        elif town.lanes[vehicle.lane].left >= 0 or town.lanes[vehicle.lane].right >= 0:
-            reach = _reach_aside(town, vehicle)
-            if abs(vehicle.own_lateral) + reach > town.lanes[vehicle.lane].half_width:
-                _list_beside(town, nodes, heads, vehicle, i, reach)
+        _list_again(town, nodes, heads, vehicle, i)
     for p in range(len(world.props)):
         prop = world.props[p]
         if prop.present:
@@ -57,6 +51,18 @@ def rebuild(town: TownArrays, world: WorldArrays) -> None:
                     node.station, node.lane, node.body = prop.station[k], prop.lane[k], len(vehicles) + p
                     node.half_length = 0.5 * max(prop.length, prop.width)
                     _insert(nodes, heads, 2 * len(vehicles) + 4 * p + k)
+
+
+@inlined
+def _list_again(town: TownArrays, nodes: Records, heads: NDArray[np.int32], vehicle: Records, i: int) -> None:
+    """Lists a vehicle on the other lane that it is on, if there is one."""
+    if vehicle.lane != vehicle.plan[0]:
+        if _is_on_followed(town, vehicle):
+            _list_vehicle(nodes, heads, vehicle, i, 2 * i + 1, vehicle.plan[0], vehicle.station)
+    elif town.lanes[vehicle.lane].left >= 0 or town.lanes[vehicle.lane].right >= 0:
+        reach = _reach_aside(town, vehicle)
+        if abs(vehicle.own_lateral) + reach > town.lanes[vehicle.lane].half_width:
+            _list_beside(town, nodes, heads, vehicle, i, reach)
 
 
 @inlined
