@@ -300,7 +300,7 @@ def has_room(town: TownArrays, world: WorldArrays, i: int, k: int) -> bool:
         n = world.heads[own.plan[k]]
         while n >= 0:
             node = world.nodes[n]
-            if node.body != i and (node.station > -AFTER_END or _follows(world, node.body, own.plan[k])):
+            if node.body != i and node.station > -AFTER_END:
                 if node.speed <= SLOW:
                     slow = start + node.station - node.half_length
                     break
@@ -314,9 +314,12 @@ def has_room(town: TownArrays, world: WorldArrays, i: int, k: int) -> bool:
 
 
 @inlined
-def _follows(world: WorldArrays, body: int, lane: int) -> bool:
-    """Whether a body is a vehicle that follows a lane."""
-    return bool(body < len(world.vehicles) and world.vehicles[body].plan[0] == lane)
+def _is_listed(world: WorldArrays, j: int, lane: int) -> bool:
+    """Whether `has_room` finds a vehicle in the list of a lane, which was made before this substep."""
+    one, other = world.nodes[2 * j], world.nodes[2 * j + 1]
+    if one.lane == lane and one.station > -AFTER_END:
+        return True
+    return bool(other.lane == lane and other.station > -AFTER_END)
 
 
 @compiled
@@ -329,7 +332,6 @@ def _heading_to(town: TownArrays, world: WorldArrays, i: int, exit: int) -> int:
             continue
         if other.claim >= 0 and town.lanes[other.claim].exit == exit:
             count += 1
-        # who follows the lane is in its list already
-        if other.inside >= 0 and town.lanes[other.inside].exit == exit and other.plan[0] != exit:
+        if other.inside >= 0 and town.lanes[other.inside].exit == exit and not _is_listed(world, j, exit):
             count += 1
     return count
