@@ -3,7 +3,8 @@
 from dorothie_gym.sessions.corpus import load_readable, load_sessions, session_folders, split_by_name
 from dorothie_gym.sessions.errors import SessionError
 from dorothie_gym.sessions.events import INFRACTIONS, Event, EventType
-from dorothie_gym.sessions.header import FORMAT_VERSION, LandmarkRow, SessionHeader, SubgoalRow
+from dorothie_gym.sessions.header import LandmarkRow, SessionHeader, SubgoalRow
+from dorothie_gym.sessions.layout import SessionState, safe_name
 from dorothie_gym.sessions.points import (
     CarState,
     DecisionPoint,
@@ -19,12 +20,44 @@ from dorothie_gym.sessions.points import (
     ufn_points,
 )
 from dorothie_gym.sessions.records import ActionRecord, InfractionRecord, MoveRecord, UtteranceRecord
+from dorothie_gym.sessions.report import ReadReport
+from dorothie_gym.sessions.scene import (
+    ACTOR_DTYPE,
+    LIGHT_DTYPE,
+    LIGHT_STATES,
+    WEATHER_DTYPE,
+    ActorKind,
+    Scene,
+    SceneTable,
+)
 from dorothie_gym.sessions.session import Session
-from dorothie_gym.sessions.trajectory import TRAJECTORY_COLUMNS, TRAJECTORY_DTYPE, Trajectory, trajectory_of
+from dorothie_gym.sessions.session_file import session_state
+from dorothie_gym.sessions.trajectory import (
+    NO_LANE,
+    TRAJECTORY_COLUMNS,
+    TRAJECTORY_DTYPE,
+    Trajectory,
+    rows_of,
+    trajectory_of,
+)
+from dorothie_gym.sessions.version import FORMAT_VERSION
 from dorothie_gym.sessions.writer import SessionWriter
 from dorothie_gym.world.config import FRAME_RATE
 
 __all__ = [
+    "ACTOR_DTYPE",
+    "LIGHT_DTYPE",
+    "LIGHT_STATES",
+    "WEATHER_DTYPE",
+    "ActorKind",
+    "Scene",
+    "SceneTable",
+    "ReadReport",
+    "SessionState",
+    "safe_name",
+    "session_state",
+    "NO_LANE",
+    "rows_of",
     "ActionRecord",
     "CarState",
     "DecisionPoint",
