@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dorothie_gym.sessions.encoding import canonical, to_line
 from dorothie_gym.sessions.event_lines import encode_event
@@ -41,7 +42,7 @@ def digest_of(session: Session) -> str:
     return content.hexdigest()
 
 
-def _bytes(values: np.ndarray) -> bytes:  # type: ignore[type-arg]
+def _bytes(values: NDArray[Any]) -> bytes:
     if values.dtype.kind not in "biuf":
         return to_line(canonical(values.tolist(), "column")).encode()
     if values.dtype.kind == "f":

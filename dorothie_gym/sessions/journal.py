@@ -8,6 +8,7 @@ dies at, everything but a torn last block is read back.
 from __future__ import annotations
 
 import struct
+import sys
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -19,8 +20,8 @@ from numpy.typing import NDArray
 
 from dorothie_gym.sessions.encoding import read_bytes
 from dorothie_gym.sessions.layout import MAX_FRAMES_FILE
-from dorothie_gym.sessions.scene import ACTOR_DTYPE, LIGHT_DTYPE, WEATHER_DTYPE, Rows, Scene, SceneTable
-from dorothie_gym.sessions.trajectory import TRAJECTORY_DTYPE, Trajectory
+from dorothie_gym.sessions.scene import ACTOR_DTYPE, LIGHT_DTYPE, WEATHER_DTYPE, Scene, SceneTable
+from dorothie_gym.sessions.trajectory import TRAJECTORY_COLUMNS, Trajectory, trajectory_of
 
 CAR: Final = b"CARS"
 ACTORS: Final = b"ACTR"
@@ -28,16 +29,26 @@ LIGHTS: Final = b"LGHT"
 WEATHER: Final = b"WTHR"
 
 DTYPES: Final[Mapping[bytes, np.dtype[Any]]] = MappingProxyType(
-    {CAR: TRAJECTORY_DTYPE, ACTORS: ACTOR_DTYPE, LIGHTS: LIGHT_DTYPE, WEATHER: WEATHER_DTYPE}
+    {
+        CAR: np.dtype("<f8"),
+        ACTORS: ACTOR_DTYPE.newbyteorder("<"),
+        LIGHTS: LIGHT_DTYPE.newbyteorder("<"),
+        WEATHER: WEATHER_DTYPE.newbyteorder("<"),
+    }
 )
+"""What the content is made of; the car's is rows of nine numbers, as in `TRAJECTORY_COLUMNS`."""
+
+_SIZES: Final = {
+    kind: dtype.itemsize * (len(TRAJECTORY_COLUMNS) if kind == CAR else 1) for kind, dtype in DTYPES.items()
+}
 
 _HEAD: Final = struct.Struct("<4sII")
 _FRAME: Final = struct.Struct("<q")
 
 
-def encode_block(kind: bytes, frame: int, rows: Rows) -> bytes:
-    """Returns a block: the rows that were recorded at a frame (for the car: of which it is the first)."""
-    content = _FRAME.pack(frame) + rows.astype(DTYPES[kind].newbyteorder("<"), copy=False).tobytes()
+def encode_block(kind: bytes, frame: int, rows: NDArray[Any]) -> bytes:
+    """Returns a block: the rows (contiguous) that were recorded at a frame; for the car: of which it is the first."""
+    content = _FRAME.pack(frame) + (rows if sys.byteorder == "little" else rows.astype(DTYPES[kind])).tobytes()
     return _HEAD.pack(kind, len(content), zlib.crc32(content)) + content
 
 
@@ -48,33 +59,31 @@ def read_journal(path: Path) -> tuple[Trajectory, Scene]:
         SessionError: it is too large to be that of a session.
         OSError: it cannot be read.
     """
-    blocks: dict[bytes, list[tuple[int, Rows]]] = {kind: [] for kind in DTYPES}
-    for kind, frame, rows in _blocks(read_bytes(path, MAX_FRAMES_FILE)):
-        blocks[kind].append((frame, rows))
-    cars = [rows for _, rows in blocks[CAR]]
-    trajectory = np.concatenate(cars) if cars else np.empty(0, dtype=TRAJECTORY_DTYPE)
+    blocks: dict[bytes, list[tuple[int, bytes]]] = {kind: [] for kind in DTYPES}
+    for kind, frame, body in _blocks(read_bytes(path, MAX_FRAMES_FILE)):
+        blocks[kind].append((frame, body))
+    cars = np.frombuffer(b"".join(body for _, body in blocks[CAR]), dtype=DTYPES[CAR])
     tables = {kind: _table(blocks[kind], DTYPES[kind]) for kind in (ACTORS, LIGHTS, WEATHER)}
-    return trajectory, Scene(actors=tables[ACTORS], lights=tables[LIGHTS], weather=tables[WEATHER])
+    scene = Scene(actors=tables[ACTORS], lights=tables[LIGHTS], weather=tables[WEATHER])
+    return trajectory_of(cars.reshape(-1, len(TRAJECTORY_COLUMNS))), scene
 
 
-def _blocks(content: bytes) -> Iterator[tuple[bytes, int, Rows]]:
-    place = 0
-    while place + _HEAD.size <= len(content):
-        kind, length, checksum = _HEAD.unpack_from(content, place)
-        place += _HEAD.size
-        body = content[place : place + length]
-        place += length
-        size = length - _FRAME.size
-        if kind not in DTYPES or size < 0 or size % DTYPES[kind].itemsize or zlib.crc32(body) != checksum:
+def _blocks(content: bytes) -> Iterator[tuple[bytes, int, bytes]]:
+    view, place = memoryview(content), 0
+    while place + _HEAD.size <= len(view):
+        kind, length, checksum = _HEAD.unpack_from(view, place)
+        body = view[place + _HEAD.size : place + _HEAD.size + length]
+        place += _HEAD.size + length
+        if kind not in DTYPES or length < _FRAME.size or (length - _FRAME.size) % _SIZES[kind]:
+            return
+        if zlib.crc32(body) != checksum:
             return  # torn here, or damaged: nothing after it can be trusted
-        rows = np.frombuffer(body, dtype=DTYPES[kind].newbyteorder("<"), offset=_FRAME.size)
-        yield kind, _FRAME.unpack_from(body)[0], rows.astype(DTYPES[kind], copy=False)
+        yield kind, _FRAME.unpack_from(body)[0], bytes(body[_FRAME.size :])
 
 
-def _table(blocks: list[tuple[int, Rows]], dtype: np.dtype[Any]) -> SceneTable:
-    if not blocks:
-        return SceneTable.empty(dtype)
-    frames: NDArray[np.int64] = np.array([frame for frame, _ in blocks], dtype=np.int64)
-    sizes = [len(rows) for _, rows in blocks]
+def _table(blocks: list[tuple[int, bytes]], dtype: np.dtype[Any]) -> SceneTable:
+    frames = np.array([frame for frame, _ in blocks], dtype=np.int64)
+    sizes = [len(body) // dtype.itemsize for _, body in blocks]
     offsets = np.concatenate(([0], np.cumsum(sizes))).astype(np.int64)
-    return SceneTable(frames, offsets, np.concatenate([rows for _, rows in blocks]))
+    rows = np.frombuffer(b"".join(body for _, body in blocks), dtype=dtype)
+    return SceneTable(frames, offsets, rows.astype(dtype.newbyteorder("="), copy=False))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Self, TypeAlias
@@ -31,20 +32,26 @@ class ActorKind(enum.IntEnum):
 LIGHT_STATES: Final = (LightColour.GREEN, LightColour.YELLOW, LightColour.RED)
 """What the numbers in the column `state` of lights mean."""
 
+_STATE_NUMBERS: Final[dict[str, int]] = {str(colour): number for number, colour in enumerate(LIGHT_STATES)}
+
 ACTOR_DTYPE: Final = np.dtype(
     [
         ("key", np.int64),
-        ("kind", np.int8),
+        ("kind", np.int64),  # as wide as the others, so that rows can be seen as plain numbers
         *((name, np.float64) for name in ("x", "y", "heading", "speed", "length", "width")),
     ]
 )
 """Number that the actor keeps while it is there, `ActorKind`, middle [m], heading [rad], speed [m/s], size [m]."""
+
+_ACTOR_COLUMNS: Final = ACTOR_DTYPE.names or ()
 
 LIGHT_DTYPE: Final = np.dtype([("signal", np.int64), ("state", np.int8)])
 """Id of the town's signal, and number in `LIGHT_STATES`."""
 
 WEATHER_DTYPE: Final = np.dtype([(str(parameter), np.float64) for parameter in WeatherParameter])
 """The ten parameters, in the ontology's units."""
+
+_WEATHER_NAMES: Final = frozenset(WEATHER_DTYPE.names or ())
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,20 +137,22 @@ def actor_rows(actors: Rows | Mapping[str, Any]) -> Rows:
         actors = _from_columns(actors)
     if actors.dtype != ACTOR_DTYPE or actors.ndim != 1:
         raise SessionError(f"actors have type {actors.dtype} and shape {actors.shape}; it must be {ACTOR_DTYPE}, (n,)")
-    for name in ("x", "y", "heading", "speed", "length", "width"):
-        if not np.all(np.isfinite(actors[name])):
-            raise SessionError(f"actors: field {name!r} has a value that is not finite")
-    if np.any((actors["kind"] < 0) | (actors["kind"] >= len(ActorKind))):
+    actors = np.ascontiguousarray(actors)
+    finite = np.isfinite(actors.view(np.float64).reshape(-1, len(_ACTOR_COLUMNS))[:, 2:])
+    if not finite.all():
+        name = _ACTOR_COLUMNS[2 + int(np.argmin(finite.all(axis=0)))]
+        raise SessionError(f"actors: field {name!r} has a value that is not finite")
+    kinds = actors["kind"]
+    if len(kinds) and not 0 <= kinds.min() <= kinds.max() < len(ActorKind):
         raise SessionError(f"actors: field 'kind' must be one of {', '.join(kind.name.lower() for kind in ActorKind)}")
     return actors
 
 
 def _from_columns(columns: Mapping[str, Any]) -> Rows:
-    names = ACTOR_DTYPE.names or ()
-    if set(columns) != set(names):
-        raise SessionError(f"actors have the columns {', '.join(columns)}; they must be {', '.join(names)}")
+    if set(columns) != set(_ACTOR_COLUMNS):
+        raise SessionError(f"actors have the columns {', '.join(columns)}; they must be {', '.join(_ACTOR_COLUMNS)}")
     rows = np.empty(len(columns["key"]), dtype=ACTOR_DTYPE)
-    for name in names:
+    for name in _ACTOR_COLUMNS:
         values = [_kind(kind) for kind in columns[name]] if name == "kind" else columns[name]
         try:
             rows[name] = values
@@ -167,13 +176,14 @@ def light_rows(lights: Mapping[int, LightColour | str]) -> Rows:
     Raises:
         SessionError: an id is no whole number, or a state no colour of a light.
     """
-    states = {str(colour): number for number, colour in enumerate(LIGHT_STATES)}
     rows = np.empty(len(lights), dtype=LIGHT_DTYPE)
-    for k, signal in enumerate(sorted(lights)):
-        state = str(lights[signal])
-        if state not in states or isinstance(signal, bool) or not isinstance(signal, int | np.integer):
-            raise SessionError(f"lights: signal {signal!r} is {state!r}; ids are whole, states {', '.join(states)}")
-        rows[k] = (signal, states[state])
+    try:
+        signals = sorted(lights)
+        rows["signal"] = signals
+        rows["state"] = [_STATE_NUMBERS[lights[signal]] for signal in signals]
+    except (KeyError, TypeError, ValueError, OverflowError):
+        states = ", ".join(f"signal {signal!r} is {str(state)!r}" for signal, state in lights.items())
+        raise SessionError(f"lights: {states[:300]}; ids are whole numbers, states {', '.join(LIGHT_STATES)}") from None
     return rows
 
 
@@ -183,12 +193,10 @@ def weather_rows(weather: Mapping[str, float]) -> Rows:
     Raises:
         SessionError: there are others than the ten, or a value is not finite.
     """
-    names = WEATHER_DTYPE.names or ()
-    given = {str(name): value for name, value in weather.items()}
-    if set(given) != set(names):
-        raise SessionError(f"weather has {', '.join(sorted(given))}; it must have {', '.join(names)}")
-    row = np.array([tuple(float(given[name]) for name in names)], dtype=WEATHER_DTYPE)
-    for name in names:
-        if not np.isfinite(row[name][0]):
-            raise SessionError(f"weather: field {name!r} is {given[name]}; it must be finite")
-    return row
+    values = {str(name): value for name, value in weather.items()}
+    if values.keys() != _WEATHER_NAMES:
+        raise SessionError(f"weather has {', '.join(sorted(values))}; it must have {', '.join(WeatherParameter)}")
+    for name, value in values.items():
+        if not math.isfinite(value):
+            raise SessionError(f"weather: field {name!r} is {value}; it must be finite")
+    return np.array([tuple(values[name] for name in WEATHER_DTYPE.names or ())], dtype=WEATHER_DTYPE)

@@ -29,6 +29,8 @@ TRAJECTORY_DTYPE: Final = np.dtype(
     [(name, np.int64 if name in WHOLE_COLUMNS else np.float64) for name in TRAJECTORY_COLUMNS]
 )
 
+_WHOLE: Final = [TRAJECTORY_COLUMNS.index(name) for name in WHOLE_COLUMNS]
+
 
 def trajectory_of(rows: NDArray[np.float64]) -> Trajectory:
     """Returns the rows as a trajectory.
@@ -37,21 +39,34 @@ def trajectory_of(rows: NDArray[np.float64]) -> Trajectory:
         rows: (n, 9) float64, columns as in `TRAJECTORY_COLUMNS`.
 
     Raises:
+        SessionError: as `checked_rows`.
+    """
+    rows = checked_rows(rows)
+    trajectory = np.empty(len(rows), dtype=TRAJECTORY_DTYPE)
+    for name, column in zip(TRAJECTORY_COLUMNS, rows.T, strict=True):
+        trajectory[name] = column
+    return trajectory
+
+
+def checked_rows(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns the rows (n, 9) if they can be those of a trajectory.
+
+    Raises:
         SessionError: another shape, a frame, place or lane that is not finite, a control that is infinite, or a frame
             or lane that is not whole.
     """
-    rows = np.asarray(rows, dtype=np.float64)
+    rows = np.ascontiguousarray(rows, dtype=np.float64)
     if rows.ndim != 2 or rows.shape[1] != len(TRAJECTORY_COLUMNS):
         raise SessionError(f"trajectory: rows have shape {rows.shape}; it must be (n, {len(TRAJECTORY_COLUMNS)})")
-    trajectory = np.empty(len(rows), dtype=TRAJECTORY_DTYPE)
+    whole = rows[:, _WHOLE]
+    if np.isfinite(rows).all() and (whole == np.rint(whole)).all():
+        return rows
     for name, column in zip(TRAJECTORY_COLUMNS, rows.T, strict=True):
-        bad = np.isinf(column) if name in OPEN_COLUMNS else ~np.isfinite(column)
-        if np.any(bad):
+        if (np.isinf(column) if name in OPEN_COLUMNS else ~np.isfinite(column)).any():
             raise SessionError(f"trajectory: field {name!r} has a value that is not finite")
-        if name in WHOLE_COLUMNS and np.any(column != np.rint(column)):
+        if name in WHOLE_COLUMNS and (column != np.rint(column)).any():
             raise SessionError(f"trajectory: field {name!r} has a value that is not a whole number")
-        trajectory[name] = column
-    return trajectory
+    return rows
 
 
 def rows_of(trajectory: Trajectory) -> NDArray[np.float64]:
@@ -59,14 +74,16 @@ def rows_of(trajectory: Trajectory) -> NDArray[np.float64]:
     return np.stack([trajectory[name].astype(np.float64) for name in TRAJECTORY_COLUMNS], axis=1)
 
 
-def check_rising(frames: NDArray[np.int64], last: int, where: str) -> None:
+def check_rising(frames: NDArray[np.int64] | NDArray[np.float64], last: int, where: str) -> None:
     """Does nothing if the frames rise, each above the one before, the first above `last`.
 
     Raises:
         SessionError: they do not; the message begins with `where` and names the first that does not.
     """
-    steps = np.diff(frames, prepend=last)
-    if np.any(steps <= 0):
-        k = int(np.argmax(steps <= 0))
+    falls = np.empty(len(frames), dtype=bool)
+    falls[:1] = frames[:1] <= last
+    falls[1:] = frames[1:] <= frames[:-1]
+    if falls.any():
+        k = int(np.argmax(falls))
         before = last if k == 0 else int(frames[k - 1])
         raise SessionError(f"{where}: frame {int(frames[k])} after {before}; each must be above the one before")

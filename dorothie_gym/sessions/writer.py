@@ -31,7 +31,7 @@ from dorothie_gym.sessions.layout import (
 from dorothie_gym.sessions.saving import picture_name
 from dorothie_gym.sessions.scene import Rows, actor_rows, light_rows, weather_rows
 from dorothie_gym.sessions.session_file import SessionFile
-from dorothie_gym.sessions.trajectory import Trajectory, check_rising, trajectory_of
+from dorothie_gym.sessions.trajectory import check_rising, checked_rows
 from dorothie_gym.world.town import LightColour
 
 
@@ -61,7 +61,9 @@ class SessionWriter:
         self._journal = (self.folder / JOURNAL_FILE).open("xb")
         self._event_count = 0
         self._last_frame = -1
-        self._frames: set[int] = set()
+        self._frames: set[float] = set()
+        self._lights: tuple[Mapping[int, LightColour | str], Rows] | None = None
+        self._weather: tuple[Mapping[str, float], Rows] | None = None
         self._recorded = {ACTORS: -1, LIGHTS: -1, WEATHER: -1}
 
     def append(self, events: Iterable[Event] = (), frames: NDArray[np.float64] | None = None) -> None:
@@ -82,9 +84,9 @@ class SessionWriter:
             self._events.flush()
             self._event_count += len(lines)
         if rows is not None and len(rows):
-            self._write(CAR, int(rows["frame"][0]), rows)
-            self._frames.update(rows["frame"].tolist())
-            self._last_frame = int(rows["frame"][-1])
+            self._write(CAR, int(rows[0, 0]), rows)
+            self._frames.update(rows[:, 0].tolist())
+            self._last_frame = int(rows[-1, 0])
 
     def add_events(self, events: Iterable[Event]) -> None:
         """Appends what happened; raises `SessionError` where an event cannot be written, and writes none then."""
@@ -104,11 +106,15 @@ class SessionWriter:
 
     def add_lights(self, frame: int, lights: Mapping[int, LightColour | str]) -> None:
         """Appends what each traffic light shows at a frame, by id of its signal; raises `SessionError` as above."""
-        self._add(LIGHTS, frame, light_rows(lights))
+        if self._lights is None or self._lights[0] != lights:  # they seldom change
+            self._lights = dict(lights), light_rows(lights)
+        self._add(LIGHTS, frame, self._lights[1])
 
     def add_weather(self, frame: int, weather: Mapping[str, float]) -> None:
         """Appends the ten weather parameters at a frame; raises `SessionError` as above."""
-        self._add(WEATHER, frame, weather_rows(weather))
+        if self._weather is None or self._weather[0] != weather:
+            self._weather = dict(weather), weather_rows(weather)
+        self._add(WEATHER, frame, self._weather[1])
 
     def add_picture(self, frame: int, png: bytes) -> None:
         """Writes a picture (PNG) of a frame.
@@ -173,12 +179,12 @@ class SessionWriter:
         if self._events.closed:
             raise SessionError(f"{self.folder}: the session is closed; {consequence}")
 
-    def _checked(self, frames: NDArray[np.float64]) -> Trajectory:
-        trajectory = trajectory_of(frames)
-        check_rising(trajectory["frame"], self._last_frame, str(self.folder))
-        if len(trajectory) and trajectory["frame"][-1] >= MAX_FRAME:
-            raise SessionError(f"{self.folder}: frame {trajectory['frame'][-1]}; frames are below {MAX_FRAME}")
-        return trajectory
+    def _checked(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
+        rows = checked_rows(frames)
+        check_rising(rows[:, 0], self._last_frame, str(self.folder))
+        if len(rows) and rows[-1, 0] >= MAX_FRAME:
+            raise SessionError(f"{self.folder}: frame {rows[-1, 0]:.0f}; frames are below {MAX_FRAME}")
+        return rows
 
     def _add(self, kind: bytes, frame: int, rows: Rows) -> None:
         self._check_open("nothing can be appended")
@@ -189,7 +195,7 @@ class SessionWriter:
         self._write(kind, int(frame), rows)
         self._recorded[kind] = int(frame)
 
-    def _write(self, kind: bytes, frame: int, rows: Rows) -> None:
+    def _write(self, kind: bytes, frame: int, rows: NDArray[Any]) -> None:
         self._journal.write(encode_block(kind, frame, rows))
         self._journal.flush()
 
