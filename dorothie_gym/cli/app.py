@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from dorothie_gym import __version__
+from dorothie_gym.cli.convert import convert
 from dorothie_gym.cli.evaluate import evaluate
 from dorothie_gym.cli.listings import storyboards, towns
 from dorothie_gym.cli.optional import PictureCommand
@@ -25,6 +26,7 @@ app.command()(run)
 app.command(cls=PictureCommand)(towns)
 app.command()(storyboards)
 app.command()(evaluate)
+app.command()(convert)
 
 
 def _tell_version(wanted: bool) -> None:

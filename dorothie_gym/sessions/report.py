@@ -56,9 +56,14 @@ class ReadReport:
 
     def lines(self) -> list[str]:
         """Returns the report in words, a line each."""
-        kinds = (("kept, not understood", self.unknown), ("missing", self.missing), ("repaired", self.repaired))
-        lines = [f"{title}: {name}{_times(n)}" for title, names in kinds for name, n in sorted(names.items())]
-        return lines + [f"{name.replace('_', ' ')}: {_in_words(value)}" for name, value in self.facts.items()]
+        return report_lines(self.to_json())
+
+
+def report_lines(report: Mapping[str, Any]) -> list[str]:
+    """Returns a report, in JSON types, in words, a line each."""
+    kinds = (("kept, not understood", "unknown"), ("missing", "missing"), ("repaired", "repaired"))
+    lines = [f"{title}: {name}{_times(count)}" for title, kind in kinds for name, count in report[kind].items()]
+    return lines + [f"{name.replace('_', ' ')}: {_in_words(value)}" for name, value in report["facts"].items()]
 
 
 def _count(names: Counter[str], name: str, count: int) -> None:

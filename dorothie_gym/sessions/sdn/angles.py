@@ -122,7 +122,8 @@ def with_roads(
 def settle_sign(folders: Iterable[Path | str]) -> SignVote:
     """Returns what the JTurns of the SDN sessions in these folders, together, say about the sign.
 
-    Sessions that cannot be read are passed over: whoever reads them is told.
+    Sessions that cannot be read are passed over: whoever reads them is told. Those that this package wrote have no
+    voice: their angles are positive to the left anyway.
     """
     from dorothie_gym.sessions.sdn.reader import raw_session
 
@@ -132,7 +133,8 @@ def settle_sign(folders: Iterable[Path | str]) -> SignVote:
             raw = raw_session(Path(folder), None)
         except SessionError:
             continue
-        result += vote(raw.events, raw.places, raw.first_frame)
+        if not raw.is_ours:
+            result += vote(raw.events, raw.places, raw.first_frame)
     return result
 
 

@@ -49,6 +49,11 @@ class RawSession:
     place: SdnMap
     report: ReadReport
 
+    @property
+    def is_ours(self) -> bool:
+        """Whether this package wrote it."""
+        return isinstance(self.config.get(OURS), Mapping)
+
 
 def read_sdn(path: Path | str, *, maps: Path | str | None = None, sign: SignVote | None = None) -> Session:
     """Reads the folder of an SDN session: release, sample or hub layout (`docs/session-format.md`).
@@ -71,8 +76,8 @@ def read_sdn(path: Path | str, *, maps: Path | str | None = None, sign: SignVote
     report = raw.report
     own = vote(raw.events, raw.places, raw.first_frame)
     settled = own if sign is None else sign
-    if isinstance(raw.config.get(OURS), Mapping):
-        settled = SignVote()  # ours are positive left
+    if raw.is_ours:
+        settled = SignVote()  # which is positive left
     report.facts["turn_angles"] = settled.to_json()
     trajectory, scene = trajectory_of_places(raw.places, raw.first_frame, raw.place)
     header = raw.header

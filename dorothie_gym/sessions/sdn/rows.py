@@ -31,6 +31,8 @@ def read_json(path: Path, report: ReadReport) -> Any:
         SessionError: it is not JSON, or too large, or nested too deeply; the message names the file and the place.
     """
     text = _text(path)
+    if not text.strip():
+        raise SessionError(f"{path}: is empty")
     if not text.lstrip().startswith("["):
         return _decode(text, _skip(text, 0), path, "", report)[0]
     return read_list(path, report, text)
@@ -45,7 +47,7 @@ def read_list(path: Path, report: ReadReport, text: str | None = None) -> list[A
     text = _text(path) if text is None else text
     place = _skip(text, 0)
     if text[place : place + 1] != "[":
-        raise SessionError(f"{path}: a JSON list is expected")
+        raise SessionError(f"{path}: a JSON list is expected" + ("" if text.strip() else ", the file is empty"))
     items: list[Any] = []
     place = _skip(text, place + 1)
     while text[place : place + 1] != "]":
@@ -140,10 +142,7 @@ def more_of(values: Row) -> dict[str, Any]:
 
 
 def _text(path: Path) -> str:
-    text = decode_text(read_bytes(path), str(path)).removeprefix("\ufeff")
-    if not text.strip():
-        raise SessionError(f"{path}: is empty")
-    return text
+    return decode_text(read_bytes(path), str(path)).removeprefix("\ufeff")
 
 
 def _skip(text: str, place: int) -> int:

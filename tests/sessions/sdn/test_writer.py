@@ -12,11 +12,12 @@ import pytest
 
 from dorothie_gym.ontology import PhysicalAction, Role
 from dorothie_gym.sessions import Event, EventType, Session, SessionError
-from dorothie_gym.sessions.sdn import read_sdn, write_sdn
+from dorothie_gym.sessions.sdn import SignVote, read_sdn, settle_sign, write_sdn
 from dorothie_gym.world.town import load_town
 from tests.sessions.builders import physical, session, utterance
 from tests.sessions.dialogues import TO_KFC, talk
-from tests.sessions.sdn.builders import release, sample
+from tests.sessions.sdn.builders import csv as csv_of
+from tests.sessions.sdn.builders import drive, release, sample
 
 
 def event(frame: int, type_: EventType, source: Role = Role.CO_WIZARD, **data: Any) -> Event:
@@ -167,7 +168,8 @@ def test_without_our_own_fields_the_layout_still_reads(original: Session, tmp_pa
     again = read_sdn(folder)
     assert [move.act for move in again.moves()] == [move.act for move in original.moves()]
     assert [len(u.moves) for u in again.utterances()] == [len(u.moves) for u in original.utterances()]
-    assert [(u.start, u.end) for u in again.utterances()] == [(u.start, u.end) for u in original.utterances()]
+    for found, said in zip(again.utterances(), original.utterances(), strict=True):
+        assert (found.start, found.end) == pytest.approx((said.start, said.end), abs=0.05)
     assert [(a.action, a.angle, a.up) for a in again.physical_actions] == [
         (a.action, a.angle, a.up) for a in original.physical_actions
     ]
@@ -188,6 +190,16 @@ def test_session_of_the_corpus_goes_there_and_back(tmp_path: Path, make: Any) ->
         again.trajectory["heading"], read.trajectory["heading"], rtol=0, atol=1e-12
     )
     assert all(np.array_equal(again.scene.columns[n], column) for n, column in read.scene.columns.items())
+
+
+def test_our_sessions_have_no_voice_in_the_sign_of_others(tmp_path: Path) -> None:
+    ours = [
+        write_sdn(replace(read_sdn(release(tmp_path / "log_0")), name=str(k)), tmp_path / f"o{k}") for k in range(3)
+    ]
+    theirs = release(tmp_path / "log_9", trajectory__csv=csv_of(drive(90.0)))
+    sign = settle_sign([*ours, theirs])
+    assert sign == SignVote(right=1)
+    assert [a.angle for a in read_sdn(ours[0], sign=sign).physical_actions][1] == 90.0
 
 
 def test_nothing_is_replaced_and_nothing_is_left_behind(original: Session, tmp_path: Path) -> None:
