@@ -126,7 +126,7 @@ def _told(path: Path) -> Iterator[None]:
 
     try:
         yield
-    except (pa.ArrowException, OSError) as error:
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:  # the last: names in a damaged footer
         if isinstance(error, OSError) and error.errno is not None:
             raise
         reason = str(error).partition("\n")[0][:200]
