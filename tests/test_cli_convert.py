@@ -42,6 +42,7 @@ def test_a_session_goes_to_sdn_and_back() -> None:
     one, back = Session.load("one"), Session.load("back")
     assert back.header == one.header and back.summary == one.summary and back.complete
     assert [e.data for e in back.events] == [e.data for e in one.events]
+    assert back.check() == ()
 
 
 def test_a_corpus_keeps_its_folds_and_gets_the_names_that_scripts_look_for() -> None:

@@ -27,7 +27,7 @@ def digest_of(session: Session) -> str:
         content.update(data)
 
     take("header", to_line(session.header.to_json()).encode())
-    take("outcome", to_line(canonical(session.summary, "outcome")).encode())
+    take("outcome", to_line(canonical(session.summary if session.complete else None, "outcome")).encode())
     take("events", "\n".join(encode_event(event, check=False) for event in session.events).encode())
     for name in session.trajectory.dtype.names or ():
         take(name, _bytes(session.trajectory[name]))

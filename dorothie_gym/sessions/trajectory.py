@@ -80,10 +80,9 @@ def check_rising(frames: NDArray[np.int64] | NDArray[np.float64], last: int, whe
     Raises:
         SessionError: they do not; the message begins with `where` and names the first that does not.
     """
-    falls = np.empty(len(frames), dtype=bool)
-    falls[:1] = frames[:1] <= last
-    falls[1:] = frames[1:] <= frames[:-1]
-    if falls.any():
-        k = int(np.argmax(falls))
-        before = last if k == 0 else int(frames[k - 1])
-        raise SessionError(f"{where}: frame {int(frames[k])} after {before}; each must be above the one before")
+    if len(frames) == 0 or (frames[0] > last and (frames[1:] > frames[:-1]).all()):
+        return
+    falls = np.concatenate(([frames[0] <= last], frames[1:] <= frames[:-1]))
+    k = int(np.argmax(falls))
+    before = last if k == 0 else int(frames[k - 1])
+    raise SessionError(f"{where}: frame {int(frames[k])} after {before}; each must be above the one before")

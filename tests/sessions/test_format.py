@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -206,6 +207,14 @@ def test_faults_that_reading_does_not_refuse_are_told() -> None:
         "events[6] (Message, frame 81): comes after the end",
     ):
         assert part in told
+
+
+def test_frames_that_are_missing_are_a_fault_and_another_rate_is_none() -> None:
+    whole = replace(session(frames=30), summary={})
+    assert whole.check() == ()
+    assert replace(whole, trajectory=whole.trajectory[::3]).check() == ()
+    gap = replace(whole, trajectory=np.delete(whole.trajectory, [7, 8]))
+    assert gap.check() == ("frames[7]: frames 7 to 8 are missing",)
 
 
 def physical_action(label: str) -> Any:

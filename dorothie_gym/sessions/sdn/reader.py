@@ -78,7 +78,8 @@ def read_sdn(path: Path | str, *, maps: Path | str | None = None, sign: SignVote
     settled = own if sign is None else sign
     if raw.is_ours:
         settled = SignVote()  # which is positive left
-    report.facts["turn_angles"] = settled.to_json()
+    else:
+        report.facts["turn_angles"] = settled.to_json()
     trajectory, scene = trajectory_of_places(raw.places, raw.first_frame, raw.place)
     header = raw.header
     if header.departure[0] < 0 and len(trajectory) and raw.place.town is not None:

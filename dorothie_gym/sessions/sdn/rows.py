@@ -119,7 +119,7 @@ def transcript_of(value: Any, report: ReadReport) -> str | None:
         return None
     if APOSTROPHE in value:
         report.repair("transcripts: U+2019 was read as an apostrophe")
-    return value.replace(APOSTROPHE, "'").strip()
+    return str(plain(value.replace(APOSTROPHE, "'").strip()))
 
 
 def plain(value: Any, depth: int = MAX_DEPTH - 8) -> Any:

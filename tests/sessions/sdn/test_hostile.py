@@ -145,7 +145,7 @@ def test_names_of_files_in_the_log_are_never_opened(tmp_path: Path) -> None:
 
 def test_odd_texts_survive(tmp_path: Path) -> None:
     text = '"\\ud800 \\u0000 ' + "x" * 70_000 + '"'
-    rows = json.dumps([move(1, "dorothy", "TEXT", "Instruct")]).replace('"TEXT"', text)
+    rows = json.dumps([move(1, "dorothy", "TEXT", "Instruct")]).replace('"TEXT"', text).replace('"text"', text)
     session = read_sdn(release(tmp_path / "log_1", annotated_log__json=rows))
     assert len(session.moves()[0].text) > 70_000
     assert Session.load(session.save(tmp_path / "native")).events == session.events
