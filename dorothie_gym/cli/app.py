@@ -10,6 +10,7 @@ import typer
 
 from dorothie_gym import __version__
 from dorothie_gym.cli.bench import bench
+from dorothie_gym.cli.convert import convert
 from dorothie_gym.cli.evaluate import evaluate
 from dorothie_gym.cli.listings import storyboards, towns
 from dorothie_gym.cli.optional import PictureCommand
@@ -27,6 +28,7 @@ app.command(cls=PictureCommand)(towns)
 app.command()(storyboards)
 app.command()(evaluate)
 app.add_typer(bench, name="bench")
+app.command()(convert)
 
 
 def _tell_version(wanted: bool) -> None:

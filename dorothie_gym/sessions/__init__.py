@@ -1,9 +1,12 @@
 """Sessions: what happened, written as it happens, read by everything else."""
 
-from dorothie_gym.sessions.corpus import load_readable, load_sessions, session_folders, split_by_name
+from dorothie_gym.sessions.corpus import Corpus, CorpusEntry, load_readable, load_sessions, split_by_name
 from dorothie_gym.sessions.errors import SessionError
 from dorothie_gym.sessions.events import INFRACTIONS, Event, EventType
-from dorothie_gym.sessions.header import FORMAT_VERSION, LandmarkRow, SessionHeader, SubgoalRow
+from dorothie_gym.sessions.folds import FOLDS, Fold
+from dorothie_gym.sessions.header import LandmarkRow, SessionHeader, SubgoalRow
+from dorothie_gym.sessions.layout import SessionState, safe_name
+from dorothie_gym.sessions.manifest import manifest_row, write_manifest
 from dorothie_gym.sessions.points import (
     CarState,
     DecisionPoint,
@@ -18,29 +21,62 @@ from dorothie_gym.sessions.points import (
     task_points,
     ufn_points,
 )
+from dorothie_gym.sessions.reading import read_session, session_folders
 from dorothie_gym.sessions.records import ActionRecord, InfractionRecord, MoveRecord, UtteranceRecord
+from dorothie_gym.sessions.report import ReadReport
+from dorothie_gym.sessions.scene import (
+    ACTOR_DTYPE,
+    LIGHT_DTYPE,
+    LIGHT_STATES,
+    WEATHER_DTYPE,
+    ActorKind,
+    Scene,
+    SceneTable,
+)
 from dorothie_gym.sessions.session import Session
-from dorothie_gym.sessions.trajectory import TRAJECTORY_COLUMNS, TRAJECTORY_DTYPE, Trajectory, trajectory_of
+from dorothie_gym.sessions.session_file import session_state
+from dorothie_gym.sessions.trajectory import (
+    NO_LANE,
+    TRAJECTORY_COLUMNS,
+    TRAJECTORY_DTYPE,
+    Trajectory,
+    rows_of,
+    trajectory_of,
+)
+from dorothie_gym.sessions.version import FORMAT_VERSION
 from dorothie_gym.sessions.writer import SessionWriter
 from dorothie_gym.world.config import FRAME_RATE
 
 __all__ = [
+    "ACTOR_DTYPE",
     "ActionRecord",
+    "ActorKind",
     "CarState",
+    "Corpus",
+    "CorpusEntry",
     "DecisionPoint",
     "Event",
     "EventType",
+    "FOLDS",
     "FORMAT_VERSION",
     "FRAME_RATE",
+    "Fold",
     "INFRACTIONS",
     "InferencePoint",
     "InfractionRecord",
+    "LIGHT_DTYPE",
+    "LIGHT_STATES",
     "LandmarkRow",
     "MoveRecord",
+    "NO_LANE",
     "Point",
+    "ReadReport",
+    "Scene",
+    "SceneTable",
     "Session",
     "SessionError",
     "SessionHeader",
+    "SessionState",
     "SessionWriter",
     "SubgoalRow",
     "TRAJECTORY_COLUMNS",
@@ -49,15 +85,22 @@ __all__ = [
     "Trajectory",
     "UtteranceRecord",
     "View",
+    "WEATHER_DTYPE",
     "final_view",
     "history_angle",
     "load_readable",
     "load_sessions",
+    "manifest_row",
     "nfd_points",
+    "read_session",
     "rfn_points",
+    "rows_of",
+    "safe_name",
     "session_folders",
+    "session_state",
     "split_by_name",
     "task_points",
     "trajectory_of",
     "ufn_points",
+    "write_manifest",
 ]

@@ -16,7 +16,8 @@ class EventType(enum.StrEnum):
 
     DIALOGUE_MOVE = "DialogueMove"
     """One act: utterance (number), text (of the whole utterance), span (this act's words), move, slots
-    ({slot label: [value labels]}), exchange (number), start and end [s]."""
+    ({slot label: [value labels]}), exchange (number or null), start and end [s]; where they are known, transaction
+    (number) and recognised (what a speech recogniser heard of the whole utterance)."""
     PHYSICAL_ACTION = "PhysicalAction"
     """Of the Co-Wizard, that changed something: action (label), angle (degrees, positive left, or null), up (or
     null)."""
@@ -49,6 +50,8 @@ class EventType(enum.StrEnum):
     """The car drives against the traffic: lane (that it is on), station, x, y [m]; key and other are null."""
     END = "End"
     """The session is over: success (bool), reason."""
+    OTHER = "Other"
+    """Of a type that this version has no name for: the type's name is in `Event.extra`, the data is kept as it is."""
 
 
 INFRACTIONS = (
@@ -68,6 +71,7 @@ class Event:
         flagged: whether it is a point of the benchmark (dialogue moves of the participant and the Co-Wizard,
             navigation actions of the Co-Wizard).
         data: JSON-able details, see `EventType`.
+        extra: further fields of the event, kept as they are (JSON types).
     """
 
     frame: int
@@ -75,6 +79,12 @@ class Event:
     source: Role
     flagged: bool = False
     data: Mapping[str, Any] = field(default_factory=dict)
+    extra: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def type_name(self) -> str:
+        """Name of the type in a file; of an event of another version or corpus, the name that it has there."""
+        return str(self.extra.get("type", self.type.value)) if self.type is EventType.OTHER else self.type.value
 
     @property
     def time(self) -> float:

@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable, Collection, Mapping
+from reprlib import Repr
 from typing import Any, TypeVar
 
 from dorothie_gym.sessions.errors import SessionError
 
 _T = TypeVar("_T")
+
+_LARGEST = sys.float_info.max
+"""A whole number of JSON may be larger, and is no float then."""
+
+
+class _Short(Repr):
+    """Shows a wrong value in a message, which it must not flood."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxstring = self.maxother = self.maxlong = 120
 
 
 class Fields:
@@ -35,7 +47,7 @@ class Fields:
     def number(self, name: str) -> float:
         """A finite number."""
         value = self.anything(name)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _LARGEST:
             raise self.error(name, "a finite number")
         return float(value)
 
@@ -87,7 +99,16 @@ class Fields:
 
     def error(self, name: str, expected: str) -> SessionError:
         """The error for a field that is not what is expected."""
-        return SessionError(f"{self.where}: field {name!r} is {self._values[name]!r}; it must be {expected}")
+        shown = _Short().repr(self._values[name])
+        return SessionError(f"{self.where}: field {name!r} is {shown}; it must be {expected}")
+
+    def if_given(self, name: str, read: Callable[[str], _T]) -> _T | None:
+        """None where the field is missing or null, else what `read` makes of it."""
+        return read(name) if self._values.get(name) is not None else None
+
+    def others(self, known: Collection[str]) -> dict[str, Any]:
+        """The fields whose names are not known."""
+        return {name: value for name, value in self._values.items() if name not in known}
 
     def anything(self, name: str) -> Any:
         """Whatever the field holds."""

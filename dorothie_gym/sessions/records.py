@@ -38,6 +38,8 @@ class MoveRecord:
         exchange: number of the exchange, None where unknown.
         start, end: when the utterance began and was over [s].
         flagged: whether it is a point of the benchmark.
+        transaction: number of the transaction, None where unknown.
+        recognised: what a speech recogniser heard of the whole utterance, None where there was none.
     """
 
     index: int
@@ -51,6 +53,8 @@ class MoveRecord:
     start: float
     end: float
     flagged: bool
+    transaction: int | None = None
+    recognised: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,6 +135,8 @@ def move_record(event: Event, index: int, where: str = "event") -> MoveRecord:
         start=data.number("start"),
         end=data.number("end"),
         flagged=event.flagged,
+        transaction=data.if_given("transaction", data.integer),
+        recognised=data.if_given("recognised", data.text),
     )
 
 

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from dorothie_gym.ontology import Role
-from dorothie_gym.sessions.encoding import from_line
+from dorothie_gym.sessions.digest import digest_of
 from dorothie_gym.sessions.errors import SessionError
-from dorothie_gym.sessions.event_lines import decode_event
 from dorothie_gym.sessions.events import INFRACTIONS, Event, EventType
-from dorothie_gym.sessions.fields import Fields
+from dorothie_gym.sessions.faults import faults_of
+from dorothie_gym.sessions.folder import read_folder
 from dorothie_gym.sessions.header import SessionHeader
-from dorothie_gym.sessions.layout import EVENTS_FILE, HEADER_FILE, SUMMARY_FILE, TRAJECTORY_FILE
+from dorothie_gym.sessions.layout import safe_name
 from dorothie_gym.sessions.records import (
     ActionRecord,
     InfractionRecord,
@@ -28,7 +26,10 @@ from dorothie_gym.sessions.records import (
     move_record,
     utterance_records,
 )
-from dorothie_gym.sessions.trajectory import TRAJECTORY_DTYPE, TRAJECTORY_HEADER, Trajectory, decode_rows
+from dorothie_gym.sessions.report import ReadReport
+from dorothie_gym.sessions.saving import save_folder
+from dorothie_gym.sessions.scene import Scene
+from dorothie_gym.sessions.trajectory import TRAJECTORY_DTYPE, Trajectory
 from dorothie_gym.world.config import FRAME_RATE
 
 
@@ -43,6 +44,9 @@ class Session:
         summary: how it ended; None where it did not.
         complete: whether it was recorded to its end.
         name: name of its folder, or of its town, storyboard and seed.
+        scene: what was around the car, as far as it was recorded.
+        pictures: paths of the pictures by frame.
+        report: what the reader noticed.
     """
 
     header: SessionHeader
@@ -51,6 +55,9 @@ class Session:
     summary: Mapping[str, Any] | None = None
     complete: bool = True
     name: str = ""
+    scene: Scene = field(default_factory=Scene)
+    pictures: Mapping[int, Path] = field(default_factory=dict)
+    report: ReadReport = field(default_factory=ReadReport)
 
     def __post_init__(self) -> None:
         """Puts the events in order, checks the trajectory's columns and gives a name to what has none."""
@@ -59,32 +66,56 @@ class Session:
         object.__setattr__(self, "events", tuple(sorted(self.events, key=lambda event: event.frame)))
         if not self.name:
             name = f"{self.header.town}-{self.header.storyboard}-{self.header.seed}"
-            object.__setattr__(self, "name", name)
+            object.__setattr__(self, "name", safe_name(name))
 
     @classmethod
     def load(cls, path: Path | str) -> Session:
-        """Reads the folder of a session.
+        """Reads the folder of a session (`docs/session-format.md`); other layouts are read by `read_session`.
 
         A session that was cut off, at whatever byte, is read up to its last complete event and frame, and its
-        `complete` is False.
+        `complete` is False. Events that are out of order are put in order. What a newer minor version of the format
+        added is kept, and named in `report`.
 
         Raises:
-            SessionError: there is no session, or it is damaged otherwise; the message names file, line and field.
+            SessionError: there is no session, or it is damaged otherwise, or of a newer major version; the message
+                names file, line and field.
         """
         folder = Path(path)
-        header = _load_header(folder / HEADER_FILE)
-        events, events_torn = _load_events(folder / EVENTS_FILE)
-        trajectory, trajectory_torn = _load_trajectory(folder / TRAJECTORY_FILE)
-        ending = _load_ending(folder / SUMMARY_FILE)
-        whole = ending is not None and ending.events == len(events) and ending.frames == len(trajectory)
+        content = read_folder(folder)
         return cls(
-            header=header,
-            events=events,
-            trajectory=trajectory,
-            summary=ending.summary if ending else None,
-            complete=whole and not events_torn and not trajectory_torn,
+            header=content.header,
+            events=content.events,
+            trajectory=content.trajectory,
+            summary=content.summary,
+            complete=content.complete,
             name=folder.resolve().name,
+            scene=content.scene,
+            pictures=content.pictures,
+            report=content.report,
         )
+
+    def save(self, path: Path | str) -> Path:
+        """Writes the session into a new folder, whole or not at all; pictures are copied.
+
+        A session without an outcome is written as one that was cut off.
+
+        Returns:
+            The folder.
+
+        Raises:
+            SessionError: there is something of that name already, or the session cannot be written.
+            OSError: the folder cannot be written.
+        """
+        return save_folder(self, Path(path))
+
+    def check(self) -> tuple[str, ...]:
+        """Returns what is wrong with the session, a sentence each, that reading it did not refuse; none is sound."""
+        return faults_of(self)
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of the content in hexadecimal digits: the same however, and by whatever version, it was packed."""
+        return digest_of(self)
 
     @property
     def duration(self) -> float:
@@ -131,56 +162,3 @@ class Session:
     def of_type(self, *types: EventType) -> tuple[Event, ...]:
         """Returns the events of the given types."""
         return tuple(event for event in self.events if event.type in types)
-
-
-@dataclass(frozen=True)
-class _Ending:
-    events: int
-    frames: int
-    summary: Mapping[str, Any]
-
-
-def _load_header(path: Path) -> SessionHeader:
-    if not path.is_file():
-        raise SessionError(f"{path.parent}: no session here (there is no {path.name})")
-    lines, torn = _read_lines(path)
-    if torn or len(lines) != 1:
-        raise SessionError(f"{path}: the header is cut off or has more than one line; the session cannot be read")
-    return SessionHeader.from_json(from_line(lines[0], f"{path}, line 1"), f"{path}, line 1")
-
-
-def _load_events(path: Path) -> tuple[tuple[Event, ...], bool]:
-    lines, torn = _read_lines(path)
-    return tuple(decode_event(line, f"{path}, line {number}") for number, line in enumerate(lines, start=1)), torn
-
-
-def _load_trajectory(path: Path) -> tuple[Trajectory, bool]:
-    lines, torn = _read_lines(path)
-    if not lines:  # cut off in the first line, or before it
-        return np.empty(0, dtype=TRAJECTORY_DTYPE), True
-    if lines[0] != TRAJECTORY_HEADER:
-        raise SessionError(f"{path}, line 1: the columns are {lines[0]!r}; they must be {TRAJECTORY_HEADER!r}")
-    return decode_rows(lines[1:], str(path), first_line=2), torn
-
-
-def _load_ending(path: Path) -> _Ending | None:
-    lines, torn = _read_lines(path)
-    if torn or not lines:
-        return None
-    fields = Fields(from_line("\n".join(lines), str(path)), str(path))
-    return _Ending(fields.integer("events", 0), fields.integer("frames", 0), fields.mapping("summary"))
-
-
-def _read_lines(path: Path) -> tuple[list[str], bool]:
-    """Returns the complete lines of a file, and whether anything is missing: a torn last line, or the file."""
-    if not path.is_file():
-        return [], True
-    *lines, rest = path.read_bytes().split(b"\n")
-    return [_decode(line, f"{path}, line {number}") for number, line in enumerate(lines, start=1)], bool(rest)
-
-
-def _decode(line: bytes, where: str) -> str:
-    try:
-        return line.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise SessionError(f"{where}: not UTF-8 at byte {error.start}") from None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +16,20 @@ Trajectory: TypeAlias = NDArray[np.void]
 TRAJECTORY_COLUMNS: Final = FRAME_COLUMNS
 """Frame (30 Hz), place [m], heading [rad, clockwise], speed [m/s], controls in [0, 1], [-1, 1], [0, 1], lane id."""
 
+WHOLE_COLUMNS: Final = ("frame", "lane")
+"""Columns of whole numbers."""
+
+OPEN_COLUMNS: Final = ("speed", "throttle", "steer", "brake")
+"""Columns that may hold NaN: what the recording does not know."""
+
+NO_LANE: Final = -1
+"""Lane of a car whose lane the recording does not know."""
+
 TRAJECTORY_DTYPE: Final = np.dtype(
-    [(name, np.int64 if name in ("frame", "lane") else np.float64) for name in TRAJECTORY_COLUMNS]
+    [(name, np.int64 if name in WHOLE_COLUMNS else np.float64) for name in TRAJECTORY_COLUMNS]
 )
 
-TRAJECTORY_HEADER: Final = ",".join(TRAJECTORY_COLUMNS)
-
-_TYPES: Final[dict[str, type[int] | type[float]]] = {
-    name: int if name in ("frame", "lane") else float for name in TRAJECTORY_COLUMNS
-}
+_WHOLE: Final = [TRAJECTORY_COLUMNS.index(name) for name in WHOLE_COLUMNS]
 
 
 def trajectory_of(rows: NDArray[np.float64]) -> Trajectory:
@@ -34,59 +39,50 @@ def trajectory_of(rows: NDArray[np.float64]) -> Trajectory:
         rows: (n, 9) float64, columns as in `TRAJECTORY_COLUMNS`.
 
     Raises:
-        SessionError: another shape, a value that is not finite, or a frame or lane that is not whole.
+        SessionError: as `checked_rows`.
     """
-    rows = np.asarray(rows, dtype=np.float64)
-    if rows.ndim != 2 or rows.shape[1] != len(TRAJECTORY_COLUMNS):
-        raise SessionError(f"trajectory: rows have shape {rows.shape}; it must be (n, {len(TRAJECTORY_COLUMNS)})")
+    rows = checked_rows(rows)
     trajectory = np.empty(len(rows), dtype=TRAJECTORY_DTYPE)
     for name, column in zip(TRAJECTORY_COLUMNS, rows.T, strict=True):
-        if not np.all(np.isfinite(column)):
-            raise SessionError(f"trajectory: field {name!r} has a value that is not finite")
-        if _TYPES[name] is int and np.any(column != np.rint(column)):
-            raise SessionError(f"trajectory: field {name!r} has a value that is not a whole number")
         trajectory[name] = column
     return trajectory
 
 
-def encode_rows(trajectory: Trajectory) -> list[str]:
-    """Returns one line of comma-separated values a row; floats in the shortest form that reads back the same."""
-    return [",".join(repr(value) for value in row) for row in trajectory.tolist()]
-
-
-def decode_rows(lines: list[str], where: str, first_line: int) -> Trajectory:
-    """Reads what `encode_rows` returned.
-
-    Args:
-        lines: the lines.
-        where: name of the file, for messages.
-        first_line: number in the file of the first of the lines.
+def checked_rows(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns the rows (n, 9) if they can be those of a trajectory.
 
     Raises:
-        SessionError: a line has another number of fields, a field is not a finite number, or a frame does not come
-            after the one before.
+        SessionError: another shape, a frame, place or lane that is not finite, a control that is infinite, or a frame
+            or lane that is not whole.
     """
-    rows: list[tuple[Any, ...]] = []
-    for number, line in enumerate(lines, start=first_line):
-        row = _decode_row(line, f"{where}, line {number}")
-        if rows and row[0] <= rows[-1][0]:
-            raise SessionError(f"{where}, line {number}: field 'frame' is {row[0]}; it must be above {rows[-1][0]}")
-        rows.append(row)
-    return np.array(rows, dtype=TRAJECTORY_DTYPE)
+    rows = np.ascontiguousarray(rows, dtype=np.float64)
+    if rows.ndim != 2 or rows.shape[1] != len(TRAJECTORY_COLUMNS):
+        raise SessionError(f"trajectory: rows have shape {rows.shape}; it must be (n, {len(TRAJECTORY_COLUMNS)})")
+    whole = rows[:, _WHOLE]
+    if np.isfinite(rows).all() and (whole == np.rint(whole)).all():
+        return rows
+    for name, column in zip(TRAJECTORY_COLUMNS, rows.T, strict=True):
+        if (np.isinf(column) if name in OPEN_COLUMNS else ~np.isfinite(column)).any():
+            raise SessionError(f"trajectory: field {name!r} has a value that is not finite")
+        if name in WHOLE_COLUMNS and (column != np.rint(column)).any():
+            raise SessionError(f"trajectory: field {name!r} has a value that is not a whole number")
+    return rows
 
 
-def _decode_row(line: str, where: str) -> tuple[Any, ...]:
-    texts = line.split(",")
-    if len(texts) != len(TRAJECTORY_COLUMNS):
-        raise SessionError(f"{where}: {len(texts)} fields; there must be {len(TRAJECTORY_COLUMNS)}")
-    values: list[int | float] = []
-    for name, text in zip(TRAJECTORY_COLUMNS, texts, strict=True):
-        try:
-            value = _TYPES[name](text)
-        except ValueError:
-            value = float("nan")
-        if not np.isfinite(value):
-            kind = "whole" if _TYPES[name] is int else "finite"
-            raise SessionError(f"{where}: field {name!r} is {text!r}; it must be a {kind} number")
-        values.append(value)
-    return tuple(values)
+def rows_of(trajectory: Trajectory) -> NDArray[np.float64]:
+    """Returns a trajectory as rows (n, 9) float64, the inverse of `trajectory_of`."""
+    return np.stack([trajectory[name].astype(np.float64) for name in TRAJECTORY_COLUMNS], axis=1)
+
+
+def check_rising(frames: NDArray[np.int64] | NDArray[np.float64], last: int, where: str) -> None:
+    """Does nothing if the frames rise, each above the one before, the first above `last`.
+
+    Raises:
+        SessionError: they do not; the message begins with `where` and names the first that does not.
+    """
+    if len(frames) == 0 or (frames[0] > last and (frames[1:] > frames[:-1]).all()):
+        return
+    falls = np.concatenate(([frames[0] <= last], frames[1:] <= frames[:-1]))
+    k = int(np.argmax(falls))
+    before = last if k == 0 else int(frames[k - 1])
+    raise SessionError(f"{where}: frame {int(frames[k])} after {before}; each must be above the one before")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterable, Mapping
-from io import TextIOWrapper
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -11,17 +11,36 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.sessions.encoding import canonical, to_line, write_atomically
+from dorothie_gym.sessions.encoding import canonical, write_atomically
 from dorothie_gym.sessions.errors import SessionError
 from dorothie_gym.sessions.event_lines import encode_event
 from dorothie_gym.sessions.events import Event
+from dorothie_gym.sessions.frames_file import write_frames
 from dorothie_gym.sessions.header import SessionHeader
-from dorothie_gym.sessions.layout import EVENTS_FILE, HEADER_FILE, SESSION_FILES, SUMMARY_FILE, TRAJECTORY_FILE
-from dorothie_gym.sessions.trajectory import TRAJECTORY_HEADER, encode_rows, trajectory_of
+from dorothie_gym.sessions.journal import ACTORS, CAR, LIGHTS, WEATHER, encode_block, read_journal
+from dorothie_gym.sessions.layout import (
+    EVENTS_FILE,
+    FRAMES_FILE,
+    HEADER_FILE,
+    JOURNAL_FILE,
+    MAX_FRAME,
+    PART,
+    PICTURES_FOLDER,
+    SESSION_FILES,
+)
+from dorothie_gym.sessions.saving import picture_name
+from dorothie_gym.sessions.scene import Rows, actor_rows, light_rows, weather_rows
+from dorothie_gym.sessions.session_file import SessionFile
+from dorothie_gym.sessions.trajectory import check_rising, checked_rows
+from dorothie_gym.world.town import LightColour
 
 
 class SessionWriter:
-    """Appends events and frames to the folder of a session; what was appended survives the death of the process.
+    """Appends what happens to the folder of a session; what was appended survives the death of the process.
+
+    Whatever moment the process dies at, the folder is a session that is finished, or one that is not and that loads up
+    to what was appended last (`session_state` tells which), or, before the header was written, none. Actors, lights
+    and weather may be missing altogether, or be handed over at some frames only.
 
     Args:
         folder: folder of the session, made if need be.
@@ -30,22 +49,25 @@ class SessionWriter:
 
     Raises:
         SessionError: the folder holds a session already and `overwrite` is False.
+        OSError: the folder cannot be written.
     """
 
     def __init__(self, folder: Path | str, header: SessionHeader, *, overwrite: bool = False) -> None:
         self.folder = Path(folder)
+        self.header = header
         self._prepare(overwrite)
-        write_atomically(self.folder / HEADER_FILE, to_line(header.to_json()) + "\n")
-        self._events = self._open(EVENTS_FILE)
-        self._trajectory = self._open(TRAJECTORY_FILE)
-        self._trajectory.write(TRAJECTORY_HEADER + "\n")
-        self._trajectory.flush()
+        SessionFile(header=header).write(self.folder)
+        self._events = (self.folder / EVENTS_FILE).open("xb")
+        self._journal = (self.folder / JOURNAL_FILE).open("xb")
         self._event_count = 0
-        self._frame_count = 0
         self._last_frame = -1
+        self._frames: set[float] = set()
+        self._lights: tuple[Mapping[int, LightColour | str], Rows] | None = None
+        self._weather: tuple[Mapping[str, float], Rows] | None = None
+        self._recorded = {ACTORS: -1, LIGHTS: -1, WEATHER: -1}
 
     def append(self, events: Iterable[Event] = (), frames: NDArray[np.float64] | None = None) -> None:
-        """Appends a batch and hands it to the operating system.
+        """Appends a batch of events and frames and hands it to the operating system.
 
         Args:
             events: what happened.
@@ -54,37 +76,82 @@ class SessionWriter:
         Raises:
             SessionError: an event or a row cannot be written; nothing of the batch is then.
         """
-        if self._events.closed:
-            raise SessionError(f"{self.folder}: the session is closed; nothing can be appended")
+        self._check_open("nothing can be appended")
         lines = [encode_event(event) for event in events]
-        rows = self._encode(frames) if frames is not None else []
-        for file, batch in ((self._events, lines), (self._trajectory, rows)):
-            if batch:
-                file.write("\n".join(batch) + "\n")
-                file.flush()
-        self._event_count += len(lines)
-        self._frame_count += len(rows)
+        rows = None if frames is None else self._checked(frames)
+        if lines:
+            self._events.write(("\n".join(lines) + "\n").encode("utf-8"))
+            self._events.flush()
+            self._event_count += len(lines)
+        if rows is not None and len(rows):
+            self._write(CAR, int(rows[0, 0]), rows)
+            self._frames.update(rows[:, 0].tolist())
+            self._last_frame = int(rows[-1, 0])
 
-    def finish(self, summary: Mapping[str, Any]) -> None:
-        """Writes how the session ended, which makes it complete, and closes it.
+    def add_events(self, events: Iterable[Event]) -> None:
+        """Appends what happened; raises `SessionError` where an event cannot be written, and writes none then."""
+        self.append(events)
+
+    def add_frames(self, frames: NDArray[np.float64]) -> None:
+        """Appends frames of the car, (n, 9) float64 as in `TRAJECTORY_COLUMNS`; raises `SessionError` as `append`."""
+        self.append((), frames)
+
+    def add_actors(self, frame: int, actors: Rows | Mapping[str, Any]) -> None:
+        """Appends the actors around the car at a frame: rows of `ACTOR_DTYPE`, or a mapping of its columns.
 
         Raises:
-            SessionError: the summary holds what JSON cannot, or the session is closed already.
+            SessionError: they are of another form, or the frame was not appended before, or has actors already.
         """
-        if self._events.closed:
-            raise SessionError(f"{self.folder}: the session is closed; it cannot be finished")
-        ending = {
-            "events": self._event_count,
-            "frames": self._frame_count,
-            "summary": canonical(summary, "summary"),
-        }
+        self._add(ACTORS, frame, actor_rows(actors))
+
+    def add_lights(self, frame: int, lights: Mapping[int, LightColour | str]) -> None:
+        """Appends what each traffic light shows at a frame, by id of its signal; raises `SessionError` as above."""
+        if self._lights is None or self._lights[0] != lights:  # they seldom change
+            self._lights = dict(lights), light_rows(lights)
+        self._add(LIGHTS, frame, self._lights[1])
+
+    def add_weather(self, frame: int, weather: Mapping[str, float]) -> None:
+        """Appends the ten weather parameters at a frame; raises `SessionError` as above."""
+        if self._weather is None or self._weather[0] != weather:
+            self._weather = dict(weather), weather_rows(weather)
+        self._add(WEATHER, frame, self._weather[1])
+
+    def add_picture(self, frame: int, png: bytes) -> None:
+        """Writes a picture (PNG) of a frame.
+
+        Raises:
+            SessionError: it is no PNG, or the frame is none.
+        """
+        self._check_open("no picture can be added")
+        if not png.startswith(b"\x89PNG\r\n\x1a\n"):
+            raise SessionError(f"{self.folder}: the picture of frame {frame} is no PNG")
+        if not 0 <= frame < MAX_FRAME:
+            raise SessionError(f"{self.folder}: a picture of frame {frame}; frames are 0 or above")
+        pictures = self.folder / PICTURES_FOLDER
+        pictures.mkdir(exist_ok=True)
+        write_atomically(pictures / picture_name(frame), png)
+
+    def finish(self, outcome: Mapping[str, Any]) -> None:
+        """Writes how the session ended, which makes it complete, and closes it.
+
+        The journal is folded into `frames.parquet`, and goes; last of all the outcome enters `session.json`, at once.
+
+        Raises:
+            SessionError: the outcome holds what JSON cannot, or the session is closed already.
+        """
+        self._check_open("it cannot be finished")
+        outcome = canonical(outcome, "outcome")
         self.close()
-        write_atomically(self.folder / SUMMARY_FILE, to_line(ending) + "\n")
+        trajectory, scene = read_journal(self.folder / JOURNAL_FILE)
+        write_frames(self.folder / FRAMES_FILE, trajectory, scene)
+        (self.folder / JOURNAL_FILE).unlink()
+        file = SessionFile(header=self.header, outcome=outcome, events=self._event_count, frames=len(trajectory))
+        file.write(self.folder)
 
     def close(self) -> None:
         """Closes the files; a session that was not finished stays incomplete. May be called again."""
         self._events.close()
-        self._trajectory.close()
+        self._journal.close()
 
     def __enter__(self) -> Self:
         return self
@@ -96,26 +163,43 @@ class SessionWriter:
 
     def _prepare(self, overwrite: bool) -> None:
         self.folder.mkdir(parents=True, exist_ok=True)
-        present = [name for name in SESSION_FILES if (self.folder / name).exists()]
-        if present and not overwrite:
+        names = (*SESSION_FILES, *(name + PART for name in SESSION_FILES))
+        present = [name for name in names if _stands(self.folder / name)]
+        if present and not overwrite and present != [HEADER_FILE + PART]:  # that one died before there was a session
             raise SessionError(
                 f"{self.folder}: holds a session already ({', '.join(present)}); choose another folder or overwrite it"
             )
         # The header goes first: from then on, whenever the process dies, the folder holds no session with parts of two.
         for name in present:
             (self.folder / name).unlink()
+        if overwrite and (self.folder / PICTURES_FOLDER).is_dir():
+            shutil.rmtree(self.folder / PICTURES_FOLDER)
 
-    def _open(self, name: str) -> TextIOWrapper:
-        return (self.folder / name).open("w", encoding="utf-8", newline="\n")
+    def _check_open(self, consequence: str) -> None:
+        if self._events.closed:
+            raise SessionError(f"{self.folder}: the session is closed; {consequence}")
 
-    def _encode(self, frames: NDArray[np.float64]) -> list[str]:
-        trajectory = trajectory_of(frames)
-        numbers = trajectory["frame"]
-        if len(numbers) == 0:
-            return []
-        if np.any(np.diff(numbers, prepend=self._last_frame) <= 0):
-            raise SessionError(
-                f"{self.folder}: frames {numbers.tolist()} after {self._last_frame}; each must be above the one before"
-            )
-        self._last_frame = int(numbers[-1])
-        return encode_rows(trajectory)
+    def _checked(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
+        rows = checked_rows(frames)
+        check_rising(rows[:, 0], self._last_frame, str(self.folder))
+        if len(rows) and rows[-1, 0] >= MAX_FRAME:
+            raise SessionError(f"{self.folder}: frame {rows[-1, 0]:.0f}; frames are below {MAX_FRAME}")
+        return rows
+
+    def _add(self, kind: bytes, frame: int, rows: Rows) -> None:
+        self._check_open("nothing can be appended")
+        if frame not in self._frames:
+            raise SessionError(f"{self.folder}: frame {frame} was not appended; append the frames of the car first")
+        if frame <= self._recorded[kind]:
+            raise SessionError(f"{self.folder}: frame {frame} after {self._recorded[kind]}; frames must rise")
+        self._write(kind, int(frame), rows)
+        self._recorded[kind] = int(frame)
+
+    def _write(self, kind: bytes, frame: int, rows: NDArray[Any]) -> None:
+        self._journal.write(encode_block(kind, frame, rows))
+        self._journal.flush()
+
+
+def _stands(path: Path) -> bool:
+    """Whether there is something of that name, a link to nowhere included."""
+    return path.exists() or path.is_symlink()

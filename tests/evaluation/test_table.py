@@ -64,7 +64,8 @@ def test_unreadable_and_incomplete_sessions_are_named(tmp_path: Path) -> None:
     for name in "abc":
         write(tmp_path / name, talk())
     (tmp_path / "a/events.jsonl").write_text("nonsense\n")
-    (tmp_path / "c/summary.json").unlink()
+    page = (tmp_path / "c/session.json").read_text()
+    (tmp_path / "c/session.json").write_text(page[: page.index(' "outcome"')] + ' "outcome": null\n}\n')
     table = evaluate_folder(tmp_path)
     assert list(table["sessions_unreadable"]) == ["a"]
     assert table["sessions_incomplete"] == ["c"]

@@ -31,7 +31,7 @@ def test_header_holds_no_time_of_day() -> None:
         ({"seed": "7"}, "'seed' is '7'; it must be a whole number"),
         ({"decision_frequency": 0.0}, "'decision_frequency' is 0.0; it must be a positive number"),
         ({"street_names": ["Elm"]}, "'street_names'.*Elm"),
-        ({"departure": (-1, 0.0)}, "'lane' is -1"),
+        ({"departure": (-2, 0.0)}, "'lane' is -2"),
         ({"departure": (1,)}, "'departure'"),
         ({"landmarks": [{"name": "KFC"}]}, r"landmarks\[0\]: field 'lane' is missing"),
         ({"config": {"f": object()}}, "config.f is a object"),

@@ -35,6 +35,8 @@ def test_round_trip_keeps_everything(recorded: Path) -> None:
     assert loaded.summary == {"success": True, "seconds": 1.5}
     assert loaded.complete
     assert loaded.name == "session"
+    assert loaded.check() == ()
+    assert loaded.report.lines() == []
 
 
 @given(
@@ -51,47 +53,26 @@ def test_any_text_and_number_round_trips(tmp_path: Path, values: list[tuple[floa
     assert list(Session.load(write(folder, events, frames=1)).events) == events
 
 
-@pytest.mark.parametrize("name", ["events.jsonl", "trajectory.csv"])
-def test_session_cut_off_at_any_byte_loads_up_to_its_last_complete_line(copy: Path, name: str) -> None:
-    whole = Session.load(copy)
-    content = (copy / name).read_bytes()
-    (copy / "summary.json").unlink()
-    for cut in range(len(content)):
-        (copy / name).write_bytes(content[:cut])
-        loaded = Session.load(copy)
-        lines = content[:cut].count(b"\n")
-        assert not loaded.complete
-        if name == "events.jsonl":
-            assert loaded.events == whole.events[:lines]
-        else:
-            assert np.array_equal(loaded.trajectory, whole.trajectory[: max(lines - 1, 0)])
-
-
-def test_cut_at_the_end_of_a_line_is_noticed_by_the_summary(copy: Path) -> None:
+def test_finished_session_that_lost_the_end_of_its_events_is_incomplete(copy: Path) -> None:
     lines = (copy / "events.jsonl").read_bytes().splitlines(keepends=True)
-    (copy / "events.jsonl").write_bytes(b"".join(lines[:-1]))
-    loaded = Session.load(copy)
-    assert (len(loaded.events), loaded.complete) == (len(talk()) - 1, False)
+    for kept in (b"".join(lines[:-1]), b"".join(lines)[:-5]):
+        (copy / "events.jsonl").write_bytes(kept)
+        loaded = Session.load(copy)
+        assert (len(loaded.events), loaded.complete) == (len(talk()) - 1, False)
 
 
-@pytest.mark.parametrize("name", ["events.jsonl", "trajectory.csv", "summary.json"])
-def test_session_that_died_before_a_file_was_made_loads_without_it(copy: Path, name: str) -> None:
-    (copy / name).unlink()
-    assert not Session.load(copy).complete
+def test_finished_session_without_its_frames_is_an_error(copy: Path) -> None:
+    (copy / "frames.parquet").unlink()
+    with pytest.raises(SessionError, match="frames.parquet: is missing, though the session is over"):
+        Session.load(copy)
 
 
-def test_cut_summary_leaves_the_session_incomplete(copy: Path) -> None:
-    content = (copy / "summary.json").read_bytes()
-    for cut in range(len(content)):
-        (copy / "summary.json").write_bytes(content[:cut])
-        assert not Session.load(copy).complete
-
-
-def test_cut_header_is_an_error(copy: Path) -> None:
-    content = (copy / "session.json").read_bytes()
-    for cut in range(0, len(content), 7):
-        (copy / "session.json").write_bytes(content[:cut])
-        with pytest.raises(SessionError, match="session.json"):
+@pytest.mark.parametrize("name", ["session.json", "frames.parquet"])
+def test_cut_header_or_frames_are_an_error(copy: Path, name: str) -> None:
+    content = (copy / name).read_bytes()
+    for cut in range(0, len(content) - 2, 97):
+        (copy / name).write_bytes(content[:cut])
+        with pytest.raises(SessionError, match=name):
             Session.load(copy)
 
 
@@ -112,16 +93,16 @@ def test_folder_without_a_session_is_an_error(tmp_path: Path) -> None:
         ("events.jsonl", b'"angle":88.0', b'"angle":NaN', r"line 6: not JSON"),
         ("events.jsonl", b"KFC please", b"KF\xff please", r"line 2: not UTF-8"),
         ("events.jsonl", b'["KFC"]', b'"KFC"', r"line 2, data: field 'slots.Landmark'"),
-        ("trajectory.csv", b"frame,x", b"frame,z", r"trajectory.csv, line 1: the columns"),
-        ("trajectory.csv", b"\n3,", b"\n2,", r"trajectory.csv, line 5: field 'frame' is 2"),
-        ("trajectory.csv", b"\n3,", b"\n3,1,", r"trajectory.csv, line 5: 10 fields"),
-        ("trajectory.csv", b"\n3,0.6", b"\n3,inf", r"line 5: field 'x' is 'inf'; it must be a finite number"),
-        ("trajectory.csv", b"\n3,0.6", b"\n3.5,0.6", r"line 5: field 'frame' is '3.5'; it must be a whole"),
-        ("session.json", b'"landmark":1', b'"landmark":2', r"session.json, line 1: .*subgoals\[1\]: field 'landmark'"),
-        ("session.json", b'"street_names"', b'"streets"', r"session.json, line 1: field 'street_names' is missing"),
-        ("session.json", b'"format_version":1', b'"format_version":99', r"'format_version' is 99"),
+        ("events.jsonl", b'"angle":88.0', b'"angle":1e999', r"line 6: not JSON .*too large"),
+        ("events.jsonl", b'"frame":45', b'"frame":4500000000', r"line 3: field 'frame' is 4500000000"),
+        ("events.jsonl", b'{"frame":45', b"[" * 100_000, r"line 3: .*nested too deeply"),
+        ("session.json", b'"landmark": 1', b'"landmark": 2', r"session.json: .*subgoals\[1\]: field 'landmark'"),
+        ("session.json", b'"street_names"', b'"streets"', r"session.json: field 'street_names' is missing"),
+        ("session.json", b'"format_version": "2.0"', b'"format_version": "3.0"', r"version 3.0 cannot be read.*update"),
+        ("session.json", b'"format_version": "2.0"', b'"format_version": 2.0', r"'format_version' is 2.0"),
+        ("session.json", b'"format_version": "2.0"', b'"format_version": "new"', r"'format_version' is 'new'"),
         ("session.json", b'"Fuller"', b'"Elm"', r"street_names.*Elm"),
-        ("summary.json", b'"events"', b'"event"', r"summary.json: field 'events' is missing"),
+        ("session.json", b'"events": 16', b'"event": 16', r"session.json, counts: field 'events' is missing"),
     ],
 )
 def test_damage_is_told_by_file_line_and_field(copy: Path, name: str, old: bytes, new: bytes, message: str) -> None:

@@ -11,7 +11,7 @@ from dorothie_gym.sessions import Event, EventType, Session, SessionError, Sessi
 from tests.sessions.builders import header, physical, rows, write
 from tests.sessions.dialogues import talk
 
-FILES = ("session.json", "events.jsonl", "trajectory.csv", "summary.json")
+FILES = ("session.json", "events.jsonl", "frames.parquet")
 
 
 def test_identical_input_gives_identical_bytes(tmp_path: Path) -> None:

@@ -1,0 +1,157 @@
+"""`dorothie-gym convert`: sessions from one layout into another."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dorothie_gym.cli.output import fail, print_json, stderr, stdout, told_plainly
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dorothie_gym.sessions import Corpus, CorpusEntry, Session
+
+
+class Layout(enum.StrEnum):
+    """What sessions are written as."""
+
+    SDN = "sdn"
+    NATIVE = "native"
+
+
+def convert(
+    source: Annotated[Path, typer.Argument(metavar="IN", help="A session, or a folder of sessions or of folds.")],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder to write, which must hold no such session yet.")],
+    to: Annotated[Layout, typer.Option("--to", help="Write the SDN release layout, or our own.")],
+    maps: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder with maps of towns that are not shipped (Town01.xodr).")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
+) -> None:
+    """Convert sessions: SDN (release, sample or hub layout) and our own, either way; reports what was not understood.
+
+    The layout of IN is told by its files. Sessions that cannot be read are named, and the exit code is 2 then.
+    """
+    if maps is not None and not maps.is_dir():
+        fail(f"{maps}: there is no such folder; give one with maps (.xodr)")
+    with told_plainly():
+        from dorothie_gym.sessions import Corpus
+
+        corpus = Corpus.load(source, maps=maps)
+        _check_out(source, out)
+        is_one = [entry.path for entry in corpus.entries] == [source]
+        rows = _convert(corpus, out, to, maps, is_one=is_one, quiet=as_json)
+    failed = {row["path"]: row["error"] for row in rows if "error" in row}
+    if is_one and failed:
+        fail(*failed.values())
+    if as_json:
+        print_json({"to": to.value, "in": str(source), "out": str(out), "sessions": rows})
+    else:
+        _show(rows, out)
+    if failed:
+        first = next(iter(failed.values()))
+        fail(f"{len(failed)} of {len(rows)} sessions could not be converted; the first: {first}")
+
+
+def _check_out(source: Path, out: Path) -> None:
+    inside, whole = out.resolve(), source.resolve()
+    if inside == whole or whole in inside.parents:
+        fail(f"{out}: lies within {source}; choose a folder outside of it")
+    if out.exists() and not out.is_dir():
+        fail(f"{out}: is a file; choose a folder")
+
+
+def _convert(
+    corpus: Corpus, out: Path, to: Layout, maps: Path | None, *, is_one: bool, quiet: bool
+) -> list[dict[str, Any]]:
+    rows = []
+    taken: set[Path] = set()
+    with _progress(len(corpus), quiet=quiet) as advance:
+        for number, entry in enumerate(corpus.entries):
+            rows.append(_convert_one(corpus, entry, number, out, to, maps, taken, is_one=is_one))
+            advance()
+    return rows
+
+
+def _convert_one(
+    corpus: Corpus,
+    entry: CorpusEntry,
+    number: int,
+    out: Path,
+    to: Layout,
+    maps: Path | None,
+    taken: set[Path],
+    *,
+    is_one: bool,
+) -> dict[str, Any]:
+    """Converts a session; returns what --json writes of it."""
+    from dorothie_gym.sessions import SessionError
+    from dorothie_gym.sessions.sdn import write_sdn
+    from dorothie_gym.world.town import TownError
+
+    path = entry.path.relative_to(corpus.root)
+    row: dict[str, Any] = {"path": str(path)}
+    try:
+        session = entry.load()
+        target = out if is_one else out / path.with_name(_name(session, number, to, out / path.parent, taken))
+        taken.add(target)
+        written = write_sdn(session, target, maps=maps) if to is Layout.SDN else session.save(target)
+    except (SessionError, TownError) as error:
+        return {**row, "error": str(error)}
+    return {
+        **row,
+        "out": str(written),
+        "complete": session.complete,
+        "events": len(session.events),
+        "frames": len(session.trajectory),
+        "report": session.report.to_json(),
+        "faults": list(session.check()),
+    }
+
+
+def _name(session: Session, number: int, to: Layout, folder: Path, taken: set[Path]) -> str:
+    """Name of the folder of a session: the original scripts look for `log_<number>`."""
+    if to is Layout.NATIVE or session.name.startswith("log_"):
+        return session.name
+    seed = session.header.seed
+    name = f"log_{number if seed is None else seed}"
+    return name if folder / name not in taken else f"log_{number:06d}{seed}"
+
+
+@contextmanager
+def _progress(total: int, *, quiet: bool) -> Iterator[Callable[[], None]]:
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    console = stderr()
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    hidden = quiet or not console.is_terminal or total == 1
+    with Progress(*columns, console=console, disable=hidden, transient=True) as progress:
+        bar = progress.add_task("Converting", total=total)
+        yield lambda: progress.advance(bar)
+
+
+def _show(rows: list[dict[str, Any]], out: Path) -> None:
+    from dorothie_gym.sessions.report import report_lines
+
+    console = stdout()
+    for row in rows:
+        if "error" in row:
+            console.print(f"{row['path']}: not converted: {row['error']}", style="yellow", markup=False, soft_wrap=True)
+            continue
+        console.print(_line(row), markup=False, soft_wrap=True)
+        for line in (*report_lines(row["report"]), *(f"fault: {fault}" for fault in row["faults"])):
+            console.print(f"  {line}", style="dim", markup=False, soft_wrap=True)
+    done = sum("error" not in row for row in rows)
+    console.print(f"{done} of {len(rows)} sessions written to {out}.", markup=False, soft_wrap=True)
+
+
+def _line(row: Mapping[str, Any]) -> str:
+    ending = "" if row["complete"] else ", not recorded to its end"
+    layout = row["report"]["layout"]
+    return f"{row['path']}: {layout}, {row['events']} events, {row['frames']} frames{ending} -> {row['out']}"
