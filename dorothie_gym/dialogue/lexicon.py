@@ -45,6 +45,7 @@ class Lexicon:
         names: what is understood: the words of a phrase, without article -> value.
         deixis: words that point at what is in view.
         repairs: words that put right the name before them.
+        ignored: phrases that sound like names and are none.
     """
 
     phrases: Mapping[SlotValue, Mapping[str, tuple[str, ...]]]
@@ -52,6 +53,7 @@ class Lexicon:
     names: Mapping[tuple[str, ...], SlotValue]
     deixis: tuple[str, ...]
     repairs: tuple[str, ...]
+    ignored: tuple[tuple[str, ...], ...] = ()
 
     def forms(self, value: SlotValue, form: str) -> tuple[str, ...]:
         """Returns the phrases for `value` in `form` ("say", "the", "order", ...); those of "say" if it has none."""
@@ -130,6 +132,7 @@ def parse_lexicon(data: Mapping[str, Any]) -> Lexicon:
         _names(phrases),
         strings("lexicon.yaml: deixis", data.get("deixis")),
         strings("lexicon.yaml: repairs", data.get("repairs")),
+        tuple(tuple(split_words(phrase)) for phrase in strings("lexicon.yaml: ignore", data.get("ignore"))),
     )
 
 
@@ -168,8 +171,7 @@ def _names(phrases: Mapping[SlotValue, Mapping[str, tuple[str, ...]]]) -> dict[t
     names: dict[tuple[str, ...], SlotValue] = {}
     for value, forms in phrases.items():
         for phrase in [phrase for form in _HEARD_FORMS for phrase in forms.get(form, ())]:
-            words = tuple(split_words(phrase))
-            for name in {words, bare_name(words)}:
-                if names.setdefault(name, value) != value:
-                    raise LexiconError(f"lexicon.yaml: {phrase!r} stands for {names[name].label} and for {value.label}")
+            name = bare_name(split_words(phrase))
+            if names.setdefault(name, value) != value:
+                raise LexiconError(f"lexicon.yaml: {phrase!r} stands for {names[name].label} and for {value.label}")
     return names
