@@ -6,6 +6,7 @@ from dorothie_gym.dialogue.exchanges import EXPECTATIONS, PATIENCE, Exchange, Ex
 from dorothie_gym.dialogue.generation import MAX_CHARACTERS, word_act, word_acts
 from dorothie_gym.dialogue.guessing import act_of, guess_act, guess_spans
 from dorothie_gym.dialogue.lexicon import Lexicon, LexiconError, load_lexicon
+from dorothie_gym.dialogue.mishearing import Channel, word_error_rate
 from dorothie_gym.dialogue.phrases import Register
 from dorothie_gym.dialogue.styles import SpeakerStyle, draw_style
 from dorothie_gym.dialogue.understanding import Heard, understand
@@ -18,6 +19,7 @@ __all__ = [
     "PATIENCE",
     "SHORTEST_SPAN",
     "WORDS_PER_SECOND",
+    "Channel",
     "Conversation",
     "Direction",
     "Exchange",
@@ -42,4 +44,5 @@ __all__ = [
     "understand",
     "word_act",
     "word_acts",
+    "word_error_rate",
 ]

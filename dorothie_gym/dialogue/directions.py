@@ -16,6 +16,7 @@ _BACK = re.compile(
     r"|\b(doubl(e|ing)|turning|driving) back\b|\bflip(ping)? around\b|\bturn(ing)? the car around\b"
 )
 _AFTER_NEXT = re.compile(r"\b(the one after|one after the next|after next)\b")
+_DOUBT = frozenset({"sure", "know", "certain", "idea", "clue", "wonder"})
 _CLAUSE_ENDS = frozenset({",", "?", "then", "and"})
 _TURNING_WORDS = frozenset({"left", "right", "straight", "turn", "turning", "back", "around", "way", "round"})
 
@@ -112,14 +113,14 @@ def _directions(clause: Sequence[str], lists: WordLists) -> list[Direction]:
     directions = [
         Direction(word)
         for place, word in enumerate(clause)
-        if word in ("left", "right", "straight") and not _is_denied(clause[max(0, place - 3) : place], lists)
+        if word in ("left", "right", "straight") and not _is_denied(clause[max(0, place - 5) : place], lists)
     ]
     return [Direction.BACK] if not directions and _BACK.search(" ".join(clause)) else directions
 
 
 def _is_denied(before: Sequence[str], lists: WordLists) -> bool:
     """Returns whether the words before a direction deny it: "not right", "don't take a right"; doubt is no denial."""
-    return "sure" not in before and not lists.denying.isdisjoint(before)
+    return _DOUBT.isdisjoint(before) and not lists.denying.isdisjoint(before)
 
 
 def _clauses(words: Sequence[str]) -> list[list[str]]:
@@ -141,5 +142,3 @@ def find_ordinal(words: Sequence[str], lists: WordLists) -> int | None:
         if number is not None and noun in lists.ordinal_nouns:
             return number
     return None
-
-

@@ -15,7 +15,7 @@ import numpy as np
 from dorothie_gym.dialogue.grammar import SPOKEN_SLOTS, Template, load_grammar
 from dorothie_gym.dialogue.phrases import Register, open_to
 from dorothie_gym.dialogue.styles import SpeakerStyle, default_style
-from dorothie_gym.dialogue.telling import Teller, draws_of
+from dorothie_gym.dialogue.telling import Draw, Teller, draws_of
 from dorothie_gym.dialogue.utterances import Span
 from dorothie_gym.dialogue.wording import Wording, WordingContext
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, Slot, SlotValue
@@ -25,6 +25,9 @@ MAX_CHARACTERS = 160
 
 _PLAIN_WORDING = Wording()
 _NO_CONTEXT = WordingContext()
+
+_TRIES = 8
+"""Bare sentences of which the shortest is taken where there is hardly room."""
 
 # Enum members are looked up once: each look-up through the class costs as much as a drawn number.
 _HUMAN, _CAR = Role.PARTICIPANT, Role.CO_WIZARD
@@ -72,7 +75,7 @@ def word_acts(
     style: SpeakerStyle | None = None,
     scene: WordingContext | None = None,
 ) -> tuple[Span, ...]:
-    """Words the acts of one utterance, each joined to the one before it: "Yes, and then left at the light."
+    """Words the acts of one utterance, each joined to the one before it ("Yes, and then left at the light").
 
     Args:
         acts: in order.
@@ -96,12 +99,12 @@ def word_acts(
     room = MAX_CHARACTERS
     for number, (act, wording) in enumerate(zip(acts, wordings, strict=True)):
         # Each of the acts to come is left its share of the room.
-        limit = room // (len(acts) - number)
+        limit = room // (len(acts) - number) - 1
         text = _word(act, speaker, rng, wording, style, scene, limit)
         if texts:
             texts[-1] = _linked(texts[-1], text)
         texts.append(text)
-        room -= len(text) + 1
+        room -= len(text) + 2
         scene = replace(scene, joined=act.move)
     return tuple(Span(text, act) for text, act in zip(texts, acts, strict=True))
 
@@ -134,7 +137,10 @@ def _word(
         own = replace(own, chattiness=0.0, disfluency=0.0, repairs=0.0, addressing=0.0)
     # Not even the bare template fits: what a speaker says who has no time for particulars.
     bare = DialogueAct(act.move)
-    return _Sentence(bare, voice, draw, _PLAIN_WORDING, replace(own, register=Register.BLUNT), scene, 1, limit).text()
+    own = replace(own, register=Register.BLUNT, indirectness=0.0, habit=0.0)
+    tries = (_Sentence(bare, voice, draw, _PLAIN_WORDING, own, scene, 1, limit).text() for _ in range(_TRIES))
+    shortest = min(tries, key=len)
+    return shortest if len(shortest) <= limit else shortest[:limit].rsplit(" ", 1)[0].rstrip(",")
 
 
 class _Sentence:
@@ -144,7 +150,7 @@ class _Sentence:
         self,
         act: DialogueAct,
         voice: Role,
-        draw: object,
+        draw: Draw,
         wording: Wording,
         style: SpeakerStyle,
         scene: WordingContext,

@@ -33,6 +33,7 @@ from dorothie_gym.ontology import (
 
 SLOT_FIELDS: Mapping[str, Slot] = {
     "do": Slot.ACTION,
+    "cmd": Slot.ACTION,
     "doing": Slot.ACTION,
     "landmark": Slot.LANDMARK,
     "street": Slot.STREET,
@@ -102,7 +103,7 @@ class Grammar:
 
     Attributes:
         templates: for each move.
-        actions: for each action, by (form, manner): form is "do" or "doing".
+        actions: for each action, by (form, manner): form is "do", "doing" or, for some, "cmd".
         tails: for each slot, afterthoughts by move; under None those of the other moves.
         manners: openers, closers and alarms by (kind, speaker, move).
         joints: what links an act to the one before it in the same breath, by (move before, move).
@@ -164,10 +165,11 @@ class _Builder:
 
     def _take(self, section: Section) -> None:
         kind, *words = section.words
-        if kind in ("do", "doing"):
+        if kind in ("do", "doing", "cmd"):
             action = _ACTIONS.get(words[0] if words else "")
             if action is None:
-                raise LexiconError(f"{section.where}: after `{kind}` comes an action of {sorted(_ACTIONS)}")
+                head = " ".join(section.words)
+                raise LexiconError(f"{section.where}: `{head}` names no action; they are {sorted(_ACTIONS)}")
             self.actions[action][kind, words[1] if len(words) > 1 else "plain"] = self._phrase(section)
         elif kind == "tail":
             slot, move = parse_slot(words[0]), parse_move(words[1]) if len(words) > 1 else None

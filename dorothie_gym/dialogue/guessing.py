@@ -29,7 +29,9 @@ _HEADS = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.EXP
 """Moves behind which a command stands on its own: "no, stop"; "I can hardly see, slow down"."""
 
 _QUESTIONS = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W})
-_BEFORE_QUESTIONS = frozenset({DialogueMove.EXPLAIN, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.REPLY_N})
+_BEFORE_QUESTIONS = frozenset(
+    {DialogueMove.EXPLAIN, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.REPLY_N}
+)
 _BEFORE_REASONS = frozenset(
     {
         DialogueMove.ACKNOWLEDGE,
@@ -43,6 +45,7 @@ _BEFORE_REASONS = frozenset(
 _MOST_CLAUSES = 6
 """Commas that are looked at for another act."""
 
+_BARE_NAME = re.compile(r"(and |but |or )?(the )?#\w+( on #street)?(later|#status)?$|#status$")
 _GOING_ON = re.compile(r"(and |after that|afterwards|next|then)", re.IGNORECASE)
 _ASKS_ANEW = re.compile(r"(so|but|and|now|okay|should|shall|do|does|can|is|are|what|which|where|how|why|when)\b")
 _STATEMENT = re.compile(
@@ -186,6 +189,8 @@ def _parts(head: str, rest: str) -> bool:
         return False
     first, second = guess_act(head), guess_act(rest)
     if second.move is DialogueMove.INSTRUCT:
+        if _BARE_NAME.match(understand(rest).masked):
+            return False
         if first.move is DialogueMove.INSTRUCT:
             # "turn left, then right"; but "stop here, at the light" is one command.
             return _GOING_ON.match(rest) is not None

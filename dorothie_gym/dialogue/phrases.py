@@ -1,9 +1,9 @@
 """A small language for phrases: what a speaker may say, with choices, gaps, options and marks of style.
 
-    (a|b)      one of several; "b *3" is three times as likely, marks (below) stand in front of an alternative
-    [a]        said or left out, more often said by the chatty; may hold alternatives
-    <name>     a phrase defined elsewhere
-    {name}     a gap that the act or its particulars fill
+- `(a|b)`: one of several; `b *3` is three times as likely, marks (below) stand in front of an alternative.
+- `[a]`: said or left out, more often said by the chatty; may hold alternatives.
+- `<name>`: a phrase defined elsewhere.
+- `{name}`: a gap that the act or its particulars fill.
 
 Marks: "~" slangy, "^" polite, "!" blunt, "%" indirect. Marked alternatives are for speakers of that kind, who also use
 the unmarked ones; where all are marked, everybody may use them all.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import functools
 import re
 
-# From spelling to sound, in order: letters that are not heard, letter groups with one sound. After the idea of Metaphone
-# (L. Philips, Computer Language 7(12), 1990), far simpler: no more than confusion of English words needs.
+# From spelling to sound, in order: letters that are not heard, letter groups with one sound. After the idea of
+# Metaphone (L. Philips, Computer Language 7(12), 1990), far simpler: no more than confusion of English words needs.
 _RULES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
     (re.compile(pattern), sound)
     for pattern, sound in (

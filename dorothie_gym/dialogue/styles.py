@@ -84,7 +84,13 @@ def draw_style(role: Role, rng: np.random.Generator) -> SpeakerStyle:
         idiolect=int(rng.integers(1, 2**31)),
         address=address,
         proper=bool(rng.random() < spread.proper),
-        **shares,
+        chattiness=shares["chattiness"],
+        indirectness=shares["indirectness"],
+        anaphora=shares["anaphora"],
+        disfluency=shares["disfluency"],
+        repairs=shares["repairs"],
+        habit=shares["habit"],
+        addressing=shares["addressing"],
     )
 
 
@@ -92,8 +98,11 @@ def draw_style(role: Role, rng: np.random.Generator) -> SpeakerStyle:
 def default_style(role: Role) -> SpeakerStyle:
     """The style of those who have none: the middle of the spread, without favourite words, address and slips."""
     spread = _spreads()[role]
-    middle = {name: sum(spread.ranges[name]) / 2 for name in ("chattiness", "indirectness", "anaphora")}
-    return SpeakerStyle(proper=role is Role.CO_WIZARD, **middle)
+    chattiness, indirectness, anaphora = (
+        sum(spread.ranges[name]) / 2 for name in ("chattiness", "indirectness", "anaphora")
+    )
+    proper = role is Role.CO_WIZARD
+    return SpeakerStyle(chattiness=chattiness, indirectness=indirectness, anaphora=anaphora, proper=proper)
 
 
 @functools.cache

@@ -1,8 +1,8 @@
 """The files of data/talk: named phrases and sections of lines, in the language of `phrases`.
 
-    # a comment
-    <name> = one | another          a phrase; lines that begin with "|" go on with it
-    == head words key=value         a section; each line behind it is one alternative
+# a comment
+<name> = one | another          a phrase; lines that begin with "|" go on with it
+== head words key=value         a section; each line behind it is one alternative
 """
 
 from __future__ import annotations

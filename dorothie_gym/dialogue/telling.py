@@ -23,7 +23,6 @@ from dorothie_gym.ontology import (
     LandmarkName,
     Slot,
     SlotValue,
-    StreetName,
     in_label_order,
 )
 
@@ -118,7 +117,8 @@ class Teller:
             assert isinstance(value, ActionValue)
             phrases = load_grammar().actions[value]
             keys = manners.get(value) or manners[_OTHERS]
-            spoken.append(next(phrases[form, key] for key in keys if (form, key) in phrases).say(self))
+            key = next(key for key in keys if ("do", key) in phrases or (form, key) in phrases)
+            spoken.append((phrases.get((form, key)) or phrases["do", key]).say(self))
         return _listed(spoken)
 
     def landmark(self) -> str:
@@ -197,6 +197,7 @@ _GAPS: Mapping[str, Callable[[Teller], str]] = MappingProxyType(
     {
         "do": lambda teller: teller.action("do"),
         "doing": lambda teller: teller.action("doing"),
+        "cmd": lambda teller: teller.action("cmd"),
         "landmark": Teller.landmark,
         "street": Teller.street,
         "object": lambda teller: teller.spoken(Slot.OBJECT, "say"),

@@ -33,7 +33,9 @@ _UP = re.compile(
     r"\b(speed(ing)? (it )?up|fast(er|ly)?|hurry|step on (it|the gas)|floor it|accelerat\w+|quick(er|ly)?|up to #number"
     r"|pick(ing)? (it )?up|hit the gas|give it some gas|move it)\b"
 )
-_DOWN = re.compile(r"\b(slow\w*|brak\w+|decelerat\w+|(too|so) fast|eas\w+ off|down to #number|drop it|easy|reduc\w+|lower)\b")
+_DOWN = re.compile(
+    r"\b(slow\w*|brak\w+|decelerat\w+|(too|so) fast|eas\w+ off|down to #number|drop it|easy|reduc\w+|lower)\b"
+)
 _LIGHTS = re.compile(r"\blights?\b|\bbeams?\b|\bheadlights?\b|\bheadlamps?\b|\blamps?\b")
 _ORDER = re.compile(r"\b(before|after)(?= that\b| it\b| (?:the )?#landmark| or | ,| \?|$)")
 _FURTHER = re.compile(r"\b(further|farther|a (bit|little|touch) more|keep going|some more|few more)\b")
@@ -43,11 +45,13 @@ _SPEED_UNITS = frozenset({"km", "kmh", "kilometers", "kilometres", "kph", "mph",
 _DISTANCE_UNITS = frozenset({"m", "meter", "meters", "metre", "metres", "feet", "yards"})
 _OPENING = frozenset({",", "oh", "well", "hmm", "um", "uh", "er", "ah", "hm", "like", "okay", "ok"})
 _DENIAL = re.compile(
-    r"(don't|do not|dont|never|not|instead of|rather than|without)( even| yet| be| try to| go| take| make| a| the| to| that)* $"
+    r"(don't|do not|dont|never|not|instead of|rather than|without)"
+    r"( even| yet| be| try to| go| take| make| a| the| to| that)* $"
 )
 # "the KFC, I mean the Ikea": the first name is taken back.
 _REPAIR = re.compile(
-    r"#(landmark|street) (?:, )?(?:uh |um |er )?(?:no wait|no no|no|i mean|i meant|wait no|sorry|sorry i meant|or rather)"
+    r"#(landmark|street) (?:, )?(?:uh |um |er )?"
+    r"(?:no wait|no no|no|i mean|i meant|wait no|sorry|sorry i meant|or rather)"
     r" (?:, )?(?:the |on |to |take |it's )*#\1\b"
 )
 
@@ -172,7 +176,11 @@ def _addressed(words: list[str], lists: WordLists) -> list[str]:
     marked = words[-1:] == ["?"]
     end = len(words) - marked
     for length in (1, 2):
-        if end > length + 1 and words[end - length - 1] == "," and " ".join(words[end - length : end]) in lists.vocatives:
+        if (
+            end > length + 1
+            and words[end - length - 1] == ","
+            and " ".join(words[end - length : end]) in lists.vocatives
+        ):
             return words[: end - length - 1] + words[end:]
         if len(words) > length + 1 and words[length] == "," and " ".join(words[:length]) in lists.vocatives:
             return words[length + 1 :]

@@ -28,12 +28,13 @@ from dorothie_gym.ontology import (
 
 M = DialogueMove
 HUMAN = {
-    M.INSTRUCT: 38, M.EXPLAIN: 12, M.IRRELEVANT: 6, M.ALIGN: 2, M.CHECK: 3, M.QUERY_YN: 5, M.QUERY_W: 5, M.ACKNOWLEDGE: 6,
-    M.CONFUSE: 2, M.CLARIFY: 3, M.CONFIRM: 4, M.REPLY_Y: 6, M.REPLY_N: 3, M.REPLY_U: 1.5, M.REPLY_W: 4.5,
+    M.INSTRUCT: 38, M.EXPLAIN: 12, M.IRRELEVANT: 6, M.ALIGN: 2, M.CHECK: 3, M.QUERY_YN: 5, M.QUERY_W: 5,
+    M.ACKNOWLEDGE: 6, M.CONFUSE: 2, M.CLARIFY: 3, M.CONFIRM: 4, M.REPLY_Y: 6, M.REPLY_N: 3, M.REPLY_U: 1.5, M.REPLY_W: 4.5,
 }  # fmt: skip
 CAR = {
     M.INSTRUCT: 0.5, M.EXPLAIN: 19, M.IRRELEVANT: 2, M.ALIGN: 1.5, M.CHECK: 6, M.QUERY_YN: 8, M.QUERY_W: 8,
-    M.ACKNOWLEDGE: 25, M.CONFUSE: 3, M.CLARIFY: 2, M.CONFIRM: 11, M.REPLY_Y: 6, M.REPLY_N: 3, M.REPLY_U: 1, M.REPLY_W: 3,
+    M.ACKNOWLEDGE: 25, M.CONFUSE: 3, M.CLARIFY: 2, M.CONFIRM: 11, M.REPLY_Y: 6, M.REPLY_N: 3, M.REPLY_U: 1,
+    M.REPLY_W: 3,
 }  # fmt: skip
 NEXT = {
     M.REPLY_Y: [M.INSTRUCT], M.REPLY_N: [M.INSTRUCT, M.EXPLAIN], M.EXPLAIN: [M.INSTRUCT, M.QUERY_YN, M.EXPLAIN],
@@ -45,10 +46,8 @@ ACTIONS = {
     ActionValue.U_TURN: 6, ActionValue.SPEED_CHANGE: 7, ActionValue.LIGHT_CHANGE: 3, ActionValue.START: 5,
 }  # fmt: skip
 # From the commonest on; the draw is skewed.
-OBJECTS = [
-    ObjectClass.STATIC, ObjectClass.PEDESTRIAN, ObjectClass.VEHICLES, ObjectClass.TRAFFIC_LIGHT, ObjectClass.TRAFFIC_SIGN,
-    *(value for value in ObjectClass if value not in (ObjectClass.STATIC, ObjectClass.PEDESTRIAN, ObjectClass.VEHICLES)),
-]  # fmt: skip
+COMMON = [ObjectClass.STATIC, ObjectClass.PEDESTRIAN, ObjectClass.VEHICLES, ObjectClass.TRAFFIC_LIGHT]
+OBJECTS = [*COMMON, *(value for value in ObjectClass if value not in COMMON)]
 TOPICS = ["fog", "rain", "night", "blocked", "wrong_way", "arrived", "plan", "refused", "no_gps"]
 
 
@@ -70,7 +69,7 @@ class Sampler:
     def act(self, move: DialogueMove, human: bool) -> tuple[DialogueAct, Wording]:
         rng = self.rng
         values: list[SlotValue] = []
-        bare = 0.12 if move is M.INSTRUCT else 0.6
+        bare = 0.12 if move is M.INSTRUCT else 0.62
         if move in (M.IRRELEVANT, M.ALIGN, M.CONFUSE) or rng.random() < bare:
             topic = {M.ACKNOWLEDGE: ["sorry", "align", None], M.EXPLAIN: [None, *TOPICS]}.get(move, [None])
             return DialogueAct.of(move), Wording(topic=self.one_of(topic) if rng.random() < 0.5 else None)
@@ -184,11 +183,11 @@ def perplexity(train: Sequence[Said], test: Sequence[Said]) -> float:
     from nltk.util import ngrams, pad_sequence
 
     class Remembering(KneserNeyInterpolated):
-        @functools.lru_cache(maxsize=None)  # noqa: B019
+        @functools.cache  # noqa: B019
         def score(self, word: str, context: tuple[str, ...] | None = None) -> float:
             return super().score(word, context)
 
-        @functools.lru_cache(maxsize=None)  # noqa: B019
+        @functools.cache  # noqa: B019
         def unmasked_score(self, word: str, context: tuple[str, ...] | None = None) -> float:
             return super().unmasked_score(word, context)
 
@@ -203,9 +202,7 @@ def perplexity(train: Sequence[Said], test: Sequence[Said]) -> float:
     found = [
         gram
         for sentence in held
-        for gram in ngrams(
-            pad_sequence(sentence, 3, True, True, left_pad_symbol="<s>", right_pad_symbol="</s>"), 3
-        )
+        for gram in ngrams(pad_sequence(sentence, 3, True, True, left_pad_symbol="<s>", right_pad_symbol="</s>"), 3)
     ]
     return float(model.perplexity(found))
 
