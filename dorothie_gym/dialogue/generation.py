@@ -7,6 +7,7 @@ speaker's style; what it leaves out is appended as an afterthought.
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -23,6 +24,7 @@ from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, Slot, SlotVal
 MAX_CHARACTERS = 160
 """Longest text [characters]."""
 
+_AN = re.compile(r"\ba(?= [aei]| o(?!ne\b|nce\b))")
 _PLAIN_WORDING = Wording()
 _NO_CONTEXT = WordingContext()
 
@@ -201,6 +203,7 @@ class _Sentence:
             manner = manners.get((kind, self._voice, move)) or manners.get(("opener", self._voice, move))
             if manner is not None and teller.random() < manner.rate * style.chattiness:
                 front = manner.phrase.say(teller)
+        teller.fronted = bool(front)
         if front:
             body = f"{front} {body}"
         closer = manners.get(("closer", self._voice, move))
@@ -216,6 +219,8 @@ class _Sentence:
         if " ," in text or " ?" in text:
             text = text.replace(" ,", ",").replace(",,", ",").replace(" ?", "?").replace(",?", "?")
         text = text.strip(", ")
+        if " a " in text:
+            text = _AN.sub("an", text)
         if not self._style.proper:
             return text
         joined_on = self._scene.joined is not None and text[0].islower() and self._teller.fronted

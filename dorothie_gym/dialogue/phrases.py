@@ -24,6 +24,8 @@ _TOKEN = re.compile(r"[()\[\]|]|<\w+>|{\w+}|[^()\[\]|<>{}]+|[<>{}]")
 WEIGHT = re.compile(r"\s\*(\d+)\s*$")
 """A weight at the end of an alternative."""
 _MARKS = "~^!%"
+_ENDS = ("|", ")", "]")
+_BRACKETS = (*_ENDS, "(", "[")
 _FAVOUR = 3
 """How much likelier than an unmarked alternative one is that carries a mark of the speaker's style."""
 
@@ -219,31 +221,33 @@ class _Reader:
         registers: set[Register] = set()
         indirect, weight = False, 1
         first = self._peek()
-        if first is not None and first not in "()[]|":
+        if first is not None and first not in _BRACKETS:
             marks = first.lstrip()
             bare = marks.lstrip(_MARKS)
             for mark in marks[: len(marks) - len(bare)]:
                 indirect |= mark == "%"
                 registers |= {_REGISTERS[mark]} if mark in _REGISTERS else set()
-            self._tokens[self._place] = bare or " "
+            self._tokens[self._place] = bare.lstrip()
         phrase, weight = self._weighted()
         return Alternative(phrase, frozenset(registers), indirect, weight)
 
     def _weighted(self) -> tuple[Phrase, int]:
         weight = 1
         depth, place = 0, self._place
-        while place < len(self._tokens) and not (depth == 0 and self._tokens[place] in "|)]"):
-            depth += (self._tokens[place] in "([") - (self._tokens[place] in ")]")
+        while place < len(self._tokens) and not (depth == 0 and self._tokens[place] in _ENDS):
+            depth += (self._tokens[place] in ("(", "[")) - (self._tokens[place] in (")", "]"))
             place += 1
         if place > self._place:
             found = WEIGHT.search(self._tokens[place - 1])
             if found is not None:
                 weight = int(found[1])
                 self._tokens[place - 1] = self._tokens[place - 1][: found.start()]
+            # Spaces around "|" are for the eye.
+            self._tokens[place - 1] = self._tokens[place - 1].rstrip()
         return self.sequence(), weight
 
     def _parts(self) -> Iterator[Phrase]:
-        while (token := self._peek()) is not None and token not in ("|", ")", "]"):
+        while (token := self._peek()) is not None and token not in _ENDS:
             self._place += 1
             if token in ("(", "["):
                 yield self._bracket(token)

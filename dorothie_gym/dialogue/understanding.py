@@ -39,6 +39,12 @@ _DOWN = re.compile(
 _LIGHTS = re.compile(r"\blights?\b|\bbeams?\b|\bheadlights?\b|\bheadlamps?\b|\blamps?\b")
 _ORDER = re.compile(r"\b(before|after)(?= that\b| it\b| (?:the )?#landmark| or | ,| \?|$)")
 _FURTHER = re.compile(r"\b(further|farther|a (bit|little|touch) more|keep going|some more|few more)\b")
+# The first four letters of words without which the expressions above need not be tried.
+_SPEED_STEMS = frozenset(
+    "spee fast hurr step floo acce quic up pick hit give move slow brak dece easi ease down drop easy redu lowe".split()
+)
+_LIGHT_STEMS = frozenset({"ligh", "beam", "head", "lamp"})
+_ORDER_WORDS = frozenset({"before", "after"})
 _PAST = frozenset({"past", "behind", "beyond"})
 _ARTICLES = frozenset({"the", "a", "an", "about", "of", "to"})
 _SPEED_UNITS = frozenset({"km", "kmh", "kilometers", "kilometres", "kph", "mph", "miles"})
@@ -138,9 +144,9 @@ def understand(text: str) -> Heard:
     speed, distance = _quantities(words) if numbered else (None, None)
     masked = _mask_numbers(words) if numbered else joined
     mentions = _repaired(mentions, words, joined)
-    acted, actions, denied = _actions(masked, words)
-    named = [mention.value for mention in mentions]
-    asked = _asked(masked, words)
+    stems = {word[:4] for word in words}
+    acted, actions, denied = _actions(masked, stems)
+    named = _each_once([*(mention.value for mention in mentions), *_asked(masked, words)])
     landmarks = [mention for mention in mentions if isinstance(mention.value, LandmarkName)]
     turns = find_turns(words, lists)
     return Heard(
@@ -151,15 +157,15 @@ def understand(text: str) -> Heard:
         ordinal=next((turn.ordinal for turn in turns if turn.ordinal is not None), find_ordinal(words, lists)),
         actions=actions,
         denied=denied,
-        landmarks=_unique(value for value in (*named, *asked) if isinstance(value, LandmarkName)),
-        streets=_unique(value for value in (*named, *asked) if isinstance(value, StreetName)),
-        objects=_unique(value for value in (*named, *asked) if isinstance(value, ObjectClass)),
-        statuses=_unique(value for value in (*named, *asked) if isinstance(value, GoalStatus)),
-        past=_behind(landmarks, words, _PAST),
-        dropped=_behind(landmarks, words, lists.dropping),
-        order=order[1] if (order := _ORDER.search(joined)) else None,
-        faster=_faster(masked),
-        lights=_lights(words, joined),
+        landmarks=tuple(value for value in named if isinstance(value, LandmarkName)),
+        streets=tuple(value for value in named if isinstance(value, StreetName)),
+        objects=tuple(value for value in named if isinstance(value, ObjectClass)),
+        statuses=tuple(value for value in named if isinstance(value, GoalStatus)),
+        past=_behind(landmarks, words, _PAST) if landmarks else (),
+        dropped=_behind(landmarks, words, lists.dropping) if landmarks else (),
+        order=order[1] if not _ORDER_WORDS.isdisjoint(words) and (order := _ORDER.search(joined)) else None,
+        faster=None if stems.isdisjoint(_SPEED_STEMS) else _faster(masked),
+        lights=None if stems.isdisjoint(_LIGHT_STEMS) else _lights(words, joined),
         speed=speed,
         distance=distance,
         here="here" in words,
@@ -235,11 +241,10 @@ def _number_run(words: Sequence[str], place: int) -> list[str]:
     return list(words[place : place + length])
 
 
-def _actions(masked: str, words: Sequence[str]) -> tuple[str, tuple[ActionValue, ...], tuple[ActionValue, ...]]:
+def _actions(masked: str, stems: set[str]) -> tuple[str, tuple[ActionValue, ...], tuple[ActionValue, ...]]:
     """Returns the words with actions masked, the actions, and those that are denied only."""
-    stems = {word[:4] for word in words}
     if "#number" in masked:
-        stems.add("#num")
+        stems = stems | {"#num"}
     found: list[ActionValue] = []
     denied: list[ActionValue] = []
     for action, cues in load_lexicon().actions.items():
@@ -317,6 +322,11 @@ def _affirms(words: Sequence[str], lists: WordLists) -> bool | None:
     if first in lists.denying:
         return False
     return True if first in lists.affirming or (words and words[0] in ("okay", "ok")) else None
+
+
+def _each_once(values: Sequence[SlotValue]) -> list[SlotValue]:
+    """Returns the values, each once, in the order in which they were said."""
+    return list(dict.fromkeys(values)) if values else []
 
 
 def _unique(values: Iterable[_Value]) -> tuple[_Value, ...]:
