@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dorothie_gym.dialogue.grammar import parse_grammar
+from dorothie_gym.dialogue.talk_files import read_talk_files
 from dorothie_gym.ontology import WeatherParameter
 from dorothie_gym.tasks import bind, load_template
 from dorothie_gym.world.town import describe, load_town
@@ -59,3 +61,15 @@ def test_the_world_page_tells_the_sight_that_the_weather_leaves() -> None:
     assert f"35 / {fog.sight(lights=False):.0f} m | the same" in text
     assert f"67 / {rain.sight(lights=False):.0f} m | the same" in text
     assert f"| night | {night.sight(lights=False):.0f} m | {night.sight(lights=True):.0f} m |" in text
+
+
+def test_the_talk_of_its_page_is_worded_misheard_and_read() -> None:
+    names: dict[str, object] = {}
+    exec(compile(example("talk.md", "python"), "talk.md", "exec"), names)  # noqa: S102 (our own page)
+    assert "left" in str(names["text"])
+    assert names["understood"]
+
+
+def test_the_phrases_of_the_talk_page_are_grammar() -> None:
+    text = example("talk.md", "text").replace("<soon>", "<soon_enough>")
+    assert parse_grammar({**read_talk_files(), "page.talk": text})

@@ -1,37 +1,54 @@
-"""Surface text: an act, its speaker and what else is known become a short spoken English sentence.
+"""Surface text: acts, their speaker and what else is known become a short spoken English utterance.
 
-The template of the grammar that says most of what is known is used, several equally good ones by chance; what it leaves
-out is appended as an afterthought.
+The template of the grammar that says most of what is known is used, several equally good ones by chance and by the
+speaker's style; what it leaves out is appended as an afterthought.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar
+import functools
+import re
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from dorothie_gym.dialogue.grammar import (
-    CONTEXT_FIELDS,
-    FIELD,
-    SLOT_FIELDS,
-    SPOKEN_SLOTS,
-    Manners,
-    Template,
-    load_grammar,
-)
-from dorothie_gym.dialogue.lexicon import LexiconError, load_lexicon
-from dorothie_gym.dialogue.numerals import cardinal, ordinal
-from dorothie_gym.dialogue.wording import Direction, Wording
-from dorothie_gym.ontology import ActionValue, DialogueAct, Role, Slot, SlotValue
+from dorothie_gym.dialogue.grammar import SPOKEN_SLOTS, Template, load_grammar
+from dorothie_gym.dialogue.phrases import Register, open_to
+from dorothie_gym.dialogue.styles import SpeakerStyle, default_style
+from dorothie_gym.dialogue.telling import Draw, Teller, draws_of
+from dorothie_gym.dialogue.utterances import Span
+from dorothie_gym.dialogue.wording import Wording, WordingContext
+from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, Slot, SlotValue
 
 MAX_CHARACTERS = 160
 """Longest text [characters]."""
 
-_Option = TypeVar("_Option")
+_AN = re.compile(r"\ba(?= [aei]| o(?!ne\b|nce\b))")
+_PLAIN_WORDING = Wording()
+_NO_CONTEXT = WordingContext()
+
+_TRIES = 8
+"""Bare sentences of which the shortest is taken where there is hardly room."""
+
+# Enum members are looked up once: each look-up through the class costs as much as a drawn number.
+_HUMAN, _CAR = Role.PARTICIPANT, Role.CO_WIZARD
+_HUMANS = (Role.PARTICIPANT, Role.AD_WIZARD)
+_IRRELEVANT = DialogueMove.IRRELEVANT
+
+_Templates = tuple[Template, ...]
+_ByManner = tuple[_Templates, ...]
 
 
-def word_act(act: DialogueAct, speaker: Role, rng: np.random.Generator, context: Wording | None = None) -> str:
+def word_act(
+    act: DialogueAct,
+    speaker: Role,
+    rng: np.random.Generator,
+    context: Wording | None = None,
+    *,
+    style: SpeakerStyle | None = None,
+    scene: WordingContext | None = None,
+) -> str:
     """Words one act.
 
     Every act gets a text. One that carries more than can be said in a breath is said in part: at most three names of a
@@ -42,186 +59,217 @@ def word_act(act: DialogueAct, speaker: Role, rng: np.random.Generator, context:
         speaker: who speaks; the Ad-Wizard speaks as the participant does, the car itself as the Co-Wizard.
         rng: chooses among equally good wordings.
         context: particulars that the slots do not carry.
+        style: how the speaker talks; without it, as the middle of all does.
+        scene: what has been said and what is in view.
 
     Returns:
         A text of 1 to `MAX_CHARACTERS` characters.
     """
-    voice = Role.PARTICIPANT if speaker in (Role.PARTICIPANT, Role.AD_WIZARD) else Role.CO_WIZARD
-    wording = Wording() if context is None else context
+    return _word(act, speaker, rng, context, style, scene, MAX_CHARACTERS)
+
+
+def word_acts(
+    acts: Sequence[DialogueAct],
+    speaker: Role,
+    rng: np.random.Generator,
+    contexts: Sequence[Wording | None] | None = None,
+    *,
+    style: SpeakerStyle | None = None,
+    scene: WordingContext | None = None,
+) -> tuple[Span, ...]:
+    """Words the acts of one utterance, each joined to the one before it ("Yes, and then left at the light").
+
+    Args:
+        acts: in order.
+        speaker: as for `word_act`.
+        rng: as for `word_act`.
+        contexts: particulars of each act, as many as there are acts.
+        style: as for `word_act`.
+        scene: as for `word_act`, for the first act; what an act mentions is known to the next.
+
+    Returns:
+        A span for each act; their texts joined by spaces have at most `MAX_CHARACTERS` characters.
+
+    Raises:
+        ValueError: if there are not as many contexts as acts.
+    """
+    wordings = list(contexts) if contexts is not None else [None] * len(acts)
+    if len(wordings) != len(acts):
+        raise ValueError(f"contexts: {len(wordings)} for {len(acts)} acts; give one for each, None for no particulars")
+    scene = _NO_CONTEXT if scene is None else scene
+    texts: list[str] = []
+    room = MAX_CHARACTERS
+    for number, (act, wording) in enumerate(zip(acts, wordings, strict=True)):
+        # Each of the acts to come is left its share of the room.
+        limit = room // (len(acts) - number) - 1
+        text = _word(act, speaker, rng, wording, style, scene, limit)
+        if texts:
+            texts[-1] = _linked(texts[-1], text)
+        texts.append(text)
+        room -= len(text) + 2
+        scene = replace(scene, joined=act.move)
+    return tuple(Span(text, act) for text, act in zip(texts, acts, strict=True))
+
+
+def _linked(before: str, text: str) -> str:
+    """Returns an act's words with the comma that leads over to the next act's, if it ends without a stop."""
+    goes_on = text[0].islower() and before[-1] == "."
+    stem = before[:-1] if goes_on else before
+    return stem if stem[-1] in "?.," else f"{stem},"
+
+
+def _word(
+    act: DialogueAct,
+    speaker: Role,
+    rng: np.random.Generator,
+    context: Wording | None,
+    style: SpeakerStyle | None,
+    scene: WordingContext | None,
+    limit: int,
+) -> str:
+    voice = _HUMAN if speaker in _HUMANS else _CAR
+    draw = draws_of(rng)
+    own = default_style(voice) if style is None else style
+    scene = _NO_CONTEXT if scene is None else scene
+    wording = _PLAIN_WORDING if context is None else context
     for names in (3, 1):
-        text = _Writer(act, voice, rng, wording, names).text()
-        if len(text) <= MAX_CHARACTERS:
+        text = _Sentence(act, voice, draw, wording, own, scene, names, limit).text()
+        if len(text) <= limit:
             return text
-    raise LexiconError(f"grammar.yaml: {act.move.label} gives a text longer than {MAX_CHARACTERS} characters: {text!r}")
+        own = replace(own, chattiness=0.0, disfluency=0.0, repairs=0.0, addressing=0.0)
+    # Not even the bare template fits: what a speaker says who has no time for particulars.
+    bare = DialogueAct(act.move)
+    own = replace(own, register=Register.BLUNT, indirectness=0.0, habit=0.0)
+    tries = (_Sentence(bare, voice, draw, _PLAIN_WORDING, own, scene, 1, limit).text() for _ in range(_TRIES))
+    shortest = min(tries, key=len)
+    return shortest if len(shortest) <= limit else shortest[:limit].rsplit(" ", 1)[0].rstrip(",")
 
 
-class _Writer:
+class _Sentence:
     """Writes one sentence."""
 
-    def __init__(self, act: DialogueAct, voice: Role, rng: np.random.Generator, wording: Wording, names: int) -> None:
-        self._lexicon = load_lexicon()
-        self._grammar = load_grammar()
+    def __init__(
+        self,
+        act: DialogueAct,
+        voice: Role,
+        draw: Draw,
+        wording: Wording,
+        style: SpeakerStyle,
+        scene: WordingContext,
+        names: int,
+        limit: int,
+    ) -> None:
         self._act = act
         self._voice = voice
-        self._rng = rng
         self._wording = wording
-        self._names = names
-        self._values = {slot: act.values(slot) for slot in SPOKEN_SLOTS if act.values(slot)}
-        self._context = self._particulars()
+        self._style = style
+        self._scene = scene
+        self._limit = limit
+        self._teller = Teller(act, draw, wording, style, scene, names)
 
     def text(self) -> str:
-        template = self._choose()
-        body, close = _split_close(self._fill(template))
-        manners = self._grammar.manners.get((self._voice, self._act.move))
-        # A bare answer or a set phrase stands as it is: manners go with what has content.
-        if manners is not None and template.covers and template.topic is None:
-            body = self._mannered(body, manners)
-        for slot in SPOKEN_SLOTS:
-            if slot in self._values and slot not in template.covers:
+        teller, act = self._teller, self._act
+        particulars = self._wording.known
+        options = fitting_templates(act.move, act.slots, self._voice, self._wording.topic, particulars)
+        template = teller.pick(options[teller.manner])
+        teller.settle("dropped" in template.needs)
+        body = template.body.phrase.say(teller)
+        body = self._mannered(body, template)
+        close = template.close.say(teller)
+        missing = teller.values.keys() - template.covers if act.move is not _IRRELEVANT else ()
+        for slot in SPOKEN_SLOTS if missing else ():
+            if slot in missing:
                 tail = self._tail(slot)
-                if len(body) + len(tail) + len(close) < MAX_CHARACTERS:
-                    body += tail
-        return self._punctuate(body + close)
-
-    def _choose(self) -> Template:
-        fitting = [template for template in self._grammar.templates[self._act.move] if self._fits(template)]
-        best = max(map(self._merit, fitting))
-        return self._pick([template for template in fitting if self._merit(template) == best])
-
-    def _fits(self, template: Template) -> bool:
-        return (
-            template.speaker in (None, self._voice)
-            and template.topic in (None, self._wording.topic)
-            and template.covers <= self._values.keys()
-            and template.needs <= self._context.keys()
-            and all({value.label for value in self._values[slot]} <= labels for slot, labels in template.when.items())
-        )
-
-    def _merit(self, template: Template) -> tuple[bool, int, int, int]:
-        return template.topic is not None, len(template.covers), len(template.needs), len(template.when)
-
-    def _fill(self, template: Template) -> str:
-        without = self._wording.dropped if "dropped" in template.needs else None
-        return FIELD.sub(lambda gap: self._phrase(gap[1], without), template.text)
-
-    def _phrase(self, name: str, without: SlotValue | None = None) -> str:
-        """Returns the words for a gap; `without` is a landmark that has been named already."""
-        if name in CONTEXT_FIELDS:
-            return self._context[name]
-        values = self._values[SLOT_FIELDS[name]]
-        if name in ("do", "doing"):
-            # Two things to do are as many as one sentence can bear.
-            return self._join([self._action(value, name) for value in values[: min(2, self._names)]])
-        if name == "is":
-            return "are" if len(self._values.get(Slot.LANDMARK, ())[: self._names]) > 1 else "is"
-        if name == "landmark":
-            values = tuple(value for value in values if value is not without) or values
-        form = {"the_object": "the", "order": "order", "tail": "tail"}.get(name, "say")
-        return self._join([self._pick(self._lexicon.forms(value, form)) for value in values[: self._names]])
-
-    def _action(self, value: SlotValue, form: str) -> str:
-        assert isinstance(value, ActionValue)
-        manners = self._lexicon.actions[value].manners
-        manner = next(manner for manner in self._manner_keys(value) if manner in manners)
-        return FIELD.sub(lambda gap: self._action_field(gap[1]), self._pick(manners[manner][form]))
-
-    def _action_field(self, name: str) -> str:
-        return str(self._wording.direction) if name == "direction" else self._context[name]
-
-    def _manner_keys(self, value: ActionValue) -> list[str]:
-        """Returns the manners that the wording allows for `value`, the most telling first."""
-        base = _base(value, self._wording)
-        details = [
-            detail
-            for detail, known in (
-                ("nth", "nth" in self._context),
-                ("past", "past" in self._context),
-                ("here", self._wording.here),
-                ("in", "distance" in self._context),
-                ("to", "speed" in self._context),
-            )
-            if known
-        ]
-        if base is None:
-            return [*details, "plain"]
-        return [*(f"{base}_{detail}" for detail in details), base, *details, "plain"]
-
-    def _particulars(self) -> dict[str, str]:
-        """Returns the words for what the wording knows, by field."""
-        wording = self._wording
-        found: dict[str, str] = {}
-        if wording.direction in (Direction.LEFT, Direction.RIGHT):
-            found["side"] = str(wording.direction)
-        if wording.ordinal is not None:
-            found["nth"] = "next" if wording.ordinal == 1 else ordinal(wording.ordinal)
-        if wording.speed is not None:
-            found["speed"] = cardinal(round(wording.speed))
-        if wording.distance is not None:
-            found["distance"] = f"{cardinal(max(10, 10 * round(wording.distance / 10)))} meters"
-        for name, landmark in (("past", wording.past), ("dropped", wording.dropped)):
-            if landmark is not None:
-                found[name] = self._pick(self._lexicon.forms(landmark, "say"))
-        return found
+                if len(body) + len(tail) + len(close) < self._limit:
+                    body = f"{body} {tail}"
+        return self._finished(body, close)
 
     def _tail(self, slot: Slot) -> str:
-        tails = self._grammar.tails[slot]
-        text = self._pick(tails.get(self._act.move) or tails[None])
-        return FIELD.sub(lambda gap: self._phrase(gap[1]), text)
+        tails = load_grammar().tails[slot]
+        return (tails.get(self._act.move) or tails[None]).say(self._teller)
 
-    def _mannered(self, body: str, manners: Manners) -> str:
-        if manners.openers and self._rng.random() < manners.opened:
-            body = f"{self._pick(manners.openers)} {body}"
-        if manners.closers and self._rng.random() < manners.closed:
-            body = f"{body}{self._pick(manners.closers)}"
+    def _mannered(self, body: str, template: Template) -> str:
+        """Returns the body with words around it and with slips."""
+        teller, style, scene = self._teller, self._style, self._scene
+        manners, move = load_grammar().manners, self._act.move
+        if style.disfluency and teller.random() < style.disfluency:
+            body = _hesitating(body, teller)
+        front = None
+        if scene.joined is not None:
+            joint = load_grammar().joints.get((scene.joined, move))
+            front = joint.say(teller) if joint is not None else None
+        else:
+            kind = "alarm" if scene.exception else "opener"
+            manner = manners.get((kind, self._voice, move)) or manners.get(("opener", self._voice, move))
+            if manner is not None and teller.random() < manner.rate * style.chattiness:
+                front = manner.phrase.say(teller)
+        teller.fronted = bool(front)
+        if front:
+            body = f"{front} {body}"
+        closer = manners.get(("closer", self._voice, move))
+        # A set phrase stands as it is; what asks or has content may be rounded off.
+        if closer is not None and template.covers and teller.random() < closer.rate * style.chattiness:
+            body = f"{body} {closer.phrase.say(teller)}"
+        if style.address and teller.random() < style.addressing:
+            body = f"{body}, {style.address}"
         return body
 
-    def _punctuate(self, sentence: str) -> str:
-        # Typed transcripts of people are half in lower case without a stop; what the car says is set properly.
-        if self._voice is Role.PARTICIPANT and self._rng.random() < 0.5:
-            return sentence
-        return sentence[0].upper() + sentence[1:] + ("" if sentence.endswith("?") else ".")
-
-    def _join(self, phrases: Sequence[str]) -> str:
-        unique = list(dict.fromkeys(phrases))
-        if len(unique) == 1:
-            return unique[0]
-        return ", ".join(unique[:-1]) + " and " + unique[-1]
-
-    def _pick(self, options: Sequence[_Option]) -> _Option:
-        return options[int(self._rng.integers(len(options)))]
+    def _finished(self, body: str, close: str) -> str:
+        text = " ".join(f"{body}{close}".split())
+        if " ," in text or " ?" in text:
+            text = text.replace(" ,", ",").replace(",,", ",").replace(" ?", "?").replace(",?", "?")
+        text = text.strip(", ")
+        if " a " in text:
+            text = _AN.sub("an", text)
+        if not self._style.proper:
+            return text
+        joined_on = self._scene.joined is not None and text[0].islower() and self._teller.fronted
+        start = text if joined_on else text[0].upper() + text[1:]
+        return start if text[-1] in "?." else start + "."
 
 
-def _split_close(sentence: str) -> tuple[str, str]:
-    """Returns what comes before and behind the place for afterthoughts: a "|", else the end but for a question mark."""
-    if "|" in sentence:
-        body, _, close = sentence.partition("|")
-        return body, close
-    return (sentence[:-1], "?") if sentence.endswith("?") else (sentence, "")
+def _hesitating(body: str, teller: Teller) -> str:
+    """Returns the sentence with a filled pause, or begun twice."""
+    words = body.split()
+    filler = load_grammar().fillers.say(teller)
+    if len(words) < 3:
+        return f"{filler}, {body}"
+    place = 1 + int(teller.random() * (len(words) - 2))
+    if place <= 2 and teller.random() < 0.5:
+        return " ".join([*words[:place], filler + ",", *words])
+    return " ".join([*words[:place], filler + ",", *words[place:]])
 
 
-def _side(wording: Wording) -> str | None:
-    return "side" if wording.direction in (Direction.LEFT, Direction.RIGHT) else None
+@functools.lru_cache(maxsize=8192)
+def fitting_templates(
+    move: DialogueMove, slots: frozenset[SlotValue], voice: Role, topic: str | None, particulars: frozenset[str]
+) -> _ByManner:
+    """Returns the templates that say most of an act, for each manner (see `phrases.manner_of`), by weight.
+
+    Args:
+        move: of the act.
+        slots: of the act.
+        voice: the participant or the Co-Wizard.
+        topic: of the wording.
+        particulars: names of what the wording knows.
+    """
+    labels: dict[Slot, set[str]] = {}
+    for value in slots:
+        labels.setdefault(value.slot, set()).add(value.label)
+    fitting = [
+        template
+        for template in load_grammar().templates[move]
+        if template.speaker in (None, voice)
+        and template.topic in (None, topic)
+        and template.covers <= labels.keys()
+        and template.needs <= particulars
+        and all(labels[slot] <= wanted for slot, wanted in template.when.items())
+    ]
+    best = max(map(_merit, fitting))
+    chosen = [template for template in fitting if _merit(template) == best]
+    bodies = [template.body for template in chosen]
+    return tuple(tuple(chosen[place] for place in open_to(bodies, manner)) for manner in range(2 * len(Register)))
 
 
-def _turn(wording: Wording) -> str | None:
-    return _side(wording) or (str(wording.direction) if wording.direction is not None else None)
-
-
-def _speed(wording: Wording) -> str | None:
-    return None if wording.faster is None else "up" if wording.faster else "down"
-
-
-def _lights(wording: Wording) -> str | None:
-    return None if wording.lights is None else "on" if wording.lights else "off"
-
-
-_BASES: Mapping[ActionValue, Callable[[Wording], str | None]] = {
-    ActionValue.J_TURN: _turn,
-    ActionValue.LANE_SWITCH: _side,
-    ActionValue.SPEED_CHANGE: _speed,
-    ActionValue.LIGHT_CHANGE: _lights,
-}
-
-
-def _base(value: ActionValue, wording: Wording) -> str | None:
-    return _BASES[value](wording) if value in _BASES else None
+def _merit(template: Template) -> tuple[bool, int, int, int]:
+    return template.topic is not None, len(template.covers), len(template.needs), len(template.when)

@@ -1,30 +1,39 @@
-"""The grammar behind the words: templates, afterthoughts and manners, read from data/grammar.yaml."""
+"""The grammar behind the words: templates, spoken actions, afterthoughts and manners, from the files of data/talk."""
 
 from __future__ import annotations
 
 import functools
-import re
+from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
-from dorothie_gym.dialogue.lexicon import LexiconError, read_data, strings
+from dorothie_gym.dialogue.lexicon import LexiconError
+from dorothie_gym.dialogue.phrases import (
+    WEIGHT,
+    Alternative,
+    Phrase,
+    choice,
+    parse_alternatives,
+    parse_phrase,
+    split_alternatives,
+)
+from dorothie_gym.dialogue.talk_files import Section, alternatives_of, parse_talk_files, read_talk_files
 from dorothie_gym.ontology import (
     SLOT_VALUES,
+    ActionValue,
     DialogueMove,
     OntologyError,
     Role,
     Slot,
+    SlotValue,
     parse_move,
     parse_role,
     parse_slot,
 )
 
-FIELD = re.compile(r"{(\w+)}")
-"""A gap in a template."""
-
 SLOT_FIELDS: Mapping[str, Slot] = {
     "do": Slot.ACTION,
+    "cmd": Slot.ACTION,
     "doing": Slot.ACTION,
     "landmark": Slot.LANDMARK,
     "street": Slot.STREET,
@@ -47,6 +56,9 @@ VOICES = (Role.PARTICIPANT, Role.CO_WIZARD)
 """The roles with words of their own."""
 
 _NAMELESS = frozenset({"Unknown", "Unlabeled", "Queried"})
+_ACTIONS = {value.label: value for value in ActionValue}
+MANNERS = ("opener", "closer", "alarm")
+"""Kinds of words around a sentence: in front, behind, and in front where something unexpected has happened."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +66,8 @@ class Template:
     """A sentence with gaps.
 
     Attributes:
-        text: the words, gaps in braces.
+        body: the words, as an alternative among others.
+        close: words behind the place for afterthoughts, for instance "?".
         speaker: whose words they are; None for anybody's.
         when: for each slot, the labels its values must be among; the template then stands for the slot.
         topic: the topic it belongs to, or None.
@@ -62,7 +75,8 @@ class Template:
         needs: the particulars (fields of the wording) that it says.
     """
 
-    text: str
+    body: Alternative
+    close: Phrase
     speaker: Role | None
     when: Mapping[Slot, frozenset[str]]
     topic: str | None
@@ -71,18 +85,16 @@ class Template:
 
 
 @dataclass(frozen=True)
-class Manners:
-    """Words around the sentence, by (speaker, move).
+class Manner:
+    """Words around sentences.
 
     Attributes:
-        openers: may be put in front, with a share of sentences that have one.
-        closers: may be put behind, likewise.
+        phrase: the words.
+        rate: how often they are said by somebody of chattiness 1.
     """
 
-    openers: tuple[str, ...]
-    closers: tuple[str, ...]
-    opened: float
-    closed: float
+    phrase: Phrase
+    rate: float
 
 
 @dataclass(frozen=True)
@@ -91,13 +103,19 @@ class Grammar:
 
     Attributes:
         templates: for each move.
+        actions: for each action, by (form, manner): form is "do", "doing" or, for some, "cmd".
         tails: for each slot, afterthoughts by move; under None those of the other moves.
-        manners: openers and closers by speaker and move.
+        manners: openers, closers and alarms by (kind, speaker, move).
+        joints: what links an act to the one before it in the same breath, by (move before, move).
+        fillers: what is said while one looks for words.
     """
 
     templates: Mapping[DialogueMove, tuple[Template, ...]]
-    tails: Mapping[Slot, Mapping[DialogueMove | None, tuple[str, ...]]]
-    manners: Mapping[tuple[Role, DialogueMove], Manners]
+    actions: Mapping[ActionValue, Mapping[tuple[str, str], Phrase]]
+    tails: Mapping[Slot, Mapping[DialogueMove | None, Phrase]]
+    manners: Mapping[tuple[str, Role, DialogueMove], Manner]
+    joints: Mapping[tuple[DialogueMove, DialogueMove], Phrase]
+    fillers: Phrase
 
 
 @functools.cache
@@ -105,90 +123,130 @@ def load_grammar() -> Grammar:
     """Returns the package's grammar, read once.
 
     Raises:
-        LexiconError: if it names what does not exist, or leaves a move of a speaker without words.
+        LexiconError: if it names what does not exist, or leaves a move of a speaker or an action without words.
     """
-    return parse_grammar(read_data("grammar.yaml"))
+    return parse_grammar(read_talk_files())
 
 
-def parse_grammar(data: Mapping[str, Any]) -> Grammar:
-    """Returns the grammar in the data of a grammar file.
+def parse_grammar(texts: dict[str, str]) -> Grammar:
+    """Returns the grammar in the texts of talk files, by name.
 
     Raises:
         LexiconError: as `load_grammar`.
     """
-    templates: dict[DialogueMove, tuple[Template, ...]] = {}
-    for move in DialogueMove:
-        rules = data.get("moves", {}).get(move.label, [])
-        listed = [template for number, rule in enumerate(rules) for template in _rule(f"{move.label}[{number}]", rule)]
-        for voice in VOICES:
-            # The template of last resort: no slot, no topic, no particulars. With it every act has words.
-            if not any(_is_plain(template) and template.speaker in (None, voice) for template in listed):
-                raise LexiconError(f"grammar.yaml: {move.label} has no template without slots for {voice.value}")
-        templates[move] = tuple(listed)
-    return Grammar(templates, _tails(data.get("tails", {})), _manners(data.get("manners", [])))
+    builder = _Builder(texts)
+    return builder.build()
+
+
+@dataclass
+class _Builder:
+    """Sorts sections by their heads."""
+
+    texts: dict[str, str]
+    phrases: dict[str, Phrase] = field(default_factory=dict)
+    templates: dict[DialogueMove, list[Template]] = field(default_factory=lambda: defaultdict(list))
+    actions: dict[ActionValue, dict[tuple[str, str], Phrase]] = field(default_factory=lambda: defaultdict(dict))
+    tails: dict[Slot, dict[DialogueMove | None, Phrase]] = field(default_factory=lambda: defaultdict(dict))
+    manners: dict[tuple[str, Role, DialogueMove], Manner] = field(default_factory=dict)
+    joints: dict[tuple[DialogueMove, DialogueMove], Phrase] = field(default_factory=dict)
+    fillers: Phrase = Phrase("uh", frozenset(), frozenset())
+
+    def build(self) -> Grammar:
+        files = parse_talk_files(self.texts)
+        self.phrases = files.phrases
+        for section in files.sections:
+            try:
+                self._take(section)
+            except (OntologyError, ValueError) as error:
+                raise error if isinstance(error, LexiconError) else LexiconError(f"{section.where}: {error}") from error
+        self._check()
+        templates = {move: tuple(self.templates[move]) for move in DialogueMove}
+        return Grammar(templates, dict(self.actions), dict(self.tails), self.manners, self.joints, self.fillers)
+
+    def _take(self, section: Section) -> None:
+        kind, *words = section.words
+        if kind in ("do", "doing", "cmd"):
+            action = _ACTIONS.get(words[0] if words else "")
+            if action is None:
+                head = " ".join(section.words)
+                raise LexiconError(f"{section.where}: `{head}` names no action; they are {sorted(_ACTIONS)}")
+            self.actions[action][kind, words[1] if len(words) > 1 else "plain"] = self._phrase(section)
+        elif kind == "tail":
+            slot, move = parse_slot(words[0]), parse_move(words[1]) if len(words) > 1 else None
+            self.tails[slot][move] = self._phrase(section)
+        elif kind in MANNERS:
+            manner = Manner(self._phrase(section), float(section.keys.get("rate", 1)))
+            for word in words[1:] or [move.label for move in DialogueMove]:
+                self.manners[kind, parse_role(words[0]), parse_move(word)] = manner
+        elif kind == "filler":
+            self.fillers = self._phrase(section)
+        elif kind == "join":
+            for before in words[0].split(","):
+                for after in words[1].split(","):
+                    self.joints[parse_move(before), parse_move(after)] = self._phrase(section)
+        else:
+            self._take_templates(section, parse_move(kind), words)
+
+    def _phrase(self, section: Section) -> Phrase:
+        return choice(" ".join(section.words), alternatives_of(section, self.phrases))
+
+    def _take_templates(self, section: Section, move: DialogueMove, words: list[str]) -> None:
+        keys = dict(section.keys)
+        topic = keys.pop("topic", None)
+        speaker = parse_role(words[0]) if words else None
+        when = {parse_slot(name): _labels(section.where, parse_slot(name), listed) for name, listed in keys.items()}
+        for line in section.lines:
+            for text in split_alternatives(line.text):
+                body, close = _parted(text)
+                ending = parse_phrase(line.where, close, self.phrases)
+                (said,) = parse_alternatives(line.where, body, self.phrases)
+                covers, needs = _fields(line.where, said.phrase)
+                self.templates[move].append(Template(said, ending, speaker, when, topic, covers | when.keys(), needs))
+
+    def _check(self) -> None:
+        for move in DialogueMove:
+            for voice in VOICES:
+                # The template of last resort: no slot, no topic, no particulars. With it every act has words.
+                if not any(_is_plain(item) and item.speaker in (None, voice) for item in self.templates[move]):
+                    raise LexiconError(f"data/talk: {move.label} has no template without slots for {voice.value}")
+        for action in ActionValue:
+            for form in ("do", "doing"):
+                if (form, "plain") not in self.actions[action]:
+                    raise LexiconError(f"data/talk: there is no section `== {form} {action.label}`")
+        for slot in SPOKEN_SLOTS:
+            if None not in self.tails[slot]:
+                raise LexiconError(f"data/talk: there is no section `== tail {slot.label}`")
+
+
+def _parted(text: str) -> tuple[str, str]:
+    """Returns a template's words before and behind the place for afterthoughts; the weight goes with the former."""
+    weight = WEIGHT.search(text)
+    words = text[: weight.start()] if weight else text.rstrip()
+    body, slash, close = words.partition("/")
+    if not slash and words.endswith("?"):
+        body, close = words[:-1], "?"
+    return body + (weight[0] if weight else ""), close
 
 
 def _is_plain(template: Template) -> bool:
     return not template.covers and not template.needs and template.topic is None
 
 
-def _rule(where: str, rule: Any) -> list[Template]:
-    where = f"grammar.yaml: {where}"
-    if not isinstance(rule, dict) or not {"say"} <= rule.keys() <= {"say", "who", "when", "topic"}:
-        raise LexiconError(f"{where}: needs `say` and may have who, when, topic; got {rule!r}")
-    when = {_slot(where, name): _labels(where, name, wanted) for name, wanted in rule.get("when", {}).items()}
-    speaker = parse_role(rule["who"]) if "who" in rule else None
-    return [_template(where, text, speaker, when, rule.get("topic")) for text in strings(where, rule["say"])]
-
-
-def _template(
-    where: str, text: str, speaker: Role | None, when: Mapping[Slot, frozenset[str]], topic: str | None
-) -> Template:
-    fields = set(FIELD.findall(text))
-    needs = fields & CONTEXT_FIELDS
-    unknown = fields - needs - SLOT_FIELDS.keys()
+def _fields(where: str, phrase: Phrase) -> tuple[frozenset[Slot], frozenset[str]]:
+    needs = phrase.maybe & CONTEXT_FIELDS
+    unknown = phrase.maybe - needs - SLOT_FIELDS.keys()
     if unknown:
-        raise LexiconError(f"{where}: {text!r} has unknown gaps {sorted(unknown)}")
-    covers = frozenset(SLOT_FIELDS[name] for name in fields - needs) | when.keys()
-    return Template(text, speaker, when, topic, covers, frozenset(needs))
+        raise LexiconError(f"{where}: unknown gaps {sorted(unknown)}")
+    covers = frozenset(SLOT_FIELDS[name] for name in phrase.gaps - needs)
+    if covers != frozenset(SLOT_FIELDS[name] for name in phrase.maybe - needs):
+        raise LexiconError(f"{where}: a slot is filled in some alternatives only; write them as lines of their own")
+    return covers, needs
 
 
-def _slot(where: str, name: str) -> Slot:
-    try:
-        return parse_slot(name)
-    except OntologyError as error:
-        raise LexiconError(f"{where}: {error}") from error
-
-
-def _labels(where: str, slot: str, wanted: object) -> frozenset[str]:
-    known = {value.label for value in SLOT_VALUES[_slot(where, slot)]}
-    if wanted == "named":
-        return frozenset(known - _NAMELESS)
-    labels = {wanted} if isinstance(wanted, str) else set(strings(where, wanted))
+def _labels(where: str, slot: Slot, wanted: str) -> frozenset[str]:
+    values: tuple[SlotValue, ...] = SLOT_VALUES[slot]
+    known = {value.label for value in values}
+    labels = frozenset(known - _NAMELESS if wanted == "named" else wanted.split(","))
     if not labels <= known:
-        raise LexiconError(f"{where}: {slot} has no values {sorted(labels - known)}")
-    return frozenset(labels)
-
-
-def _tails(data: Mapping[str, Any]) -> dict[Slot, dict[DialogueMove | None, tuple[str, ...]]]:
-    tails: dict[Slot, dict[DialogueMove | None, tuple[str, ...]]] = {}
-    for slot in SPOKEN_SLOTS:
-        where = f"grammar.yaml: tails.{slot.label}"
-        tails[slot] = {
-            None if key == "other" else parse_move(key): strings(f"{where}.{key}", listed)
-            for key, listed in data.get(slot.label, {}).items()
-        }
-        if None not in tails[slot]:
-            raise LexiconError(f"{where}.other is missing")
-    return tails
-
-
-def _manners(data: Any) -> dict[tuple[Role, DialogueMove], Manners]:
-    manners: dict[tuple[Role, DialogueMove], Manners] = {}
-    for number, rule in enumerate(data):
-        where = f"grammar.yaml: manners[{number}]"
-        openers, closers = strings(where, rule.get("openers", [])), strings(where, rule.get("closers", []))
-        manner = Manners(openers, closers, float(rule.get("opened", 0)), float(rule.get("closed", 0)))
-        for move in strings(where, rule.get("moves")):
-            manners[parse_role(rule["who"]), parse_move(move)] = manner
-    return manners
+        raise LexiconError(f"{where}: {slot.label} has no values {sorted(labels - known)}")
+    return labels

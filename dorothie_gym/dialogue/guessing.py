@@ -6,29 +6,92 @@ import functools
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
+from dorothie_gym.dialogue.directions import word_lists
 from dorothie_gym.dialogue.lexicon import LexiconError, read_data, strings
 from dorothie_gym.dialogue.understanding import Heard, understand
 from dorothie_gym.dialogue.utterances import Span
-from dorothie_gym.ontology import DialogueAct, DialogueMove, OntologyError, parse_move
+from dorothie_gym.ontology import (
+    ActionValue,
+    DialogueAct,
+    DialogueMove,
+    GoalStatus,
+    OntologyError,
+    SlotValue,
+    parse_move,
+)
 
 _SENTENCE_END = re.compile(r"(?<=[.?!])\s+")
+_DOMAIN_RULE = "%domain"
 
 _HEADS = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.EXPLAIN})
 """Moves behind which a command stands on its own: "no, stop"; "I can hardly see, slow down"."""
 
+_QUESTIONS = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W})
+_BEFORE_QUESTIONS = frozenset(
+    {DialogueMove.EXPLAIN, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.REPLY_N}
+)
+_BEFORE_REASONS = frozenset(
+    {
+        DialogueMove.ACKNOWLEDGE,
+        DialogueMove.CONFIRM,
+        DialogueMove.REPLY_Y,
+        DialogueMove.REPLY_N,
+        DialogueMove.REPLY_U,
+        DialogueMove.CONFUSE,
+    }
+)
+_MOST_CLAUSES = 6
+"""Commas that are looked at for another act."""
+
+_BARE_NAME = re.compile(r"(and |but |or )?(the )?#\w+( on #street)?(later|#status)?$|#status$")
+_GOING_ON = re.compile(r"(and |after that|afterwards|next|then)", re.IGNORECASE)
+_ASKS_ANEW = re.compile(r"(so|but|and|now|okay|should|shall|do|does|can|is|are|what|which|where|how|why|when)\b")
+_STATEMENT = re.compile(
+    r"(well|actually|because|also|but|so|now i see it)\b(?! (am|do|is|are|can)\b)"
+    r"|(there's|there is|there are|i can't|i cannot|i have to|we can't|we have to|the (road|way)|my (gps|map))\b"
+)
+"""The beginning of a statement of its own; others behind "okay," or "yes," only say what is okay."""
+
+_MOVING = frozenset({ActionValue.STOP, ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_SWITCH})
+"""Actions whose denial is a command to drive on: "don't stop here"."""
+
 
 @dataclass(frozen=True)
-class Cues:
+class Rule:
     """Expressions that betray a move.
 
     Attributes:
-        moves: pairs of an expression over masked words and its move; the first that is found decides.
-        answers: for the move before, what the guess becomes in its light.
+        move: the move.
+        masked: found in masked words.
+        acted: found in words with actions masked, too.
+        domain: whether any word of rides betrays it.
+        words: words of which one must be there for the rest to be tried; empty for no such condition.
     """
 
-    moves: tuple[tuple[re.Pattern[str], DialogueMove], ...]
+    move: DialogueMove
+    masked: re.Pattern[str] | None
+    acted: re.Pattern[str] | None
+    domain: bool
+    words: frozenset[str]
+
+
+@dataclass(frozen=True)
+class Cues:
+    """What betrays moves.
+
+    Attributes:
+        rules: in order; the first that is found decides.
+        answers: for the move before, what the guess becomes in its light.
+        domain: words of rides.
+        small_talk: words of other things.
+    """
+
+    rules: tuple[Rule, ...]
     answers: Mapping[DialogueMove, Mapping[DialogueMove, DialogueMove]]
+    domain: frozenset[str]
+    small_talk: frozenset[str]
 
 
 def guess_act(text: str, after: DialogueMove | None = None) -> DialogueAct:
@@ -46,19 +109,56 @@ def guess_act(text: str, after: DialogueMove | None = None) -> DialogueAct:
 
 def act_of(heard: Heard, after: DialogueMove | None = None) -> DialogueAct:
     """Returns the act that fits what was heard; see `guess_act`."""
-    cues = _cues()
-    sentence = heard.masked.strip(" ,")
-    move = next((move for pattern, move in cues.moves if pattern.search(sentence)), None)
-    if move is None:
-        # No cue at all: a bare command ("lights on") if something is to be done, else nothing we understand.
-        move = DialogueMove.INSTRUCT if heard.actions else DialogueMove.IRRELEVANT
+    move = _move_of(heard)
     if after is not None:
-        move = cues.answers.get(after, {}).get(move, move)
-    return DialogueAct(move, frozenset() if move is DialogueMove.IRRELEVANT else heard.values)
+        changes = _cues().answers.get(after)
+        # Small talk stays small talk, unless it is a bare answer: "the blue one".
+        if changes is not None and (move is not DialogueMove.IRRELEVANT or not _is_small_talk(heard)):
+            move = changes.get(move, move)
+    return DialogueAct(move, _slots(heard, move))
+
+
+def _move_of(heard: Heard) -> DialogueMove:
+    sentence, acted = heard.masked.strip(" ,"), heard.acted.strip(" ,")
+    if _is_small_talk(heard):
+        return DialogueMove.IRRELEVANT
+    words = set(sentence.split())
+    for rule in _cues().rules:
+        if rule.words and words.isdisjoint(rule.words):
+            continue
+        if rule.masked is not None and rule.masked.search(sentence):
+            return rule.move
+        if rule.acted is not None and rule.acted.search(acted):
+            return rule.move
+        if rule.domain and not words.isdisjoint(_cues().domain):
+            return rule.move
+    # No cue at all: a bare command ("lights on") if something is to be done, else nothing we understand.
+    return DialogueMove.INSTRUCT if heard.actions else DialogueMove.IRRELEVANT
+
+
+def _is_small_talk(heard: Heard) -> bool:
+    """Returns whether there is a word of small talk, and nothing that has to do with the ride."""
+    if heard.actions or heard.streets or heard.statuses or heard.objects:
+        return False
+    return not _cues().small_talk.isdisjoint(heard.masked.split()) and not heard.landmarks
+
+
+def _slots(heard: Heard, move: DialogueMove) -> frozenset[SlotValue]:
+    if move is DialogueMove.IRRELEVANT:
+        return frozenset()
+    values = set(heard.values)
+    if heard.denied and move is DialogueMove.INSTRUCT:
+        values -= set(heard.denied)
+        if not any(isinstance(value, ActionValue) for value in values) and not _MOVING.isdisjoint(heard.denied):
+            values.add(ActionValue.LANE_FOLLOW)
+    # Something is given up for something else.
+    if GoalStatus.ABANDONED in values and len(heard.landmarks) > 1:
+        values.add(GoalStatus.ONGOING)
+    return frozenset(values)
 
 
 def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...]:
-    """Parts free English into acts: at the ends of sentences, and where a command follows an answer or a reason.
+    """Parts free English into acts: at the ends of sentences, and where another act begins behind a comma.
 
     Args:
         text: free English; blank text gives no span.
@@ -74,26 +174,60 @@ def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...
 
 
 def _pieces(sentence: str) -> list[str]:
-    head, comma, rest = sentence.partition(",")
-    command = guess_act(rest).move is DialogueMove.INSTRUCT and understand(rest).affirms is not False
-    if comma and command and guess_act(head).move in _HEADS:
-        return [head.strip() + comma, rest.strip()]
+    """Returns a sentence parted at the first comma behind which another act begins, and so on with the rest."""
+    clauses = sentence.strip().split(",")
+    for number in range(1, min(len(clauses), _MOST_CLAUSES)):
+        head, rest = ",".join(clauses[:number]).strip(), ",".join(clauses[number:]).strip()
+        if head and rest and _parts(head, rest):
+            return [f"{head},", *_pieces(rest)]
     return [sentence.strip()]
+
+
+def _parts(head: str, rest: str) -> bool:
+    """Returns whether what stands before and behind a comma are two acts."""
+    if rest.lower().strip(" .?!,") in word_lists().vocatives:
+        return False
+    first, second = guess_act(head), guess_act(rest)
+    if second.move is DialogueMove.INSTRUCT:
+        if _BARE_NAME.match(understand(rest).masked):
+            return False
+        if first.move is DialogueMove.INSTRUCT:
+            # "turn left, then right"; but "stop here, at the light" is one command.
+            return _GOING_ON.match(rest) is not None
+        return first.move in _HEADS and understand(rest).affirms is not False
+    if second.move in _QUESTIONS:
+        return first.move in _BEFORE_QUESTIONS and _ASKS_ANEW.match(rest.lower()) is not None
+    if second.move is DialogueMove.EXPLAIN:
+        return first.move in _BEFORE_REASONS and not first.slots and _STATEMENT.match(rest.lower()) is not None
+    return False
 
 
 @functools.cache
 def _cues() -> Cues:
     data = read_data("cues.yaml")
-    moves = []
-    for number, rule in enumerate(data.get("moves", [])):
-        where = f"cues.yaml: moves[{number}]"
-        for text in strings(f"{where}.cues", rule.get("cues")):
-            try:
-                moves.append((re.compile(text), parse_move(rule["move"])))
-            except (re.error, OntologyError) as error:
-                raise LexiconError(f"{where}: {text!r}: {error}") from error
+    soft = data.get("soft", "")
+    rules = tuple(_rule(f"cues.yaml: moves[{number}]", rule, soft) for number, rule in enumerate(data.get("moves", [])))
     answers = {
         parse_move(before): {parse_move(guess): parse_move(move) for guess, move in changes.items()}
         for before, changes in data.get("answers", {}).items()
     }
-    return Cues(tuple(moves), answers)
+    words = {name: frozenset(strings(f"cues.yaml: {name}", data.get(name))) for name in ("domain", "small_talk")}
+    return Cues(rules, answers, words["domain"], words["small_talk"])
+
+
+def _rule(where: str, rule: Mapping[str, Any], soft: str) -> Rule:
+    texts = [text.replace("{soft}", soft) for text in strings(f"{where}.cues", rule.get("cues"))]
+    try:
+        move = parse_move(rule["move"])
+        acted = _either([text[1:] for text in texts if text.startswith("@")])
+        masked = _either([text for text in texts if text[0] not in "@%"])
+    except (re.error, OntologyError) as error:
+        raise LexiconError(f"{where}: {error}") from error
+    words = frozenset(strings(f"{where}.words", rule.get("words", [])))
+    return Rule(move, masked, acted, _DOMAIN_RULE in texts, words)
+
+
+def _either(patterns: list[str]) -> re.Pattern[str] | None:
+    for pattern in patterns:
+        re.compile(pattern)  # on its own, so that a faulty one is found by its own message
+    return re.compile("|".join(f"(?:{pattern})" for pattern in patterns)) if patterns else None

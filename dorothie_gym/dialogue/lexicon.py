@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
@@ -13,10 +13,9 @@ import yaml
 
 from dorothie_gym.ontology import SLOT_VALUES, ActionValue, Slot, SlotValue
 
-_FORMS = frozenset({"say", "the", "order", "tail", "hear"})
-_STREET_KINDS = frozenset({"street", "st", "road", "rd", "avenue", "ave", "drive", "boulevard", "blvd", "lane"})
-_FUZZY_LENGTH = 6
-"""Names of at least this many letters are understood with one letter wrong."""
+_FORMS = frozenset({"say", "also", "again", "here", "the", "order", "tail", "hear"})
+_HEARD_FORMS = ("say", "also", "the", "tail", "hear")
+_ARTICLES = frozenset({"a", "an", "the", "some"})
 
 
 class LexiconError(ValueError):
@@ -24,29 +23,16 @@ class LexiconError(ValueError):
 
 
 @dataclass(frozen=True)
-class SpokenAction:
-    """How an action is said and recognised.
+class ActionCues:
+    """By what an action is recognised.
 
     Attributes:
-        manners: for each manner, the forms "do" (bare infinitive) and "doing", each with its phrases.
-        patterns: expressions over masked words (see `Mention`) that betray the action.
+        stems: the first four letters of words of which one is needed.
+        pattern: an expression over masked words (see `names.find_names`) that betrays the action.
     """
 
-    manners: Mapping[str, Mapping[str, tuple[str, ...]]]
-    patterns: tuple[re.Pattern[str], ...]
-
-
-@dataclass(frozen=True)
-class Mention:
-    """A name found in a row of words.
-
-    Attributes:
-        value: what is named.
-        start: index of its first word in the masked words.
-    """
-
-    value: SlotValue
-    start: int
+    stems: frozenset[str]
+    pattern: re.Pattern[str]
 
 
 @dataclass(frozen=True)
@@ -54,85 +40,35 @@ class Lexicon:
     """All spoken forms.
 
     Attributes:
-        phrases: forms of each value except actions: "say", "the", "order", "tail" -> phrases.
-        actions: spoken actions, in the order in which they are to be recognised.
-        names: what is understood: the words of a phrase -> value.
+        phrases: forms of each value except actions: "say", "also", "again", "here", "the", "order", "tail" -> phrases.
+        actions: cues of actions, in the order in which they are to be recognised.
+        names: what is understood: the words of a phrase, without article -> value.
+        deixis: words that point at what is in view.
+        repairs: words that put right the name before them.
+        ignored: phrases that sound like names and are none.
     """
 
     phrases: Mapping[SlotValue, Mapping[str, tuple[str, ...]]]
-    actions: Mapping[ActionValue, SpokenAction]
+    actions: Mapping[ActionValue, ActionCues]
     names: Mapping[tuple[str, ...], SlotValue]
-    _longest: int = field(init=False, default=1)
-    _single: Mapping[str, SlotValue] = field(init=False, default_factory=dict)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_longest", max(map(len, self.names)))
-        proper = {Slot.LANDMARK, Slot.STREET}
-        single = {
-            words[0]: value
-            for words, value in self.names.items()
-            if len(words) == 1 and len(words[0]) >= _FUZZY_LENGTH and value.slot in proper
-        }
-        object.__setattr__(self, "_single", single)
+    deixis: tuple[str, ...]
+    repairs: tuple[str, ...]
+    ignored: tuple[tuple[str, ...], ...] = ()
 
     def forms(self, value: SlotValue, form: str) -> tuple[str, ...]:
-        """Returns the phrases for `value` in `form` ("say", "the", "order", "tail"); those of "say" if it has none."""
+        """Returns the phrases for `value` in `form` ("say", "the", "order", ...); those of "say" if it has none."""
         phrases = self.phrases[value]
         return phrases.get(form) or phrases["say"]
 
-    def find(self, words: Sequence[str]) -> tuple[list[Mention], list[str]]:
-        """Finds names, the longest first at each place.
 
-        Args:
-            words: lower-case words, see `split_words`.
-
-        Returns:
-            The mentions in order, and the words with each mention replaced by "#landmark", "#street", "#object" or
-            "#status"; by "#what" if it is what somebody asks for.
-        """
-        mentions: list[Mention] = []
-        masked: list[str] = []
-        place = 0
-        while place < len(words):
-            value, length = self._at(words, place)
-            if value is None:
-                masked.append(words[place])
-            else:
-                mentions.append(Mention(value, len(masked)))
-                masked.append("#what" if value.label == "Queried" else f"#{value.slot.label.lower()}")
-                if value.slot is Slot.STREET:
-                    length += " ".join(words[place + length : place + length + 1]) in _STREET_KINDS
-            place += length
-        return mentions, masked
-
-    def _at(self, words: Sequence[str], place: int) -> tuple[SlotValue | None, int]:
-        for length in range(min(self._longest, len(words) - place), 0, -1):
-            value = self.names.get(tuple(words[place : place + length]))
-            if value is not None:
-                return value, length
-        word = words[place].removesuffix("'s")
-        if len(word) >= _FUZZY_LENGTH - 1:
-            for name, value in self._single.items():
-                if name[0] == word[0] and _one_letter_apart(name, word):
-                    return value, 1
-        return None, 1
+_TYPOGRAPHY = str.maketrans({"\u2019": "'", "\u2018": "'", "-": " ", "/": " "})
+_STOP = re.compile(r"[.;:!\u2014\u2026]+(?=\s|$)")
+_WORD = re.compile(r"[a-z0-9']+|\?|,")
 
 
 def split_words(text: str) -> list[str]:
     """Returns lower-case words; "?" and "," stand alone, other stops become ",", hyphens part words."""
-    text = text.lower().replace("\u2019", "'").replace("\u2018", "'")
-    text = re.sub(r"\b(\d+)-(\d+)\b", r"\1 \2", text)
-    text = re.sub(r"[.;:!\u2014\u2026]+(?=\s|$)", " , ", text)
-    return re.findall(r"[a-z0-9']+|\?|,", re.sub(r"([?,])", r" \1 ", text))
-
-
-def _one_letter_apart(one: str, other: str) -> bool:
-    if abs(len(one) - len(other)) > 1:
-        return False
-    short, long = sorted((one, other), key=len)
-    place = next((i for i, (a, b) in enumerate(zip(short, long, strict=False)) if a != b), len(short))
-    rest = short[place + 1 :] if len(short) == len(long) else short[place:]
-    return rest == long[place + 1 :]
+    return _WORD.findall(_STOP.sub(" , ", text.lower().translate(_TYPOGRAPHY)))
 
 
 def read_data(name: str) -> dict[str, Any]:
@@ -180,12 +116,29 @@ def parse_lexicon(data: Mapping[str, Any]) -> Lexicon:
     """
     phrases: dict[SlotValue, Mapping[str, tuple[str, ...]]] = {}
     for slot in (Slot.LANDMARK, Slot.STREET, Slot.OBJECT, Slot.STATUS):
+        shared = {
+            form: strings(f"lexicon.yaml: {form}.{slot.label}", data[form][slot.label])
+            for form in ("again", "here")
+            if slot.label in data.get(form, {})
+        }
         for value in SLOT_VALUES[slot]:
-            phrases[value] = _forms(value, _entry(data, slot.label, value.label))
+            phrases[value] = {**shared, **_forms(value, _entry(data, slot.label, value.label))}
     order = {label: place for place, label in enumerate(data.get("Action", {}))}
-    actions = {value: _spoken_action(value.label, _entry(data, "Action", value.label)) for value in ActionValue}
+    actions = {value: _action_cues(value.label, _entry(data, "Action", value.label)) for value in ActionValue}
     ranked = sorted(actions, key=lambda value: order[value.label])
-    return Lexicon(phrases, {value: actions[value] for value in ranked}, _names(phrases))
+    return Lexicon(
+        phrases,
+        {value: actions[value] for value in ranked},
+        _names(phrases),
+        strings("lexicon.yaml: deixis", data.get("deixis")),
+        strings("lexicon.yaml: repairs", data.get("repairs")),
+        tuple(tuple(split_words(phrase)) for phrase in strings("lexicon.yaml: ignore", data.get("ignore"))),
+    )
+
+
+def bare_name(words: Sequence[str]) -> tuple[str, ...]:
+    """Returns the words of a name without its article."""
+    return tuple(words[1:] if len(words) > 1 and words[0] in _ARTICLES else words)
 
 
 def _entry(data: Mapping[str, Any], slot: str, label: str) -> dict[str, Any]:
@@ -202,26 +155,23 @@ def _forms(value: SlotValue, entry: Mapping[str, Any]) -> Mapping[str, tuple[str
     return {form: strings(f"{where}.{form}", listed) for form, listed in entry.items()}
 
 
-def _spoken_action(label: str, entry: Mapping[str, Any]) -> SpokenAction:
+def _action_cues(label: str, entry: Mapping[str, Any]) -> ActionCues:
     where = f"lexicon.yaml: Action.{label}"
-    manners = {
-        manner: {form: strings(f"{where}.{manner}.{form}", forms.get(form)) for form in ("do", "doing")}
-        for manner, forms in entry.items()
-        if manner != "hear"
-    }
-    if "plain" not in manners:
-        raise LexiconError(f"{where}: needs the manner `plain`")
-    patterns = tuple(re.compile(rf"(?<!\S)(?:{text})(?!\S)") for text in strings(f"{where}.hear", entry.get("hear")))
-    return SpokenAction(manners, patterns)
+    if set(entry) != {"stems", "hear"}:
+        raise LexiconError(f"{where}: needs `stems` and `hear`, has {sorted(entry)}")
+    listed = strings(f"{where}.hear", entry["hear"])
+    try:
+        pattern = re.compile(rf"(?<!\S)(?:{'|'.join(f'(?:{text})' for text in listed)})(?!\S)")
+    except re.error as error:
+        raise LexiconError(f"{where}.hear: {error}") from error
+    return ActionCues(frozenset(stem[:4] for stem in strings(f"{where}.stems", entry["stems"])), pattern)
 
 
 def _names(phrases: Mapping[SlotValue, Mapping[str, tuple[str, ...]]]) -> dict[tuple[str, ...], SlotValue]:
     names: dict[tuple[str, ...], SlotValue] = {}
     for value, forms in phrases.items():
-        heard = [phrase for form in ("say", "the", "tail", "hear") for phrase in forms.get(form, ())]
-        for phrase in heard:
-            words = tuple(split_words(phrase))
-            bare = words[1:] if len(words) > 1 and words[0] in {"a", "an", "the"} else words
-            if names.setdefault(bare, value) != value:
-                raise LexiconError(f"lexicon.yaml: {phrase!r} stands for {names[bare].label} and for {value.label}")
+        for phrase in [phrase for form in _HEARD_FORMS for phrase in forms.get(form, ())]:
+            name = bare_name(split_words(phrase))
+            if names.setdefault(name, value) != value:
+                raise LexiconError(f"lexicon.yaml: {phrase!r} stands for {names[name].label} and for {value.label}")
     return names

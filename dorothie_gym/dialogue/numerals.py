@@ -14,6 +14,9 @@ _DIGIT_ORDINALS = {"1st": 1, "2nd": 2, "3rd": 3, "4th": 4, "5th": 5, "6th": 6, "
 _UNITS = {word: number for number, word in enumerate(_ONES)}
 _ROUND = {word: 10 * number for number, word in enumerate(_TENS) if number > 1}
 
+NUMBER_WORDS = frozenset((*_ONES, *_ROUND, "hundred"))
+"""Words that are, or are part of, a cardinal."""
+
 
 def cardinal(number: int) -> str:
     """Returns the words for a whole number, e.g. 25 -> "twenty-five"; digits from 1000 on.

@@ -4,47 +4,62 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from dorothie_gym.dialogue.lexicon import Lexicon, LexiconError, Mention, load_lexicon, read_data, split_words, strings
-from dorothie_gym.dialogue.numerals import read_cardinals, read_ordinal
+from dorothie_gym.dialogue.directions import Turn, WordLists, find_ordinal, find_turns, mask_directions, word_lists
+from dorothie_gym.dialogue.lexicon import LexiconError, load_lexicon, read_data, split_words, strings
+from dorothie_gym.dialogue.names import Mention, find_names
+from dorothie_gym.dialogue.numerals import NUMBER_WORDS, read_cardinals
 from dorothie_gym.dialogue.wording import Direction
-from dorothie_gym.ontology import ActionValue, GoalStatus, LandmarkName, ObjectClass, SlotValue, StreetName
+from dorothie_gym.ontology import (
+    SLOT_VALUES,
+    ActionValue,
+    GoalStatus,
+    LandmarkName,
+    ObjectClass,
+    SlotValue,
+    StreetName,
+    parse_slot,
+)
 
 _Value = TypeVar("_Value")
 
 _LEAST_NUMBER = 5
 """Smaller numbers are rarely speeds or distances: "the next one"."""
 
-_UP = re.compile(r"\b(speed(ing)? (it )?up|fast(er|ly)?|hurry|step on it|accelerat\w+|quick(er|ly)?)\b")
-_DOWN = re.compile(r"\b(slow\w*|brak\w+|decelerat\w+|too fast)\b")
-_LIGHTS = re.compile(r"\blights?\b|\bbeams?\b|\bheadlights?\b")
-_BACK = re.compile(
-    r"\bu turn|\b(go|going|head|heading) back\b|\b(turn|turning|come|coming) (back|a?round)\b|\bthe other way\b"
+_UP = re.compile(
+    r"\b(speed(ing)? (it )?up|fast(er|ly)?|hurry|step on (it|the gas)|floor it|accelerat\w+|quick(er|ly)?|up to #number"
+    r"|pick(ing)? (it )?up|hit the gas|give it some gas|move it)\b"
 )
+_DOWN = re.compile(
+    r"\b(slow\w*|brak\w+|decelerat\w+|(too|so) fast|eas\w+ off|down to #number|drop it|easy|reduc\w+|lower)\b"
+)
+_LIGHTS = re.compile(r"\blights?\b|\bbeams?\b|\bheadlights?\b|\bheadlamps?\b|\blamps?\b")
 _ORDER = re.compile(r"\b(before|after)(?= that\b| it\b| (?:the )?#landmark| or | ,| \?|$)")
-_FURTHER = re.compile(r"\b(further|farther|a (bit|little) more|keep going)\b")
-_AFTER_NEXT = re.compile(r"\b(the one after|one after the next|after next)\b")
+_FURTHER = re.compile(r"\b(further|farther|a (bit|little|touch) more|keep going|some more|few more)\b")
+# The first four letters of words without which the expressions above need not be tried.
+_SPEED_STEMS = frozenset(
+    "spee fast hurr step floo acce quic up pick hit give move slow brak dece easi ease down drop easy redu lowe".split()
+)
+_LIGHT_STEMS = frozenset({"ligh", "beam", "head", "lamp"})
+_ORDER_WORDS = frozenset({"before", "after"})
 _PAST = frozenset({"past", "behind", "beyond"})
 _ARTICLES = frozenset({"the", "a", "an", "about", "of", "to"})
-_CLAUSE_ENDS = frozenset({",", "?", "then", "and"})
 _SPEED_UNITS = frozenset({"km", "kmh", "kilometers", "kilometres", "kph", "mph", "miles"})
-_DISTANCE_UNITS = frozenset({"m", "meter", "meters", "metre", "metres"})
-
-
-@dataclass(frozen=True, kw_only=True)
-class Turn:
-    """One turn of a route told in words.
-
-    Attributes:
-        direction: which way.
-        ordinal: at which opportunity (1 is the next), None if not said.
-    """
-
-    direction: Direction
-    ordinal: int | None = None
+_DISTANCE_UNITS = frozenset({"m", "meter", "meters", "metre", "metres", "feet", "yards"})
+_OPENING = frozenset({",", "oh", "well", "hmm", "um", "uh", "er", "ah", "hm", "like", "okay", "ok"})
+_DENIAL = re.compile(
+    r"(don't|do not|dont|never|not|instead of|rather than|without)"
+    r"( even| yet| be| try to| go| take| make| a| the| to| that)* $"
+)
+# "the KFC, I mean the Ikea": the first name is taken back.
+_REPAIR = re.compile(
+    r"#(landmark|street) (?:, )?(?:uh |um |er )?"
+    r"(?:no wait|no no|no|i mean|i meant|wait no|sorry|sorry i meant|or rather)"
+    r" (?:, )?(?:the |on |to |take |it's )*#\1\b"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,10 +69,12 @@ class Heard:
     Attributes:
         text: the words themselves.
         masked: the words in lower case with names masked (see data/cues.yaml).
+        acted: the same, with actions masked as "#action", those in the -ing form as "#acting".
         turns: directions in order; a route may have several.
         direction: the first of them.
         ordinal: which opportunity, 1 is the next.
         actions: actions named, in the order of the lexicon.
+        denied: actions named only to be denied: "don't turn".
         landmarks: landmarks named.
         streets: streets named.
         objects: objects named.
@@ -77,9 +94,11 @@ class Heard:
 
     text: str
     masked: str
+    acted: str = ""
     turns: tuple[Turn, ...] = ()
     ordinal: int | None = None
     actions: tuple[ActionValue, ...] = ()
+    denied: tuple[ActionValue, ...] = ()
     landmarks: tuple[LandmarkName, ...] = ()
     streets: tuple[StreetName, ...] = ()
     objects: tuple[ObjectClass, ...] = ()
@@ -107,20 +126,7 @@ class Heard:
         return frozenset((*self.actions, *self.landmarks, *self.streets, *self.objects, *self.statuses))
 
 
-@dataclass(frozen=True)
-class _WordLists:
-    """Word lists of data/cues.yaml, where each is explained."""
-
-    turning: frozenset[str]
-    right_not_before: frozenset[str]
-    right_not_after: frozenset[str]
-    left_not_after: frozenset[str]
-    ordinal_nouns: frozenset[str]
-    dropping: frozenset[str]
-    affirming: frozenset[str]
-    denying: frozenset[str]
-
-
+@functools.lru_cache(maxsize=2048)
 def understand(text: str) -> Heard:
     """Reads a text in free English, of any case and with typographic or plain apostrophes.
 
@@ -130,32 +136,36 @@ def understand(text: str) -> Heard:
     Returns:
         What rules can take from it. Nothing is ever refused.
     """
-    lists = _word_lists()
-    mentions, words = load_lexicon().find(split_words(text))
-    while words and words[-1] == ",":
-        words.pop()
-    words = _mask_directions(words, lists)
+    lists = word_lists()
+    mentions, words = find_names(_addressed(split_words(text), lists))
+    words = mask_directions(words, lists)
     joined = " ".join(words)
-    speed, distance = _quantities(joined)
-    masked = _mask_numbers(joined)
+    numbered = not NUMBER_WORDS.isdisjoint(words) or any(word[0].isdigit() for word in words)
+    speed, distance = _quantities(words) if numbered else (None, None)
+    masked = _mask_numbers(words) if numbered else joined
+    mentions = _repaired(mentions, words, joined)
+    stems = {word[:4] for word in words}
+    acted, actions, denied = _actions(masked, stems)
+    named = _each_once([*(mention.value for mention in mentions), *_asked(masked, words)])
     landmarks = [mention for mention in mentions if isinstance(mention.value, LandmarkName)]
-    actions = _actions(masked, load_lexicon())
-    turns = _turns(words, lists)
+    turns = find_turns(words, lists)
     return Heard(
         text=text,
         masked=masked,
+        acted=acted,
         turns=turns,
-        ordinal=next((turn.ordinal for turn in turns if turn.ordinal is not None), _ordinal(words, lists)),
+        ordinal=next((turn.ordinal for turn in turns if turn.ordinal is not None), find_ordinal(words, lists)),
         actions=actions,
-        landmarks=_unique(mention.value for mention in landmarks if isinstance(mention.value, LandmarkName)),
-        streets=_unique(mention.value for mention in mentions if isinstance(mention.value, StreetName)),
-        objects=_unique(mention.value for mention in mentions if isinstance(mention.value, ObjectClass)),
-        statuses=_unique(mention.value for mention in mentions if isinstance(mention.value, GoalStatus)),
-        past=_behind(landmarks, words, _PAST),
-        dropped=_behind(landmarks, words, lists.dropping),
-        order=order[1] if (order := _ORDER.search(joined)) else None,
-        faster=False if _DOWN.search(joined) else True if _UP.search(joined) else None,
-        lights=_lights(words, joined),
+        denied=denied,
+        landmarks=tuple(value for value in named if isinstance(value, LandmarkName)),
+        streets=tuple(value for value in named if isinstance(value, StreetName)),
+        objects=tuple(value for value in named if isinstance(value, ObjectClass)),
+        statuses=tuple(value for value in named if isinstance(value, GoalStatus)),
+        past=_behind(landmarks, words, _PAST) if landmarks else (),
+        dropped=_behind(landmarks, words, lists.dropping) if landmarks else (),
+        order=order[1] if not _ORDER_WORDS.isdisjoint(words) and (order := _ORDER.search(joined)) else None,
+        faster=None if stems.isdisjoint(_SPEED_STEMS) else _faster(masked),
+        lights=None if stems.isdisjoint(_LIGHT_STEMS) else _lights(words, joined),
         speed=speed,
         distance=distance,
         here="here" in words,
@@ -165,46 +175,34 @@ def understand(text: str) -> Heard:
     )
 
 
-@functools.cache
-def _word_lists() -> _WordLists:
-    data = read_data("cues.yaml")
-    lists = {
-        **data.get("directions", {}),
-        **{name: data.get(name) for name in ("ordinal_nouns", "dropping", "affirming", "denying")},
-    }
-    if lists.keys() != _WordLists.__dataclass_fields__.keys():
-        raise LexiconError(
-            f"cues.yaml: needs the word lists {sorted(_WordLists.__dataclass_fields__)}, has {sorted(lists)}"
-        )
-    return _WordLists(**{name: frozenset(strings(f"cues.yaml: {name}", words)) for name, words in lists.items()})
+def _addressed(words: list[str], lists: WordLists) -> list[str]:
+    """Returns the words without an address at the end ("stop here, man") or at the beginning."""
+    while words and words[-1] == ",":
+        words.pop()
+    marked = words[-1:] == ["?"]
+    end = len(words) - marked
+    for length in (1, 2):
+        if (
+            end > length + 1
+            and words[end - length - 1] == ","
+            and " ".join(words[end - length : end]) in lists.vocatives
+        ):
+            return words[: end - length - 1] + words[end:]
+        if len(words) > length + 1 and words[length] == "," and " ".join(words[:length]) in lists.vocatives:
+            return words[length + 1 :]
+    return words
 
 
-def _mask_directions(words: Sequence[str], lists: _WordLists) -> list[str]:
-    """Returns the words with each "left" or "right" that is no direction replaced by "#left", "#ok" or "#tag"."""
-    masked = list(words)
-    for place, word in enumerate(words):
-        before = words[place - 1] if place else ","
-        after = words[place + 1] if place + 1 < len(words) else ""
-        if word == "right":
-            masked[place] = _right(before, after, place, lists)
-        elif word == "left" and before in lists.left_not_after:
-            masked[place] = "#left"
-        elif word == "straight" and after == "away":
-            masked[place] = "#ok"
-    return masked
+def _repaired(mentions: list[Mention], words: Sequence[str], joined: str) -> list[Mention]:
+    """Returns the mentions without those that the speaker takes back."""
+    found = _REPAIR.search(joined) if len(mentions) > 1 else None
+    if found is None:
+        return mentions
+    place = joined.count(" ", 0, found.start())
+    return [mention for mention in mentions if mention.start != place]
 
 
-def _right(before: str, after: str, place: int, lists: _WordLists) -> str:
-    if after == "?" and place > 0 and (before == "," or before not in lists.turning):
-        return "#tag"
-    if before in lists.right_not_after or (place == 0 and after == ","):
-        return "#ok"
-    turning = before in lists.turning and (before != "," or place == 0)
-    return "#ok" if after in lists.right_not_before and not turning else "right"
-
-
-def _mask_numbers(joined: str) -> str:
-    words = joined.split()
+def _mask_numbers(words: Sequence[str]) -> str:
     masked: list[str] = []
     for word in words:
         number = any(value >= _LEAST_NUMBER for value in read_cardinals([word]))
@@ -215,10 +213,9 @@ def _mask_numbers(joined: str) -> str:
     return " ".join(masked)
 
 
-def _quantities(joined: str) -> tuple[int | None, int | None]:
+def _quantities(words: Sequence[str]) -> tuple[int | None, int | None]:
     """Returns a speed [km/h] and a distance [m], each None if not said."""
     speed = distance = None
-    words = joined.split()
     for place in range(len(words)):
         run = _number_run(words, place)
         if not run:
@@ -244,65 +241,51 @@ def _number_run(words: Sequence[str], place: int) -> list[str]:
     return list(words[place : place + length])
 
 
-def _actions(masked: str, lexicon: Lexicon) -> tuple[ActionValue, ...]:
-    found = []
-    for action, spoken in lexicon.actions.items():
-        for pattern in spoken.patterns:
-            masked, count = pattern.subn("#action", masked)
-            if count and action not in found:
-                found.append(action)
-    return tuple(found)
+def _actions(masked: str, stems: set[str]) -> tuple[str, tuple[ActionValue, ...], tuple[ActionValue, ...]]:
+    """Returns the words with actions masked, the actions, and those that are denied only."""
+    if "#number" in masked:
+        stems = stems | {"#num"}
+    found: list[ActionValue] = []
+    denied: list[ActionValue] = []
+    for action, cues in load_lexicon().actions.items():
+        if stems.isdisjoint(cues.stems):
+            continue
+        heard: list[bool] = []
+
+        def mask(match: re.Match[str], heard: list[bool] = heard) -> str:
+            heard.append(_DENIAL.search(match.string, 0, match.start()) is None)
+            return "#acting" if match[0].split(" ", 1)[0].endswith("ing") else "#action"
+
+        masked = cues.pattern.sub(mask, masked)
+        if heard:
+            found.append(action)
+            if not any(heard):
+                denied.append(action)
+    return masked, tuple(found), tuple(denied)
 
 
-def _turns(words: Sequence[str], lists: _WordLists) -> tuple[Turn, ...]:
-    turns: list[Turn] = []
-    waiting: int | None = None  # an ordinal said before its direction: "the second one, on the left"
-    for clause in _clauses(words):
-        ordinal = _ordinal(clause, lists)
-        directions = _directions(clause, lists)
-        for number, direction in enumerate(directions):
-            turns.append(Turn(direction=direction, ordinal=(ordinal or waiting) if number == 0 else None))
-            waiting = None
-        if not directions and ordinal is not None:
-            if turns and turns[-1].ordinal is None:
-                turns[-1] = Turn(direction=turns[-1].direction, ordinal=ordinal)
-            else:
-                waiting = ordinal
-    return tuple(turns)
+@functools.cache
+def _askings() -> tuple[tuple[SlotValue, re.Pattern[str]], ...]:
+    """Expressions by which the value of a slot is asked for."""
+    data: Mapping[str, object] = read_data("cues.yaml").get("asked", {})
+    askings = []
+    for name, listed in data.items():
+        queried = next(value for value in SLOT_VALUES[parse_slot(name)] if value.label == "Queried")
+        pattern = "|".join(strings(f"cues.yaml: asked.{name}", listed))
+        try:
+            askings.append((queried, re.compile(pattern)))
+        except re.error as error:
+            raise LexiconError(f"cues.yaml: asked.{name}: {error}") from error
+    return tuple(askings)
 
 
-def _directions(clause: Sequence[str], lists: _WordLists) -> list[Direction]:
-    directions = [
-        Direction(word)
-        for place, word in enumerate(clause)
-        if word in ("left", "right", "straight") and not _is_denied(clause[max(0, place - 3) : place], lists)
-    ]
-    return [Direction.BACK] if not directions and _BACK.search(" ".join(clause)) else directions
+_ASKING_WORDS = frozenset({"what", "which", "where", "what's", "where's", "how", "wheres", "whats", "where'd"})
 
 
-def _is_denied(before: Sequence[str], lists: _WordLists) -> bool:
-    """Returns whether the words before a direction deny it: "not right", "don't take a right"; doubt is no denial."""
-    return "sure" not in before and not lists.denying.isdisjoint(before)
-
-
-def _clauses(words: Sequence[str]) -> list[list[str]]:
-    clauses: list[list[str]] = [[]]
-    for word in words:
-        if word in _CLAUSE_ENDS:
-            clauses.append([])
-        else:
-            clauses[-1].append(word)
-    return [clause for clause in clauses if clause]
-
-
-def _ordinal(words: Sequence[str], lists: _WordLists) -> int | None:
-    if _AFTER_NEXT.search(" ".join(words)):
-        return 2
-    for word, noun in zip(words, words[1:], strict=False):
-        number = read_ordinal(word)
-        if number is not None and noun in lists.ordinal_nouns:
-            return number
-    return None
+def _asked(masked: str, words: Sequence[str]) -> list[SlotValue]:
+    if _ASKING_WORDS.isdisjoint(words):
+        return []
+    return [value for value, pattern in _askings() if pattern.search(masked)]
 
 
 def _behind(landmarks: Sequence[Mention], words: Sequence[str], heads: frozenset[str]) -> tuple[LandmarkName, ...]:
@@ -317,20 +300,33 @@ def _behind(landmarks: Sequence[Mention], words: Sequence[str], heads: frozenset
     return _unique(found)
 
 
+def _faster(masked: str) -> bool | None:
+    if _DOWN.search(masked):
+        return False
+    return True if _UP.search(masked) else None
+
+
 def _lights(words: Sequence[str], joined: str) -> bool | None:
     if not _LIGHTS.search(joined):
         return None
-    return False if "off" in words else True if "on" in words else None
+    if "off" in words or "kill" in words:
+        return False
+    return True if "on" in words else None
 
 
-def _affirms(words: Sequence[str], lists: _WordLists) -> bool | None:
-    said = [word for word in words if word not in (",", "oh", "well", "hmm", "um")]
-    first = said[0] if said else ""
+def _affirms(words: Sequence[str], lists: WordLists) -> bool | None:
+    said = [word for word in words if word not in _OPENING] or list(words)
     if said[:2] == ["not", "sure"]:
         return None
+    first = said[0] if said else ""
     if first in lists.denying:
         return False
-    return True if first in lists.affirming else None
+    return True if first in lists.affirming or (words and words[0] in ("okay", "ok")) else None
+
+
+def _each_once(values: Sequence[SlotValue]) -> list[SlotValue]:
+    """Returns the values, each once, in the order in which they were said."""
+    return list(dict.fromkeys(values)) if values else []
 
 
 def _unique(values: Iterable[_Value]) -> tuple[_Value, ...]:

@@ -1,11 +1,12 @@
-"""What a speaker knows beyond the act: the particulars that slots do not carry and words do."""
+"""What a speaker knows beyond the act: particulars that words carry and slots do not, and the talk so far."""
 
 from __future__ import annotations
 
 import enum
+import functools
 from dataclasses import dataclass
 
-from dorothie_gym.ontology import LandmarkName
+from dorothie_gym.ontology import DialogueMove, LandmarkName, SlotValue, StreetName
 
 
 class Direction(enum.StrEnum):
@@ -55,3 +56,39 @@ class Wording:
         for name, value in (("speed", self.speed), ("distance", self.distance)):
             if value is not None and not 0 <= value < 1e5:
                 raise ValueError(f"Wording.{name} must be at least 0 and below 100000, not {value}")
+
+    @functools.cached_property
+    def known(self) -> frozenset[str]:
+        """Names of the particulars that can be said, as gaps of the grammar, and "here"."""
+        sideways = self.direction in (Direction.LEFT, Direction.RIGHT)
+        found = {
+            "side": sideways,
+            "nth": self.ordinal is not None,
+            "speed": self.speed is not None,
+            "distance": self.distance is not None,
+            "past": self.past is not None,
+            "dropped": self.dropped is not None,
+            "here": self.here,
+        }
+        return frozenset(name for name, is_known in found.items() if is_known)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WordingContext:
+    """What has been said and what is in view when an act is worded; each is optional.
+
+    Attributes:
+        joined: the act said just before in the same breath: "yes, and then left".
+        last: the other speaker's last move.
+        mentioned: values that both have heard lately; they may be referred to by "that one", "the same street".
+        street: the street that the car is on: "this street".
+        landmark: a landmark in view: "the KFC over there".
+        exception: whether something unexpected is going on; words come less smoothly then.
+    """
+
+    joined: DialogueMove | None = None
+    last: DialogueMove | None = None
+    mentioned: frozenset[SlotValue] = frozenset()
+    street: StreetName | None = None
+    landmark: LandmarkName | None = None
+    exception: bool = False

@@ -1,13 +1,25 @@
 import re
+import time
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dorothie_gym.dialogue import MAX_CHARACTERS, Direction, LexiconError, Wording, word_act
+from dorothie_gym.dialogue import (
+    MAX_CHARACTERS,
+    Direction,
+    LexiconError,
+    SpeakerStyle,
+    Wording,
+    WordingContext,
+    draw_style,
+    understand,
+    word_act,
+    word_acts,
+)
 from dorothie_gym.dialogue.grammar import parse_grammar
-from dorothie_gym.dialogue.lexicon import read_data
+from dorothie_gym.dialogue.talk_files import read_talk_files
 from dorothie_gym.ontology import (
     LABELS,
     ActionValue,
@@ -18,6 +30,7 @@ from dorothie_gym.ontology import (
     Role,
     StreetName,
 )
+from tests.dialogue.talk_corpus import session
 
 wordings = st.builds(
     Wording,
@@ -85,8 +98,8 @@ def test_particulars_are_said():
         assert "second" in words(turn, seed=seed, direction="right", ordinal=2)
         assert "twenty-five" in words(speed, Role.CO_WIZARD, seed, faster=False, speed=25.0)
         assert "off" in words(lights, seed=seed, lights=False)
-        forgotten, taken = words(change, seed=seed, dropped=LandmarkName.IKEA).lower().split(",")[:2]
-        assert "ikea" in forgotten and "coco" in taken
+        heard = understand(words(change, seed=seed, dropped=LandmarkName.IKEA))
+        assert heard.dropped == (LandmarkName.IKEA,) and LandmarkName.COCO in heard.landmarks, heard.text
 
 
 def test_a_topic_picks_its_templates():
@@ -129,22 +142,93 @@ def test_wording_names_the_field_that_is_out_of_range(fields):
         Wording(**fields)
 
 
+def without_section(name: str, head: str) -> dict[str, str]:
+    """The talk files without the sections that begin with a head."""
+    texts = read_talk_files()
+    sections = re.split(r"(?m)^(?===)", texts[name])
+    texts[name] = "".join(section for section in sections if not section.startswith(head))
+    return texts
+
+
 def test_a_grammar_that_leaves_a_speaker_without_words_is_refused():
-    data = read_data("grammar.yaml")
-    data["moves"]["Explain"] = [{"who": "participant", "say": ["look"]}]
-    with pytest.raises(LexiconError, match="Explain has no template without slots for co_wizard"):
-        parse_grammar(data)
+    texts = without_section("20_initiating.talk", "== Align co_wizard")
+    with pytest.raises(LexiconError, match="Align has no template without slots for co_wizard"):
+        parse_grammar(texts)
 
 
-def test_an_unknown_gap_is_named():
-    data = read_data("grammar.yaml")
-    data["moves"]["Explain"].append({"say": ["the {weather} is fine"]})
-    with pytest.raises(LexiconError, match="weather"):
-        parse_grammar(data)
+def test_a_grammar_that_leaves_an_action_without_words_is_refused():
+    with pytest.raises(LexiconError, match="doing UTurn"):
+        parse_grammar(without_section("00_actions.talk", "== doing UTurn"))
 
 
-def test_an_unknown_value_is_named():
-    data = read_data("grammar.yaml")
-    data["moves"]["Explain"].append({"when": {"Street": "Elm"}, "say": ["on Elm"]})
-    with pytest.raises(LexiconError, match="Elm"):
-        parse_grammar(data)
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        ("== Explain\nthe {weather} is fine", "weather"),
+        ("== Explain Street=Elm\non Elm", "Elm"),
+        ("== Explain\n<nobody> knows", "nobody"),
+        ("== Explain\n(left|right", "missing"),
+        ("== Explain\ngo ({street}|left)", "lines of their own"),
+        ("== Shout\nhey", "Shout"),
+        ("== do Fly\nfly", "Fly"),
+        ("hello", "before the first section"),
+    ],
+)
+def test_a_faulty_line_is_named_with_its_file(line, reason):
+    with pytest.raises(LexiconError, match=rf"new\.talk.*{reason}"):
+        parse_grammar({**read_talk_files(), "new.talk": line})
+
+
+def test_acts_of_one_breath_are_joined():
+    acts = [
+        DialogueAct.of(DialogueMove.REPLY_Y),
+        DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.J_TURN),
+        DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.STOP),
+    ]
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        spans = word_acts(acts, Role.PARTICIPANT, rng, [None, Wording(direction="left"), None])
+        assert [span.act for span in spans] == acts
+        text = " ".join(span.text for span in spans)
+        assert len(text) <= MAX_CHARACTERS
+        assert "left" in spans[1].text
+        # What goes on in lower case goes on from a comma.
+        assert not re.search(r"\. [a-z]", text), text
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(acts, min_size=1, max_size=4), st.sampled_from(Role), st.integers(0, 2**32))
+def test_any_acts_fit_into_an_utterance(said, speaker, seed):
+    rng = np.random.default_rng(seed)
+    spans = word_acts(said, speaker, rng, style=draw_style(speaker, rng), scene=WordingContext(exception=True))
+    assert [span.act for span in spans] == said
+    assert len(" ".join(span.text for span in spans)) <= MAX_CHARACTERS
+
+
+def test_as_many_contexts_as_acts_are_wanted():
+    with pytest.raises(ValueError, match="2 for 1 acts"):
+        word_acts([DialogueAct.of(DialogueMove.CONFIRM)], Role.PARTICIPANT, np.random.default_rng(0), [None, None])
+
+
+def test_what_was_mentioned_is_referred_to():
+    act = DialogueAct.of(DialogueMove.INSTRUCT, StreetName.BEAL)
+    style = SpeakerStyle(anaphora=1.0)
+    scene = WordingContext(mentioned=frozenset({StreetName.BEAL}))
+    for seed in range(20):
+        text = word_act(act, Role.PARTICIPANT, np.random.default_rng(seed), style=style, scene=scene)
+        assert "Beal" not in text and re.search("that street|same street|that road", text.lower()), text
+        text = word_act(act, Role.PARTICIPANT, np.random.default_rng(seed), style=style)
+        assert "Beal" in text
+
+
+@pytest.mark.slow
+def test_wording_is_fast():
+    acts = [act for item in session(0, 200) for act in (span.act for span in item.spans)]
+    rng = np.random.default_rng(0)
+    style = draw_style(Role.PARTICIPANT, rng)
+    for act in acts:
+        word_act(act, Role.PARTICIPANT, rng, style=style)
+    start = time.process_time()
+    for act in acts:
+        word_act(act, Role.PARTICIPANT, rng, style=style)
+    assert (time.process_time() - start) / len(acts) < 100e-6

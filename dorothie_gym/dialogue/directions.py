@@ -1,0 +1,144 @@
+"""Which way words point: left and right that are directions, turns of a route, ordinals."""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from dorothie_gym.dialogue.lexicon import LexiconError, read_data, strings
+from dorothie_gym.dialogue.numerals import read_ordinal
+from dorothie_gym.dialogue.wording import Direction
+
+_BACK = re.compile(
+    r"\bu turn|\b(go|going|head|heading) back\b|\b(turn|turning|come|coming) (back|a?round)\b|\bthe other way\b"
+    r"|\b(doubl(e|ing)|turning|driving) back\b|\bflip(ping)? around\b|\bturn(ing)? the car around\b"
+)
+_AFTER_NEXT = re.compile(r"\b(the one after|one after the next|after next)\b")
+_DOUBT = frozenset({"sure", "know", "certain", "idea", "clue", "wonder"})
+_CLAUSE_ENDS = frozenset({",", "?", "then", "and"})
+_TURNING_WORDS = frozenset({"left", "right", "straight", "turn", "turning", "back", "around", "way", "round"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Turn:
+    """One turn of a route told in words.
+
+    Attributes:
+        direction: which way.
+        ordinal: at which opportunity (1 is the next), None if not said.
+    """
+
+    direction: Direction
+    ordinal: int | None = None
+
+
+@dataclass(frozen=True)
+class WordLists:
+    """Word lists of data/cues.yaml, where each is explained."""
+
+    turning: frozenset[str]
+    right_not_before: frozenset[str]
+    right_never_before: frozenset[str]
+    right_not_after: frozenset[str]
+    left_not_after: frozenset[str]
+    ordinal_nouns: frozenset[str]
+    dropping: frozenset[str]
+    affirming: frozenset[str]
+    denying: frozenset[str]
+    vocatives: frozenset[str]
+
+
+@functools.cache
+def word_lists() -> WordLists:
+    """Returns the word lists, read once; raises LexiconError if they are not as they must be."""
+    data = read_data("cues.yaml")
+    lists = {
+        **data.get("directions", {}),
+        **{name: data.get(name) for name in ("ordinal_nouns", "dropping", "affirming", "denying", "vocatives")},
+    }
+    if lists.keys() != WordLists.__dataclass_fields__.keys():
+        raise LexiconError(
+            f"cues.yaml: needs the word lists {sorted(WordLists.__dataclass_fields__)}, has {sorted(lists)}"
+        )
+    return WordLists(**{name: frozenset(strings(f"cues.yaml: {name}", words)) for name, words in lists.items()})
+
+
+def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:
+    """Returns the words with each "left" or "right" that is no direction replaced by "#left", "#ok" or "#tag"."""
+    masked = list(words)
+    for place, word in enumerate(words):
+        before = words[place - 1] if place else ","
+        after = words[place + 1] if place + 1 < len(words) else ""
+        if word == "right":
+            masked[place] = _right(before, after, place, lists)
+        elif word == "left" and before in lists.left_not_after:
+            masked[place] = "#left"
+        elif word == "straight" and after == "away":
+            masked[place] = "#ok"
+    return masked
+
+
+def _right(before: str, after: str, place: int, lists: WordLists) -> str:
+    if after == "?" and place > 0 and (before == "," or before not in lists.turning):
+        return "#tag"
+    if before in lists.right_not_after or after in lists.right_never_before or (place == 0 and after == ","):
+        return "#ok"
+    turning = before in lists.turning and (before != "," or place == 0)
+    return "#ok" if after in lists.right_not_before and not turning else "right"
+
+
+def find_turns(words: Sequence[str], lists: WordLists) -> tuple[Turn, ...]:
+    """Returns the turns that words (see `mask_directions`) tell, in order, each with the ordinal of its clause."""
+    if _TURNING_WORDS.isdisjoint(words):
+        return ()
+    turns: list[Turn] = []
+    waiting: int | None = None  # an ordinal said before its direction: "the second one, on the left"
+    for clause in _clauses(words):
+        ordinal = find_ordinal(clause, lists)
+        directions = _directions(clause, lists)
+        for number, direction in enumerate(directions):
+            turns.append(Turn(direction=direction, ordinal=(ordinal or waiting) if number == 0 else None))
+            waiting = None
+        if not directions and ordinal is not None:
+            if turns and turns[-1].ordinal is None:
+                turns[-1] = Turn(direction=turns[-1].direction, ordinal=ordinal)
+            else:
+                waiting = ordinal
+    return tuple(turns)
+
+
+def _directions(clause: Sequence[str], lists: WordLists) -> list[Direction]:
+    directions = [
+        Direction(word)
+        for place, word in enumerate(clause)
+        if word in ("left", "right", "straight") and not _is_denied(clause[max(0, place - 5) : place], lists)
+    ]
+    return [Direction.BACK] if not directions and _BACK.search(" ".join(clause)) else directions
+
+
+def _is_denied(before: Sequence[str], lists: WordLists) -> bool:
+    """Returns whether the words before a direction deny it: "not right", "don't take a right"; doubt is no denial."""
+    return _DOUBT.isdisjoint(before) and not lists.denying.isdisjoint(before)
+
+
+def _clauses(words: Sequence[str]) -> list[list[str]]:
+    clauses: list[list[str]] = [[]]
+    for word in words:
+        if word in _CLAUSE_ENDS:
+            clauses.append([])
+        else:
+            clauses[-1].append(word)
+    return [clause for clause in clauses if clause]
+
+
+def find_ordinal(words: Sequence[str], lists: WordLists) -> int | None:
+    """Returns which opportunity words mean ("the second light"), 1 for the next one, or None."""
+    if _AFTER_NEXT.search(" ".join(words)):
+        return 2
+    for word, noun in zip(words, words[1:], strict=False):
+        number = read_ordinal(word)
+        if number is not None and noun in lists.ordinal_nouns:
+            return number
+    return None

@@ -1,0 +1,189 @@
+"""A recogniser's transcript of what was said: words misheard for others that sound alike, dropped, and put in."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+import re
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from rapidfuzz import process
+from rapidfuzz.distance import Levenshtein
+
+from dorothie_gym.dialogue.lexicon import load_lexicon, read_data, split_words, strings
+from dorothie_gym.dialogue.sounds import sound_of
+from dorothie_gym.dialogue.talk_files import read_talk_files
+from dorothie_gym.ontology import Slot
+
+_WORD = re.compile(r"[A-Za-z][A-Za-z']*")
+_CANDIDATES = 6
+"""Words among which a misheard one is chosen."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Channel:
+    """How badly a recogniser hears.
+
+    Attributes:
+        rate: word error rate, within [0, 1): substitutions, deletions and insertions per word that was said.
+        substitutions: their share of the errors.
+        deletions: their share of the errors; the rest are insertions. The shares are those of large-vocabulary
+            recognisers in conversation (Goldwater, Jurafsky and Manning, Speech Communication 52(3), 2010: about
+            three fifths substitutions, a quarter deletions).
+    """
+
+    rate: float = 0.12
+    substitutions: float = 0.6
+    deletions: float = 0.25
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.rate < 1:
+            raise ValueError(f"Channel.rate must be at least 0 and below 1, not {self.rate}")
+        if self.substitutions < 0 or self.deletions < 0 or self.substitutions + self.deletions > 1:
+            raise ValueError(
+                f"Channel.substitutions ({self.substitutions}) and deletions ({self.deletions}) are shares of the "
+                "errors: none below 0, their sum at most 1"
+            )
+
+    def transcribe(self, text: str, rng: np.random.Generator) -> str:
+        """Returns what is heard of a text: lower case but for names, without punctuation but for "?" and ",".
+
+        Args:
+            text: what was said.
+            rng: source of chance.
+
+        Returns:
+            The transcript; at least one word of a text that has one, so that something is heard.
+        """
+        draw: Callable[[], float] = rng.random
+        words = text.split()
+        heard: list[str] = []
+        deletions = self.deletions * self.rate
+        substitutions = self.substitutions * self.rate
+        insertions = self.rate - deletions - substitutions
+        for place, word in enumerate(words):
+            drawn = draw()
+            last_hope = place == len(words) - 1 and not heard
+            if drawn < deletions and not last_hope:
+                # What parts sentences is no sound of the word: it stays with the word before.
+                if heard and word[-1] in "?.," and heard[-1][-1] not in "?.,":
+                    heard[-1] += word[-1]
+            elif drawn < deletions + substitutions:
+                heard.append(misheard(word, draw))
+            else:
+                heard.append(word)
+            if draw() < insertions:
+                heard.insert(len(heard) - 1 if heard and draw() < 0.5 else len(heard), _inserted(draw))
+        return " ".join(heard)
+
+
+def word_error_rate(said: Sequence[str], heard: Sequence[str]) -> float:
+    """Returns the word error rate of transcripts: word edits over words said, case and punctuation aside.
+
+    Args:
+        said: texts.
+        heard: their transcripts, in the same order.
+
+    Raises:
+        ValueError: if there are not as many transcripts as texts.
+    """
+    if len(said) != len(heard):
+        raise ValueError(f"{len(said)} texts and {len(heard)} transcripts: give one transcript for each text")
+    edits = words = 0
+    for text, transcript in zip(said, heard, strict=True):
+        reference = _bare(text)
+        edits += Levenshtein.distance(reference, _bare(transcript))
+        words += len(reference)
+    return edits / words if words else math.nan
+
+
+def misheard(word: str, draw: Callable[[], float]) -> str:
+    """Returns a word that may be heard for another: one that sounds much like it, more probably the more alike.
+
+    Args:
+        word: as written, perhaps with punctuation, which is kept.
+        draw: draws from [0, 1).
+    """
+    found = _WORD.search(word)
+    if found is None:
+        return f"{_inserted(draw)}{word[-1] if word[-1] in '?.,' else ''}"
+    options, weights = _confusions(found[0].lower())
+    drawn = draw() * weights[-1]
+    choice = next(option for option, weight in zip(options, weights, strict=True) if drawn < weight)
+    if found[0][0].isupper() and choice not in _proper_words():
+        choice = choice[0].upper() + choice[1:] if word[0].isupper() and found.start() == 0 else choice
+    elif choice in _proper_words():
+        choice = _proper_words()[choice]
+    return word[: found.start()] + choice + word[found.end() :]
+
+
+@functools.lru_cache(maxsize=8192)
+def _confusions(word: str) -> tuple[tuple[str, ...], tuple[float, ...]]:
+    """Returns what a word is misheard for, with cumulative weights."""
+    sounds = _vocabulary_by_sound()
+    own = sound_of(word)
+    near = process.extract(own, list(sounds), scorer=Levenshtein.normalized_similarity, limit=3 * _CANDIDATES)
+    options = [
+        (other, likeness * likeness)
+        for sound, likeness, _ in near
+        for other in sounds[sound]
+        if other != word and likeness > 0
+    ][:_CANDIDATES]
+    if word in _proper_words():
+        # A rare name is heard as a common word, or as another name, or nearly right.
+        options += [(_worn(word), 0.6)]
+    if not options:
+        options = [(_worn(word), 1.0)]
+    return tuple(other for other, _ in options), tuple(itertools.accumulate(weight for _, weight in options))
+
+
+def _worn(word: str) -> str:
+    """Returns a word without its first inner consonant, as a mumbled name is written down."""
+    for place in range(1, len(word) - 1):
+        if word[place] not in "aeiouy'":
+            return word[:place] + word[place + 1 :]
+    return word + "s"
+
+
+def _inserted(draw: Callable[[], float]) -> str:
+    words = _insertions()
+    return words[int(draw() * len(words))]
+
+
+def _bare(text: str) -> list[str]:
+    return re.findall(r"[a-z0-9']+", text.lower())
+
+
+@functools.cache
+def _insertions() -> tuple[str, ...]:
+    return strings("cues.yaml: inserted", read_data("cues.yaml").get("inserted"))
+
+
+@functools.cache
+def _proper_words() -> Mapping[str, str]:
+    """Words of names, in lower case, with their spelling."""
+    return {
+        word.lower(): word
+        for value, forms in load_lexicon().phrases.items()
+        if value.slot in (Slot.LANDMARK, Slot.STREET)
+        for phrase in forms["say"]
+        for word in phrase.split()
+        if word[0].isupper() and len(word) > 2
+    }
+
+
+@functools.cache
+def _vocabulary_by_sound() -> Mapping[str, tuple[str, ...]]:
+    """The words that a recogniser knows: all that speakers say, and ordinary words that sound like names."""
+    spoken = " ".join(read_talk_files().values()).lower()
+    known = split_words(" ".join(strings("cues.yaml: known", read_data("cues.yaml").get("known"))))
+    words = {word for word in re.findall(r"\b[a-z][a-z']+\b", spoken)} | set(known) | set(_proper_words())
+    found: dict[str, list[str]] = defaultdict(list)
+    for word in sorted(words):
+        if len(word) > 1:
+            found[sound_of(word)].append(word)
+    return {sound: tuple(listed) for sound, listed in found.items()}

@@ -1,0 +1,138 @@
+"""Styles of speakers: how somebody talks throughout a session, drawn from data/styles.yaml."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from dorothie_gym.dialogue.lexicon import LexiconError, read_data, strings
+from dorothie_gym.dialogue.phrases import Register
+from dorothie_gym.ontology import Role, parse_role
+
+_SHARES = ("chattiness", "indirectness", "anaphora", "disfluency", "repairs", "habit", "addressing")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeakerStyle:
+    """How a speaker talks. Shares are within [0, 1].
+
+    Attributes:
+        register: plain, slangy, polite or blunt.
+        chattiness: share of optional words that are said.
+        indirectness: share of sentences that may be put indirectly: "could you turn left".
+        anaphora: share of names known to both that are replaced by "that one", "the same street".
+        disfluency: share of sentences with a hesitation or a restart.
+        repairs: share of sentences with a wrong name that is put right at once.
+        habit: share of choices that fall on favourite words; below 1.
+        idiolect: settles which the favourite words are; not negative.
+        address: what the other is called; empty for nothing.
+        addressing: share of sentences with the address.
+        proper: whether sentences are written with a capital and a full stop.
+    """
+
+    register: Register = Register.PLAIN
+    chattiness: float = 0.35
+    indirectness: float = 0.3
+    anaphora: float = 0.3
+    disfluency: float = 0.0
+    repairs: float = 0.0
+    habit: float = 0.0
+    idiolect: int = 0
+    address: str = ""
+    addressing: float = 0.0
+    proper: bool = True
+
+    def __post_init__(self) -> None:
+        for name in _SHARES:
+            value = getattr(self, name)
+            if not 0 <= value <= 1:
+                raise ValueError(f"SpeakerStyle.{name} must be within 0 to 1, not {value}")
+        if self.habit == 1:
+            raise ValueError("SpeakerStyle.habit must be below 1: somebody who always says the same has no choices")
+        if self.idiolect < 0:
+            raise ValueError(f"SpeakerStyle.idiolect must not be negative, but is {self.idiolect}")
+
+
+@dataclass(frozen=True)
+class _StyleSpread:
+    """How styles are spread over the speakers of a role: shares of registers, ranges of the other traits."""
+
+    registers: Mapping[Register, float]
+    ranges: Mapping[str, tuple[float, float]]
+    addresses: tuple[str, ...]
+    proper: float
+
+
+def draw_style(role: Role, rng: np.random.Generator) -> SpeakerStyle:
+    """Draws the style of a speaker for a session.
+
+    Args:
+        role: the participant (whose spread the Ad-Wizard shares) or the Co-Wizard (likewise the car itself).
+        rng: source of chance.
+    """
+    spread = _spreads()[Role.PARTICIPANT if role in (Role.PARTICIPANT, Role.AD_WIZARD) else Role.CO_WIZARD]
+    registers = list(spread.registers)
+    weights = np.array([spread.registers[register] for register in registers])
+    register = registers[int(rng.choice(len(registers), p=weights / weights.sum()))]
+    shares = {name: float(rng.uniform(*spread.ranges[name])) for name in _SHARES}
+    address = spread.addresses[int(rng.integers(len(spread.addresses)))] if spread.addresses else ""
+    return SpeakerStyle(
+        register=register,
+        idiolect=int(rng.integers(1, 2**31)),
+        address=address,
+        proper=bool(rng.random() < spread.proper),
+        chattiness=shares["chattiness"],
+        indirectness=shares["indirectness"],
+        anaphora=shares["anaphora"],
+        disfluency=shares["disfluency"],
+        repairs=shares["repairs"],
+        habit=shares["habit"],
+        addressing=shares["addressing"],
+    )
+
+
+@functools.cache
+def default_style(role: Role) -> SpeakerStyle:
+    """The style of those who have none: the middle of the spread, without favourite words, address and slips."""
+    spread = _spreads()[role]
+    chattiness, indirectness, anaphora = (
+        sum(spread.ranges[name]) / 2 for name in ("chattiness", "indirectness", "anaphora")
+    )
+    proper = role is Role.CO_WIZARD
+    return SpeakerStyle(chattiness=chattiness, indirectness=indirectness, anaphora=anaphora, proper=proper)
+
+
+@functools.cache
+def _spreads() -> Mapping[Role, _StyleSpread]:
+    data = read_data("styles.yaml")
+    return {parse_role(name): _spread(name, entry) for name, entry in data.items()}
+
+
+def _spread(role: str, entry: Mapping[str, object]) -> _StyleSpread:
+    wanted = {"registers", "addresses", "proper", *_SHARES}
+    if set(entry) != wanted:
+        raise LexiconError(f"styles.yaml: {role} needs exactly {sorted(wanted)}, has {sorted(entry)}")
+    shares = entry["registers"]
+    if not isinstance(shares, dict) or not set(shares) <= {register.name.lower() for register in Register}:
+        raise LexiconError(f"styles.yaml: {role}.registers gives shares of {[r.name.lower() for r in Register]}")
+    ranges = {name: _range(f"{role}.{name}", entry[name]) for name in _SHARES}
+    proper = entry["proper"]
+    if not isinstance(proper, int | float):
+        raise LexiconError(f"styles.yaml: {role}.proper is a share, not {proper!r}")
+    return _StyleSpread(
+        {Register[name.upper()]: float(share) for name, share in shares.items()},
+        ranges,
+        strings(f"styles.yaml: {role}.addresses", entry["addresses"]),
+        float(proper),
+    )
+
+
+def _range(where: str, value: object) -> tuple[float, float]:
+    if isinstance(value, list) and len(value) == 2 and all(isinstance(end, int | float) for end in value):
+        low, high = map(float, value)
+        if 0 <= low <= high <= 1:
+            return low, high
+    raise LexiconError(f"styles.yaml: {where} is a range [low, high] within 0 to 1, not {value!r}")

@@ -1,0 +1,39 @@
+"""Understanding of words that no grammar has made; the figures stand in docs/talk.md."""
+
+import time
+
+import numpy as np
+import pytest
+
+from dorothie_gym.dialogue import guess_spans, understand
+from tests.dialogue.heard import read_annotated, score
+
+
+@pytest.mark.parametrize("half", ["dev", "test"])
+def test_hand_written_utterances_are_understood(half):
+    annotated = read_annotated(half)
+    assert len(annotated) >= 75
+    alone = score(annotated, context=False)
+    assert alone.moves >= 0.8 and alone.f1 >= 0.8, alone.wrong
+    # The move before settles what short answers are.
+    assert score(annotated).moves >= alone.moves
+
+
+@pytest.mark.parametrize("half", ["dev", "test"])
+def test_hand_written_utterances_are_parted_into_their_acts(half):
+    annotated = read_annotated(half)
+    right = sum(len(guess_spans(item.text, item.after)) == len(item.acts) for item in annotated)
+    assert right / len(annotated) >= 0.85
+
+
+def test_understanding_is_fast():
+    texts = [item.text for half in ("dev", "test") for item in read_annotated(half)]
+    guess_spans(texts[0])
+    times = []
+    understand.cache_clear()
+    for text in texts:
+        start = time.process_time()
+        guess_spans(text)
+        times.append(time.process_time() - start)
+    # Ten times what it takes: a machine that is shared is slow now and then.
+    assert np.median(times) < 1000e-6
