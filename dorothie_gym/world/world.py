@@ -121,6 +121,7 @@ class World:
         poses[1:] = trace[:, _POSE]
         self.localizer.localize(poses, self.frame - frames, gps_from=self.faults.get(Sensor.GPS, 0))
         self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
+        self.planner.props = self._props_seen()
         return self.reports.close(poses, self.frame)
 
     def _run(self, frames: int) -> Array:
@@ -202,6 +203,12 @@ class World:
         self._perception.open(arrays.eye, self.visibility)
         table = np.empty((len(arrays.seen), len(BODY)))
         return table[: look_around(arrays, self.frame, table)]
+
+    def _props_seen(self) -> tuple[tuple[float, float, float], ...]:
+        """Where the props are that the car perceives: x, y and height [m]."""
+        if not self.actors.arrays.props.view(np.ndarray)["present"].any():
+            return ()
+        return tuple((body.x, body.y, body.height) for body in self.perceived() if body.kind is ObjectClass.STATIC)
 
     def _pose(self) -> tuple[float, float, float, float, float, bool]:
         """Of the car, in the columns of `kernel.rules`."""
