@@ -71,7 +71,8 @@ def _reach_aside(town: TownArrays, vehicle: Records) -> float:
     """How far a vehicle's outline reaches to either side of its middle, across the lane that it follows [m]."""
     here, there = town.points[vehicle.segment], town.points[vehicle.segment + 1]
     across = abs(vehicle.sin * (there[0] - here[0]) - vehicle.cos * (there[1] - here[1])) / (there[2] - here[2])
-    return float(0.5 * vehicle.width + 0.5 * vehicle.length * across)
+    along = math.sqrt(max(1.0 - across * across, 0.0))
+    return float(0.5 * (vehicle.width * along + vehicle.length * across))
 
 
 @inlined
