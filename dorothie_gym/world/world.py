@@ -130,6 +130,7 @@ class World:
         self.driver.brief(arrays)
         self._tell_weather(arrays)
         step(self._arrays, arrays, frames, 1.0 / FRAME_RATE)
+        self.car.refresh()
         self.driver.debrief(arrays)
         self.frame += frames
         self._report(arrays)
