@@ -66,18 +66,18 @@ def test_car_stays_behind_a_cyclist_where_there_is_one_lane() -> None:
     lane = max((lane for lane in town.lanes if not lane.in_junction), key=lambda lane: lane.length)
     world = world_at("brookside", lane.id, 5.0)
     world.driver.cruise = 12.0
-    for seed in range(100):  # one in eight rides a bicycle
+    for _ in range(100):  # one in eight rides a bicycle
         assert world.actors.add_vehicle(lane.id, 25.0, distance=5.0)
         (cyclist,) = world.actors.vehicles
         if cyclist.kind is Kind.CYCLIST:
             break
         cyclist.kind = Kind.EMPTY
     assert cyclist.kind is Kind.CYCLIST
-    closest = math.inf
-    for _ in range(24):
+    gaps = []
+    for _ in range(45):  # 15 s
         world.step(10)
-        closest = min(closest, cyclist.station - world.planner.station)
+        gaps.append(cyclist.station - world.planner.station)
     assert world.planner.lane == lane.id == cyclist.lane_id
-    assert 4.0 < closest and cyclist.station - world.planner.station < 20.0
-    assert float(world.car.speed) < cyclist.speed + 1.0
+    assert min(gaps) > 4.0 and gaps[-1] < 30.0
+    assert abs(float(world.car.speed) - cyclist.speed) < 1.5
     assert world.collisions == 0

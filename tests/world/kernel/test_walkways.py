@@ -19,7 +19,7 @@ def test_every_crosswalk_joins_two_pavements_where_they_have_a_mouth(name):
         ends = np.column_stack((crossing.x, crossing.y))
         assert np.hypot(*(ends[1] - ends[0])) == pytest.approx(crossing.length)
         middle = np.mean(np.asarray(town.crosswalks[number].outline)[:, :2], axis=0)
-        assert np.hypot(*(ends.mean(axis=0) - middle)) < 1.5
+        assert np.hypot(*(ends.mean(axis=0) - middle)) < 3.0
         for end in (0, 1):
             walk = arrays.walks[crossing.walk[end]]
             assert walk.kind == Footway.PAVEMENT
@@ -29,25 +29,22 @@ def test_every_crosswalk_joins_two_pavements_where_they_have_a_mouth(name):
             points = arrays.walk_points[walk.first : walk.last + 1]
             x = np.interp(mouth.station, points[:, 2], points[:, 0])
             y = np.interp(mouth.station, points[:, 2], points[:, 1])
-            assert np.hypot(x - ends[end, 0], y - ends[end, 1]) < 5.0
+            assert np.hypot(x - ends[end, 0], y - ends[end, 1]) < 0.1
 
 
 @pytest.mark.parametrize("name", TOWNS)
-def test_lanes_cross_a_crosswalk_where_its_outline_is(name):
+def test_lanes_cross_every_crosswalk_where_people_walk_over_it(name):
     town = find_town(name)
     arrays = town_arrays(TownNetwork(town))
     assert set(arrays.passages.crossing.tolist()) == set(range(len(town.crosswalks)))
     for lane, record in zip(town.lanes, arrays.lanes, strict=True):
         for passage in arrays.passages[record.passage : record.passage + record.passages]:
             x, y = lane.position(float(passage.start + passage.stop) / 2)
-            outline = np.asarray(town.crosswalks[passage.crossing].outline)[:, :2]
-            ahead = np.roll(outline, -1, axis=0) - outline
-            sides = ahead[:, 0] * (y - outline[:, 1]) - ahead[:, 1] * (x - outline[:, 0])
-            assert (sides >= -0.5).all() or (sides <= 0.5).all()
-            assert 1.0 < passage.stop - passage.start < 25.0
+            assert 0.4 < passage.stop - passage.start < 25.0
             crossing = arrays.crossings[passage.crossing]
             across = (x - crossing.x[0]) * crossing.cos + (y - crossing.y[0]) * crossing.sin
             assert passage.across == pytest.approx(across, abs=1.0)
+            assert abs((y - crossing.y[0]) * crossing.cos - (x - crossing.x[0]) * crossing.sin) < 1.0
 
 
 @pytest.mark.parametrize("name", TOWNS)
