@@ -137,13 +137,8 @@ class World:
         self.driver.brief(arrays, record)
         self._tell_weather(arrays)
         step(self._arrays, arrays, frames, 1.0 / FRAME_RATE)
-<<<<<<< HEAD
         self.driver.debrief(record)
         self.car.refresh()
-=======
-        self.car.refresh()
-        self.driver.debrief(arrays)
->>>>>>> 57534fb9511d0c128fa78fb3a0aee6252e5d41c6
         self.frame += frames
         if record["events"]:
             self._report(arrays)
