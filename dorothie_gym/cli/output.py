@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -54,6 +55,25 @@ def told_plainly() -> Iterator[None]:
         fail(str(error))
     except OSError as error:
         fail(f"{error.filename}: {error.strerror}; check the path" if error.filename else str(error))
+
+
+@contextmanager
+def compiling(after: float = 2.0) -> Iterator[None]:
+    """Tells on a terminal what takes so long, where the world's loops have to be compiled first.
+
+    Args:
+        after: seconds until it is told.
+    """
+    console = stderr()
+    message = "compiling the world's loops for this machine: once after an installation, about a minute ..."
+    timer = threading.Timer(after, lambda: console.print(message, style="dim"))
+    timer.daemon = True
+    if console.is_terminal:
+        timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def check_picture(path: Path) -> None:

@@ -16,6 +16,7 @@ from dorothie_gym.cli.output import (
     INTERRUPTED,
     check_file,
     check_picture,
+    compiling,
     fail,
     print_json,
     stderr,
@@ -116,12 +117,16 @@ def _play(plan: _Plan, *, quiet: bool) -> dict[str, Any]:
     """Plays the session and returns what --json writes."""
     from dorothie_gym.envs.config import EnvConfig
     from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-    from dorothie_gym.ontology import AGENT_ROLES
+    from dorothie_gym.ontology import AGENT_ROLES, Role
     from dorothie_gym.policies import make_policy
     from dorothie_gym.rollout import play_session
+    from dorothie_gym.spaces import noop
 
     config = EnvConfig() if plan.max_seconds is None else EnvConfig(max_seconds=plan.max_seconds)
-    env = DuoWizardEnv(plan.town, plan.storyboard, config=config)
+    with compiling():
+        env = DuoWizardEnv(plan.town, plan.storyboard, config=config)
+        env.reset(seed=plan.seed)
+        env.step({agent: noop(Role(agent), env.limits) for agent in env.agents})
     try:
         policies = {
             role: make_policy(name, role, env.limits) for role, name in zip(AGENT_ROLES, plan.players, strict=True)

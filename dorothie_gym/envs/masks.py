@@ -77,7 +77,9 @@ class Masks:
     def _note_car(self) -> None:
         """What the car may be told to do, and with which angles, when anything that this depends on has changed."""
         planner, speed, cruise = self._world.planner, float(self._world.car.speed), self._world.driver.cruise
-        state = planner.path, planner.s, planner.held, planner.manoeuvre, planner.roadblock, speed, cruise
+        state = (
+            planner.path, planner.s, planner.held, planner.manoeuvre, planner.roadblock, planner.props, speed, cruise
+        )  # fmt: skip
         if state == self._state:
             return
         self._state = state
@@ -86,8 +88,8 @@ class Masks:
         lane = planner.lane
         busy = planner.in_manoeuvre or self._world.town.lanes[lane].in_junction
         beside_left, beside_right = self._lanes_beside(lane)
-        left = not busy and beside_left and planner.may_switch(LinkType.LANE_CHANGE_LEFT)
-        right = not busy and beside_right and planner.may_switch(LinkType.LANE_CHANGE_RIGHT)
+        left = not busy and beside_left and planner.may_switch(LinkType.LANE_CHANGE_LEFT, speed)
+        right = not busy and beside_right and planner.may_switch(LinkType.LANE_CHANGE_RIGHT, speed)
         committed = planner.is_committed(speed)
         exits = () if committed else self._prospect.options().exits
         leaves = not busy and not committed and (planner.held or planner.manoeuvre[0] is not None)

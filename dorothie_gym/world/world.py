@@ -126,6 +126,7 @@ class World:
         self.localizer.localize(poses, self.frame - frames, gps_from=self.faults.get(Sensor.GPS, 0))
         if self.faults:
             self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
+        self.planner.props = self._props_seen()
         stood = self.car.speed == 0.0 and before[:4] == (*self.car.position.tolist(), self.car.heading, 0.0)
         return self.reports.close(poses, self.frame, stood=stood)
 
@@ -219,6 +220,12 @@ class World:
         self._tell_weather(arrays)
         table = np.empty((len(arrays.seen), len(BODY)))
         return table[: look_around(arrays, self.frame, table)]
+
+    def _props_seen(self) -> tuple[tuple[float, float, float], ...]:
+        """Where the props are that the car perceives: x, y and height [m]."""
+        if not self.actors.arrays.props.view(np.ndarray)["present"].any():
+            return ()
+        return tuple((body.x, body.y, body.height) for body in self.perceived() if body.kind is ObjectClass.STATIC)
 
     def _pose(self) -> tuple[float, float, float, float, float, bool]:
         """Of the car, in the columns of `kernel.rules`."""

@@ -59,6 +59,35 @@ def test_car_switches_lanes_round_a_roadblock() -> None:
     assert world.collisions == 0
 
 
+@pytest.mark.parametrize("speed", [0.0, 3.0, 8.0])
+@pytest.mark.parametrize("ahead", [0.0, 12.0, 20.0, 30.0, 45.0, 60.0])
+def test_car_that_switched_lanes_before_a_roadblock_can_switch_back(ahead: float, speed: float) -> None:
+    town = network("midtown").town
+    right, left = next(
+        (lane.id, beside)
+        for lane in town.lanes
+        if lane.length > 100.0 and (beside := town.neighbour(lane.id, LinkType.LANE_CHANGE_LEFT)) is not None
+    )
+    world = world_at("midtown", right, 20.0)
+    station = town.lanes[left].project(town.lanes[right].position(20.0))[0]
+    world.actors.add_prop(PropKind.STREET_BARRIER, left, station + ahead)
+    world.step(1)
+    world.car.speed = speed
+    reason = world.planner.command(PhysicalAction.LANE_SWITCH, 90, speed)
+    assert reason in (None, "a roadblock is too close on the lane to the left")
+    if ahead <= 12.0:
+        assert reason is not None
+    if ahead == 60.0:
+        assert reason is None
+    if reason is None:
+        run(world, 15.0)
+        assert world.planner.lane == left and world.car.speed < 0.05
+        assert world.planner.command(PhysicalAction.LANE_SWITCH, -90, 0.0) is None
+        run(world, 15.0)
+        assert world.planner.lane != left
+        assert world.collisions == 0
+
+
 def test_hazard_stop_and_its_end_are_each_told_once_with_their_reason() -> None:
     town = network("brookside").town
     world = world_at("brookside", long_lane(town), 2.0)

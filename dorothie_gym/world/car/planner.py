@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from dorothie_gym.ontology import PhysicalAction
-from dorothie_gym.world.car.lanes import HORIZON, LEAD, MIN_SWITCH, Lanes, Step
+from dorothie_gym.world.car.hazards import HEIGHT_MARGIN
+from dorothie_gym.world.car.lanes import HORIZON, LEAD, MIN_SWITCH, SWITCH_TIME, Lanes, Step
 from dorothie_gym.world.car.path import TURNING_RADIUS, U_TURN_REACH, Path, Piece, follow, u_turn
 from dorothie_gym.world.town.model import Exit, LinkType, Town
 from dorothie_gym.world.town.oncoming import Oncoming, oncoming_lanes
@@ -31,6 +32,10 @@ U_TURN_SPEED = 3.5
 HALF_LENGTH = 2.5
 """Of the car [m]."""
 
+FROM_PROP = 16.5
+"""Where a lane switch ends, the car's middle is at least this far before that of a prop, less the way to stop [m]:
+`hazards.ROADBLOCK_GAP`, half the car and half the prop."""
+
 HARD_STOP = 5.0
 """Deceleration with which the car still stops before a junction when its plan is changed [m/s^2]."""
 
@@ -47,6 +52,7 @@ class LocalPlanner:
         offset: its distance from the path, positive right [m].
         held: whether the car stands by the action Stop.
         roadblock: how far ahead of the car's middle a roadblock is seen [m], or inf.
+        props: where all props are that the car sees (x, y, height) [m].
     """
 
     def __init__(self, town: Town, lane: int, station: float) -> None:
@@ -55,6 +61,7 @@ class LocalPlanner:
         self._oncoming = oncoming_lanes(town)
         self.held = False
         self.roadblock = math.inf
+        self.props: tuple[tuple[float, float, float], ...] = ()
         self._manoeuvre: PhysicalAction | None = None
         self._manoeuvre_angle = 0
         self._manoeuvre_end = 0.0
@@ -210,7 +217,7 @@ class LocalPlanner:
     def _switch_lane(self, angle: int, speed: float) -> str | None:
         if angle == 0:
             return "a lane switch needs a side: a positive angle is left, a negative one right"
-        target = self._plan_switch(LinkType.LANE_CHANGE_LEFT if angle > 0 else LinkType.LANE_CHANGE_RIGHT)
+        target = self._plan_switch(LinkType.LANE_CHANGE_LEFT if angle > 0 else LinkType.LANE_CHANGE_RIGHT, speed)
         if isinstance(target, str):
             return target
         self._clear()
@@ -218,11 +225,11 @@ class LocalPlanner:
         self._lay([Step(self.lane), Step(target, change=True)], self.station, speed)
         return None
 
-    def may_switch(self, side: LinkType) -> bool:
-        """Whether a lane switch would be carried out; `side` is one of the two lane-change types."""
-        return not isinstance(self._plan_switch(side), str)
+    def may_switch(self, side: LinkType, speed: float = 0.0) -> bool:
+        """Whether a lane switch would be carried out at a speed [m/s]; `side` is one of the two lane-change types."""
+        return not isinstance(self._plan_switch(side, speed), str)
 
-    def _plan_switch(self, side: LinkType) -> int | str:
+    def _plan_switch(self, side: LinkType, speed: float) -> int | str:
         """The lane to switch to, or why there can be no switch."""
         name = "left" if side is LinkType.LANE_CHANGE_LEFT else "right"
         if self.in_manoeuvre or self._town.lanes[self.lane].in_junction:
@@ -232,7 +239,23 @@ class LocalPlanner:
             return f"there is no lane to the {name}"
         if self._town.lanes[self.lane].length - self.station < MIN_SWITCH + LEAD:
             return f"there is no room left to switch to the {name}"
+        if self._leads_to_a_prop(target, speed):
+            return f"a roadblock is too close on the lane to the {name}"
         return target
+
+    def _leads_to_a_prop(self, target: int, speed: float) -> bool:
+        """Whether a car that switches to a lane would come too close to a prop to get away from it again."""
+        if not self.props:
+            return False
+        lane = self._town.lanes[target]
+        here = lane.project(self._town.lanes[self.lane].position(self.station))[0]
+        until = here + LEAD + max(MIN_SWITCH, SWITCH_TIME * speed) + speed**2 / (2 * BRAKING) + FROM_PROP
+        for x, y, height in self.props:
+            station, lateral = lane.project(np.array((x, y)))
+            level = abs(lane.height_at(station) - height) < HEIGHT_MARGIN
+            if level and abs(lateral) < lane.width_at(station) / 2 and here - HALF_LENGTH < station < until:
+                return True
+        return False
 
     @property
     def turn_ahead(self) -> int | None:

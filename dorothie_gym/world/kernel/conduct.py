@@ -17,11 +17,8 @@ GIVING_WAY_PATIENCE = 30.0
 SNEAKING = 2.0
 """Who has been giving way at a green light for this long may go when it turns yellow (HCM's sneakers) [s]."""
 
-START = 1.2
-"""Time from a stand at the line until the front is over it [s]."""
-
-CYCLIST_START = 2.6
-"""The same for a cyclist, who accelerates by 1 m/s^2 [s]."""
+START = 0.3
+"""Who uses the yellow takes this long to start, and then as long as it takes to reach the line [s]."""
 
 AT_LINE = 3.5
 """Who stands with its front this close before the line stands at it [m]."""

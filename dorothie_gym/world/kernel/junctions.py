@@ -14,7 +14,6 @@ from dorothie_gym.world.kernel.conduct import (
     AT_LINE,
     COMFORTABLE_BRAKING,
     CRITICAL_GAP,
-    CYCLIST_START,
     GIVING_WAY_PATIENCE,
     HARDEST_BRAKING,
     LAPSE,
@@ -29,7 +28,7 @@ from dorothie_gym.world.kernel.conduct import (
     UNUSED,
 )
 from dorothie_gym.world.kernel.lights import light
-from dorothie_gym.world.kernel.parameters import AFTER_END, CLOSED
+from dorothie_gym.world.kernel.parameters import AFTER_END, CLOSED, COMFORT, CYCLIST_ACCELERATION
 from dorothie_gym.world.kernel.records import NOBODY, Colour, Control, Kind, Records, Relation, Wait
 
 if TYPE_CHECKING:
@@ -214,8 +213,9 @@ def _may_sneak(town: TownArrays, world: WorldArrays, vehicle: Records, now: floa
         return False
     if let_in:
         return True
-    start = CYCLIST_START if vehicle.kind == Kind.CYCLIST else START
-    return bool(light(town, world, vehicle.approach_lane, now + start) == Colour.YELLOW)
+    pull = CYCLIST_ACCELERATION if vehicle.kind == Kind.CYCLIST else COMFORT
+    over = now + START + math.sqrt(2.0 * max(vehicle.distance, 0.0) / pull)
+    return bool(light(town, world, vehicle.approach_lane, over) == Colour.YELLOW)
 
 
 @compiled

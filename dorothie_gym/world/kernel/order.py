@@ -41,7 +41,10 @@ def rebuild(town: TownArrays, world: WorldArrays) -> None:
         if vehicle.kind == Kind.EMPTY:
             continue
         _list_vehicle(nodes, heads, vehicle, i, 2 * i, vehicle.lane, vehicle.own_station)
-        _list_again(town, nodes, heads, vehicle, i)
+        if vehicle.lane == vehicle.plan[0]:
+            _list_beside(town, nodes, heads, vehicle, i)
+        elif _is_on_followed(town, vehicle):
+            _list_vehicle(nodes, heads, vehicle, i, 2 * i + 1, vehicle.plan[0], vehicle.station)
     for p in range(len(world.props)):
         prop = world.props[p]
         if prop.present:
@@ -51,18 +54,6 @@ def rebuild(town: TownArrays, world: WorldArrays) -> None:
                     node.station, node.lane, node.body = prop.station[k], prop.lane[k], len(vehicles) + p
                     node.half_length = 0.5 * max(prop.length, prop.width)
                     _insert(nodes, heads, 2 * len(vehicles) + 4 * p + k)
-
-
-@inlined
-def _list_again(town: TownArrays, nodes: Records, heads: NDArray[np.int32], vehicle: Records, i: int) -> None:
-    """Lists a vehicle on the other lane that it is on, if there is one."""
-    if vehicle.lane != vehicle.plan[0]:
-        if _is_on_followed(town, vehicle):
-            _list_vehicle(nodes, heads, vehicle, i, 2 * i + 1, vehicle.plan[0], vehicle.station)
-    elif town.lanes[vehicle.lane].left >= 0 or town.lanes[vehicle.lane].right >= 0:
-        reach = _reach_aside(town, vehicle)
-        if abs(vehicle.own_lateral) + reach > town.lanes[vehicle.lane].half_width:
-            _list_beside(town, nodes, heads, vehicle, i, reach)
 
 
 @inlined
@@ -80,15 +71,19 @@ def _reach_aside(town: TownArrays, vehicle: Records) -> float:
     """How far a vehicle's outline reaches to either side of its middle, across the lane that it follows [m]."""
     here, there = town.points[vehicle.segment], town.points[vehicle.segment + 1]
     across = abs(vehicle.sin * (there[0] - here[0]) - vehicle.cos * (there[1] - here[1])) / (there[2] - here[2])
-    return float(0.5 * vehicle.width + 0.5 * vehicle.length * across)
+    along = math.sqrt(max(1.0 - across * across, 0.0))
+    return float(0.5 * (vehicle.width * along + vehicle.length * across))
 
 
-@compiled
-def _list_beside(
-    town: TownArrays, nodes: Records, heads: NDArray[np.int32], vehicle: Records, body: int, reach: float
-) -> None:
+@inlined
+def _list_beside(town: TownArrays, nodes: Records, heads: NDArray[np.int32], vehicle: Records, body: int) -> None:
     """Lists a vehicle on the lane beside into which it reaches so far that nobody passes it there."""
     lane = town.lanes[vehicle.lane]
+    if lane.left < 0 and lane.right < 0:
+        return
+    reach = _reach_aside(town, vehicle)
+    if abs(vehicle.own_lateral) + reach <= lane.half_width:
+        return
     for side in (lane.left, lane.right):
         if side < 0:
             continue

@@ -37,6 +37,12 @@ STANDING = 0.1
 BEFORE_MANOEUVRE = 15.0
 """How far before it would have to brake for a lane switch or U-turn it looks whether others are in its way [m]."""
 
+REACHED = 0.2
+"""A car that switches lanes is in the way on the new one when it reaches into that so far [m]."""
+
+BESIDE = 7.0
+"""Who is no farther before or behind the car than this is beside it [m], and who comes from behind in a second."""
+
 SLOWEST = 1.0
 """Speed at which a car comes to a place at least [m/s]."""
 
@@ -170,7 +176,9 @@ def _gap_to_traffic(town: TownArrays, world: WorldArrays, seen: int, blocked: bo
     turning = car.action == U_TURN
     start = int(car.at)
     if path[start].manoeuvre and (car.s > BEGUN or vehicle.speed > STANDING):
-        if turning and not blocked:
+        if not turning:
+            return _gap_beside(town, world, seen, int(path[start].lane))
+        if not blocked:
             _close_junctions(town, world, start)
         return math.inf, 0
     reach = BEFORE_MANOEUVRE + vehicle.speed * vehicle.speed / (2.0 * BRAKING)
@@ -197,6 +205,27 @@ def _gap_to_traffic(town: TownArrays, world: WorldArrays, seen: int, blocked: bo
     # asked for last: those who wait before the junction have to go first
     if turning and not blocked and not _close_junctions(town, world, start):
         return max(ahead, 0.0), -2
+    return math.inf, 0
+
+
+@compiled
+def _gap_beside(town: TownArrays, world: WorldArrays, seen: int, target: int) -> tuple[float, int]:
+    """In a lane switch, as long as the car is not yet in the way on its target: whether somebody is beside it there.
+
+    Returns:
+        0 if so, else infinite, and the key of that one.
+    """
+    vehicle, half_width = world.vehicles[0], town.lanes[target].half_width
+    own, lateral, _ = project(town, target, vehicle.x, vehicle.y)
+    if abs(lateral) < half_width + 0.5 * vehicle.width - REACHED:
+        return math.inf, 0
+    for n in range(seen):
+        body = world.seen[n]
+        if body.kind != VEHICLES or body.distance2 > BESIDE * BESIDE * 4.0:
+            continue
+        station, lateral, _ = project(town, target, body.x, body.y)
+        if abs(lateral) < half_width and abs(station - own) < BESIDE + max(body.speed - vehicle.speed, 0.0):
+            return 0.0, int(body.key)
     return math.inf, 0
 
 

@@ -5,13 +5,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from dorothie_gym.world.kernel import TownArrays, Wait, WorldArrays, populate, step, town_arrays
+from dorothie_gym.world.kernel import Kind, TownArrays, Wait, WorldArrays, add_vehicle, populate, step, town_arrays
 from dorothie_gym.world.kernel.lights import light
 from dorothie_gym.world.kernel.records import Colour
 from dorothie_gym.world.kernel.world_arrays import empty_world
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.town import Town
-from dorothie_gym.world.town.lights import LightColour
+from dorothie_gym.world.town.lights import LightColour, LightPhase
 from dorothie_gym.world.town.model import SignalKind
 from dorothie_gym.world.town.right_of_way import right_of_way
 from tests.world.crossings import ARMS, across, crossing, lit, lit_crossing, way_in, way_out
@@ -56,6 +56,33 @@ def test_vehicle_waits_at_red_and_goes_at_green():
     assert crossed(world, 0)
 
 
+@pytest.mark.parametrize(("before", "stops"), [(35.0, True), (6.0, False)])
+def test_yellow_stops_who_can_stop_comfortably_and_lets_the_others_through(before, stops):
+    phases = [LightPhase(duration=4.0, yellow=(0, 2)), LightPhase(duration=40.0)]
+    town = crossing(dict.fromkeys(ARMS, SignalKind.TRAFFIC_LIGHT), phases)
+    arrays, world = going(town, ("s", "n", before + 2.5))
+    run(arrays, world, 10.0)
+    assert crossed(world, 0) != stops
+    assert not stops or (world.vehicles[0].speed == 0.0 and 0.0 < world.vehicles[0].distance < 3.5)
+
+
+@pytest.mark.parametrize("kind", [Kind.CAR, Kind.CYCLIST])
+def test_who_waits_at_a_long_red_light_is_not_towed(kind):
+    phases = [LightPhase(duration=100.0, green=(1, 3)), LightPhase(duration=20.0, green=(0, 2))]
+    town = crossing(dict.fromkeys(ARMS, SignalKind.TRAFFIC_LIGHT), phases)
+    arrays = town_arrays(TownNetwork(town))
+    world = empty_world(arrays, vehicles=3, pedestrians=0)
+    for station in (100.0, 85.0, 70.0):
+        i = add_vehicle(arrays, world, way_in("s"), station, kind=kind, desired=8.0)
+        world.vehicles[i].plan[:3] = way_in("s"), across("s", "n"), way_out("n")
+    keys = world.vehicles.key.tolist()
+    run(arrays, world, 99.0)
+    assert world.vehicles.key.tolist() == keys and world.clock[0].towed == 0
+    assert (world.vehicles.speed == 0.0).all() and (world.vehicles.lane == way_in("s")).all()
+    run(arrays, world, 20.0)
+    assert [crossed(world, i) for i in range(3)] == [True, True, True]
+
+
 def test_vehicle_does_not_slow_down_for_a_green_light():
     arrays, world = going(lit_crossing("ew", green=60.0), ("e", "w", 60.0))
     slowest = 8.0
@@ -98,6 +125,35 @@ def test_first_come_first_served_among_equals():
     order = []
     run(arrays, world, 30.0, lambda: order.extend(i for i in (0, 1) if crossed(world, i) and i not in order) or False)
     assert order == [1, 0]
+
+
+@pytest.mark.parametrize("way", [1, 2, 3])  # left, straight on, right
+@pytest.mark.parametrize("sign", [None, SignalKind.STOP])
+def test_four_cars_at_a_crossing_of_equals_all_get_across(way, sign):
+    town = crossing(dict.fromkeys(ARMS, sign) if sign else {})
+    arrays, world = going(town, *((arm, ARMS[(k + way) % 4], 28.0) for k, arm in enumerate(ARMS)))
+    done: set[int] = set()
+    seconds = run(arrays, world, 60.0, lambda: done.update(i for i in range(4) if crossed(world, i)) or len(done) == 4)
+    assert len(done) == 4 and seconds < 45.0
+
+
+def test_no_more_are_let_in_than_have_room_behind_the_junction():
+    network = TownNetwork(crossing())
+    poses = [Pose(way_out("n"), 18.0), *(Pose(way_in("s"), LENGTH - left, speed=8.0) for left in (18.0, 32.0, 46.0))]
+    arrays, world = kernel_world(network, poses)
+    for vehicle in world.vehicles[1:]:
+        vehicle.plan[:3], vehicle.planned = (way_in("s"), across("s", "n"), way_out("n")), 3
+    entered: list[set[int]] = []
+    for _ in range(round(14.0 / DT)):
+        world.vehicles[0].desired = world.vehicles[0].speed = 0.0
+        world.vehicles.standing = 0.0  # nobody looks for another way
+        step(arrays, world, 1, DT)
+        entered.append({i for i in (1, 2, 3) if arrays.lanes[world.vehicles[i].plan[0]].junction >= 0})
+        assert not world.vehicles.crashed.any()
+    assert {i for inside in entered for i in inside} == {1}
+    vehicle = world.vehicles[1]
+    assert vehicle.speed < 0.3 and vehicle.inside < 0  # it stands, and has left the crossing altogether
+    assert vehicle.lane == way_out("n") and vehicle.own_station > 0.5 * vehicle.length
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -74,6 +74,32 @@ def test_vehicle_that_stands_for_long_is_towed_unless_its_light_is_red():
     assert world.vehicles[1].key != key
 
 
+def test_queue_before_a_red_light_that_reaches_back_through_another_junction_is_not_towed():
+    network = TownNetwork(find_town("midtown"))
+    town, arrays = network.town, town_arrays(network)
+    lit = arrays.lanes.programme >= 0
+    ways = (
+        (lane.id, link.target, after.target)
+        for lane in town.lanes if not lane.in_junction and not lit[lane.id] and lane.length > 40.0
+        for link in town.successors(lane.id) if town.lanes[link.target].in_junction
+        for after in town.successors(link.target)
+    )  # fmt: skip
+    way = next(way for way in ways if lit[way[2]])
+    reds = [t for t in np.arange(0.0, 900.0, 0.5) if town.light(way[2], float(t)) is LightColour.RED]
+    greens = [t for t in np.arange(0.0, 900.0, 0.5) if town.light(way[2], float(t)) is LightColour.GREEN]
+    world = empty_world(arrays, vehicles=1, pedestrians=0)
+    add_vehicle(arrays, world, way[0], 20.0, desired=8.0)
+    world.vehicles[0].plan[:3], world.vehicles[0].planned = way, 3
+    for times, towed in ((reds[:180], False), (greens[:130], True)):  # 90 s, 65 s
+        key = int(world.vehicles[0].key)
+        for time in times:
+            world.clock[0].time, world.lamps.until = float(time), -np.inf
+            for frame in range(15):
+                world.clock[0].frame = frame
+                tow(arrays, world, DT)
+        assert (world.vehicles[0].key != key) == towed
+
+
 @pytest.mark.parametrize(("turning", "towed"), [(True, True), (False, False)])
 def test_who_stands_before_the_car_that_turns_round_gives_way_to_it(turning, towed):
     arrays, world = with_car(straight_network(), [(4, 58.0), (4, 90.0)])

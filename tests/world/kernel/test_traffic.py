@@ -98,6 +98,8 @@ def test_vehicles_stop_for_somebody_on_a_crosswalk():
                 nearest = min(nearest, ahead)
         assert nearest > 0.0
         assert world.clock[0].run_over == 0
+        step(arrays, world, 300, DT)
+        assert world.vehicles[0].lane != number or world.vehicles[0].own_station > passage.stop  # and then go on
         tested += 1
     assert tested >= 2
 
@@ -123,8 +125,9 @@ def test_nobody_steps_in_front_of_a_vehicle_that_cannot_stop_with_ease():
     assert walker.state == Walk.CROSSING
 
 
-def test_pedestrians_walk_on_pavements_and_cross_on_crosswalks_only():
-    network = TownNetwork(find_town("brookside"))
+@pytest.mark.parametrize("name", ["brookside", "midtown"])
+def test_pedestrians_walk_on_pavements_and_cross_on_crosswalks_only(name):
+    network = TownNetwork(find_town(name))
     arrays = town_arrays(network)
     world = empty_world(arrays, vehicles=0, pedestrians=20, seed=2)
     populate(network, arrays, world, seed=2, vehicles=0, pedestrians=20)
@@ -133,7 +136,7 @@ def test_pedestrians_walk_on_pavements_and_cross_on_crosswalks_only():
         step(arrays, world, 15, DT)
         for walker in world.pedestrians:
             place = np.array([walker.x, walker.y])
-            lane = network.get_lane(network.get_closest_lane_index(place))
+            lane = network.get_lane(network.get_closest_lane_index(place, height=walker.height))
             on_road = abs(lane.local_coordinates(place)[1]) < lane.width / 2
             crossed += on_road
             assert not on_road or walker.state == Walk.CROSSING

@@ -1,0 +1,60 @@
+"""Where crosswalks are, which pavements they join, and where lanes cross them."""
+
+import numpy as np
+import pytest
+
+from dorothie_gym.world.kernel import Footway, town_arrays
+from dorothie_gym.world.network.network import TownNetwork
+from tests.world.network.towns import find_town
+
+TOWNS = ["brookside", "millbrook", "midtown", "northgate"]
+
+
+@pytest.mark.parametrize("name", TOWNS)
+def test_every_crosswalk_joins_two_pavements_where_they_have_a_mouth(name):
+    town = find_town(name)
+    arrays = town_arrays(TownNetwork(town))
+    assert len(arrays.crossings) == len(town.crosswalks) > 0
+    for number, crossing in enumerate(arrays.crossings):
+        ends = np.column_stack((crossing.x, crossing.y))
+        assert np.hypot(*(ends[1] - ends[0])) == pytest.approx(crossing.length)
+        middle = np.mean(np.asarray(town.crosswalks[number].outline)[:, :2], axis=0)
+        assert np.hypot(*(ends.mean(axis=0) - middle)) < 3.0
+        for end in (0, 1):
+            walk = arrays.walks[crossing.walk[end]]
+            assert walk.kind == Footway.PAVEMENT
+            mouths = arrays.mouths[walk.mouth : walk.mouth + walk.mouths]
+            (mouth,) = [m for m in mouths if m.crossing == number and m.end == end]
+            assert mouth.station == crossing.station[end]
+            points = arrays.walk_points[walk.first : walk.last + 1]
+            x = np.interp(mouth.station, points[:, 2], points[:, 0])
+            y = np.interp(mouth.station, points[:, 2], points[:, 1])
+            assert np.hypot(x - ends[end, 0], y - ends[end, 1]) < 0.1
+
+
+@pytest.mark.parametrize("name", TOWNS)
+def test_lanes_cross_every_crosswalk_where_people_walk_over_it(name):
+    town = find_town(name)
+    arrays = town_arrays(TownNetwork(town))
+    assert set(arrays.passages.crossing.tolist()) == set(range(len(town.crosswalks)))
+    for lane, record in zip(town.lanes, arrays.lanes, strict=True):
+        for passage in arrays.passages[record.passage : record.passage + record.passages]:
+            x, y = lane.position(float(passage.start + passage.stop) / 2)
+            assert 0.4 < passage.stop - passage.start < 25.0
+            crossing = arrays.crossings[passage.crossing]
+            across = (x - crossing.x[0]) * crossing.cos + (y - crossing.y[0]) * crossing.sin
+            assert passage.across == pytest.approx(across, abs=1.0)
+            assert abs((y - crossing.y[0]) * crossing.cos - (x - crossing.x[0]) * crossing.sin) < 1.0
+
+
+@pytest.mark.parametrize("name", TOWNS)
+def test_pavements_keep_off_the_lanes(name):
+    network = TownNetwork(find_town(name))
+    arrays = town_arrays(network)
+    for walk in arrays.walks[arrays.walks.kind == Footway.PAVEMENT]:
+        points = arrays.walk_points[walk.first : walk.last + 1]
+        for station in np.linspace(0.0, walk.length, 9):
+            x, y, z = (float(np.interp(station, points[:, 2], points[:, k])) for k in (0, 1, 4))
+            lane = network.get_lane(network.get_closest_lane_index(np.array([x, y]), height=z))
+            at, lateral = lane.local_coordinates(np.array([x, y]))
+            assert abs(lateral) > lane.width_at(at) / 2 or not 0.0 < at < lane.length
