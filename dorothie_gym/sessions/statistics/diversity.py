@@ -89,7 +89,7 @@ def _padded(words: Sequence[str]) -> list[str]:
 
 
 def _fitted(sentences: Sequence[Sequence[str]]) -> Any:
-    """nltk's model over the sentences, whose estimator counts continuations once instead of for every score."""
+    """Nltk's model over the sentences, whose estimator counts continuations once instead of for every score."""
     from nltk.lm.models import InterpolatedLanguageModel
     from nltk.lm.smoothing import KneserNey
     from nltk.util import everygrams

@@ -12,7 +12,7 @@ from functools import cached_property
 from dorothie_gym.dialogue.exchanges import EXPECTATIONS, Exchange, ExchangeTracker
 from dorothie_gym.dialogue.transactions import TransactionTracker
 from dorothie_gym.dialogue.utterances import Span, Utterance
-from dorothie_gym.ontology import GoalStatus, LandmarkName, OntologyError, Role, parse_landmark, parse_goal_status
+from dorothie_gym.ontology import GoalStatus, LandmarkName, OntologyError, Role, parse_goal_status, parse_landmark
 from dorothie_gym.sessions.events import Event, EventType
 from dorothie_gym.sessions.header import NATIVE
 from dorothie_gym.sessions.records import MoveRecord, UtteranceRecord
@@ -122,7 +122,9 @@ def is_initiating(move: MoveRecord) -> bool:
 def goals_of(session: Session) -> tuple[LandmarkName, ...]:
     """Landmarks of the subgoals in a session's header; names that are not the ontology's are passed over."""
     rows = session.header.landmarks
-    names = [rows[subgoal["landmark"]]["name"] for subgoal in session.header.subgoals if subgoal["landmark"] < len(rows)]
+    names = [
+        rows[subgoal["landmark"]]["name"] for subgoal in session.header.subgoals if subgoal["landmark"] < len(rows)
+    ]
     return tuple(name for name in map(_landmark, names) if name is not None)
 
 

@@ -9,25 +9,18 @@ from dorothie_gym.ontology import (
     DialogueMove,
     ExceptionKind,
     GoalStatus,
-    LandmarkName,
     MentalAction,
-    ObjectClass,
     PhysicalAction,
     Slot,
     WeatherParameter,
 )
 from dorothie_gym.sessions.events import Event, EventType
+from dorothie_gym.sessions.statistics.handling import OBSTACLES
 from dorothie_gym.sessions.statistics.phenomena.query import CAR, HUMAN, Finding
 from dorothie_gym.sessions.statistics.phenomena.talk import Talk, Turn, labels
 from dorothie_gym.sessions.statistics.phenomena.ways import asks_where_next
 
 M = DialogueMove
-
-OBSTACLES = (
-    ObjectClass.STATIC, ObjectClass.DYNAMIC, ObjectClass.OTHER, ObjectClass.FENCE, ObjectClass.VEGETATION,
-    ObjectClass.TRAFFIC_SIGN, ObjectClass.GUARD_RAIL, ObjectClass.WALL, ObjectClass.UNLABELED,
-)  # fmt: skip
-"""What lies across a road may be called."""
 
 DIM = (
     WeatherParameter.FOG_DENSITY, WeatherParameter.FOG_DISTANCE, WeatherParameter.FOG_FALLOFF,
@@ -84,7 +77,7 @@ def meets_roadblock(talk: Talk) -> bool:
 
 
 def dim_weather(talk: Talk) -> Iterator[Finding]:
-    """10: after fog, rain or dusk set in the participant wants less speed or more light, and gets it or a word on it."""
+    """10: once fog, rain or dusk set in, the participant wants less speed or more light, and gets it or an answer."""
     first = min((event.time for event in _dimming(talk)), default=None)
     if first is None:
         return
@@ -211,8 +204,3 @@ def gives_cause_to_negotiate(talk: Talk) -> bool:
     """Whether a roadblock is met or the task changes."""
     kinds = (ExceptionKind.TASK_TRIGGER, ExceptionKind.TASK_CHANGE)
     return meets_roadblock(talk) or any(task_exception(talk, kind) for kind in kinds)
-
-
-def is_place(name: LandmarkName) -> bool:
-    """Whether a landmark's name is that of a place."""
-    return name not in (LandmarkName.UNKNOWN, LandmarkName.QUERIED)

@@ -76,19 +76,26 @@ def acts_by_itself(talk: Talk) -> bool:
 
 
 def overlap(talk: Talk) -> Iterator[Finding]:
-    """19: two exchanges, begun by different speakers, are open at once, and both are answered."""
-    spans = []
-    for unit in talk.units.exchanges:
-        first = unit.moves[0]
-        answer = next((move for move in unit.moves if move.speaker is not first.speaker), None)
-        if answer is not None and first.act.move in EXPECTATIONS:
-            spans.append((first.start, answer.start, first.speaker, first.utterance))
-    turn_of = {(turn.speaker, turn.start): turn for turn in talk.turns}
-    for k, (start, answered, speaker, _) in enumerate(spans):
-        for other_start, other_answered, other, _ in spans[k + 1 :]:
-            if other is not speaker and max(start, other_start) < min(answered, other_answered):
-                earlier = min((start, speaker), (other_start, other), key=lambda each: each[0])
-                yield Finding(turn_of[earlier[1], earlier[0]], "both answered")
+    """19: both begin an exchange while the other is still speaking, and both are answered."""
+    begun = list(_answered_exchanges(talk))
+    for k, first in enumerate(begun):
+        for other in begun[k + 1 :]:
+            at_once = max(first.start, other.start) < min(first.end, other.end)
+            if at_once and first.speaker is not other.speaker:
+                yield Finding(min(first, other, key=lambda turn: turn.number), "both answered")
+
+
+def _answered_exchanges(talk: Talk) -> Iterator[Turn]:
+    """The turns that open an exchange of which the other speaker is a part."""
+    opened: dict[int | None, Turn] = {}
+    for turn in talk.turns:
+        for act, exchange in zip(turn.acts, turn.exchanges, strict=True):
+            if exchange not in opened:
+                opened[exchange] = turn
+            elif opened[exchange].speaker is not turn.speaker and act.move not in EXPECTATIONS:
+                opener = opened[exchange]
+                if opener.does(*EXPECTATIONS):
+                    yield opener
 
 
 def irrelevant(talk: Talk) -> Iterator[Finding]:
@@ -109,7 +116,7 @@ def abandoned(talk: Talk) -> Iterator[Finding]:
         unanswered = any(len(said_by_both[k]) == 1 for k in asked)
         if not unanswered or talk.session.duration - turn.end < PATIENCE:
             continue
-        answered = (talk.answers(turn, *(set(M) - {M.IRRELEVANT, M.ALIGN}), within=PATIENCE))
+        answered = talk.answers(turn, *(set(M) - {M.IRRELEVANT, M.ALIGN}), within=PATIENCE)
         if any(not other.does(*EXPECTATIONS) for other in answered):
             continue
         yield Finding(turn, "asked again" if _asked_again(talk, turn) else "dropped")

@@ -26,7 +26,9 @@ from dorothie_gym.ontology import (
 from dorothie_gym.sessions.events import Event, EventType
 from dorothie_gym.sessions.records import UtteranceRecord
 from dorothie_gym.sessions.session import Session
+from dorothie_gym.sessions.statistics.handling import time_met
 from dorothie_gym.sessions.statistics.units import Units, goals_of
+from dorothie_gym.world.config import FRAME_RATE
 
 ANSWER = 15.0
 """Within this time of a turn's end its answer begins [s]: an exchange's patience, and the answer's own time."""
@@ -141,7 +143,7 @@ class Talk:
     def did(self, *actions: PhysicalAction, since: float = 0.0, until: float = math.inf) -> bool:
         """Whether the Co-Wizard did one of the actions in a stretch of time [s]."""
         return any(
-            action.action in actions and action.source is Role.CO_WIZARD and since <= action.frame / 30.0 <= until
+            action.action in actions and action.source is Role.CO_WIZARD and since <= action.frame / FRAME_RATE <= until
             for action in self.session.physical_actions
         )
 
@@ -158,16 +160,9 @@ class Talk:
     @cached_property
     def met_roadblock(self) -> float | None:
         """When the car first was near something that the Ad-Wizard had put on the road [s]; None if never."""
-        times = []
-        for event in self.exceptions(ExceptionKind.PLACE_PROP, ExceptionKind.MOVE_PROP):
-            x, y = event.data.get("x"), event.data.get("y")
-            if not isinstance(x, int | float) or not isinstance(y, int | float):
-                continue
-            rows = self.session.trajectory[self.session.trajectory["frame"] >= event.frame]
-            near = (rows["x"] - x) ** 2 + (rows["y"] - y) ** 2 <= NEAR**2
-            if near.any():
-                times.append(float(rows["frame"][near][0]) / 30.0)
-        return min(times, default=None)
+        props = self.exceptions(ExceptionKind.PLACE_PROP, ExceptionKind.MOVE_PROP)
+        met = min((time_met(self.session, event) for event in props), default=math.inf)
+        return met if math.isfinite(met) else None
 
     @cached_property
     def hidden_goals(self) -> frozenset[str]:
@@ -187,10 +182,6 @@ class Talk:
             start=utterance.start,
             end=utterance.end,
         )
-
-
-NEAR = 60.0
-"""The car has met a roadblock when it comes this close to it [m]: it is seen from there by day."""
 
 
 def named(act: DialogueAct, slot: Slot) -> frozenset[SlotValue]:

@@ -28,7 +28,9 @@ _REFERENCE = re.compile(
     r"|\bnext one\b|\bother side\b|\bsame (?:street|road|place|way)\b|\bone we (?:just )?(?:passed|saw|took)\b"
     r"|\b(?:this|that) one\b|\bpast it\b|\bthe latter\b|\bthe former\b"
 )
-_NOT_A_PLACE = re.compile(r"\bthere(?:'s| is| are| was| were| will| seems|'re)\b|\bhi there\b|\bhey there\b|\bhello there\b")
+_NOT_A_PLACE = re.compile(
+    r"\bthere(?:'s| is| are| was| were| will| seems|'re)\b|\bhi there\b|\bhey there\b|\bhello there\b"
+)
 
 
 def goal_level(talk: Talk) -> Iterator[Finding]:
