@@ -23,8 +23,8 @@ FAULTS_SHOWN = 5
 
 _ROWS = (
     ("sessions", "sessions"),
-    ("control stream [h]", "control_hours"),
-    ("participants' speech [h]", "audio_hours"),
+    ("control stream (hours)", "control_hours"),
+    ("participants' speech (hours)", "audio_hours"),
     ("utterances", "utterances"),
     ("words", "words"),
     ("vocabulary", "vocabulary"),
@@ -37,7 +37,7 @@ _ROWS = (
 _ANCHORS = (
     ("commonest human move (UfN)", "commonest_human_move"),
     ("commonest car move (RfN)", "commonest_car_move"),
-    ("commonest navigation action (NfD)", "commonest_navigation_action"),
+    ("commonest navigation (NfD)", "commonest_navigation_action"),
     ("human moves without slot", "human_moves_without_slot"),
     ("car moves without slot", "car_moves_without_slot"),
 )
@@ -174,7 +174,7 @@ def _anchors(anchors: Mapping[str, Any]) -> Table:
     shown = Table(box=None, pad_edge=False)
     for title in ("how easy the tasks are", "here", "paper", "unseen"):
         shown.add_column(title, justify="left" if title.startswith("how") else "right", no_wrap=True)
-    shown.add_column("")
+    shown.add_column("", no_wrap=True)
     for title, key in _ANCHORS:
         row = anchors[key]
         note = row.get("label") or ""

@@ -25,9 +25,9 @@ _COLOURS: Final = {
 """For people (light) and the car (dark)."""
 
 _NAMES: Final = {
-    Handled.ENVIRONMENTAL: "environmental exception",
-    Handled.TASK: "task exception",
-    Handled.NONE: "no exception",
+    Handled.ENVIRONMENTAL: "environmental",
+    Handled.TASK: "task",
+    Handled.NONE: "none",
 }
 _SPEAKERS: Final = ((Role.PARTICIPANT, "human"), (Role.CO_WIZARD, "car"))
 _FONT = "DejaVu Sans"
@@ -95,15 +95,16 @@ def _per_exchange(moves: Any, slots: Any, profiles: Profiles) -> None:
     for place, (kind, k, role) in enumerate(bars):
         profile, colour = profiles.exchanges[kind], _COLOURS[kind][k]
         offset = (place - (len(bars) - 1) / 2) * width
-        label = f"{_NAMES[kind]}, {_SPEAKERS[k][1]} ({profile.units:,} exchanges)" if k == 0 else _SPEAKERS[k][1]
+        label = f"{_NAMES[kind]}, {_SPEAKERS[k][1]}"
         heights = [profile.mean_move(role, *group) for group in CLASSES.values()]
         moves.bar([x + offset for x in range(len(CLASSES))], heights, width * 0.93, color=colour, label=label)
         heights = [profile.mean_slot(role, slot) for slot in SLOTS]
         slots.bar([x + offset for x in range(len(SLOTS))], heights, width * 0.93, color=colour)
-    _dress(moves, "Moves in an exchange, by what it handles", list(CLASSES))
-    _dress(slots, "Slot values in an exchange, by what it handles", [slot.label for slot in SLOTS])
+    numbers = ", ".join(f"{name} {profiles.exchanges[kind].units:,}" for kind, name in _NAMES.items())
+    _dress(moves, f"Moves in an exchange, by the exception that it handles ({numbers})", list(CLASSES))
+    _dress(slots, "Slot values in an exchange, likewise", [slot.label for slot in SLOTS])
     _give_room(moves)
-    moves.legend(frameon=False, fontsize=8, ncols=3, loc="upper center", columnspacing=1.6)
+    moves.legend(frameon=False, fontsize=8.5, ncols=3, loc="upper center", columnspacing=2.5)
 
 
 def _give_room(axes: Any) -> None:

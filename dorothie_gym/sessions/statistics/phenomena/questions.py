@@ -88,14 +88,14 @@ def overlap(talk: Talk) -> Iterator[Finding]:
 def _answered_exchanges(talk: Talk) -> Iterator[Turn]:
     """The turns that open an exchange of which the other speaker is a part."""
     opened: dict[int | None, Turn] = {}
+    answered: dict[int | None, Turn] = {}
     for turn in talk.turns:
         for act, exchange in zip(turn.acts, turn.exchanges, strict=True):
             if exchange not in opened:
                 opened[exchange] = turn
             elif opened[exchange].speaker is not turn.speaker and act.move not in EXPECTATIONS:
-                opener = opened[exchange]
-                if opener.does(*EXPECTATIONS):
-                    yield opener
+                answered.setdefault(exchange, opened[exchange])
+    return (opener for opener in answered.values() if opener.does(*EXPECTATIONS))
 
 
 def irrelevant(talk: Talk) -> Iterator[Finding]:

@@ -20,13 +20,14 @@ _TAKEN_UP = (M.ACKNOWLEDGE, M.CONFIRM, M.REPLY_Y)
 _WHY = re.compile(r"\bwhy\b|\bhow come\b|\bwhat for\b|\breason\b")
 _WAY = re.compile(r"\bhow (?:are|will|do|would)\b|\bwhich (?:way|route|road|street)\b|\broute\b|\bplan\b|\bway\b")
 _WRONG = re.compile(
-    r"\bwrong\b|\bmissed\b|\bnot (?:that|this|the right) (?:way|one|turn|street|road)\b|\b(?:other|opposite) (?:way|direction)\b"
+    r"\bwrong\b|\bmissed\b|\bnot (?:that|this|the right) (?:way|one|turn|street|road)\b"
     r"|\bshould(?:'ve| have)\b|\bshouldn't\b|\bdidn't (?:say|mean|want)\b|\bturned? too\b|\bwent past\b|\bpassed it\b"
 )
 _REFERENCE = re.compile(
-    r"\b(?:over |right )?there\b|\b(?:the|this|that) (?:next|last|first|second|third|other|same) (?:one|street|road|side|turn|light|corner)\b"
+    r"(?<!out )\bthere\b"
+    r"|\b(?:the|this|that) (?:next|last|first|second|third|other|same) (?:one|street|road|side|turn|light|corner)\b"
     r"|\bnext one\b|\bother side\b|\bsame (?:street|road|place|way)\b|\bone we (?:just )?(?:passed|saw|took)\b"
-    r"|\b(?:this|that) one\b|\bpast it\b|\bthe latter\b|\bthe former\b"
+    r"|\bpast it\b|\bthe latter\b|\bthe former\b"
 )
 _NOT_A_PLACE = re.compile(
     r"\bthere(?:'s| is| are| was| were| will| seems|'re)\b|\bhi there\b|\bhey there\b|\bhello there\b"
