@@ -95,13 +95,12 @@ def _per_exchange(moves: Any, slots: Any, profiles: Profiles) -> None:
     for place, (kind, k, role) in enumerate(bars):
         profile, colour = profiles.exchanges[kind], _COLOURS[kind][k]
         offset = (place - (len(bars) - 1) / 2) * width
-        label = f"{_NAMES[kind]}, {_SPEAKERS[k][1]}"
+        label = f"{_NAMES[kind]} ({profile.units:,}), {_SPEAKERS[k][1]}"
         heights = [profile.mean_move(role, *group) for group in CLASSES.values()]
         moves.bar([x + offset for x in range(len(CLASSES))], heights, width * 0.93, color=colour, label=label)
         heights = [profile.mean_slot(role, slot) for slot in SLOTS]
         slots.bar([x + offset for x in range(len(SLOTS))], heights, width * 0.93, color=colour)
-    numbers = ", ".join(f"{name} {profiles.exchanges[kind].units:,}" for kind, name in _NAMES.items())
-    _dress(moves, f"Moves in an exchange, by the exception that it handles ({numbers})", list(CLASSES))
+    _dress(moves, "Moves in an exchange, by the exception that it handles", list(CLASSES))
     _dress(slots, "Slot values in an exchange, likewise", [slot.label for slot in SLOTS])
     _give_room(moves)
     moves.legend(frameon=False, fontsize=8.5, ncols=3, loc="upper center", columnspacing=2.5)
