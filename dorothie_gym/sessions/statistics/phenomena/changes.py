@@ -125,7 +125,7 @@ def task_changed(talk: Talk) -> Iterator[Finding]:
             places = turn.names(Slot.LANDMARK)
             if len(places) > 1 and turn.mentions(GoalStatus.ABANDONED, GoalStatus.ONGOING, GoalStatus.PENDING):
                 yield Finding(turn, "both named")
-            elif event.data.get("landmark") in labels(places) and (
+            elif str(event.data.get("landmark")) in labels(places) and (
                 turn.mentions(GoalStatus.ABANDONED) or _gave_up(talk, turn)
             ):
                 yield Finding(turn, "in two steps")
@@ -153,7 +153,7 @@ def _told(talk: Talk, kind: ExceptionKind) -> Iterator[tuple[Event, Turn]]:
     """The participant's turns that name the landmark of a task's exception after it happened."""
     for event in talk.exceptions(kind):
         for turn in talk.by(HUMAN):
-            if turn.start >= event.time and event.data.get("landmark") in labels(turn.names(Slot.LANDMARK)):
+            if turn.start >= event.time and str(event.data.get("landmark")) in labels(turn.names(Slot.LANDMARK)):
                 yield event, turn
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 
@@ -77,12 +78,14 @@ def acts_by_itself(talk: Talk) -> bool:
 
 def overlap(talk: Talk) -> Iterator[Finding]:
     """19: both begin an exchange while the other is still speaking, and both are answered."""
-    begun = list(_answered_exchanges(talk))
+    begun = sorted(_answered_exchanges(talk), key=lambda turn: turn.number)
     for k, first in enumerate(begun):
-        for other in begun[k + 1 :]:
-            at_once = max(first.start, other.start) < min(first.end, other.end)
-            if at_once and first.speaker is not other.speaker:
-                yield Finding(min(first, other, key=lambda turn: turn.number), "both answered")
+        for other in itertools.islice(begun, k + 1, None):
+            if other.start >= first.end:
+                break
+            if first.speaker is not other.speaker:
+                yield Finding(first, "both answered")
+                break
 
 
 def _answered_exchanges(talk: Talk) -> Iterator[Turn]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import bisect
 import math
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -32,6 +33,9 @@ from dorothie_gym.world.config import FRAME_RATE
 
 ANSWER = 15.0
 """Within this time of a turn's end its answer begins [s]: an exchange's patience, and the answer's own time."""
+
+_LONGEST = 60.0
+"""No utterance is longer than this [s]: turns that began earlier are over."""
 
 _UNKNOWN = (ActionValue.UNKNOWN, StreetName.UNKNOWN, LandmarkName.UNKNOWN, GoalStatus.UNKNOWN)
 _QUERIED = (
@@ -124,14 +128,20 @@ class Talk:
 
     def later(self, turn: Turn, *, within: float) -> Iterator[Turn]:
         """Yields the turns after a turn that begin at most `within` seconds after its end."""
-        for other in self.turns[turn.number + 1 :]:
+        for k in range(turn.number + 1, len(self.turns)):
+            other = self.turns[k]
             if other.start - turn.end > within:
                 return
             yield other
 
     def before(self, turn: Turn, *, within: float) -> Iterator[Turn]:
         """Yields the turns before a turn that ended at most `within` seconds before its start, latest first."""
-        return (other for other in reversed(self.turns[: turn.number]) if turn.start - other.end <= within)
+        for k in range(turn.number - 1, -1, -1):
+            other = self.turns[k]
+            if turn.start - other.start > within + _LONGEST:
+                return
+            if turn.start - other.end <= within:
+                yield other
 
     # --- what happened ----------------------------------------------------------------------------------------------
 
@@ -142,16 +152,11 @@ class Talk:
 
     def did(self, *actions: PhysicalAction, since: float = 0.0, until: float = math.inf) -> bool:
         """Whether the Co-Wizard did one of the actions in a stretch of time [s]."""
-        return any(
-            action.action in actions and action.source is Role.CO_WIZARD and since <= action.frame / FRAME_RATE <= until
-            for action in self.session.physical_actions
-        )
+        return any(_falls(self._action_times.get(action, ()), since, until) for action in actions)
 
     def believed(self, *actions: MentalAction, since: float = 0.0, until: float = math.inf) -> bool:
         """Whether the Co-Wizard did one of the mental actions in a stretch of time [s]."""
-        labels = {action.label for action in actions}
-        updates = self.session.of_type(EventType.BELIEF_UPDATE)
-        return any(event.data.get("action") in labels and since <= event.time <= until for event in updates)
+        return any(_falls(self._belief_times.get(action.label, ()), since, until) for action in actions)
 
     def happened(self, *types: EventType) -> bool:
         """Whether there is an event of one of the types."""
@@ -163,6 +168,21 @@ class Talk:
         props = self.exceptions(ExceptionKind.PLACE_PROP, ExceptionKind.MOVE_PROP)
         met = min((time_met(self.session, event) for event in props), default=math.inf)
         return met if math.isfinite(met) else None
+
+    @cached_property
+    def _action_times(self) -> dict[PhysicalAction, list[float]]:
+        times: dict[PhysicalAction, list[float]] = {}
+        for action in self.session.physical_actions:
+            if action.source is Role.CO_WIZARD:
+                times.setdefault(action.action, []).append(action.frame / FRAME_RATE)
+        return times
+
+    @cached_property
+    def _belief_times(self) -> dict[str, list[float]]:
+        times: dict[str, list[float]] = {}
+        for event in self.session.of_type(EventType.BELIEF_UPDATE):
+            times.setdefault(str(event.data.get("action")), []).append(event.time)
+        return times
 
     @cached_property
     def hidden_goals(self) -> frozenset[str]:
@@ -192,6 +212,12 @@ def named(act: DialogueAct, slot: Slot) -> frozenset[SlotValue]:
 def asks_for(act: DialogueAct, *slots: Slot) -> bool:
     """Whether an act leaves a value of one of the slots open, as a question does."""
     return any(value in _QUERIED and value.slot in slots for value in act.slots)
+
+
+def _falls(times: Sequence[float], since: float, until: float) -> bool:
+    """Whether one of the times, which rise, lies in a stretch."""
+    k = bisect.bisect_left(times, since)
+    return k < len(times) and times[k] <= until
 
 
 def labels(values: Collection[SlotValue]) -> frozenset[str]:
