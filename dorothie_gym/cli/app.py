@@ -15,6 +15,7 @@ from dorothie_gym.cli.evaluate import evaluate
 from dorothie_gym.cli.listings import storyboards, towns
 from dorothie_gym.cli.optional import PictureCommand
 from dorothie_gym.cli.run import run
+from dorothie_gym.cli.stats import stats
 
 app = typer.Typer(
     help="Talk between a passenger and a car that drives through a town, with an adversary in between.",
@@ -29,6 +30,7 @@ app.command()(storyboards)
 app.command()(evaluate)
 app.add_typer(bench, name="bench")
 app.command()(convert)
+app.command(cls=PictureCommand)(stats)
 
 
 def _tell_version(wanted: bool) -> None:

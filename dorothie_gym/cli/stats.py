@@ -1,0 +1,277 @@
+"""`dorothie-gym stats`: what a corpus is like, beside the paper's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.table import Table
+
+from dorothie_gym.cli.optional import OWN_NAME
+from dorothie_gym.cli.output import check_picture, fail, print_json, stdout, told_plainly
+
+if TYPE_CHECKING:
+    from dorothie_gym.sessions import Corpus
+
+PICTURE = Path("statistics.png")
+"""Picture that is written where `--picture` has no name."""
+
+FAULTS_SHOWN = 5
+"""So many faults of a session are shown; --json has all."""
+
+_ROWS = (
+    ("sessions", "sessions"),
+    ("control stream (hours)", "control_hours"),
+    ("participants' speech (hours)", "audio_hours"),
+    ("utterances", "utterances"),
+    ("words", "words"),
+    ("vocabulary", "vocabulary"),
+    ("transactions", "transactions"),
+    ("exchanges", "exchanges"),
+    ("dialogue moves", "moves"),
+    ("slot values", "slot_values"),
+    ("physical actions", "physical_actions"),
+)
+_ANCHORS = (
+    ("commonest human move (UfN)", "commonest_human_move"),
+    ("commonest car move (RfN)", "commonest_car_move"),
+    ("commonest navigation (NfD)", "commonest_navigation_action"),
+    ("human moves without slot", "human_moves_without_slot"),
+    ("car moves without slot", "car_moves_without_slot"),
+)
+_NOT_PER_SESSION = ("sessions", "vocabulary")
+
+
+def stats(
+    folder: Annotated[
+        Path | None, typer.Argument(metavar="DIR", help="A corpus, a folder of sessions, or one session.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
+    picture: Annotated[
+        Path | None,
+        typer.Option(metavar="[FILE.png]", help=f"Draw moves and slots by speaker and exception; else {PICTURE}."),
+    ] = None,
+    phenomena: Annotated[
+        bool, typer.Option("--phenomena", help="In how many sessions each of the 24 phenomena of talk occurs.")
+    ] = False,
+    check: Annotated[
+        bool, typer.Option("--check", help="Check that the annotation holds together; exit code 1 if not.")
+    ] = False,
+    kappa: Annotated[
+        tuple[Path, Path] | None,
+        typer.Option(metavar="A B", help="Cohen's kappa of two annotations of one session."),
+    ] = None,
+    maps: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder with maps of towns that are not shipped (Town01.xodr).")
+    ] = None,
+) -> None:
+    """Count a corpus: table 2 of the paper and what makes its tasks easy or hard, found anew from the events."""
+    _check_choice(folder, picture, phenomena, check, kappa)
+    if picture is not None:
+        picture = PICTURE if picture == Path(OWN_NAME) else picture
+        check_picture(picture)
+    with told_plainly():
+        from dorothie_gym.sessions import Corpus
+
+        if kappa is not None:
+            _kappa(*kappa, maps, as_json=as_json)
+            return
+        assert folder is not None
+        corpus = Corpus.load(folder, maps=maps)
+        if check:
+            _check(corpus, as_json=as_json)
+        elif phenomena:
+            _phenomena(corpus, as_json=as_json)
+        else:
+            _count(corpus, picture, as_json=as_json)
+
+
+def _check_choice(folder: Path | None, picture: Path | None, phenomena: bool, check: bool, kappa: object) -> None:
+    chosen = {
+        "--kappa": kappa is not None,
+        "--check": check,
+        "--phenomena": phenomena,
+        "--picture": picture is not None,
+    }
+    given = [name for name, is_given in chosen.items() if is_given]
+    if len(given) > 1:
+        fail(f"{' and '.join(given)} exclude each other; give one of them")
+    if kappa is not None and folder is not None:
+        fail(f"{folder}: --kappa compares the two sessions that follow it; leave the folder out")
+    if kappa is None and folder is None:
+        fail("give a corpus, a folder of sessions, or one session: dorothie-gym stats DIR")
+
+
+# --- table 2 --------------------------------------------------------------------------------------------------------
+
+
+def _count(corpus: Corpus, picture: Path | None, *, as_json: bool) -> None:
+    from dorothie_gym.sessions.statistics import census_of
+
+    census = census_of(corpus)
+    if picture is not None:
+        from dorothie_gym.sessions.statistics.picture import draw_profiles
+
+        draw_profiles(census.profiles, census.counts, corpus.root.resolve().name, picture)
+    table = census.to_json()
+    if as_json:
+        print_json(table)
+        return
+    console = stdout()
+    console.print(_table2(table))
+    console.print()
+    console.print(_folds(table["folds"]))
+    console.print()
+    console.print(_anchors(table["anchors"]))
+    console.print()
+    console.print(_diversity(table["diversity"]))
+    if census.incomplete:
+        console.print(f"Cut off, but counted: {', '.join(census.incomplete)}.", style="yellow", markup=False)
+    if picture is not None:
+        console.print(f"Picture: {picture}", style="dim", markup=False, soft_wrap=True)
+
+
+def _table2(table: Mapping[str, Any]) -> Table:
+    from dorothie_gym.sessions.statistics import PAPER
+
+    shown = Table(box=None, pad_edge=False)
+    for title in ("", "here", "paper", "a session here", "in the paper"):
+        shown.add_column(title, justify="right" if title else "left", no_wrap=True)
+    for title, key in _ROWS:
+        mine, paper = table[key], PAPER[key]
+        row = [title, _figure(mine), _figure(paper)]
+        if key not in _NOT_PER_SESSION:
+            row += [_per_session(mine, table["sessions"], key), _per_session(paper, PAPER["sessions"], key)]
+        shown.add_row(*row)
+    return shown
+
+
+def _figure(value: float) -> str:
+    return f"{value:,}" if isinstance(value, int) else f"{value:.2f}"
+
+
+def _per_session(value: float, sessions: float, key: str) -> str:
+    if not sessions:
+        return ""
+    each = value / sessions
+    return f"{3600 * each:.0f} s" if key.endswith("_hours") else f"{each:.2f}"
+
+
+def _folds(folds: Mapping[str, int]) -> Table:
+    from dorothie_gym.sessions.statistics import PAPER_FOLDS
+
+    shown = Table(box=None, pad_edge=False)
+    for title in ("fold", "sessions", "paper"):
+        shown.add_column(title, justify="left" if title == "fold" else "right")
+    for fold, paper in PAPER_FOLDS.items():
+        shown.add_row(fold.value, str(folds.get(fold.value, 0)), str(paper))
+    return shown
+
+
+def _anchors(anchors: Mapping[str, Any]) -> Table:
+    shown = Table(box=None, pad_edge=False)
+    for title in ("how easy the tasks are", "here", "paper", "unseen"):
+        shown.add_column(title, justify="left" if title.startswith("how") else "right", no_wrap=True)
+    shown.add_column("", no_wrap=True)
+    for title, key in _ANCHORS:
+        row = anchors[key]
+        note = row.get("label") or ""
+        if row["within"] is False:
+            note += f"{', ' if note else ''}out of range"
+        shown.add_row(title, _percent(row["share"]), _percent(row["paper"]), _percent(row["paper_unseen"]), note)
+    return shown
+
+
+def _diversity(diversity: Mapping[str, Any]) -> Table:
+    from dorothie_gym.sessions.statistics.diversity import has_language_models
+
+    shown = Table(box=None, pad_edge=False)
+    shown.add_column("how varied the talk is")
+    shown.add_column("", justify="right")
+    shown.add_column("")
+    shown.add_row("distinct utterances", _percent(diversity["distinct_utterance_ratio"]), "")
+    commonest = diversity["commonest_utterance"]
+    note = "" if commonest is None else f'"{commonest}"'
+    shown.add_row("commonest utterance", _percent(diversity["commonest_utterance_share"]), note)
+    perplexity = diversity["perplexity"]
+    lacking = "" if has_language_models() else "needs nltk: pip install 'dorothie-gym[statistics]'"
+    note = lacking or ("needs utterances in train and test" if perplexity is None else "")
+    shown.add_row("trigram perplexity, train on test", "-" if perplexity is None else f"{perplexity:.1f}", note)
+    return shown
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{100 * share:.1f} %"
+
+
+# --- phenomena, consistency, agreement ------------------------------------------------------------------------------
+
+
+def _phenomena(corpus: Corpus, *, as_json: bool) -> None:
+    from dorothie_gym.sessions.statistics import phenomena_of
+
+    rows = phenomena_of(corpus)
+    if as_json:
+        print_json({"sessions": len(corpus), "phenomena": rows})
+        return
+    shown = Table(box=None, pad_edge=False)
+    for title in ("", "phenomenon", "cause in", "occurs in", "share", "forms"):
+        shown.add_column(title, justify="left" if title in ("phenomenon", "forms") else "right")
+    for row in rows:
+        forms = ", ".join(f"{form} {count}" for form, count in row["forms"].items())
+        style = "yellow" if row["sessions"] and row["share"] < 0.05 else ""
+        counts = (str(row["sessions"]), str(row["occurs"]), _percent(row["share"]))
+        shown.add_row(str(row["number"]), row["title"], *counts, forms, style=style)
+    stdout().print(shown)
+
+
+def _check(corpus: Corpus, *, as_json: bool) -> None:
+    from dorothie_gym.sessions.statistics import faults_of_corpus
+
+    found = faults_of_corpus(corpus)
+    faulty = {name: faults for name, faults in found.items() if faults}
+    if as_json:
+        print_json({"sessions": len(found), "consistent": len(found) - len(faulty), "faults": _listed(faulty)})
+    else:
+        _show_faults(faulty, len(found))
+    if faulty:
+        raise typer.Exit(1)
+
+
+def _listed(faulty: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
+    return {name: list(faults) for name, faults in faulty.items()}
+
+
+def _show_faults(faulty: Mapping[str, Sequence[str]], sessions: int) -> None:
+    console = stdout()
+    for name, faults in faulty.items():
+        console.print(f"{name}: {len(faults)} fault{'' if len(faults) == 1 else 's'}", style="bold", markup=False)
+        for fault in faults[:FAULTS_SHOWN]:
+            console.print(f"  {fault}", markup=False, soft_wrap=True)
+        if len(faults) > FAULTS_SHOWN:
+            console.print(f"  and {len(faults) - FAULTS_SHOWN} more (--json has all)", style="dim")
+    console.print(f"{sessions - len(faulty)} of {sessions} sessions are annotated consistently.")
+
+
+def _kappa(first: Path, second: Path, maps: Path | None, *, as_json: bool) -> None:
+    from dorothie_gym.sessions import read_session
+    from dorothie_gym.sessions.statistics import agreement
+
+    found = agreement(read_session(first, maps=maps), read_session(second, maps=maps))
+    if as_json:
+        print_json({"moves": found.moves, "slots": found.slots, "pieces": found.pieces, "utterances": found.utterances})
+        return
+    shown = Table(box=None, pad_edge=False)
+    for title in ("Cohen's kappa", "here", "paper"):
+        shown.add_column(title, justify="left" if title.startswith("Cohen") else "right")
+    shown.add_row("dialogue moves", _kappa_text(found.moves), "0.77")
+    shown.add_row("dialogue slots", _kappa_text(found.slots), "0.85")
+    console = stdout()
+    console.print(shown)
+    console.print(f"{found.utterances} utterances, {found.pieces} pieces that neither annotation splits", style="dim")
+
+
+def _kappa_text(value: float | None) -> str:
+    return "undefined" if value is None else f"{value:.2f}"

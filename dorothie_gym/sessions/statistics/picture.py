@@ -1,0 +1,128 @@
+"""The paper's figures 3 to 5 of a corpus as one picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+from dorothie_gym.ontology import DialogueMove, Role
+from dorothie_gym.sessions.statistics.counts import Counts
+from dorothie_gym.sessions.statistics.handling import Handled
+from dorothie_gym.sessions.statistics.profiles import CLASSES, SLOTS, Profile, Profiles
+
+SIZE: Final = (12.0, 9.2)
+"""Width and height of the picture [inches]."""
+
+DOTS: Final = 130
+"""Dots an inch."""
+
+_INK, _SOFT, _GRID, _SHEET = "#2e3644", "#707783", "#e2ddd1", "#fbf8f1"
+_COLOURS: Final = {
+    Handled.ENVIRONMENTAL: ("#9bd0b5", "#2f8f62"),
+    Handled.TASK: ("#f3cb8d", "#cf7f1d"),
+    Handled.NONE: ("#a9c4f2", "#2f62c4"),
+}
+"""For people (light) and the car (dark)."""
+
+_NAMES: Final = {
+    Handled.ENVIRONMENTAL: "environmental",
+    Handled.TASK: "task",
+    Handled.NONE: "none",
+}
+_SPEAKERS: Final = ((Role.PARTICIPANT, "human"), (Role.CO_WIZARD, "car"))
+_FONT = "DejaVu Sans"
+
+
+def draw_profiles(profiles: Profiles, counts: Counts, title: str, path: Path) -> None:
+    """Draws moves and slots per transaction by speaker, and per exchange by the kind of exception that it handles.
+
+    Args:
+        profiles: what to draw.
+        counts: of the same sessions, for the words above the figures.
+        title: name of the corpus.
+        path: PNG file to write.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    # imported here: matplotlib is slow to import, and a picture is not always wanted
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with rc_context({"font.family": _FONT, "text.color": _INK, "axes.labelcolor": _SOFT}):
+        figure = Figure(figsize=SIZE, dpi=DOTS, facecolor=_SHEET)
+        FigureCanvasAgg(figure)
+        grid = figure.add_gridspec(
+            2, 2, left=0.06, right=0.98, top=0.84, bottom=0.075, hspace=0.42, wspace=0.13, width_ratios=(14, 8)
+        )
+        _words(figure, counts, title)
+        _per_transaction(figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1]), profiles.transactions)
+        _per_exchange(figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1]), profiles)
+        figure.savefig(path, format="png")
+
+
+def _words(figure: Any, counts: Counts, title: str) -> None:
+    figure.text(0.06, 0.95, title, fontsize=15, weight="bold")
+    line = (
+        f"{_number(counts.sessions, 'session')} · {_number(counts.utterances, 'utterance')} · "
+        f"{_number(counts.transactions, 'transaction')} · {_number(counts.exchanges, 'exchange')}"
+    )
+    figure.text(0.06, 0.918, line, fontsize=10, color=_SOFT)
+
+
+def _number(count: int, noun: str) -> str:
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
+def _per_transaction(moves: Any, slots: Any, profile: Profile) -> None:
+    shown = [move for move in DialogueMove if move is not DialogueMove.IRRELEVANT] + [DialogueMove.IRRELEVANT]
+    light, dark = _COLOURS[Handled.NONE]
+    for k, (role, name) in enumerate(_SPEAKERS):
+        colour = (light, dark)[k]
+        at = [x + (k - 0.5) * 0.4 for x in range(len(shown))]
+        moves.bar(at, [profile.mean_move(role, move) for move in shown], 0.38, color=colour, label=name)
+        at = [x + (k - 0.5) * 0.4 for x in range(len(SLOTS))]
+        slots.bar(at, [profile.mean_slot(role, slot) for slot in SLOTS], 0.38, color=colour)
+    _dress(moves, "Moves in a transaction", [move.label for move in shown], slanted=True)
+    _dress(slots, "Slot values in a transaction", [slot.label for slot in SLOTS])
+    moves.legend(frameon=False, fontsize=9, loc="upper right")
+
+
+def _per_exchange(moves: Any, slots: Any, profiles: Profiles) -> None:
+    width = 0.13
+    bars = [(kind, k, role) for kind in Handled for k, (role, _) in enumerate(_SPEAKERS)]
+    for place, (kind, k, role) in enumerate(bars):
+        profile, colour = profiles.exchanges[kind], _COLOURS[kind][k]
+        offset = (place - (len(bars) - 1) / 2) * width
+        label = f"{_NAMES[kind]} ({profile.units:,}), {_SPEAKERS[k][1]}"
+        heights = [profile.mean_move(role, *group) for group in CLASSES.values()]
+        moves.bar([x + offset for x in range(len(CLASSES))], heights, width * 0.93, color=colour, label=label)
+        heights = [profile.mean_slot(role, slot) for slot in SLOTS]
+        slots.bar([x + offset for x in range(len(SLOTS))], heights, width * 0.93, color=colour)
+    _dress(moves, "Moves in an exchange, by the exception that it handles", list(CLASSES))
+    _dress(slots, "Slot values in an exchange, likewise", [slot.label for slot in SLOTS])
+    _give_room(moves)
+    moves.legend(frameon=False, fontsize=8.5, ncols=3, loc="upper center", columnspacing=2.5)
+
+
+def _give_room(axes: Any) -> None:
+    """Leaves room above the bars for the legend."""
+    axes.set_ylim(0.0, axes.get_ylim()[1] * 1.22)
+
+
+def _dress(axes: Any, title: str, labels: list[str], *, slanted: bool = False) -> None:
+    axes.set_facecolor(_SHEET)
+    axes.set_title(title, loc="left", fontsize=11, color=_INK, pad=10)
+    axes.set_xticks(range(len(labels)), labels, fontsize=9, color=_INK)
+    if slanted:
+        for label in axes.get_xticklabels():
+            label.set(rotation=32, ha="right", rotation_mode="anchor")
+    axes.tick_params(axis="both", length=0)
+    axes.tick_params(axis="y", labelsize=8, labelcolor=_SOFT)
+    axes.set_ylabel("mean number", fontsize=8.5)
+    axes.grid(axis="y", color=_GRID, linewidth=0.8)
+    axes.set_axisbelow(True)
+    for side, spine in axes.spines.items():
+        spine.set_visible(side == "bottom")
+        spine.set_color(_SOFT)
