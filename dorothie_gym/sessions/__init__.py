@@ -1,6 +1,7 @@
 """Sessions: what happened, written as it happens, read by everything else."""
 
 from dorothie_gym.sessions.corpus import Corpus, CorpusEntry, load_readable, load_sessions, split_by_name
+from dorothie_gym.sessions.decisions import Decision
 from dorothie_gym.sessions.errors import SessionError
 from dorothie_gym.sessions.events import INFRACTIONS, Event, EventType
 from dorothie_gym.sessions.folds import FOLDS, Fold
@@ -54,6 +55,7 @@ __all__ = [
     "CarState",
     "Corpus",
     "CorpusEntry",
+    "Decision",
     "DecisionPoint",
     "Event",
     "EventType",
