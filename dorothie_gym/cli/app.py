@@ -12,6 +12,7 @@ from dorothie_gym import __version__
 from dorothie_gym.cli.bench import bench
 from dorothie_gym.cli.convert import convert
 from dorothie_gym.cli.evaluate import evaluate
+from dorothie_gym.cli.generate import generate
 from dorothie_gym.cli.listings import storyboards, towns
 from dorothie_gym.cli.optional import PictureCommand
 from dorothie_gym.cli.run import run
@@ -29,6 +30,7 @@ app.command()(storyboards)
 app.command()(evaluate)
 app.add_typer(bench, name="bench")
 app.command()(convert)
+app.command()(generate)
 
 
 def _tell_version(wanted: bool) -> None:

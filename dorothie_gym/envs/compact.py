@@ -19,6 +19,11 @@ def _idle(role: Role, limits: SpaceLimits) -> ActionDict:
     return noop(role, limits)
 
 
+@lru_cache(maxsize=16)
+def _arrays(role: Role, limits: SpaceLimits) -> frozenset[str]:
+    return frozenset(name for name, value in _idle(role, limits).items() if isinstance(value, np.ndarray))
+
+
 def compact(actions: Mapping[str, Mapping[str, Any]], limits: SpaceLimits) -> dict[Role, dict[str, Any]]:
     """Returns actions as a `Decision` keeps them.
 
@@ -28,12 +33,13 @@ def compact(actions: Mapping[str, Mapping[str, Any]], limits: SpaceLimits) -> di
     """
     found = {}
     for role in AGENT_ROLES:
-        idle = _idle(role, limits)
-        fields = {}
+        idle, arrays = _idle(role, limits), _arrays(role, limits)
+        fields: dict[str, Any] = {}
         for name, value in actions[str(role)].items():
-            if isinstance(idle[name], np.ndarray):
-                if np.any(value):
-                    fields[name] = _short(np.asarray(value), _is_flags(role, name, limits))
+            if name in arrays:
+                values = np.asarray(value)
+                if values.any():
+                    fields[name] = _short(values, _is_flags(role, name, limits))
             elif value != idle[name]:
                 fields[name] = value if isinstance(value, str) else int(value)
         if fields:

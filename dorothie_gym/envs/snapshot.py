@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,7 +12,7 @@ from dorothie_gym.sessions import ACTOR_DTYPE, ActorKind
 from dorothie_gym.world.bodies import Pedestrian
 from dorothie_gym.world.kernel import Kind, Walk
 from dorothie_gym.world.kernel.records import plain
-from dorothie_gym.world.town import LightColour, LightPhase, Town
+from dorothie_gym.world.town import LightColour, LightProgramme, Town
 from dorothie_gym.world.world import World
 
 _ACTOR_KINDS = np.full(max(Kind) + 1, -1, dtype=np.int64)
@@ -47,6 +50,10 @@ def actors_around(world: World) -> NDArray[np.void]:
     return rows
 
 
+_CLOSE = 1e-3
+"""So shortly before a light changes it is looked at anew: sums of durations are not exact [s]."""
+
+
 class LightStates:
     """What the traffic lights of a town show; put together anew only when one of them has changed.
 
@@ -56,17 +63,22 @@ class LightStates:
 
     def __init__(self, town: Town) -> None:
         self._programmes = town.programmes
-        self._phases: list[LightPhase] | None = None
+        self._since, self._until = 0.0, -math.inf
         self._states: dict[int, LightColour] = {}
 
     def at(self, time: float) -> dict[int, LightColour]:
         """Returns the colours at a simulated time [s] by id of the signal; not to be modified."""
-        phases = [programme.phase_at(time) for programme in self._programmes]
-        if phases != self._phases:
-            self._phases = phases
+        if not self._since <= time < self._until:
+            remaining = (_remaining(programme, time) for programme in self._programmes)
+            self._since, self._until = time, time + min(remaining, default=math.inf) - _CLOSE
             self._states = {
-                signal: programme.colour(signal, time)
-                for programme in self._programmes
-                for signal in programme.signals
+                signal: programme.colour(signal, time) for programme in self._programmes for signal in programme.signals
             }
         return self._states
+
+
+def _remaining(programme: LightProgramme, time: float) -> float:
+    """How long the present phase still lasts [s]."""
+    now = (time - programme.offset) % programme.cycle
+    ends = itertools.accumulate(phase.duration for phase in programme.phases)
+    return next((end - now for end in ends if now < end), 0.0)

@@ -67,7 +67,7 @@ class SessionWriter:
         self._last_frame = -1
         self._frames: set[float] = set()
         self._lights: tuple[Mapping[int, LightColour | str], Rows] | None = None
-        self._weather: tuple[Mapping[str, float], Rows] | None = None
+        self._weather: tuple[Mapping[Any, float], Rows] | None = None
         self._recorded = {ACTORS: -1, LIGHTS: -1, WEATHER: -1}
         self._last_decision = -1
 
@@ -112,10 +112,10 @@ class SessionWriter:
         self._check_open("nothing can be appended")
         if frame <= self._last_decision:
             raise SessionError(f"{self.folder}: a decision at frame {frame} after {self._last_decision}")
-        line = encode_decision(Decision(frame=frame, actions=actions))
+        line = encode_decision(Decision(frame=frame, actions=actions)) if actions else ""
         if self._decisions is None:
             self._decisions = (self.folder / ACTIONS_FILE).open("xb")
-        if actions:
+        if line:
             self._decisions.write((line + "\n").encode("utf-8"))
             self._decisions.flush()
         self._last_decision = frame
@@ -134,7 +134,7 @@ class SessionWriter:
             self._lights = dict(lights), light_rows(lights)
         self._add(LIGHTS, frame, self._lights[1])
 
-    def add_weather(self, frame: int, weather: Mapping[str, float]) -> None:
+    def add_weather(self, frame: int, weather: Mapping[Any, float]) -> None:
         """Appends the ten weather parameters at a frame; raises `SessionError` as above."""
         if self._weather is None or self._weather[0] != weather:
             self._weather = dict(weather), weather_rows(weather)
