@@ -15,6 +15,7 @@ from dorothie_gym.cli.evaluate import evaluate
 from dorothie_gym.cli.generate import generate
 from dorothie_gym.cli.listings import storyboards, towns
 from dorothie_gym.cli.optional import PictureCommand
+from dorothie_gym.cli.replay import replay
 from dorothie_gym.cli.run import run
 
 app = typer.Typer(
@@ -31,6 +32,7 @@ app.command()(evaluate)
 app.add_typer(bench, name="bench")
 app.command()(convert)
 app.command()(generate)
+app.command()(replay)
 
 
 def _tell_version(wanted: bool) -> None:
