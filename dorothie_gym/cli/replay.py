@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -171,6 +172,8 @@ def _window(playback: Any, fps: float) -> int:
         fail("no window can be opened here; write a film instead: --video FILE.mp4")
     shown = 0
     try:
+        if _is_unseen():
+            fail("there is no screen to open a window on; write a film instead: --video FILE.mp4")
         for scene in playback.scenes(fps):
             window.show(renderer.draw(scene), fps)
             if window.closed:
@@ -179,6 +182,13 @@ def _window(playback: Any, fps: float) -> int:
     finally:
         window.close()
     return shown
+
+
+def _is_unseen() -> bool:
+    """Whether windows are open where nobody sees them, though nobody asked for that: so SDL does without a screen."""
+    import pygame
+
+    return pygame.display.get_driver() in ("offscreen", "dummy") and "SDL_VIDEODRIVER" not in os.environ
 
 
 def _town(session: Session, town: str | None, maps: Path | None) -> Town:
