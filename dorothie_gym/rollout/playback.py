@@ -149,10 +149,13 @@ class Playback:
             if row["trigger"] and not status:
                 continue
             state = _STATES.get(status, "pending")
-            if state in ("ongoing", "pending"):
-                state = "ongoing" if all(k in reached for k in row["after"]) else "pending"
             changed = row["change"] if "change" in cause else None
             goals[number] = changed or row["description"], state
+        live = [number for number, (_, state) in goals.items() if state != "abandoned"]
+        for number in live:
+            if number not in reached:
+                before = live[:-1] if number == live[-1] else [k for k in subgoals[number]["after"] if k in live]
+                goals[number] = goals[number][0], "ongoing" if reached.issuperset(before) else "pending"
         return goals
 
     def _notes(self, frame: int) -> list[str]:
