@@ -12,8 +12,10 @@ from dorothie_gym import __version__
 from dorothie_gym.cli.bench import bench
 from dorothie_gym.cli.convert import convert
 from dorothie_gym.cli.evaluate import evaluate
+from dorothie_gym.cli.generate import generate
 from dorothie_gym.cli.listings import storyboards, towns
 from dorothie_gym.cli.optional import PictureCommand
+from dorothie_gym.cli.replay import replay
 from dorothie_gym.cli.run import run
 from dorothie_gym.cli.stats import stats
 
@@ -31,6 +33,8 @@ app.command()(evaluate)
 app.add_typer(bench, name="bench")
 app.command()(convert)
 app.command(cls=PictureCommand)(stats)
+app.command()(generate)
+app.command()(replay)
 
 
 def _tell_version(wanted: bool) -> None:

@@ -10,6 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from dorothie_gym.cli.video import video_writer
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.painter import scene_of
 from dorothie_gym.envs.rendering import SceneRenderer
@@ -36,13 +37,9 @@ class Film:
     """
 
     def __init__(self, path: Path) -> None:
-        import imageio.v2 as imageio
-
         self.frames = 0
         self._renderer = SceneRenderer()
-        self._writer: Any = imageio.get_writer(
-            path, fps=FRAMES_PER_SECOND, macro_block_size=16, ffmpeg_params=["-preset", "veryfast"]
-        )
+        self._writer: Any = video_writer(path, FRAMES_PER_SECOND)
         self._last: Scene | None = None
 
     def __enter__(self) -> Self:

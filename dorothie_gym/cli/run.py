@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,7 +13,6 @@ import typer
 
 from dorothie_gym.cli.output import (
     INTERRUPTED,
-    check_file,
     check_picture,
     compiling,
     fail,
@@ -23,6 +21,7 @@ from dorothie_gym.cli.output import (
     stdout,
     told_plainly,
 )
+from dorothie_gym.cli.video import check_video
 
 if TYPE_CHECKING:
     from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
@@ -31,7 +30,6 @@ PICTURE = Path("dorothie.png")
 """Picture that is written where none is asked for."""
 
 _POLICY = "scripted|silent|random"
-_VIDEO_SUFFIXES = (".mp4", ".mkv", ".mov")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,13 +102,8 @@ def _check_outputs(plan: _Plan) -> None:
     """Fails before anything takes time where something could not be written in the end."""
     if plan.picture is not None:
         check_picture(plan.picture)
-    if plan.video is None:
-        return
-    if plan.video.suffix.lower() not in _VIDEO_SUFFIXES:
-        fail(f"{plan.video}: no format of a film; give a name that ends in {', '.join(_VIDEO_SUFFIXES)}")
-    check_file(plan.video)
-    if find_spec("imageio") is None or find_spec("imageio_ffmpeg") is None:
-        fail("--video needs imageio, which is not installed; run: pip install 'dorothie-gym[video]'")
+    if plan.video is not None:
+        check_video(plan.video)
 
 
 def _play(plan: _Plan, *, quiet: bool) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.envs.recorder import SessionRecorder
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy
 from dorothie_gym.policies.seeds import policy_seed
@@ -47,20 +48,18 @@ def play_session(
     states = {role: policies[role].initial_state(policy_seed(seed, role), env.town) for role in AGENT_ROLES}
     with ExitStack() as stack:
         writer = None if folder is None else stack.enter_context(SessionWriter(folder, env.session_header()))
-        _watch(env, writer, on_step)
+        recorder = None if writer is None else SessionRecorder(env, writer)
+        if on_step is not None:
+            on_step(env)
         while env.agents:
             actions = {}
             for role in AGENT_ROLES:
                 actions[str(role)], states[role] = policies[role].step(observations[str(role)], states[role])
             observations, *_ = env.step(actions)
-            _watch(env, writer, on_step)
+            if recorder is not None:
+                recorder.record(actions)
+            if on_step is not None:
+                on_step(env)
         if writer is not None:
             writer.finish(env.summary())
     return env.summary()
-
-
-def _watch(env: DuoWizardEnv, writer: SessionWriter | None, on_step: Callable[[DuoWizardEnv], None] | None) -> None:
-    if writer is not None:
-        writer.append(env.last_events, env.last_frames)
-    if on_step is not None:
-        on_step(env)

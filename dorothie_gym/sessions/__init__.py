@@ -1,6 +1,8 @@
 """Sessions: what happened, written as it happens, read by everything else."""
 
 from dorothie_gym.sessions.corpus import Corpus, CorpusEntry, load_readable, load_sessions, split_by_name
+from dorothie_gym.sessions.decisions import Decision
+from dorothie_gym.sessions.difference import Difference, first_difference
 from dorothie_gym.sessions.errors import SessionError
 from dorothie_gym.sessions.events import INFRACTIONS, Event, EventType
 from dorothie_gym.sessions.folds import FOLDS, Fold
@@ -54,7 +56,9 @@ __all__ = [
     "CarState",
     "Corpus",
     "CorpusEntry",
+    "Decision",
     "DecisionPoint",
+    "Difference",
     "Event",
     "EventType",
     "FOLDS",
@@ -87,6 +91,7 @@ __all__ = [
     "View",
     "WEATHER_DTYPE",
     "final_view",
+    "first_difference",
     "history_angle",
     "load_readable",
     "load_sessions",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.sessions.decisions import encode_decision
 from dorothie_gym.sessions.encoding import canonical, to_line
 from dorothie_gym.sessions.event_lines import encode_event
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def digest_of(session: Session) -> str:
-    """Returns the SHA-256 of a session's content: header, outcome, events and every number of its frames.
+    """Returns the SHA-256 of a session's content: header, outcome, events, decisions and every number of its frames.
 
     Its name, its pictures and the report of its reader do not count.
     """
@@ -29,6 +30,8 @@ def digest_of(session: Session) -> str:
     take("header", to_line(session.header.to_json()).encode())
     take("outcome", to_line(canonical(session.summary if session.complete else None, "outcome")).encode())
     take("events", "\n".join(encode_event(event, check=False) for event in session.events).encode())
+    if session.decisions is not None:
+        take("decisions", "\n".join(map(encode_decision, session.decisions)).encode())
     for name in session.trajectory.dtype.names or ():
         take(name, _bytes(session.trajectory[name]))
     scene = session.scene

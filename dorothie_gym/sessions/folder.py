@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from dorothie_gym.sessions.decisions import Decision, read_decisions
 from dorothie_gym.sessions.errors import SessionError
 from dorothie_gym.sessions.event_lines import decode_event
 from dorothie_gym.sessions.events import Event, EventType
@@ -43,6 +44,7 @@ class FolderContent:
     complete: bool
     report: ReadReport
     pictures: Mapping[int, Path]
+    decisions: tuple[Decision, ...] | None = None
 
 
 def read_folder(folder: Path) -> FolderContent:
@@ -52,6 +54,7 @@ def read_folder(folder: Path) -> FolderContent:
     file = read_session_file(folder)
     report = ReadReport()
     events, events_torn = _read_events(folder / EVENTS_FILE)
+    decisions, decisions_torn = read_decisions(folder)
     trajectory, scene, frames_whole = _read_frames(folder, file.outcome is not None, report)
     whole = file.outcome is not None and (file.events, file.frames) == (len(events), len(trajectory))
     _note_unknown(file.header, events, report)
@@ -61,9 +64,10 @@ def read_folder(folder: Path) -> FolderContent:
         trajectory=trajectory,
         scene=scene,
         summary=file.outcome,
-        complete=whole and frames_whole and not events_torn,
+        complete=whole and frames_whole and not events_torn and not decisions_torn,
         report=report,
         pictures=_pictures(folder / PICTURES_FOLDER),
+        decisions=decisions,
     )
 
 

@@ -12,6 +12,9 @@ HEADER_FILE: Final = "session.json"
 EVENTS_FILE: Final = "events.jsonl"
 """One event a line, appended as they happen."""
 
+ACTIONS_FILE: Final = "actions.jsonl"
+"""What the roles decided, one decision a line, those left out in which nobody did anything."""
+
 FRAMES_FILE: Final = "frames.parquet"
 """One row a frame, written whole when the session is over."""
 
@@ -30,7 +33,9 @@ SUMMARY_FILE: Final = "summary.json"
 PART: Final = ".part"
 """Ending of a file that is being written; it is given its name when it is whole."""
 
-SESSION_FILES: Final = (HEADER_FILE, EVENTS_FILE, FRAMES_FILE, JOURNAL_FILE, TRAJECTORY_FILE, SUMMARY_FILE)
+SESSION_FILES: Final = (
+    HEADER_FILE, EVENTS_FILE, ACTIONS_FILE, FRAMES_FILE, JOURNAL_FILE, TRAJECTORY_FILE, SUMMARY_FILE,
+)  # fmt: skip
 
 MAX_EVENTS: Final = 200_000
 """Events that a session may have; 15 minutes of three roles that act at 2 Hz give some 5,000."""

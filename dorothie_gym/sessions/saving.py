@@ -10,10 +10,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dorothie_gym.sessions.decisions import encode_decision
 from dorothie_gym.sessions.errors import SessionError
 from dorothie_gym.sessions.event_lines import encode_event
 from dorothie_gym.sessions.frames_file import write_frames
-from dorothie_gym.sessions.layout import EVENTS_FILE, FRAMES_FILE, PART, PICTURES_FOLDER
+from dorothie_gym.sessions.layout import ACTIONS_FILE, EVENTS_FILE, FRAMES_FILE, PART, PICTURES_FOLDER
 from dorothie_gym.sessions.session_file import SessionFile
 
 if TYPE_CHECKING:
@@ -44,6 +45,9 @@ def save_folder(session: Session, folder: Path) -> Path:
     with new_folder(folder) as part:
         lines = [encode_event(event) + "\n" for event in session.events]
         (part / EVENTS_FILE).write_text("".join(lines), encoding="utf-8", newline="\n")
+        if session.decisions is not None:
+            lines = [encode_decision(decision) + "\n" for decision in session.decisions]
+            (part / ACTIONS_FILE).write_text("".join(lines), encoding="utf-8", newline="\n")
         write_frames(part / FRAMES_FILE, session.trajectory, session.scene)
         if session.pictures:
             (part / PICTURES_FOLDER).mkdir()

@@ -187,7 +187,7 @@ def light_rows(lights: Mapping[int, LightColour | str]) -> Rows:
     return rows
 
 
-def weather_rows(weather: Mapping[str, float]) -> Rows:
+def weather_rows(weather: Mapping[Any, float]) -> Rows:
     """Returns the ten parameters as one row of `WEATHER_DTYPE`.
 
     Raises:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from dorothie_gym.ontology import Role
+from dorothie_gym.sessions.decisions import Decision
 from dorothie_gym.sessions.digest import digest_of
 from dorothie_gym.sessions.errors import SessionError
 from dorothie_gym.sessions.events import INFRACTIONS, Event, EventType
@@ -46,6 +47,7 @@ class Session:
         name: name of its folder, or of its town, storyboard and seed.
         scene: what was around the car, as far as it was recorded.
         pictures: paths of the pictures by frame.
+        decisions: what the roles decided, from which the session can be played again; None where it is not known.
         report: what the reader noticed.
     """
 
@@ -57,6 +59,7 @@ class Session:
     name: str = ""
     scene: Scene = field(default_factory=Scene)
     pictures: Mapping[int, Path] = field(default_factory=dict)
+    decisions: tuple[Decision, ...] | None = None
     report: ReadReport = field(default_factory=ReadReport)
 
     def __post_init__(self) -> None:
@@ -91,6 +94,7 @@ class Session:
             name=folder.resolve().name,
             scene=content.scene,
             pictures=content.pictures,
+            decisions=content.decisions,
             report=content.report,
         )
 

@@ -6,11 +6,13 @@ import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import IO, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.ontology import Role
+from dorothie_gym.sessions.decisions import Decision, encode_decision
 from dorothie_gym.sessions.encoding import canonical, write_atomically
 from dorothie_gym.sessions.errors import SessionError
 from dorothie_gym.sessions.event_lines import encode_event
@@ -19,6 +21,7 @@ from dorothie_gym.sessions.frames_file import write_frames
 from dorothie_gym.sessions.header import SessionHeader
 from dorothie_gym.sessions.journal import ACTORS, CAR, LIGHTS, WEATHER, encode_block, read_journal
 from dorothie_gym.sessions.layout import (
+    ACTIONS_FILE,
     EVENTS_FILE,
     FRAMES_FILE,
     HEADER_FILE,
@@ -59,12 +62,14 @@ class SessionWriter:
         SessionFile(header=header).write(self.folder)
         self._events = (self.folder / EVENTS_FILE).open("xb")
         self._journal = (self.folder / JOURNAL_FILE).open("xb")
+        self._decisions: IO[bytes] | None = None
         self._event_count = 0
         self._last_frame = -1
         self._frames: set[float] = set()
         self._lights: tuple[Mapping[int, LightColour | str], Rows] | None = None
-        self._weather: tuple[Mapping[str, float], Rows] | None = None
+        self._weather: tuple[Mapping[Any, float], Rows] | None = None
         self._recorded = {ACTORS: -1, LIGHTS: -1, WEATHER: -1}
+        self._last_decision = -1
 
     def append(self, events: Iterable[Event] = (), frames: NDArray[np.float64] | None = None) -> None:
         """Appends a batch of events and frames and hands it to the operating system.
@@ -96,6 +101,25 @@ class SessionWriter:
         """Appends frames of the car, (n, 9) float64 as in `TRAJECTORY_COLUMNS`; raises `SessionError` as `append`."""
         self.append((), frames)
 
+    def add_decision(self, frame: int, actions: Mapping[Role, Mapping[str, Any]]) -> None:
+        """Appends what the roles decided at a frame, see `Decision`; nothing is written where nobody did anything.
+
+        From the first call on the session is one whose decisions are recorded.
+
+        Raises:
+            SessionError: an action cannot be written, or the frame is not above that of the decision before.
+        """
+        self._check_open("nothing can be appended")
+        if frame <= self._last_decision:
+            raise SessionError(f"{self.folder}: a decision at frame {frame} after {self._last_decision}")
+        line = encode_decision(Decision(frame=frame, actions=actions)) if actions else ""
+        if self._decisions is None:
+            self._decisions = (self.folder / ACTIONS_FILE).open("xb")
+        if line:
+            self._decisions.write((line + "\n").encode("utf-8"))
+            self._decisions.flush()
+        self._last_decision = frame
+
     def add_actors(self, frame: int, actors: Rows | Mapping[str, Any]) -> None:
         """Appends the actors around the car at a frame: rows of `ACTOR_DTYPE`, or a mapping of its columns.
 
@@ -110,7 +134,7 @@ class SessionWriter:
             self._lights = dict(lights), light_rows(lights)
         self._add(LIGHTS, frame, self._lights[1])
 
-    def add_weather(self, frame: int, weather: Mapping[str, float]) -> None:
+    def add_weather(self, frame: int, weather: Mapping[Any, float]) -> None:
         """Appends the ten weather parameters at a frame; raises `SessionError` as above."""
         if self._weather is None or self._weather[0] != weather:
             self._weather = dict(weather), weather_rows(weather)
@@ -152,6 +176,8 @@ class SessionWriter:
         """Closes the files; a session that was not finished stays incomplete. May be called again."""
         self._events.close()
         self._journal.close()
+        if self._decisions is not None:
+            self._decisions.close()
 
     def __enter__(self) -> Self:
         return self

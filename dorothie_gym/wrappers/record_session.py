@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 from pettingzoo.utils import BaseParallelWrapper
 
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.envs.recorder import SessionRecorder
 from dorothie_gym.sessions import Event, SessionHeader, SessionWriter
 
 ResetResult: TypeAlias = tuple[dict[Any, Any], dict[Any, dict[str, Any]]]
@@ -45,6 +47,9 @@ def name_by_seed(header: SessionHeader) -> str:
 class RecordSession(BaseParallelWrapper):
     """Writes a session folder for each reset of the environment inside; observations and actions pass unchanged.
 
+    Of a `DuoWizardEnv` also the decisions of the roles and what is around the car are written, of others events and
+    frames.
+
     A session that is not played to its end (another reset, `close`, the death of the process) is left as it is, to be
     read up to the last decision.
 
@@ -71,6 +76,7 @@ class RecordSession(BaseParallelWrapper):
         self._name = name
         self._overwrite = overwrite
         self._writer: SessionWriter | None = None
+        self._recorder: SessionRecorder | None = None
         self._session_folder: Path | None = None
 
     @property
@@ -85,16 +91,22 @@ class RecordSession(BaseParallelWrapper):
         header = self._recorded.session_header()
         self._session_folder = self.folder / self._name(header)
         self._writer = SessionWriter(self._session_folder, header, overwrite=self._overwrite)
-        self._append()
+        if isinstance(self.env.unwrapped, DuoWizardEnv):
+            self._recorder = SessionRecorder(self.env.unwrapped, self._writer)
+        else:
+            self._append()
         return result
 
     def step(self, actions: dict[Any, Any]) -> StepResult:
         """Steps the environment, appends what happened, and finishes the session when all agents are done."""
         result: StepResult = super().step(actions)
-        self._append()
+        if self._recorder is not None:
+            self._recorder.record(actions)
+        else:
+            self._append()
         if self._writer is not None and not self.env.agents:
             self._writer.finish(self._recorded.summary())
-            self._writer = None
+            self._writer = self._recorder = None
         return result
 
     def close(self) -> None:
@@ -113,4 +125,4 @@ class RecordSession(BaseParallelWrapper):
     def _close_writer(self) -> None:
         if self._writer is not None:
             self._writer.close()
-            self._writer = None
+            self._writer = self._recorder = None

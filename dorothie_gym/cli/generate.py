@@ -1,0 +1,116 @@
+"""`dorothie-gym generate`: a corpus of sessions."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
+
+if TYPE_CHECKING:
+    from dorothie_gym.rollout import Generated
+
+_FAILED = 1
+"""Exit code where a session could not be played."""
+
+
+def generate(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the corpus; one that was begun is gone on with.")],
+    sessions: Annotated[int, typer.Option(min=1, help="How many, in folds as the paper's 183.")] = 183,
+    seed: Annotated[int, typer.Option(min=0, help="Equal seeds make equal corpora.")] = 0,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes that play; as many as there are processors.")
+    ] = None,
+    max_seconds: Annotated[
+        float | None, typer.Option(min=1.0, max=86400.0, help="Cut sessions off after so many simulated seconds.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
+) -> None:
+    """Make a corpus: the scripted three play many sessions, divided into train, val and test, seen and unseen towns.
+
+    The same bytes come out whatever the number of workers. When it is stopped, the same command goes on.
+    """
+    with told_plainly():
+        from dorothie_gym.envs.config import EnvConfig
+        from dorothie_gym.rollout import ProcessError, generate_corpus
+
+        config = EnvConfig() if max_seconds is None else EnvConfig(max_seconds=max_seconds)
+        begun = time.perf_counter()
+        try:
+            with _progress(quiet=as_json) as on_session:
+                made = generate_corpus(
+                    out,
+                    sessions=sessions,
+                    seed=seed,
+                    workers=workers or _processors(),
+                    config=config,
+                    on_session=on_session,
+                )
+        except KeyboardInterrupt:
+            _tell_interruption(out, sessions, seed, max_seconds)
+        except ProcessError as error:
+            fail(str(error), _FAILED)
+    facts = _facts(made, seed, time.perf_counter() - begun)
+    if as_json:
+        print_json(facts)
+    else:
+        folds = ", ".join(f"{fold} {count}" for fold, count in facts["folds"].items())
+        stdout().print(
+            f"{facts['sessions']} sessions in {out} ({folds}); {facts['played']} played now in "
+            f"{facts['wall_seconds']:.0f} s. Hashes: {made.manifest}",
+            markup=False,
+            soft_wrap=True,
+        )
+
+
+def _processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _tell_interruption(out: Path, sessions: int, seed: int, max_seconds: float | None) -> None:
+    from dorothie_gym.rollout import finished_sessions
+
+    done = finished_sessions(out, sessions=sessions, seed=seed)
+    command = f"dorothie-gym generate --sessions {sessions} --seed {seed} --out {out}"
+    if max_seconds is not None:
+        command += f" --max-seconds {max_seconds:g}"
+    stderr().print(
+        f"Interrupted with {done} of {sessions} sessions finished; go on with: {command}", markup=False, soft_wrap=True
+    )
+    raise typer.Exit(INTERRUPTED)
+
+
+@contextmanager
+def _progress(*, quiet: bool) -> Iterator[Callable[[int, int], None]]:
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = stderr()
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    hidden = quiet or not console.is_terminal
+    with Progress(*columns, console=console, disable=hidden, transient=True) as progress:
+        bar = progress.add_task("Sessions", total=None)
+        yield lambda done, total: progress.update(bar, completed=done, total=total)
+
+
+def _facts(made: Generated, seed: int, wall: float) -> dict[str, Any]:
+    import json
+
+    folds: dict[str, int] = {}
+    for row in made.rows:
+        folds[row["fold"]] = folds.get(row["fold"], 0) + 1
+    return {
+        "out": str(made.root),
+        "sessions": len(made.rows),
+        "seed": seed,
+        "folds": folds,
+        "played": made.played,
+        "wall_seconds": round(wall, 3),
+        "manifest": str(made.manifest),
+        "sha256": json.loads(made.manifest.read_text(encoding="utf-8"))["sha256"],
+    }

@@ -1,0 +1,132 @@
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.rollout import generate_corpus
+from dorothie_gym.sessions import Corpus, SessionError
+
+ROOT = Path(__file__).parents[2]
+SHORT = EnvConfig(max_seconds=8.0)
+COMMAND = [sys.executable, "-m", "dorothie_gym.cli", "generate", "--seed", "5", "--sessions", "6"]
+
+
+def contents(root: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(root)): path.read_bytes() for path in sorted(root.rglob("*")) if path.is_file()}
+
+
+def begin(out: Path, *, seconds: float, workers: int) -> subprocess.Popen[str]:
+    arguments = ["--out", str(out), "--max-seconds", str(seconds), "--workers", str(workers)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(
+        [*COMMAND, *arguments], env=environment, text=True, start_new_session=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("corpus") / "undisturbed"
+    made = generate_corpus(root, sessions=6, seed=5, config=SHORT)
+    assert made.played == 6
+    return root
+
+
+def test_corpus_is_whole_and_has_its_hashes(corpus: Path) -> None:
+    found = Corpus.load(corpus)
+    assert len(found) == 6 and found.verify() == ()
+    assert all(session.complete and session.decisions is not None for session in found)
+    assert all(len(session.scene.actors) and len(session.scene.weather) for session in found)
+    assert sorted(path.name for path in corpus.iterdir() if path.is_file()) == ["generation.json", "manifest.json"]
+    assert not list(corpus.glob(".*"))
+
+
+def test_what_is_there_is_not_played_again(corpus: Path) -> None:
+    before = contents(corpus)
+    steps: list[tuple[int, int]] = []
+    made = generate_corpus(
+        corpus, sessions=6, seed=5, config=SHORT, on_session=lambda done, total: steps.append((done, total))
+    )
+    assert made.played == 0 and steps == [(k, 6) for k in range(7)]
+    assert contents(corpus) == before
+
+
+def test_session_that_is_missing_is_played_anew_with_the_same_bytes(corpus: Path, tmp_path: Path) -> None:
+    before = contents(corpus)
+    victim = Corpus.load(corpus).entries[2].path
+    victim.rename(tmp_path / "gone")
+    (corpus / "manifest.json").unlink()
+    (corpus / ".parts" / victim.name).mkdir(parents=True)
+    (corpus / ".parts" / victim.name / "session.json").write_text("torn")
+    assert generate_corpus(corpus, sessions=6, seed=5, config=SHORT).played == 1
+    assert contents(corpus) == before
+
+
+@pytest.mark.parametrize("change", [{"seed": 6}, {"sessions": 7}, {"config": EnvConfig(max_seconds=9.0)}])
+def test_corpus_of_other_settings_is_not_gone_on_with(corpus: Path, change: dict[str, object]) -> None:
+    settings: dict[str, object] = {"sessions": 6, "seed": 5, "config": SHORT, **change}
+    with pytest.raises(SessionError, match=f"has {next(iter(change))} .* choose another folder"):
+        generate_corpus(corpus, **settings)  # type: ignore[arg-type]
+
+
+def test_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("dear")
+    with pytest.raises(SessionError, match=r"holds something else \(thesis.tex\)"):
+        generate_corpus(tmp_path, sessions=1, seed=0)
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_two_at_once_are_kept_apart(tmp_path: Path) -> None:
+    def meanwhile(done: int, total: int) -> None:
+        with pytest.raises(SessionError, match="another process"):
+            generate_corpus(tmp_path, sessions=1, seed=0, config=SHORT)
+
+    generate_corpus(tmp_path, sessions=1, seed=0, config=SHORT, on_session=meanwhile)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_killed_at_random_moments_it_ends_in_the_bytes_of_an_undisturbed_run(tmp_path: Path) -> None:
+    generate_corpus(tmp_path / "one", sessions=6, seed=5, config=EnvConfig(max_seconds=60.0))
+    moments, kept = random.Random(0), 0
+    for _ in range(5):
+        process = begin(tmp_path / "two", seconds=60, workers=2)
+        time.sleep(moments.uniform(2.0, 8.0))
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+        finished = len(list((tmp_path / "two").glob("[tv]*/**/session.json")))
+        assert finished >= kept, "no finished session is lost"
+        kept = finished
+    process = begin(tmp_path / "two", seconds=60, workers=2)
+    _, errors = process.communicate()
+    assert process.returncode == 0, errors
+    assert contents(tmp_path / "two") == contents(tmp_path / "one")
+
+
+def test_two_workers_make_the_same_bytes_and_ctrl_c_tells_how_to_go_on(corpus: Path, tmp_path: Path) -> None:
+    out = tmp_path / "two"
+    process = begin(out, seconds=8, workers=2)
+    while process.poll() is None and not list(out.glob("*/*/session.json")):
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)
+    _, errors = process.communicate()
+    if process.returncode:  # it may have been faster
+        assert process.returncode == 130
+        assert (
+            errors.count("\n") == 1 and f"go on with: dorothie-gym generate --sessions 6 --seed 5 --out {out}" in errors
+        )
+    made = generate_corpus(out, sessions=6, seed=5, config=SHORT)
+    assert made.played < 6 and contents(out) == contents(corpus)
+    assert (
+        json.loads(made.manifest.read_text())["sessions"]
+        == json.loads((corpus / "manifest.json").read_text())["sessions"]
+    )
