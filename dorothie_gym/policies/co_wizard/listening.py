@@ -51,7 +51,7 @@ def listen(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
     if heard is None:
         return
     mind.heard_at = mind.idle_since = view.time
-    mind.voice = mind.voice.heard_other(view.time)
+    mind.voice = mind.voice.heard_other(view.time, heard.acts)
     before = mind.voice.queue
     for act in heard.acts:
         react = _REACTIONS.get(act.move)

@@ -233,6 +233,12 @@ class View:
         return _located(view, town)
 
     @property
+    def position(self) -> tuple[float, float]:
+        """Where it believes the car to be [m]."""
+        x, y = self.raw["pose"][:2]
+        return float(x), float(y)
+
+    @property
     def here(self) -> Place:
         """Where the car is."""
         return self.lane, self.station

@@ -9,14 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from dorothie_gym.dialogue import draw_style
 from dorothie_gym.ontology import ObjectClass, Role
 from dorothie_gym.policies.co_wizard.driving import creep, drive
 from dorothie_gym.policies.co_wizard.goals import note_plan
 from dorothie_gym.policies.co_wizard.listening import listen
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, Style, View
 from dorothie_gym.policies.co_wizard.obstacles import watch_road
-from dorothie_gym.policies.co_wizard.talking import speak_up, tell_action
+from dorothie_gym.policies.co_wizard.talking import scene_of, speak_up, tell_action
 from dorothie_gym.policies.policy import Policy
+from dorothie_gym.policies.speech import Voice
 from dorothie_gym.spaces import ActionDict, CoWizardAction, Mental, Motion, SpaceLimits
 from dorothie_gym.world.town import Town
 
@@ -46,8 +48,10 @@ class ScriptedCoWizard(Policy[CoWizardMind]):
 
     def initial_state(self, seed: int, town: Town) -> CoWizardMind:
         """A Co-Wizard that has not been told anything yet."""
-        style = Style.draw(np.random.default_rng((seed, 0))) if self._style is None else self._style
-        return CoWizardMind(seed=seed, town=town, style=style)
+        rng = np.random.default_rng((seed, 0))
+        style = Style.draw(rng) if self._style is None else self._style
+        voice = Voice(role=Role.CO_WIZARD, style=draw_style(Role.CO_WIZARD, rng))
+        return CoWizardMind(seed=seed, town=town, style=style, voice=voice)
 
     def step(self, observation: Mapping[str, Any], state: CoWizardMind) -> tuple[ActionDict, CoWizardMind]:
         """Listens, looks, drives, and says something or nothing."""
@@ -62,7 +66,7 @@ class ScriptedCoWizard(Policy[CoWizardMind]):
         physical = drive(mind, view)
         tell_action(mind, view, physical, rng)
         speak_up(mind, view, rng)
-        speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng)
+        speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng, scene_of(mind, view))
         return CoWizardAction(speech=speech, physical=physical, mental=_next_note(mind)).encode(self.limits), mind
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dorothie_gym.dialogue import Direction, Wording
+from dorothie_gym.dialogue import Direction, Wording, WordingContext
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueMove,
@@ -17,7 +17,7 @@ from dorothie_gym.ontology import (
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View, Wish
 from dorothie_gym.policies.journey import direction_of
-from dorothie_gym.policies.scenery import street_of
+from dorothie_gym.policies.scenery import nearest_landmark, street_of
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.spaces import Motion, Physical
 
@@ -51,6 +51,17 @@ def speak_up(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
         consider(mind, view, rng)
         if not mind.voice.idle:
             return
+
+
+def scene_of(mind: CoWizardMind, view: View) -> WordingContext:
+    """What is in view as it speaks: its street, a place on the map close ahead, and whether something is wrong."""
+    landmark = nearest_landmark(view.landmarks, *view.position)
+    street = street_of(view.raw, mind.town, view.lane)
+    return WordingContext(
+        street=street if street is not StreetName.UNKNOWN else None,
+        landmark=landmark.name if landmark is not None else None,
+        exception=mind.detour_at is not None or (view.motion is Motion.HAZARD and view.hazard is ObjectClass.STATIC),
+    )
 
 
 def _give_up_wish(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:

@@ -222,7 +222,7 @@ def _approach(mind: ParticipantMind, view: View, rng: np.random.Generator) -> bo
     if not mind.guiding:
         return left < NEAR
     if not mind.stop_text:
-        mind.stop_text = word_act(_STOP, Role.PARTICIPANT, rng, Wording(here=True))
+        mind.stop_text = word_act(_STOP, Role.PARTICIPANT, rng, Wording(here=True), style=mind.voice.style)
     if _time_to_stop(mind, view, left):
         if view.time - mind.stopped_at > 5.0 and left > 0.0:
             mind.stopped_at = view.time

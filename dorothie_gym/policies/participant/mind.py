@@ -169,6 +169,12 @@ class View:
         )
 
     @property
+    def position(self) -> tuple[float, float]:
+        """Where the car is [m]."""
+        x, y = self.raw["pose"][:2]
+        return float(x), float(y)
+
+    @property
     def place(self) -> Place:
         """Where the car is."""
         return self.lane, self.station

@@ -9,14 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from dorothie_gym.dialogue import draw_style
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.journey import light_ahead
 from dorothie_gym.policies.participant.goals import choose_target, note_tasks, tell_target
 from dorothie_gym.policies.participant.guidance import follow_journey, guide, watch
 from dorothie_gym.policies.participant.mind import ParticipantMind, Style, View
-from dorothie_gym.policies.participant.reactions import react
+from dorothie_gym.policies.participant.reactions import react, scene_of
 from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.policy import Policy
+from dorothie_gym.policies.speech import Voice
 from dorothie_gym.spaces import ActionDict, ParticipantAction, SpaceLimits
 from dorothie_gym.world.town import Town
 from dorothie_gym.world.town.lights import LightColour
@@ -46,7 +48,9 @@ class ScriptedParticipant(Policy[ParticipantMind]):
         """A participant who has not said anything yet."""
         rng = np.random.default_rng((seed, 0))
         style = Style.draw(rng) if self._style is None else self._style
-        return ParticipantMind(seed=seed, town=town, style=style, chat_at=float(rng.uniform(25.0, style.chat + 25.0)))
+        chat_at = float(rng.uniform(25.0, style.chat + 25.0))
+        voice = Voice(role=Role.PARTICIPANT, style=draw_style(Role.PARTICIPANT, rng))
+        return ParticipantMind(seed=seed, town=town, style=style, chat_at=chat_at, voice=voice)
 
     def step(self, observation: Mapping[str, Any], state: ParticipantMind) -> tuple[ActionDict, ParticipantMind]:
         """Listens, looks, and says something or nothing."""
@@ -69,7 +73,7 @@ class ScriptedParticipant(Policy[ParticipantMind]):
         watch(mind, view)
         guide(mind, view, rng)
         react(mind, view, rng)
-        speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng)
+        speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng, scene_of(mind, view))
         mind.speed_before = view.speed
         return ParticipantAction(speech=speech).encode(self.limits), mind
 

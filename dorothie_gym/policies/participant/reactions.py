@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from dorothie_gym.dialogue import Wording
-from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, WeatherParameter
+from dorothie_gym.dialogue import Wording, WordingContext
+from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, StreetName, WeatherParameter
 from dorothie_gym.policies.participant.mind import ParticipantMind, View
-from dorothie_gym.policies.scenery import place_on_lanes, weather
+from dorothie_gym.policies.scenery import nearest_landmark, place_on_lanes, street_of, weather
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.world.town.routing import Place
 
@@ -22,6 +22,18 @@ SLOW, USUAL = 25.0, 40.0
 
 SIGHT = 80.0
 """How far ahead an obstacle is noticed [m]."""
+
+
+def scene_of(mind: ParticipantMind, view: View) -> WordingContext:
+    """What is in view as the participant speaks: the street, a place close by, and whether something is wrong."""
+    landmark = nearest_landmark(view.landmarks, *view.position)
+    street = street_of(view.raw, mind.town, view.lane)
+    fog, rain = (weather(view.raw, name) for name in (WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATION))
+    return WordingContext(
+        street=street if street is not StreetName.UNKNOWN else None,
+        landmark=landmark.name if landmark is not None else None,
+        exception=fog > THICK_FOG or rain > HEAVY_RAIN,
+    )
 
 
 def react(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:

@@ -47,7 +47,7 @@ def listen(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     if heard is None:
         return
     mind.heard_at = view.time
-    mind.voice = mind.voice.heard_other(view.time)
+    mind.voice = mind.voice.heard_other(view.time, heard.acts)
     for act in heard.acts:
         answer = _ANSWERS.get(act.move)
         if answer is not None:
