@@ -95,6 +95,10 @@ class Voice:
         """Whether nothing waits to be said."""
         return not self.queue
 
+    def has_just_spoken(self, now: float, within: float) -> bool:
+        """Whether the last words were over no longer than `within` ago [s], or are still being said."""
+        return now - self.last_end < within
+
     def plan(self, *remarks: Remark) -> Voice:
         """The same with remarks added at the end."""
         return replace(self, queue=(*self.queue, *remarks))

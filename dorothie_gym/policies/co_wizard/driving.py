@@ -11,6 +11,7 @@ from dorothie_gym.policies.journey import (
     SAME_WAY,
     SWITCH_ROOM,
     U_TURN_SPEED_SQUARED,
+    Choice,
     Crossing,
     find_exit,
     lanes_ahead,
@@ -31,6 +32,19 @@ TURN_LEAD = 85.0
 
 PATIENCE = 2.0
 """A command that has shown no effect is given again after this time [s]."""
+
+
+UNLESS_TOLD = 24.0
+"""A car that is guided goes straight on where it has not been told otherwise until it is this near [m]."""
+
+PAUSE_BEFORE = 8.0
+"""A car that does not know the way stops this far before a junction [m]."""
+
+GENTLE = 25
+"""Speed at which the car comes up to a place [km/h]."""
+
+GENTLE_WITHIN = 70.0
+"""A place on the map is driven up to gently from here on [m]."""
 
 
 def drive(mind: CoWizardMind, view: View) -> Physical | None:
@@ -176,14 +190,24 @@ def wanted_exit(mind: CoWizardMind, view: View) -> Exit | None:
             straight = [option for option in choice.exits if option.type is LinkType.STRAIGHT]
             return straight[0] if straight else None
         return way
-    if mind.journey is None or mind.wish is Wish.U_TURN:
+    if mind.wish is Wish.U_TURN:
         return None
+    if mind.journey is None:
+        return _straight_on(mind, choice)
     crossing = mind.journey.next_crossing(mind.town, view.station)
     if crossing is None or mind.journey.changes_before(crossing):
         return None
     if crossing.lane == choice.lane or crossing.lane in lanes_beside(mind.town, choice.lane):
         return crossing.exit
     return None
+
+
+def _straight_on(mind: CoWizardMind, choice: Choice) -> Exit | None:
+    """The way on for a car that is being guided, has not asked, and has not been told otherwise in time."""
+    guided = mind.goal is not None and not mind.pausing and not mind.creeping and mind.asked != choice.lane
+    if not guided or choice.distance > UNLESS_TOLD:
+        return None
+    return next((way for way in choice.exits if way.type is LinkType.STRAIGHT), None)
 
 
 def _turn(mind: CoWizardMind, view: View) -> Physical | None:
@@ -202,15 +226,46 @@ def _turn(mind: CoWizardMind, view: View) -> Physical | None:
     return Physical(action=PhysicalAction.J_TURN, angle=way.angle)
 
 
-def _go(mind: CoWizardMind, view: View) -> Physical | None:
-    if mind.halted or view.motion is not Motion.STOPPED:
+def _rest(mind: CoWizardMind, view: View) -> Physical | None:
+    """Stops for good while something is in the way that it has said to stop for."""
+    if view.time >= mind.rest_until or mind.halted or view.motion is not Motion.HAZARD or view.manoeuvring:
         return None
-    return Physical(action=PhysicalAction.START)
+    return Physical(action=PhysicalAction.STOP)
+
+
+def _pause(mind: CoWizardMind, view: View) -> Physical | None:
+    """Stops before a junction at which it has asked for the way, until it knows one."""
+    knows = mind.journey is not None or mind.directive is not None or mind.wish is not None or mind.nudge is not None
+    if knows or mind.creeping or view.choice is None:
+        mind.pausing = False
+    if not mind.pausing or mind.halted or view.motion is Motion.STOPPED or view.choice is None:
+        return None
+    near = view.choice.distance - stopping_distance(view.speed) < PAUSE_BEFORE
+    if not near or view.manoeuvring or view.time - mind.stop_sent_at < PATIENCE:
+        return None
+    mind.stop_sent_at = view.time
+    return Physical(action=PhysicalAction.STOP)
+
+
+def _go(mind: CoWizardMind, view: View) -> Physical | None:
+    if mind.halted or mind.pausing or view.motion is not Motion.STOPPED or view.time < mind.rest_until:
+        return None
+    if mind.town.lanes[view.lane].in_junction or view.manoeuvre is not None:
+        return Physical(action=PhysicalAction.START)
+    return Physical(action=PhysicalAction.LANE_FOLLOW)
+
+
+def _close(mind: CoWizardMind, view: View) -> bool:
+    """Whether the goal is so near, with no junction before it, that the car should come up to it gently."""
+    if mind.journey is None or not mind.exact or mind.journey.left(view.station) > GENTLE_WITHIN:
+        return False
+    return mind.journey.next_crossing(mind.town, view.station) is None
 
 
 def _comfort(mind: CoWizardMind, view: View) -> Physical | None:
-    if abs(view.cruise - mind.speed) > 2.6:
-        return Physical(action=PhysicalAction.SPEED_CHANGE, up=view.cruise < mind.speed)
+    wanted = min(mind.speed, GENTLE) if _close(mind, view) else mind.speed
+    if abs(view.cruise - wanted) > 2.6:
+        return Physical(action=PhysicalAction.SPEED_CHANGE, up=view.cruise < wanted)
     if mind.lights is not None and mind.lights is not view.lights:
         return Physical(action=PhysicalAction.LIGHT_CHANGE, up=mind.lights)
     return None
@@ -221,8 +276,10 @@ _CONCERNS: tuple[Callable[[CoWizardMind, View], Physical | None], ...] = (
     _stand,
     _wish,
     _manoeuvre,
-    _turn,
+    _rest,
     _go,
+    _turn,
+    _pause,
     _comfort,
 )
 

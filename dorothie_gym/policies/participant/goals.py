@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -39,7 +40,8 @@ def _done(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.rando
     mind.voice = mind.voice.cleared().plan(remark(DialogueMove.EXPLAIN, *values, GoalStatus.COMPLETE, urgent=True))
     if subgoal.index == mind.target:
         forget_target(mind)
-        if rng.random() > mind.style.hurries:
+        mind.goes_on = bool(rng.random() < mind.style.hurries)
+        if not mind.goes_on:
             mind.voice = mind.voice.hold(view.time + 6.0)
 
 
@@ -130,14 +132,35 @@ def announcement(mind: ParticipantMind, view: View, rng: np.random.Generator) ->
     return remark(DialogueMove.INSTRUCT, *values, wording=Wording(topic=topic))
 
 
+def _announce(mind: ParticipantMind, view: View, goes_on: bool, rng: np.random.Generator) -> None:
+    """Names the target, perhaps with a reason for it, and what is to be done later."""
+    words = replace(announcement(mind, view, rng), joined=goes_on)
+    draw = rng.random()
+    if draw < mind.style.reasons:
+        reason = remark(DialogueMove.EXPLAIN, joined=goes_on)
+        mind.voice = mind.voice.plan(reason, replace(words, joined=True))
+    elif draw < 1.6 * mind.style.reasons:
+        mind.voice = mind.voice.plan(words, remark(DialogueMove.EXPLAIN, joined=True))
+    else:
+        mind.voice = mind.voice.plan(words)
+    later = [view.landmark(item.landmark) for item in view.subgoals if item.open and item.index != mind.target]
+    named = [mark for mark in later if mark is not None and mind.goal is not None and mark.name is not mind.goal.name]
+    if named and rng.random() < 0.25:
+        also = remark(DialogueMove.EXPLAIN, named[0].name, GoalStatus.PENDING, joined=True)
+        mind.voice = mind.voice.plan(also)
+    elif rng.random() < mind.style.aligns:
+        mind.voice = mind.voice.plan(remark(DialogueMove.ALIGN, joined=True))
+
+
 def tell_target(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     """Tells the car of the target when its turn has come, and again if it does not answer."""
-    if mind.goal is None or not mind.voice.idle:
+    goes_on, mind.goes_on = mind.goes_on, False
+    if mind.goal is None or not (mind.voice.idle or goes_on):
         return
     if not mind.told:
         mind.told, mind.told_at = True, view.time
         if not mind.guiding or rng.random() < mind.style.names_goal:
-            mind.voice = mind.voice.plan(announcement(mind, view, rng))
+            _announce(mind, view, goes_on and not mind.voice.idle, rng)
         return
     waiting = max(mind.told_at, mind.voice.last_end)
     unheard = mind.heard_at < mind.told_at and view.time - waiting > UNANSWERED

@@ -25,6 +25,9 @@ from dorothie_gym.world.town.routing import Entry
 TELL_DISTANCE = 110.0
 """A turn is told when it is this near [m]."""
 
+TOO_LATE = 60.0
+"""A turn is told when it is this near, even if the car has not asked [m]."""
+
 AGAIN = 9.0
 """What has not been done is told again after this time [s]."""
 
@@ -102,6 +105,8 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     if _ease(mind, view):
         return
     near = distance < (_turning_distance(mind, view) if key[0] == "round" else TELL_DISTANCE)
+    if _left_to_ask(mind, view, key, distance, words.wording.direction is Direction.STRAIGHT, rng):
+        return
     waited = view.time - max(mind.guided_at, mind.heard_at)
     on_its_lane = key[0] == "round" and mind.journey.turns_round_on(view.lane)
     if on_its_lane and mind.standing_since is not None and view.time - mind.standing_since > 4.0:
@@ -114,8 +119,40 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     if key[0] == "lane" and view.time - mind.guided_at < SWITCHING:
         return
     if near and (mind.guided != key or overdue):
+        again = mind.guided == key
         note_told(mind, view, key)
-        mind.voice = mind.voice.plan(words)
+        mind.voice = mind.voice.plan(*_rounded_off(mind, words, again, rng))
+
+
+def _rounded_off(mind: ParticipantMind, words: Remark, again: bool, rng: np.random.Generator) -> tuple[Remark, ...]:
+    """A step with what else is said in the same breath: a reason before it, or a question whether it was heard."""
+    draw = rng.random()
+    if again and rng.random() < 0.25:
+        return words, remark(DialogueMove.ALIGN, joined=True)
+    if draw < mind.style.aligns:
+        return words, remark(DialogueMove.ALIGN, joined=True)
+    if draw < mind.style.aligns + 0.4 * mind.style.reasons:
+        return words, remark(DialogueMove.EXPLAIN, joined=True)
+    return (words,)
+
+
+def _left_to_ask(
+    mind: ParticipantMind,
+    view: View,
+    key: tuple[str, int, int],
+    distance: float,
+    goes_straight: bool,
+    rng: np.random.Generator,
+) -> bool:
+    """Whether the way at a junction is kept back until the car asks; that it goes straight on need not be said."""
+    if key[0] != "turn" or mind.guided == key:
+        return False
+    standing = 0.0 if mind.standing_since is None else view.time - mind.standing_since
+    if mind.drawn_for != key:
+        mind.drawn_for, mind.left_to_ask = key, bool(rng.random() < mind.style.waits)
+    if not mind.left_to_ask or standing > AGAIN:
+        return False
+    return distance > TOO_LATE or goes_straight
 
 
 def _ease(mind: ParticipantMind, view: View) -> bool:

@@ -42,6 +42,10 @@ class Style:
         hurries: chance that the next task follows in the same breath as the report of the last.
         patience: standing time after which it asks why [s].
         chat: seconds between remarks beside the matter, on average [s].
+        waits: chance that the way is told only when the car asks, or when it is nearly too late.
+        reasons: chance that a reason is given with a place, or a step.
+        aligns: chance that it makes sure to have been understood.
+        nods: chance that what the car explains is acknowledged.
     """
 
     guides: float
@@ -50,17 +54,25 @@ class Style:
     hurries: float
     patience: float
     chat: float
+    waits: float = 0.0
+    reasons: float = 0.0
+    aligns: float = 0.0
+    nods: float = 0.2
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> Style:
         """A style by chance: two in five guide most of the way themselves."""
         return cls(
-            guides=0.85 if rng.random() < 0.4 else 0.1,
+            guides=0.6 if rng.random() < 0.4 else 0.1,
             names_goal=float(rng.uniform(0.4, 1.0)),
             names_street=float(rng.uniform(0.1, 0.7)),
             hurries=float(rng.uniform(0.2, 0.9)),
             patience=float(rng.uniform(7.0, 14.0)),
-            chat=float(rng.uniform(60.0, 200.0)),
+            chat=float(rng.uniform(20.0, 60.0)),
+            waits=float(rng.uniform(0.2, 0.9)),
+            reasons=float(rng.uniform(0.05, 0.45)),
+            aligns=float(rng.uniform(0.0, 0.12)),
+            nods=float(rng.uniform(0.2, 0.8)),
         )
 
 
@@ -100,6 +112,10 @@ class ParticipantMind:
         lights_at: when lights were last talked about [s].
         chat_at: when to talk beside the matter next [s].
         speed_before: speed at the decision before [m/s].
+        left_to_ask: step that is told only when the car asks.
+        drawn_for: step for which it has been drawn whether it is.
+        goes_on: whether the next task is named in the breath that reports the last.
+        hurried: whether the car has been told to go faster.
     """
 
     seed: int
@@ -133,6 +149,10 @@ class ParticipantMind:
     lights_at: float = -math.inf
     chat_at: float = math.inf
     speed_before: float = 0.0
+    left_to_ask: bool = False
+    drawn_for: tuple[str, int, int] | None = None
+    goes_on: bool = False
+    hurried: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
