@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from dorothie_gym.ontology import LandmarkName, ObjectClass, PhysicalAction
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View, Wish
 from dorothie_gym.policies.journey import (
@@ -45,6 +47,13 @@ GENTLE = 25
 
 GENTLE_WITHIN = 70.0
 """A place on the map is driven up to gently from here on [m]."""
+
+
+HELD_UP = 2.0
+"""A hazard that stops the car for longer than this holds it up [s]."""
+
+REST = 4.0
+"""So long it stands when it has stopped for good for something in the way [s]."""
 
 
 def drive(mind: CoWizardMind, view: View) -> Physical | None:
@@ -224,6 +233,18 @@ def _turn(mind: CoWizardMind, view: View) -> Physical | None:
         return None
     mind.turn_sent, mind.turn_sent_at = sent, view.time
     return Physical(action=PhysicalAction.J_TURN, angle=way.angle)
+
+
+def rest(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
+    """Decides, once for each time that something holds up the car for long, whether to stop for good meanwhile."""
+    if view.motion is not Motion.HAZARD or mind.standing_since is None:
+        mind.rested = mind.rested and view.motion is Motion.STOPPED
+        return
+    if mind.rested or view.time - mind.standing_since < HELD_UP:
+        return
+    mind.rested = True
+    if rng.random() < mind.style.careful:
+        mind.rest_until = view.time + REST
 
 
 def _rest(mind: CoWizardMind, view: View) -> Physical | None:

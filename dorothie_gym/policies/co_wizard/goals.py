@@ -10,6 +10,7 @@ from dorothie_gym.dialogue import Wording
 from dorothie_gym.ontology import DialogueMove, GoalStatus, LandmarkName, MentalAction, SlotValue, StreetName
 from dorothie_gym.policies.co_wizard.driving import place_ahead
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View
+from dorothie_gym.policies.co_wizard.uptake import musing
 from dorothie_gym.policies.journey import Journey
 from dorothie_gym.policies.scenery import SeenLandmark
 from dorothie_gym.policies.speech import remark
@@ -94,7 +95,7 @@ def hear_goal(
         if streets and rng.random() < mind.style.echoes:
             values.append(mark.street)
         move = DialogueMove.CONFIRM if rng.random() < 0.25 else DialogueMove.ACKNOWLEDGE
-        mind.voice = mind.voice.plan(remark(move, *values))
+        mind.voice = mind.voice.plan(remark(move, *values), *musing(mind, rng, joined=True))
 
 
 def _unknown(mind: CoWizardMind, view: View, name: LandmarkName) -> None:

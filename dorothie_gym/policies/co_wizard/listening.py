@@ -24,8 +24,9 @@ from dorothie_gym.policies.co_wizard.driving import place_ahead
 from dorothie_gym.policies.co_wizard.goals import complete, doubt, give_up, hear_description, hear_goal, hear_stop_ahead
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, Directive, View, Wish
 from dorothie_gym.policies.co_wizard.obstacles import detour
-from dorothie_gym.policies.co_wizard.uptake import take_up
+from dorothie_gym.policies.co_wizard.uptake import musing, take_up
 from dorothie_gym.policies.hearing import HeardUtterance, heard_utterance
+from dorothie_gym.policies.scenery import street_of
 from dorothie_gym.policies.speech import remark
 
 NUDGE = 4.0
@@ -235,7 +236,8 @@ def _explanation(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard,
             mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
     elif GoalStatus.ABANDONED in statuses:
         give_up(mind, name)
-        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+        values = (name,) if name is not None and rng.random() < mind.style.echoes else ()
+        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, *values), *musing(mind, rng, joined=True))
     elif act.values(Slot.STREET):
         hear_description(mind, view, _streets(act.values(Slot.STREET)), landmarks, rng)
     elif "wrong" in words.text.lower():
@@ -301,9 +303,12 @@ def _alignment(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, r
 
 
 def _check(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
-    landmarks = act.values(Slot.LANDMARK)
+    landmarks, streets = act.values(Slot.LANDMARK), act.values(Slot.STREET)
     right = not landmarks or mind.goal in landmarks
-    mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM if right else DialogueMove.REPLY_N))
+    if streets and not landmarks:
+        right = street_of(view.raw, mind.town, view.lane) in streets
+    move = DialogueMove.CONFIRM if right else DialogueMove.REPLY_N
+    mind.voice = mind.voice.plan(remark(move), *musing(mind, rng, joined=True))
 
 
 def _confusion(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:

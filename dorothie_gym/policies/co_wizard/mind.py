@@ -47,6 +47,8 @@ class Style:
         mishears: chance that it does not catch an instruction.
         careful: chance that it stops before a junction to ask.
         chats: chance that it answers small talk.
+        rambles: chance that it tells what it is up to in the same breath as something else.
+        pace: speed at which it drives when nothing is said about it [km/h].
     """
 
     echoes: float
@@ -58,6 +60,8 @@ class Style:
     mishears: float = 0.0
     careful: float = 0.0
     chats: float = 0.0
+    rambles: float = 0.0
+    pace: int = USUAL_SPEED
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> Style:
@@ -65,12 +69,14 @@ class Style:
         return cls(
             echoes=float(rng.uniform(0.3, 0.8)),
             checks=float(rng.uniform(0.15, 0.6)),
-            tells=float(rng.uniform(0.15, 0.6)),
+            tells=float(rng.uniform(0.05, 0.35)),
             silent=float(rng.uniform(0.05, 0.3)),
             asks=float(rng.uniform(0.3, 0.8)),
             proposes=float(rng.uniform(0.1, 0.5)),
             mishears=float(rng.uniform(0.0, 0.04)),
             careful=float(rng.uniform(0.2, 0.9)),
+            rambles=float(rng.uniform(0.1, 0.7)),
+            pace=int(rng.choice((30, 35, 40))),
             chats=float(rng.uniform(0.1, 0.6)),
         )
 
@@ -144,6 +150,7 @@ class CoWizardMind:
         proposed: way that it has proposed and waits for an answer to.
         rest_until: until when it stands for something in the way [s].
         pausing: whether it stops before the junction ahead until it is told the way.
+        rested: whether it has decided whether to stop for good at the present hazard.
         weather_told: whether it has remarked on the weather as it is.
         slower_asked: whether it has proposed to slow down and waits for an answer.
         lost_told: whether it has said that it does not know where it is.
@@ -188,6 +195,7 @@ class CoWizardMind:
     proposed: Directive | None = None
     rest_until: float = -math.inf
     pausing: bool = False
+    rested: bool = False
     weather_told: bool = False
     slower_asked: bool = False
     lost_told: bool = False

@@ -11,7 +11,7 @@ import numpy as np
 
 from dorothie_gym.dialogue import draw_style
 from dorothie_gym.ontology import ObjectClass, Role
-from dorothie_gym.policies.co_wizard.driving import creep, drive
+from dorothie_gym.policies.co_wizard.driving import creep, drive, rest
 from dorothie_gym.policies.co_wizard.goals import note_plan
 from dorothie_gym.policies.co_wizard.listening import listen
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, Style, View
@@ -51,7 +51,7 @@ class ScriptedCoWizard(Policy[CoWizardMind]):
         rng = np.random.default_rng((seed, 0))
         style = Style.draw(rng) if self._style is None else self._style
         voice = Voice(role=Role.CO_WIZARD, style=draw_style(Role.CO_WIZARD, rng))
-        return CoWizardMind(seed=seed, town=town, style=style, voice=voice)
+        return CoWizardMind(seed=seed, town=town, style=style, voice=voice, speed=style.pace, usual=style.pace)
 
     def step(self, observation: Mapping[str, Any], state: CoWizardMind) -> tuple[ActionDict, CoWizardMind]:
         """Listens, looks, drives, and says something or nothing."""
@@ -62,6 +62,7 @@ class ScriptedCoWizard(Policy[CoWizardMind]):
         _notice(mind, view)
         listen(mind, view, rng)
         watch_road(mind, view, rng)
+        rest(mind, view, rng)
         creep(mind, view)
         physical = drive(mind, view)
         tell_action(mind, view, physical, rng)

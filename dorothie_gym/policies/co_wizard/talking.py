@@ -17,6 +17,7 @@ from dorothie_gym.ontology import (
 from dorothie_gym.policies.co_wizard.conditions import mind_place, mind_weather
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, Directive, View, Wish
+from dorothie_gym.policies.co_wizard.uptake import musing
 from dorothie_gym.policies.journey import Choice, direction_of
 from dorothie_gym.policies.scenery import nearest_landmark, street_of
 from dorothie_gym.policies.speech import remark
@@ -29,11 +30,8 @@ ASK_DISTANCE = 75.0
 ASK_AGAIN = 8.0
 """A question without an answer is put again after this time [s]."""
 
-REASON = 3.0
+REASON = 5.0
 """A hazard is explained when it holds the car for longer than this [s]."""
-
-REST = 4.0
-"""So long it stands at least for what it has said to stop for [s]."""
 
 FIRST_WORD = 5.0
 """The human is left to speak first until this time [s]."""
@@ -106,7 +104,8 @@ def _ask_way(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
         _propose_way(mind, view, choice, rng)
     else:
         mind.proposed = None
-        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, ActionValue.QUERIED))
+        first = musing(mind, rng)
+        mind.voice = mind.voice.plan(*first, remark(DialogueMove.QUERY_W, ActionValue.QUERIED, joined=bool(first)))
 
 
 def _propose_way(mind: CoWizardMind, view: View, choice: Choice, rng: np.random.Generator) -> None:
@@ -120,7 +119,9 @@ def _propose_way(mind: CoWizardMind, view: View, choice: Choice, rng: np.random.
         values.append(street)
     move = DialogueMove.QUERY_YN if rng.random() < 0.7 else DialogueMove.CHECK
     mind.proposed = Directive(direction=direction, junction=choice.junction)
-    mind.voice = mind.voice.plan(remark(move, *values, wording=Wording(direction=direction)))
+    first = musing(mind, rng)
+    question = remark(move, *values, wording=Wording(direction=direction), joined=bool(first))
+    mind.voice = mind.voice.plan(*first, question)
 
 
 def _say_arrived(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
@@ -154,13 +155,12 @@ def _explain_hazard(mind: CoWizardMind, view: View, rng: np.random.Generator) ->
     if view.time - mind.standing_since < REASON or view.time - mind.hazard_told < TOLD_AGAIN:
         return
     mind.hazard_told = view.time
-    if view.hazard is ObjectClass.TRAFFIC_LIGHT and rng.random() < 0.6:
+    if rng.random() < (0.8 if view.hazard is ObjectClass.TRAFFIC_LIGHT else 0.3):
         return  # everybody sees a red light
     values: tuple[SlotValue, ...] = (view.hazard,)
-    if rng.random() < 0.6:
+    if mind.rest_until > view.time or rng.random() < 0.3:
         values = (ActionValue.STOP, view.hazard)
-        mind.rest_until = view.time + REST
-    mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, *values))
+    mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, *values), *musing(mind, rng, joined=True))
 
 
 def tell_action(mind: CoWizardMind, view: View, physical: Physical | None, rng: np.random.Generator) -> None:

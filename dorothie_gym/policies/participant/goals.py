@@ -8,12 +8,18 @@ from dataclasses import replace
 import numpy as np
 
 from dorothie_gym.dialogue import Wording
-from dorothie_gym.ontology import DialogueMove, GoalStatus, SlotValue
+from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, SlotValue
 from dorothie_gym.policies.journey import Journey
 from dorothie_gym.policies.participant.mind import ParticipantMind, View
 from dorothie_gym.policies.scenery import SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.speech import Remark, remark
 from dorothie_gym.world.town.routing import router
+
+ROOM_TO_WAIT = 80.0
+"""A car that is nearer to its goal than this is not told to wait when something new comes up [m]."""
+
+THINKING = 9.0
+"""So long it waits then [s]."""
 
 UNANSWERED = 8.0
 """After this time without a word from the car it is asked whether it has understood [s]."""
@@ -26,7 +32,7 @@ def note_tasks(mind: ParticipantMind, view: View, rng: np.random.Generator) -> N
         if new.reached and not old.reached:
             _done(mind, view, new, rng)
         elif new.open and not old.live:
-            _added(mind, view, new)
+            _added(mind, view, new, rng)
         elif old.open and not new.live:
             _dropped(mind, view, old)
         elif new.open and new.landmark != old.landmark:
@@ -45,13 +51,27 @@ def _done(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.rando
             mind.voice = mind.voice.hold(view.time + 6.0)
 
 
-def _added(mind: ParticipantMind, view: View, subgoal: SeenSubgoal) -> None:
+def _added(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.random.Generator) -> None:
     landmark = view.landmark(subgoal.landmark)
     if landmark is None:
         return
-    mind.voice = mind.voice.plan(
-        remark(DialogueMove.INSTRUCT, landmark.name, GoalStatus.PENDING, wording=Wording(topic="added"))
-    )
+    news = remark(DialogueMove.INSTRUCT, landmark.name, GoalStatus.PENDING, wording=Wording(topic="added"))
+    far = mind.journey is not None and mind.journey.left(view.station) > ROOM_TO_WAIT
+    if view.speed > 2.0 and far and mind.voice.idle and rng.random() < mind.style.waits:
+        mind.go_at = view.time + THINKING
+        stop = remark(DialogueMove.INSTRUCT, ActionValue.STOP, urgent=True)
+        mind.voice = mind.voice.plan(stop, replace(news, joined=True))
+    else:
+        mind.voice = mind.voice.plan(news)
+
+
+def go_on(mind: ParticipantMind, view: View) -> None:
+    """Tells the car to go on that has been told to wait."""
+    if view.time < mind.go_at or not mind.voice.idle:
+        return
+    mind.go_at = math.inf
+    if view.standing:
+        mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.START))
 
 
 def _dropped(mind: ParticipantMind, view: View, subgoal: SeenSubgoal) -> None:

@@ -131,7 +131,7 @@ def _rounded_off(mind: ParticipantMind, words: Remark, again: bool, rng: np.rand
         return words, remark(DialogueMove.ALIGN, joined=True)
     if draw < mind.style.aligns:
         return words, remark(DialogueMove.ALIGN, joined=True)
-    if draw < mind.style.aligns + 0.4 * mind.style.reasons:
+    if draw < mind.style.aligns + 0.7 * mind.style.reasons:
         return words, remark(DialogueMove.EXPLAIN, joined=True)
     return (words,)
 

@@ -63,15 +63,15 @@ class Style:
     def draw(cls, rng: np.random.Generator) -> Style:
         """A style by chance: two in five guide most of the way themselves."""
         return cls(
-            guides=0.6 if rng.random() < 0.4 else 0.1,
+            guides=0.5 if rng.random() < 0.4 else 0.05,
             names_goal=float(rng.uniform(0.4, 1.0)),
             names_street=float(rng.uniform(0.1, 0.7)),
-            hurries=float(rng.uniform(0.2, 0.9)),
+            hurries=float(rng.uniform(0.4, 1.0)),
             patience=float(rng.uniform(7.0, 14.0)),
             chat=float(rng.uniform(20.0, 60.0)),
             waits=float(rng.uniform(0.2, 0.9)),
-            reasons=float(rng.uniform(0.05, 0.45)),
-            aligns=float(rng.uniform(0.0, 0.12)),
+            reasons=float(rng.uniform(0.1, 0.7)),
+            aligns=float(rng.uniform(0.0, 0.15)),
             nods=float(rng.uniform(0.2, 0.8)),
         )
 
@@ -115,6 +115,7 @@ class ParticipantMind:
         left_to_ask: step that is told only when the car asks.
         drawn_for: step for which it has been drawn whether it is.
         goes_on: whether the next task is named in the breath that reports the last.
+        go_at: when the car, which has been told to wait, is to go on [s].
         hurried: whether the car has been told to go faster.
     """
 
@@ -152,6 +153,7 @@ class ParticipantMind:
     left_to_ask: bool = False
     drawn_for: tuple[str, int, int] | None = None
     goes_on: bool = False
+    go_at: float = math.inf
     hurried: bool = False
 
 

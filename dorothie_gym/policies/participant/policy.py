@@ -12,7 +12,7 @@ import numpy as np
 from dorothie_gym.dialogue import draw_style
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.journey import light_ahead
-from dorothie_gym.policies.participant.goals import choose_target, note_tasks, tell_target
+from dorothie_gym.policies.participant.goals import choose_target, go_on, note_tasks, tell_target
 from dorothie_gym.policies.participant.guidance import follow_journey, guide, watch
 from dorothie_gym.policies.participant.mind import ParticipantMind, Style, View
 from dorothie_gym.policies.participant.reactions import react, scene_of
@@ -70,6 +70,7 @@ class ScriptedParticipant(Policy[ParticipantMind]):
         follow_journey(mind, view)
         listen(mind, view, rng)
         tell_target(mind, view, rng)
+        go_on(mind, view)
         watch(mind, view)
         guide(mind, view, rng)
         react(mind, view, rng)

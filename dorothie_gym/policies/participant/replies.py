@@ -98,7 +98,7 @@ def _fits(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng
 
 def _more(mind: ParticipantMind, rng: np.random.Generator) -> tuple[Remark, ...]:
     """What is added to a yes now and then."""
-    return (remark(DialogueMove.EXPLAIN, joined=True),) if rng.random() < 0.4 * mind.style.reasons else ()
+    return (remark(DialogueMove.EXPLAIN, joined=True),) if rng.random() < mind.style.reasons else ()
 
 
 def _refuse_with_step(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
@@ -185,7 +185,8 @@ def _say_way(mind: ParticipantMind, view: View, move: DialogueMove, rng: np.rand
         return
     key, _, words = step
     note_told(mind, view, key)
-    mind.voice = mind.voice.cleared().plan(words)
+    more = _more(mind, rng) if move is DialogueMove.REPLY_W else ()
+    mind.voice = mind.voice.cleared().plan(words, *more)
 
 
 def _describe(mind: ParticipantMind, view: View, move: DialogueMove) -> None:
@@ -235,7 +236,7 @@ def _explanation(mind: ParticipantMind, view: View, act: DialogueAct, words: Hea
         if ObjectClass.STATIC in act.values(Slot.OBJECT):
             note_blocked(mind, view, near=True)
     if mind.voice.idle and rng.random() < mind.style.nods:
-        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE), *_more(mind, rng))
 
 
 def _confusion(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
