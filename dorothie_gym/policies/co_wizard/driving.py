@@ -143,7 +143,8 @@ def turn_round(mind: CoWizardMind, view: View) -> Physical | None:
 
 def _switch(mind: CoWizardMind, view: View, side: LinkType) -> Physical | None:
     lane = mind.town.lanes[view.lane]
-    ready = not view.manoeuvring and view.time - mind.commanded_at >= PATIENCE and not lane.in_junction
+    # one that is refused is given again at once: there is seldom much room
+    ready = not view.manoeuvring and view.time - mind.commanded_at >= DECISION and not lane.in_junction
     possible = mind.town.neighbour(view.lane, side) is not None and lane.length - view.station > SWITCH_ROOM
     if not ready or not possible:
         return None
@@ -278,7 +279,11 @@ def _go(mind: CoWizardMind, view: View) -> Physical | None:
 
 def _close(mind: CoWizardMind, view: View) -> bool:
     """Whether the goal is so near, with no junction before it, that the car should come up to it gently."""
-    if mind.journey is None or not mind.exact or mind.journey.left(view.station) > GENTLE_WITHIN:
+    if mind.journey is None or not mind.exact:
+        return False
+    if mind.misses:
+        return mind.journey.left(view.station) < 2.0 * GENTLE_WITHIN
+    if mind.journey.left(view.station) > GENTLE_WITHIN:
         return False
     return mind.journey.next_crossing(mind.town, view.station) is None
 

@@ -34,6 +34,7 @@ def aim(mind: CoWizardMind, view: View, mark: SeenLandmark) -> None:
     """Makes a place on the map the goal and plans the way."""
     mind.goal, mind.place, mind.exact = mark.name, mark.place, True
     mind.directive, mind.wish, mind.nudge = None, None, None
+    mind.misses, mind.avoided = 0, ()
     mind.halted = mind.arrived = mind.creeping = False
     mind.note(Mental(action=MentalAction.GOAL_UPDATE, goals=(mark.name,)))
     mind.note_status(mark.name, GoalStatus.ONGOING)
@@ -45,7 +46,7 @@ def plan_way(mind: CoWizardMind, view: View) -> None:
     if mind.place is None or not mind.exact:
         mind.journey = None
         return
-    mind.journey = Journey.plan(mind.town, view.here, mind.place, mind.blocked)
+    mind.journey = Journey.plan(mind.town, view.here, mind.place, mind.blocked + mind.avoided)
     note_plan(mind)
 
 

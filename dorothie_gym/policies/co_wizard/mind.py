@@ -68,14 +68,14 @@ class Style:
         """A style by chance."""
         return cls(
             echoes=float(rng.uniform(0.3, 0.8)),
-            checks=float(rng.uniform(0.15, 0.6)),
+            checks=float(rng.uniform(0.1, 0.4)),
             tells=float(rng.uniform(0.05, 0.35)),
             silent=float(rng.uniform(0.05, 0.3)),
             asks=float(rng.uniform(0.3, 0.8)),
-            proposes=float(rng.uniform(0.1, 0.5)),
+            proposes=float(rng.uniform(0.1, 0.6)),
             mishears=float(rng.uniform(0.0, 0.04)),
             careful=float(rng.uniform(0.2, 0.9)),
-            rambles=float(rng.uniform(0.1, 0.7)),
+            rambles=float(rng.uniform(0.05, 0.5)),
             pace=int(rng.choice((30, 35, 40))),
             chats=float(rng.uniform(0.1, 0.6)),
         )
@@ -148,6 +148,8 @@ class CoWizardMind:
         idle_since: since when it has known nothing to do [s].
         heard_at: when the human last spoke [s].
         proposed: way that it has proposed and waits for an answer to.
+        misses: how often it has driven past the goal.
+        avoided: places that it does not come by any more, for it missed the goal when it did.
         rest_until: until when it stands for something in the way [s].
         pausing: whether it stops before the junction ahead until it is told the way.
         rested: whether it has decided whether to stop for good at the present hazard.
@@ -193,6 +195,8 @@ class CoWizardMind:
     idle_since: float = 0.0
     heard_at: float = -math.inf
     proposed: Directive | None = None
+    misses: int = 0
+    avoided: tuple[Place, ...] = ()
     rest_until: float = -math.inf
     pausing: bool = False
     rested: bool = False

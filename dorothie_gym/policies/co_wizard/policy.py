@@ -25,6 +25,12 @@ from dorothie_gym.world.town import Town
 ASTRAY = 2
 """After so many decisions off the plan it is made anew."""
 
+CLOSE_BY = 150.0
+"""Who leaves the way with the goal nearer than this, [m]"""
+
+AROUND = 60.0
+"""and then is farther from it by more than this, has missed it [m]."""
+
 AFTER_RED = 15.0
 """A manoeuvre that was asked for is not given up before this time after a red light [s]."""
 
@@ -82,10 +88,24 @@ def _notice(mind: CoWizardMind, view: View) -> None:
     _pass_junction(mind, view)
     if mind.journey is None or view.manoeuvring:
         return
+    before = mind.journey.left(view.station)
     mind.journey = mind.journey.followed(mind.town, view.lane, view.station)
     if mind.journey.astray >= ASTRAY:
-        mind.journey = mind.journey.replanned(mind.town, view.here, mind.blocked)
-        note_plan(mind)
+        _plan_anew(mind, view, before)
+
+
+def _plan_anew(mind: CoWizardMind, view: View, before: float) -> None:
+    """Plans another way; who has missed the goal again and again does not come to it as before."""
+    assert mind.journey is not None
+    former = mind.journey
+    mind.journey = former.replanned(mind.town, view.here, mind.blocked + mind.avoided)
+    if before < CLOSE_BY and mind.journey.left(view.station) > before + AROUND:
+        mind.misses += 1
+        way_in = former.way_in()
+        if mind.misses > 1 and way_in is not None:
+            mind.avoided = (*mind.avoided, way_in)
+            mind.journey = former.replanned(mind.town, view.here, mind.blocked + mind.avoided)
+    note_plan(mind)
 
 
 def _pass_junction(mind: CoWizardMind, view: View) -> None:

@@ -113,7 +113,7 @@ def forget_target(mind: ParticipantMind) -> None:
     mind.told, mind.guiding, mind.best = False, False, math.inf
     mind.guided, mind.repeats = None, 0
     mind.announced, mind.stop_text = False, ""
-    mind.misses, mind.eased = 0, False
+    mind.misses, mind.eased, mind.avoided = 0, False, ()
     mind.stopped_at = mind.nudged_at = -math.inf
 
 

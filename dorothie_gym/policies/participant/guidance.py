@@ -25,6 +25,12 @@ from dorothie_gym.world.town.routing import Entry
 TELL_DISTANCE = 110.0
 """A turn is told when it is this near [m]."""
 
+CLOSE_BY = 150.0
+"""A car that leaves the way with the place nearer than this, [m]"""
+
+AROUND = 60.0
+"""and then is farther from it by more than this, has gone past it [m]."""
+
 TOO_LATE = 60.0
 """A turn is told when it is this near, even if the car has not asked [m]."""
 
@@ -66,9 +72,15 @@ def follow_journey(mind: ParticipantMind, view: View) -> None:
     if passed:
         mind.guiding = True
     if mind.journey.astray >= 3 or passed:
-        if mind.guiding and before < 15.0:
+        former = mind.journey
+        mind.journey = former.replanned(mind.town, view.place, mind.blocked + mind.avoided)
+        gone_past = before < CLOSE_BY and mind.journey.left(view.station) > before + AROUND
+        if mind.guiding and (before < 15.0 or gone_past):
             mind.misses, mind.eased = mind.misses + 1, False
-        mind.journey = mind.journey.replanned(mind.town, view.place, mind.blocked)
+            way_in = former.way_in()
+            if mind.misses > 1 and way_in is not None:
+                mind.avoided = (*mind.avoided, way_in)
+                mind.journey = former.replanned(mind.town, view.place, mind.blocked + mind.avoided)
         mind.announced, mind.stop_text = False, ""
         missed = mind.guiding and mind.guided is not None and mind.guided[0] == "turn"
         if missed and mind.journey.left(view.station) > before + 60.0 and math.isfinite(before):

@@ -63,14 +63,14 @@ class Style:
     def draw(cls, rng: np.random.Generator) -> Style:
         """A style by chance: two in five guide most of the way themselves."""
         return cls(
-            guides=0.5 if rng.random() < 0.4 else 0.05,
+            guides=0.4 if rng.random() < 0.4 else 0.05,
             names_goal=float(rng.uniform(0.4, 1.0)),
             names_street=float(rng.uniform(0.1, 0.7)),
             hurries=float(rng.uniform(0.4, 1.0)),
             patience=float(rng.uniform(7.0, 14.0)),
             chat=float(rng.uniform(20.0, 60.0)),
             waits=float(rng.uniform(0.2, 0.9)),
-            reasons=float(rng.uniform(0.1, 0.7)),
+            reasons=float(rng.uniform(0.1, 0.5)),
             aligns=float(rng.uniform(0.0, 0.15)),
             nods=float(rng.uniform(0.2, 0.8)),
         )
@@ -99,6 +99,7 @@ class ParticipantMind:
         repeats: how often that has been repeated.
         announced: whether the car has been told that the place is near.
         misses: how often the car has gone past the place.
+        avoided: places that the car is not led by any more, for it went past the target when it was.
         eased: whether it has been told to go slowly because of that.
         stop_text: words to stop the car with.
         stopped_at: when they were said [s].
@@ -137,6 +138,7 @@ class ParticipantMind:
     repeats: int = 0
     announced: bool = False
     misses: int = 0
+    avoided: tuple[Place, ...] = ()
     eased: bool = False
     stop_text: str = ""
     stopped_at: float = -math.inf
