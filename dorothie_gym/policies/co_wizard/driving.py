@@ -45,6 +45,9 @@ PAUSE_BEFORE = 8.0
 GENTLE = 25
 """Speed at which the car comes up to a place [km/h]."""
 
+EASE_WITHIN = 40.0
+"""Who eases into turns slows down when the junction is this near [m]."""
+
 GENTLE_WITHIN = 70.0
 """A place on the map is driven up to gently from here on [m]."""
 
@@ -277,6 +280,14 @@ def _go(mind: CoWizardMind, view: View) -> Physical | None:
     return Physical(action=PhysicalAction.LANE_FOLLOW)
 
 
+def _turns_soon(mind: CoWizardMind, view: View) -> bool:
+    """Whether a turn to a side comes up that a driver of this style slows down for by himself."""
+    if not mind.style.eases or view.choice is None or view.choice.distance > EASE_WITHIN:
+        return False
+    way = wanted_exit(mind, view)
+    return way is not None and way.type in (LinkType.LEFT, LinkType.RIGHT)
+
+
 def _close(mind: CoWizardMind, view: View) -> bool:
     """Whether the goal is so near, with no junction before it, that the car should come up to it gently."""
     if mind.journey is None or not mind.exact:
@@ -289,7 +300,7 @@ def _close(mind: CoWizardMind, view: View) -> bool:
 
 
 def _comfort(mind: CoWizardMind, view: View) -> Physical | None:
-    wanted = min(mind.speed, GENTLE) if _close(mind, view) else mind.speed
+    wanted = min(mind.speed, GENTLE) if _close(mind, view) or _turns_soon(mind, view) else mind.speed
     if abs(view.cruise - wanted) > 2.6:
         return Physical(action=PhysicalAction.SPEED_CHANGE, up=view.cruise < wanted)
     if mind.lights is not None and mind.lights is not view.lights:

@@ -140,6 +140,8 @@ def hear_description(
             action=MentalAction.KNOWLEDGE_UPDATE, landmark=mind.goal, place=_map_place(near.lane, near.station)
         )
         mind.note(guess)
+    if mind.goal is not None and not mind.exact and not mind.arrived:
+        mind.halted = False  # it goes where it is told to
     values: tuple[SlotValue, ...] = tuple(streets[:1]) if rng.random() < mind.style.echoes else ()
     mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, *values))
 

@@ -47,6 +47,7 @@ class Style:
         mishears: chance that it does not catch an instruction.
         careful: chance that it stops before a junction to ask.
         chats: chance that it answers small talk.
+        eases: whether it slows down well before it turns.
         rambles: chance that it tells what it is up to in the same breath as something else.
         pace: speed at which it drives when nothing is said about it [km/h].
     """
@@ -60,6 +61,7 @@ class Style:
     mishears: float = 0.0
     careful: float = 0.0
     chats: float = 0.0
+    eases: bool = False
     rambles: float = 0.0
     pace: int = USUAL_SPEED
 
@@ -70,11 +72,12 @@ class Style:
             echoes=float(rng.uniform(0.3, 0.8)),
             checks=float(rng.uniform(0.1, 0.4)),
             tells=float(rng.uniform(0.05, 0.35)),
-            silent=float(rng.uniform(0.05, 0.3)),
-            asks=float(rng.uniform(0.3, 0.8)),
+            silent=float(rng.uniform(0.15, 0.5)),
+            asks=float(rng.uniform(0.4, 1.0)),
             proposes=float(rng.uniform(0.1, 0.6)),
             mishears=float(rng.uniform(0.0, 0.04)),
             careful=float(rng.uniform(0.2, 0.9)),
+            eases=bool(rng.random() < 0.4),
             rambles=float(rng.uniform(0.05, 0.5)),
             pace=int(rng.choice((30, 35, 40))),
             chats=float(rng.uniform(0.1, 0.6)),

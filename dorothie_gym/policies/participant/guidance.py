@@ -37,7 +37,7 @@ TOO_LATE = 60.0
 AGAIN = 9.0
 """What has not been done is told again after this time [s]."""
 
-SWITCHING = 5.0
+SWITCHING = 13.0
 """The car is given this long for a lane change before the next one is told [s]."""
 
 DECISION = 0.5
@@ -128,7 +128,7 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
         key, words = ("on", view.lane, 0), remark(DialogueMove.INSTRUCT, ActionValue.START)
         near = True
     overdue = stuck or (key[0] != "turn" and waited > AGAIN)
-    if key[0] == "lane" and view.time - mind.guided_at < SWITCHING:
+    if key[0] == "lane" and (view.time - mind.guided_at < SWITCHING or view.time < mind.excused_until):
         return
     if near and (mind.guided != key or overdue):
         again = mind.guided == key

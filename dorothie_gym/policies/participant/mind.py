@@ -69,10 +69,10 @@ class Style:
             hurries=float(rng.uniform(0.4, 1.0)),
             patience=float(rng.uniform(7.0, 14.0)),
             chat=float(rng.uniform(20.0, 60.0)),
-            waits=float(rng.uniform(0.2, 0.9)),
-            reasons=float(rng.uniform(0.1, 0.5)),
+            waits=float(rng.uniform(0.5, 1.0)),
+            reasons=float(rng.uniform(0.1, 0.45)),
             aligns=float(rng.uniform(0.0, 0.15)),
-            nods=float(rng.uniform(0.2, 0.8)),
+            nods=float(rng.uniform(0.1, 0.5)),
         )
 
 

@@ -184,6 +184,8 @@ def _say_way(mind: ParticipantMind, view: View, move: DialogueMove, rng: np.rand
     if step is None:
         return
     key, _, words = step
+    if move is DialogueMove.REPLY_W and mind.guided == key and view.time - mind.guided_at < JUST_TOLD:
+        return  # it was asked while the answer was being given
     note_told(mind, view, key)
     more = _more(mind, rng) if move is DialogueMove.REPLY_W else ()
     mind.voice = mind.voice.cleared().plan(words, *more)
@@ -225,8 +227,7 @@ def _near(goal: SeenLandmark, view: View) -> SeenLandmark | None:
 def _explanation(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
     landmarks, statuses = act.values(Slot.LANDMARK), act.values(Slot.STATUS)
     if GoalStatus.UNKNOWN in statuses and mind.goal is not None and mind.goal.name in landmarks:
-        if not mind.guiding:
-            _describe(mind, view, DialogueMove.EXPLAIN)
+        _describe(mind, view, DialogueMove.EXPLAIN)
         return
     if mind.goal is not None and mind.goal.name in landmarks and not statuses and _elsewhere(mind, view):
         _not_here(mind, view)
