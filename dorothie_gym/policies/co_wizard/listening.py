@@ -97,6 +97,8 @@ def _instruction(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard,
         if mind.arrived and _MOVES & set(actions) and not _A_BIT.search(words.text.lower()):
             doubt(mind)
         mind.proposed = None
+        if _MOVES & set(actions) and not mind.exact:
+            mind.journey = None  # it is guided, and need not look for the place by itself
         for action in actions:
             _OBEYED[action](mind, view, act, words)
         take_up(mind, actions[0], words, rng)
@@ -259,6 +261,7 @@ def _reply(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: 
         _instruction(mind, view, act, words, rng)
     elif words.turns:
         mind.proposed = None
+        mind.journey = mind.journey if mind.exact else None
         _do_turn(mind, view, act, words)
         take_up(mind, ActionValue.J_TURN, words, rng)
     elif act.values(Slot.STREET) or act.values(Slot.LANDMARK):

@@ -12,7 +12,7 @@ import numpy as np
 from dorothie_gym.dialogue import draw_style
 from dorothie_gym.ontology import ObjectClass, Role
 from dorothie_gym.policies.co_wizard.driving import creep, drive, rest
-from dorothie_gym.policies.co_wizard.goals import note_plan
+from dorothie_gym.policies.co_wizard.goals import note_plan, search_on
 from dorothie_gym.policies.co_wizard.listening import listen
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, Style, View
 from dorothie_gym.policies.co_wizard.obstacles import watch_road
@@ -69,6 +69,7 @@ class ScriptedCoWizard(Policy[CoWizardMind]):
         listen(mind, view, rng)
         watch_road(mind, view, rng)
         rest(mind, view, rng)
+        search_on(mind, view)
         creep(mind, view)
         physical = drive(mind, view)
         tell_action(mind, view, physical, rng)

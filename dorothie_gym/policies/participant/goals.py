@@ -110,7 +110,7 @@ def _changed(mind: ParticipantMind, view: View, old: SeenSubgoal, new: SeenSubgo
 def forget_target(mind: ParticipantMind) -> None:
     """Leaves the present target."""
     mind.target, mind.goal, mind.journey = None, None, None
-    mind.told, mind.guiding, mind.best = False, False, math.inf
+    mind.told, mind.described, mind.guiding, mind.best = False, False, False, math.inf
     mind.guided, mind.repeats = None, 0
     mind.announced, mind.stop_text = False, ""
     mind.misses, mind.eased, mind.avoided = 0, False, ()

@@ -46,6 +46,9 @@ DECISION = 0.5
 FASTEST = 11.0
 """The car is not expected to get faster than this [m/s]."""
 
+TAKES_OVER = 150.0
+"""A car that looks for a place by itself is guided from here on [m]."""
+
 NEAR = 95.0
 """A place is announced when it is this near [m]."""
 
@@ -93,6 +96,9 @@ def follow_journey(mind: ParticipantMind, view: View) -> None:
 def watch(mind: ParticipantMind, view: View) -> None:
     """Takes over a car that goes far out of its way or does not get on by itself."""
     if mind.guiding or mind.journey is None or not mind.told:
+        return
+    if mind.described and mind.journey.left(view.station) < TAKES_OVER:
+        mind.guiding = True
         return
     standing = 0.0 if mind.standing_since is None else view.time - mind.standing_since
     lost = mind.journey.left(view.station) > mind.best + 350.0

@@ -91,6 +91,7 @@ class ParticipantMind:
         goal: landmark of that subgoal.
         told: whether the car has been told of it.
         told_at: when [s].
+        described: whether the car, which does not know the place, has been told where it is.
         guiding: whether the way is told turn by turn.
         journey: the way to the target.
         best: least distance to the target so far [m].
@@ -130,6 +131,7 @@ class ParticipantMind:
     goal: SeenLandmark | None = None
     told: bool = False
     told_at: float = -math.inf
+    described: bool = False
     guiding: bool = False
     journey: Journey | None = None
     best: float = math.inf

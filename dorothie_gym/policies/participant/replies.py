@@ -28,6 +28,9 @@ from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.scenery import SeenLandmark
 from dorothie_gym.policies.speech import Remark, remark
 
+GUIDES_AT_ONCE = 0.25
+"""Chance that the way to a place that the car does not know is told from where it has been described."""
+
 ELSEWHERE = 40.0
 """A car that stands farther than this from the target has not come to it [m]."""
 
@@ -169,7 +172,7 @@ def _open_question(mind: ParticipantMind, view: View, act: DialogueAct, words: H
         # "before or after ...?": what is under way is finished first
         mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_W, wording=Wording(topic="after")))
     else:
-        _describe(mind, view, DialogueMove.REPLY_W)
+        _describe(mind, view, DialogueMove.REPLY_W, rng)
 
 
 def _just_named(mind: ParticipantMind, view: View) -> bool:
@@ -191,10 +194,11 @@ def _say_way(mind: ParticipantMind, view: View, move: DialogueMove, rng: np.rand
     mind.voice = mind.voice.cleared().plan(words, *more)
 
 
-def _describe(mind: ParticipantMind, view: View, move: DialogueMove) -> None:
-    """Says where the target is, and goes on to tell the way."""
+def _describe(mind: ParticipantMind, view: View, move: DialogueMove, rng: np.random.Generator) -> None:
+    """Says where the target is; at once, or when the car is close to it, the way is told turn by turn."""
     assert mind.goal is not None
-    mind.guiding = True
+    mind.guiding = bool(mind.goal.street is StreetName.UNKNOWN or mind.described or rng.random() < GUIDES_AT_ONCE)
+    mind.described = True
     values: list[SlotValue] = [mind.goal.street] if mind.goal.street is not StreetName.UNKNOWN else []
     near = _near(mind.goal, view)
     if near is not None:
@@ -227,7 +231,7 @@ def _near(goal: SeenLandmark, view: View) -> SeenLandmark | None:
 def _explanation(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
     landmarks, statuses = act.values(Slot.LANDMARK), act.values(Slot.STATUS)
     if GoalStatus.UNKNOWN in statuses and mind.goal is not None and mind.goal.name in landmarks:
-        _describe(mind, view, DialogueMove.EXPLAIN)
+        _describe(mind, view, DialogueMove.EXPLAIN, rng)
         return
     if mind.goal is not None and mind.goal.name in landmarks and not statuses and _elsewhere(mind, view):
         _not_here(mind, view)
