@@ -71,8 +71,8 @@ class Style:
         return cls(
             echoes=float(rng.uniform(0.3, 0.8)),
             checks=float(rng.uniform(0.1, 0.4)),
-            tells=float(rng.uniform(0.05, 0.35)),
-            silent=float(rng.uniform(0.15, 0.5)),
+            tells=float(rng.uniform(0.0, 0.25)),
+            silent=float(rng.uniform(0.15, 0.45)),
             asks=float(rng.uniform(0.4, 1.0)),
             proposes=float(rng.uniform(0.1, 0.6)),
             mishears=float(rng.uniform(0.0, 0.04)),

@@ -155,7 +155,7 @@ def _explain_hazard(mind: CoWizardMind, view: View, rng: np.random.Generator) ->
     if view.time - mind.standing_since < REASON or view.time - mind.hazard_told < TOLD_AGAIN:
         return
     mind.hazard_told = view.time
-    if rng.random() < (0.8 if view.hazard is ObjectClass.TRAFFIC_LIGHT else 0.3):
+    if rng.random() < (0.8 if view.hazard is ObjectClass.TRAFFIC_LIGHT else 0.5):
         return  # everybody sees a red light
     values: tuple[SlotValue, ...] = (view.hazard,)
     if mind.rest_until > view.time or rng.random() < 0.3:

@@ -63,16 +63,16 @@ class Style:
     def draw(cls, rng: np.random.Generator) -> Style:
         """A style by chance: two in five guide most of the way themselves."""
         return cls(
-            guides=0.4 if rng.random() < 0.4 else 0.05,
+            guides=0.3 if rng.random() < 0.4 else 0.03,
             names_goal=float(rng.uniform(0.4, 1.0)),
             names_street=float(rng.uniform(0.1, 0.7)),
             hurries=float(rng.uniform(0.4, 1.0)),
             patience=float(rng.uniform(7.0, 14.0)),
-            chat=float(rng.uniform(20.0, 60.0)),
+            chat=float(rng.uniform(40.0, 120.0)),
             waits=float(rng.uniform(0.5, 1.0)),
             reasons=float(rng.uniform(0.1, 0.45)),
             aligns=float(rng.uniform(0.0, 0.15)),
-            nods=float(rng.uniform(0.1, 0.5)),
+            nods=float(rng.uniform(0.2, 0.7)),
         )
 
 

@@ -23,6 +23,9 @@ from dorothie_gym.spaces import ActionDict, ParticipantAction, SpaceLimits
 from dorothie_gym.world.town import Town
 from dorothie_gym.world.town.lights import LightColour
 
+NEARLY_THERE = 45.0
+"""A car that has been stopped this near to the place does not stand because of a light [m]."""
+
 START = 8.0
 """A car is given this long to start after a light has turned green, for others may be before it [s]."""
 
@@ -81,7 +84,15 @@ class ScriptedParticipant(Policy[ParticipantMind]):
 
 def _excuse_at_light(mind: ParticipantMind, view: View) -> None:
     """Nobody wonders about a car that waits before a red light, nor right after it has turned green."""
-    if not view.standing or light_ahead(mind.town, view.lane, view.station, view.time) in (None, LightColour.GREEN):
+    last_stretch = (
+        mind.guiding
+        and mind.journey is not None
+        and mind.journey.left(view.station) < NEARLY_THERE
+        and mind.journey.next_crossing(mind.town, view.station) is None
+    )
+    if not view.standing or last_stretch:
+        return
+    if light_ahead(mind.town, view.lane, view.station, view.time) in (None, LightColour.GREEN):
         return
     mind.standing_since = view.time
     mind.excused_until = max(mind.excused_until, view.time + START)

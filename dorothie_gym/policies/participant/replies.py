@@ -22,7 +22,7 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies.hearing import heard_utterance
 from dorothie_gym.policies.participant.goals import announcement
-from dorothie_gym.policies.participant.guidance import next_step, note_told
+from dorothie_gym.policies.participant.guidance import NEAR, next_step, note_told
 from dorothie_gym.policies.participant.mind import ParticipantMind, View
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.scenery import SeenLandmark
@@ -186,7 +186,9 @@ def _say_way(mind: ParticipantMind, view: View, move: DialogueMove, rng: np.rand
     step = next_step(mind, view, move, rng)
     if step is None:
         return
-    key, _, words = step
+    key, distance, words = step
+    if key[0] == "on" and distance < NEAR:
+        return  # the place is right ahead: that is what is to be said now
     if move is DialogueMove.REPLY_W and mind.guided == key and view.time - mind.guided_at < JUST_TOLD:
         return  # it was asked while the answer was being given
     note_told(mind, view, key)
