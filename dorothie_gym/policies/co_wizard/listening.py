@@ -267,7 +267,7 @@ def _reply(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: 
     elif act.values(Slot.STREET) or act.values(Slot.LANDMARK):
         landmarks = [name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName)]
         clarified = act.move is DialogueMove.CLARIFY and landmarks and mind.goal is not landmarks[0]
-        if clarified or (mind.goal is None and landmarks):
+        if clarified or ((mind.goal is None or mind.arrived) and landmarks):
             hear_goal(mind, view, landmarks[0], _streets(act.values(Slot.STREET)), rng)
         else:
             hear_description(mind, view, _streets(act.values(Slot.STREET)), landmarks, rng)

@@ -66,13 +66,13 @@ class Style:
             guides=0.3 if rng.random() < 0.4 else 0.03,
             names_goal=float(rng.uniform(0.4, 1.0)),
             names_street=float(rng.uniform(0.1, 0.7)),
-            hurries=float(rng.uniform(0.4, 1.0)),
+            hurries=float(rng.uniform(0.1, 0.8)),
             patience=float(rng.uniform(7.0, 14.0)),
             chat=float(rng.uniform(40.0, 120.0)),
             waits=float(rng.uniform(0.5, 1.0)),
-            reasons=float(rng.uniform(0.1, 0.45)),
+            reasons=float(rng.uniform(0.1, 0.55)),
             aligns=float(rng.uniform(0.0, 0.15)),
-            nods=float(rng.uniform(0.2, 0.7)),
+            nods=float(rng.uniform(0.4, 0.9)),
         )
 
 

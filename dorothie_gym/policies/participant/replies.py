@@ -160,7 +160,8 @@ def _open_question(mind: ParticipantMind, view: View, act: DialogueAct, words: H
         return
     elif landmarks == (LandmarkName.QUERIED,):
         mind.told, mind.told_at = True, view.time
-        mind.voice = mind.voice.cleared().plan(announcement(mind, view, rng))
+        target = announcement(mind, view, rng).act.slots
+        mind.voice = mind.voice.cleared().plan(remark(DialogueMove.REPLY_W, *target), *_more(mind, rng))
     elif actions and _just_named(mind, view):
         return
     elif actions:
