@@ -232,7 +232,9 @@ def _explanation(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard,
     landmarks = [name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName)]
     statuses = act.values(Slot.STATUS)
     name = landmarks[0] if landmarks else None
-    if GoalStatus.COMPLETE in statuses:
+    if _MOVES & set(act.values(Slot.ACTION)):
+        _instruction(mind, view, act, words, rng)  # "you should be turning left" is as good as a command
+    elif GoalStatus.COMPLETE in statuses:
         complete(mind, name)
         if rng.random() < 0.5:
             mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
@@ -248,7 +250,7 @@ def _explanation(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard,
     elif GoalStatus.PENDING in statuses and name is not None:
         mind.note_status(name, GoalStatus.PENDING)
         mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
-    elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.4:
+    elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.25:
         mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
 
 

@@ -69,17 +69,17 @@ class Style:
     def draw(cls, rng: np.random.Generator) -> Style:
         """A style by chance."""
         return cls(
-            echoes=float(rng.uniform(0.3, 0.8)),
+            echoes=float(rng.uniform(0.15, 0.5)),
             checks=float(rng.uniform(0.1, 0.4)),
             tells=float(rng.uniform(0.0, 0.25)),
-            silent=float(rng.uniform(0.25, 0.6)),
-            asks=float(rng.uniform(0.4, 1.0)),
+            silent=float(rng.uniform(0.2, 0.5)),
+            asks=float(rng.uniform(0.6, 1.0)),
             proposes=float(rng.uniform(0.1, 0.6)),
             mishears=float(rng.uniform(0.0, 0.04)),
             careful=float(rng.uniform(0.2, 0.9)),
             eases=bool(rng.random() < 0.4),
             rambles=float(rng.uniform(0.05, 0.45)),
-            pace=int(rng.choice((25, 30, 35, 40))),
+            pace=int(rng.choice((30, 35, 40))),
             chats=float(rng.uniform(0.1, 0.6)),
         )
 

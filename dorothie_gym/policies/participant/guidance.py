@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -31,7 +32,7 @@ CLOSE_BY = 150.0
 AROUND = 60.0
 """and then is farther from it by more than this, has gone past it [m]."""
 
-TOO_LATE = 60.0
+TOO_LATE = 48.0
 """A turn is told when it is this near, even if the car has not asked [m]."""
 
 AGAIN = 9.0
@@ -138,6 +139,8 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
         return
     if near and (mind.guided != key or overdue):
         again = mind.guided == key
+        if key[0] in ("round", "turn", "lane") and not again and rng.random() < mind.style.hints:
+            words = replace(words, act=DialogueAct(DialogueMove.EXPLAIN, words.act.slots))
         note_told(mind, view, key)
         mind.voice = mind.voice.plan(*_rounded_off(mind, words, again, rng))
 

@@ -43,6 +43,7 @@ class Style:
         patience: standing time after which it asks why [s].
         chat: seconds between remarks beside the matter, on average [s].
         waits: chance that the way is told only when the car asks, or when it is nearly too late.
+        hints: chance that a step is not commanded, but said to be what one should do.
         reasons: chance that a reason is given with a place, or a step.
         aligns: chance that it makes sure to have been understood.
         nods: chance that what the car explains is acknowledged.
@@ -55,6 +56,7 @@ class Style:
     patience: float
     chat: float
     waits: float = 0.0
+    hints: float = 0.0
     reasons: float = 0.0
     aligns: float = 0.0
     nods: float = 0.2
@@ -69,8 +71,9 @@ class Style:
             hurries=float(rng.uniform(0.1, 0.8)),
             patience=float(rng.uniform(7.0, 14.0)),
             chat=float(rng.uniform(40.0, 120.0)),
-            waits=float(rng.uniform(0.5, 1.0)),
-            reasons=float(rng.uniform(0.1, 0.55)),
+            waits=float(rng.uniform(0.7, 1.0)),
+            hints=float(rng.uniform(0.0, 0.35)),
+            reasons=float(rng.uniform(0.05, 0.45)),
             aligns=float(rng.uniform(0.0, 0.15)),
             nods=float(rng.uniform(0.4, 0.9)),
         )
