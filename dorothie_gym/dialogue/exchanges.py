@@ -44,6 +44,17 @@ EXPECTATIONS: Mapping[DialogueMove, frozenset[DialogueMove]] = MappingProxyType(
 )
 """For each initiating move, the responses that fulfil it. Confuse answers any of them and fulfils none."""
 
+_ASKING = frozenset({DialogueMove.CHECK, DialogueMove.QUERY_YN, DialogueMove.QUERY_W})
+
+_INSERTED: Mapping[DialogueMove, frozenset[DialogueMove]] = MappingProxyType(
+    {
+        DialogueMove.INSTRUCT: frozenset({DialogueMove.CHECK, DialogueMove.EXPLAIN}),
+        **{move: frozenset({DialogueMove.INSTRUCT, DialogueMove.EXPLAIN}) for move in _ASKING},
+    }
+)
+"""For an open move, the initiating moves by which the other side goes on with it instead of beginning something new:
+it checks or objects to what it is told to do, or answers a question by telling what to do or how things are."""
+
 _REPAIRS = frozenset({DialogueMove.CLARIFY, DialogueMove.CONFIRM, DialogueMove.REPLY_W})
 """What the initiator says after a Confuse to get the exchange going again."""
 
@@ -70,6 +81,7 @@ class Exchange:
         unprompted: whether it began with a response (or irrelevant talk) that nothing had asked for.
         acts: number of acts in it.
         confused: whether the other side has not understood and the initiator has to repair.
+        asked_back: whether the other side has checked, or objected to, what it was told: the initiator has to answer.
     """
 
     id: int
@@ -81,13 +93,15 @@ class Exchange:
     unprompted: bool = False
     acts: int = field(default=0)
     confused: bool = False
+    asked_back: bool = False
 
     def accepts(self, speaker: Role, move: DialogueMove) -> bool:
         """Returns whether `move` by `speaker` answers, or goes on with, this exchange."""
         if self.unprompted:
             return False
         if speaker is self.initiator:
-            return self.confused and move in _REPAIRS
+            answers = self.asked_back and move in EXPECTATIONS[DialogueMove.CHECK]
+            return answers or (self.confused and move in _REPAIRS)
         return move is DialogueMove.CONFUSE or move in EXPECTATIONS[self.move]
 
 
@@ -95,7 +109,9 @@ class ExchangeTracker:
     """Assigns each act to an exchange, as utterances are delivered.
 
     Initiating acts of one utterance share an exchange (a reason and the command it leads to are one initiative), and an
-    Explain behind a response in the same breath elaborates on that response. Overlapping exchanges are allowed.
+    Explain behind a response in the same breath elaborates on that response. Who is told to do something and asks back,
+    or who is asked and answers by a command or an explanation, goes on with the exchange that is open. Overlapping
+    exchanges are allowed: what begins while the other still speaks is a new one.
     """
 
     def __init__(self, patience: float = PATIENCE) -> None:
@@ -155,7 +171,25 @@ class ExchangeTracker:
             if move is not DialogueMove.EXPLAIN:
                 opened.move = move
             return opened
-        return self._begin(utterance, move)
+        return self._insert(utterance, move) or self._begin(utterance, move)
+
+    def _insert(self, utterance: Utterance, move: DialogueMove) -> Exchange | None:
+        """Returns the open exchange that an initiating move goes on with, if there is one."""
+        for exchange in reversed(self.exchanges):
+            waited = utterance.start - exchange.end
+            if exchange.state is not ExchangeState.OPEN or exchange.unprompted or not 0.0 <= waited <= self.patience:
+                continue
+            own = exchange.initiator is utterance.speaker
+            if own and exchange.asked_back and move is DialogueMove.EXPLAIN:
+                exchange.asked_back = False
+                return exchange
+            if not own and move in _INSERTED.get(exchange.move, ()):
+                if exchange.move in _ASKING:
+                    self._close(exchange, ExchangeState.FULFILLED)
+                else:
+                    exchange.asked_back = True
+                return exchange
+        return None
 
     def _respond(self, utterance: Utterance, move: DialogueMove) -> Exchange:
         exchange = self._awaiting(utterance, move)
@@ -182,7 +216,7 @@ class ExchangeTracker:
     def _settle(self, exchange: Exchange, speaker: Role, move: DialogueMove) -> None:
         if move is DialogueMove.CONFUSE:
             exchange.confused = True
-        elif speaker is exchange.initiator:
+        elif speaker is exchange.initiator and exchange.confused:
             exchange.confused = False
         else:
             exchange.confused = False

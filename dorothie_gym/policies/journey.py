@@ -237,6 +237,13 @@ class Journey:
             return self.goal[1] - station
         return max(legs[0].end - station, 0.0) + sum(leg.end - leg.start for leg in legs[1:])
 
+    def way_in(self) -> Place | None:
+        """Where the last lane change before the goal begins; None if the goal's own lane is driven up to it."""
+        for before, leg in reversed(list(itertools.pairwise(self.route.legs if self.route is not None else ()))):
+            if leg.entry in (Entry.CHANGE_LEFT, Entry.CHANGE_RIGHT):
+                return before.lane, (before.start + before.end) / 2
+        return None
+
     def next_crossing(self, town: Town, station: float) -> Crossing | None:
         """The next junction with a choice on the route; None if the rest needs no choice."""
         legs = self.legs

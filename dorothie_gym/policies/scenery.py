@@ -35,6 +35,16 @@ class SeenLandmark:
         return self.lane, self.station
 
 
+IN_VIEW = 45.0
+"""A landmark no farther than this can be pointed at [m]."""
+
+
+def nearest_landmark(landmarks: Sequence[SeenLandmark], x: float, y: float) -> SeenLandmark | None:
+    """The landmark closest to a point [m], None if none is in view from there."""
+    near = [mark for mark in landmarks if abs(mark.x - x) < IN_VIEW and abs(mark.y - y) < IN_VIEW]
+    return min(near, key=lambda mark: (math.hypot(mark.x - x, mark.y - y), mark.row), default=None)
+
+
 @dataclass(frozen=True, kw_only=True)
 class SeenSubgoal:
     """A task as it stands; `landmark` is a row of the landmarks."""

@@ -121,3 +121,34 @@ def test_irrelevant_talk_disturbs_no_exchange():
 def test_patience_must_be_positive():
     with pytest.raises(ValueError, match="patience"):
         ExchangeTracker(0.0)
+
+
+def test_who_asks_back_about_a_command_stays_in_its_exchange_until_it_is_answered():
+    tracker = ExchangeTracker()
+    tracker.update(said(P, 0.0, M.INSTRUCT))
+    assert tracker.update(said(C, 2.0, M.CHECK)) == (0,)
+    assert tracker.exchanges[0].state is ExchangeState.OPEN
+    assert tracker.update(said(P, 4.0, M.CONFIRM)) == (0,)
+    assert tracker.exchanges[0].state is ExchangeState.FULFILLED
+
+
+def test_what_the_other_does_not_know_is_explained_within_the_exchange():
+    tracker = ExchangeTracker()
+    tracker.update(said(P, 0.0, M.INSTRUCT))
+    assert tracker.update(said(C, 2.0, M.EXPLAIN)) == (0,)
+    assert tracker.update(said(P, 4.0, M.EXPLAIN)) == (0,)
+    assert tracker.update(said(C, 6.0, M.ACKNOWLEDGE)) == (0,)
+    assert tracker.exchanges[0].state is ExchangeState.FULFILLED
+
+
+def test_a_question_may_be_answered_by_a_command():
+    tracker = ExchangeTracker()
+    tracker.update(said(C, 0.0, M.QUERY_W))
+    assert tracker.update(said(P, 2.0, M.INSTRUCT)) == (0,)
+    assert tracker.exchanges[0].state is ExchangeState.FULFILLED
+
+
+def test_a_command_given_while_the_other_still_asks_begins_an_exchange_of_its_own():
+    tracker = ExchangeTracker()
+    tracker.update(said(C, 0.0, M.QUERY_W, seconds=2.0))
+    assert tracker.update(said(P, 1.0, M.INSTRUCT, seconds=2.0)) == (1,)

@@ -17,7 +17,8 @@ from dorothie_gym.ontology import (
     Slot,
 )
 from dorothie_gym.policies import ScriptedCoWizard
-from dorothie_gym.policies.co_wizard.mind import Wish
+from dorothie_gym.policies.co_wizard.mind import Directive, Wish
+from dorothie_gym.policies.journey import next_choice
 from dorothie_gym.spaces import NO_MOVE, CoWizardAction, Motion, ParticipantAction, Speech, noop
 
 
@@ -166,3 +167,46 @@ def test_wish_is_not_given_up_at_a_red_light():
         observation["time"] = observation["time"] + 0.5
         _, state = talk.policy.step(observation, state)
     assert state.wish is None
+
+
+def test_a_proposed_way_is_taken_when_the_human_says_yes():
+    talk = Talk(seed=2)
+    for _ in range(8):
+        talk.step()
+    view_junction = next_choice(talk.env.town, *lane_and_station(talk)).junction
+    talk.state = replace(talk.state, proposed=Directive(direction=Direction.STRAIGHT, junction=view_junction))
+    talk.say(DialogueMove.REPLY_Y, decisions=4)
+    assert talk.state.proposed is None
+    assert talk.state.directive is not None and talk.state.directive.direction is Direction.STRAIGHT
+
+
+def lane_and_station(talk: Talk) -> tuple[int, float]:
+    observation = talk.observations["co_wizard"]
+    return int(observation["lane"]), float(observation["station"].item())
+
+
+def test_an_instruction_that_was_not_caught_is_asked_for_again_and_not_carried_out():
+    talk = Talk()
+    talk.state = replace(talk.state, style=replace(talk.state.style, mishears=1.0))
+    known = talk.landmarks(hidden=False)[0]
+    talk.say(DialogueMove.INSTRUCT, known.name, decisions=8)
+    assert DialogueMove.CONFUSE in talk.moves()
+    assert talk.state.goal is None
+
+
+def test_a_place_that_is_described_is_looked_for_in_its_street():
+    talk = Talk()
+    hidden = talk.landmarks(hidden=True)[0]
+    street = talk.env.scenario.street_names[hidden.street]
+    talk.state = replace(talk.state, style=replace(talk.state.style, mishears=0.0))
+    talk.say(DialogueMove.INSTRUCT, hidden.name)
+    talk.say(DialogueMove.EXPLAIN, street, wording=Wording(topic="where"), decisions=6)
+    assert talk.state.journey is not None and not talk.state.exact
+    assert talk.env.scenario.street_names[talk.env.town.lanes[talk.state.journey.goal[0]].street] is street
+
+
+def test_what_one_should_be_doing_is_as_good_as_a_command():
+    talk = Talk()
+    wording = Wording(direction=Direction.LEFT)
+    talk.say(DialogueMove.EXPLAIN, ActionValue.J_TURN, wording=wording, decisions=5)
+    assert talk.state.directive is not None and talk.state.directive.direction is Direction.LEFT

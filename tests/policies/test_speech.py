@@ -1,5 +1,6 @@
 import numpy as np
 
+from dorothie_gym.dialogue import draw_style
 from dorothie_gym.ontology import DialogueMove, LandmarkName, Role
 from dorothie_gym.policies.speech import ANSWER_TIME, Voice, remark
 
@@ -43,3 +44,24 @@ def test_what_has_expired_is_dropped_with_what_goes_on_from_it():
     late = voice().plan(remark(DialogueMove.EXPLAIN, expires=1.0), remark(DialogueMove.INSTRUCT, joined=True))
     spoken, speaker = late.speak(2.0, 0.0, RNG)
     assert spoken is None and speaker.idle
+
+
+def test_what_is_joined_is_worded_with_what_it_goes_on_from():
+    two = voice().plan(remark(DialogueMove.REPLY_N), remark(DialogueMove.INSTRUCT, LandmarkName.KFC, joined=True))
+    first, speaker = two.speak(0.0, 0.0, np.random.default_rng(4))
+    second, _ = speaker.speak(0.5, 0.4, np.random.default_rng(9))
+    again, _ = speaker.speak(0.5, 0.4, np.random.default_rng(1))
+    assert first is not None and second is not None
+    assert first.text.endswith(",") or first.text.endswith(".")
+    assert second == again  # the words were settled with those of the first
+
+
+def test_a_speaker_of_some_style_does_not_talk_like_another():
+    styles = [draw_style(Role.PARTICIPANT, np.random.default_rng(seed)) for seed in range(12)]
+    said = set()
+    for style in styles:
+        speaker = Voice(role=Role.PARTICIPANT, style=style).plan(remark(DialogueMove.INSTRUCT, LandmarkName.KFC))
+        speech, _ = speaker.speak(0.0, 0.0, np.random.default_rng(3))
+        assert speech is not None
+        said.add(speech.text)
+    assert len(said) > 6

@@ -18,6 +18,7 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View
+from dorothie_gym.policies.co_wizard.uptake import musing
 from dorothie_gym.policies.journey import direction_of
 from dorothie_gym.policies.scenery import street_of
 from dorothie_gym.policies.speech import remark
@@ -48,7 +49,8 @@ def answer_yes_no(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard
         yes = _doing(mind, view) in actions
     else:
         yes = mind.journey is not None and mind.journey.left(view.station) < CLOSE
-    mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_Y if yes else DialogueMove.REPLY_N))
+    more = musing(mind, rng, joined=True)
+    mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_Y if yes else DialogueMove.REPLY_N), *more)
 
 
 def _doing(mind: CoWizardMind, view: View) -> ActionValue:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from dorothie_gym.ontology import LandmarkName, ObjectClass, PhysicalAction
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View, Wish
 from dorothie_gym.policies.journey import (
@@ -11,6 +13,7 @@ from dorothie_gym.policies.journey import (
     SAME_WAY,
     SWITCH_ROOM,
     U_TURN_SPEED_SQUARED,
+    Choice,
     Crossing,
     find_exit,
     lanes_ahead,
@@ -31,6 +34,29 @@ TURN_LEAD = 85.0
 
 PATIENCE = 2.0
 """A command that has shown no effect is given again after this time [s]."""
+
+
+UNLESS_TOLD = 24.0
+"""A car that is guided goes straight on where it has not been told otherwise until it is this near [m]."""
+
+PAUSE_BEFORE = 8.0
+"""A car that does not know the way stops this far before a junction [m]."""
+
+GENTLE = 20
+"""Speed at which the car comes up to a place [km/h]."""
+
+EASE_WITHIN = 40.0
+"""Who eases into turns slows down when the junction is this near [m]."""
+
+GENTLE_WITHIN = 70.0
+"""A place on the map is driven up to gently from here on [m]."""
+
+
+HELD_UP = 2.0
+"""A hazard that stops the car for longer than this holds it up [s]."""
+
+REST = 4.0
+"""So long it stands when it has stopped for good for something in the way [s]."""
 
 
 def drive(mind: CoWizardMind, view: View) -> Physical | None:
@@ -120,7 +146,8 @@ def turn_round(mind: CoWizardMind, view: View) -> Physical | None:
 
 def _switch(mind: CoWizardMind, view: View, side: LinkType) -> Physical | None:
     lane = mind.town.lanes[view.lane]
-    ready = not view.manoeuvring and view.time - mind.commanded_at >= PATIENCE and not lane.in_junction
+    # one that is refused is given again at once: there is seldom much room
+    ready = not view.manoeuvring and view.time - mind.commanded_at >= DECISION and not lane.in_junction
     possible = mind.town.neighbour(view.lane, side) is not None and lane.length - view.station > SWITCH_ROOM
     if not ready or not possible:
         return None
@@ -176,14 +203,24 @@ def wanted_exit(mind: CoWizardMind, view: View) -> Exit | None:
             straight = [option for option in choice.exits if option.type is LinkType.STRAIGHT]
             return straight[0] if straight else None
         return way
-    if mind.journey is None or mind.wish is Wish.U_TURN:
+    if mind.wish is Wish.U_TURN:
         return None
+    if mind.journey is None:
+        return _straight_on(mind, choice)
     crossing = mind.journey.next_crossing(mind.town, view.station)
     if crossing is None or mind.journey.changes_before(crossing):
         return None
     if crossing.lane == choice.lane or crossing.lane in lanes_beside(mind.town, choice.lane):
         return crossing.exit
     return None
+
+
+def _straight_on(mind: CoWizardMind, choice: Choice) -> Exit | None:
+    """The way on for a car that is being guided, has not asked, and has not been told otherwise in time."""
+    guided = mind.goal is not None and not mind.pausing and not mind.creeping and mind.asked != choice.lane
+    if not guided or choice.distance > UNLESS_TOLD:
+        return None
+    return next((way for way in choice.exits if way.type is LinkType.STRAIGHT), None)
 
 
 def _turn(mind: CoWizardMind, view: View) -> Physical | None:
@@ -202,15 +239,70 @@ def _turn(mind: CoWizardMind, view: View) -> Physical | None:
     return Physical(action=PhysicalAction.J_TURN, angle=way.angle)
 
 
-def _go(mind: CoWizardMind, view: View) -> Physical | None:
-    if mind.halted or view.motion is not Motion.STOPPED:
+def rest(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
+    """Decides, once for each time that something holds up the car for long, whether to stop for good meanwhile."""
+    if view.motion is not Motion.HAZARD or mind.standing_since is None:
+        mind.rested = mind.rested and view.motion is Motion.STOPPED
+        return
+    if mind.rested or view.time - mind.standing_since < HELD_UP:
+        return
+    mind.rested = True
+    if rng.random() < mind.style.careful:
+        mind.rest_until = view.time + REST
+
+
+def _rest(mind: CoWizardMind, view: View) -> Physical | None:
+    """Stops for good while something is in the way that it has said to stop for."""
+    if view.time >= mind.rest_until or mind.halted or view.motion is not Motion.HAZARD or view.manoeuvring:
         return None
-    return Physical(action=PhysicalAction.START)
+    return Physical(action=PhysicalAction.STOP)
+
+
+def _pause(mind: CoWizardMind, view: View) -> Physical | None:
+    """Stops before a junction at which it has asked for the way, until it knows one."""
+    knows = mind.journey is not None or mind.directive is not None or mind.wish is not None or mind.nudge is not None
+    if knows or mind.creeping or view.choice is None:
+        mind.pausing = False
+    if not mind.pausing or mind.halted or view.motion is Motion.STOPPED or view.choice is None:
+        return None
+    near = view.choice.distance - stopping_distance(view.speed) < PAUSE_BEFORE
+    if not near or view.manoeuvring or view.time - mind.stop_sent_at < PATIENCE:
+        return None
+    mind.stop_sent_at = view.time
+    return Physical(action=PhysicalAction.STOP)
+
+
+def _go(mind: CoWizardMind, view: View) -> Physical | None:
+    if mind.halted or mind.pausing or view.motion is not Motion.STOPPED or view.time < mind.rest_until:
+        return None
+    if mind.town.lanes[view.lane].in_junction or view.manoeuvre is not None:
+        return Physical(action=PhysicalAction.START)
+    return Physical(action=PhysicalAction.LANE_FOLLOW)
+
+
+def _turns_soon(mind: CoWizardMind, view: View) -> bool:
+    """Whether a turn to a side comes up that a driver of this style slows down for by himself."""
+    if not mind.style.eases or view.choice is None or view.choice.distance > EASE_WITHIN:
+        return False
+    way = wanted_exit(mind, view)
+    return way is not None and way.type in (LinkType.LEFT, LinkType.RIGHT)
+
+
+def _close(mind: CoWizardMind, view: View) -> bool:
+    """Whether the goal is so near, with no junction before it, that the car should come up to it gently."""
+    if mind.journey is None or not mind.exact:
+        return False
+    if mind.misses:
+        return mind.journey.left(view.station) < 2.0 * GENTLE_WITHIN
+    if mind.journey.left(view.station) > GENTLE_WITHIN:
+        return False
+    return mind.journey.next_crossing(mind.town, view.station) is None
 
 
 def _comfort(mind: CoWizardMind, view: View) -> Physical | None:
-    if abs(view.cruise - mind.speed) > 2.6:
-        return Physical(action=PhysicalAction.SPEED_CHANGE, up=view.cruise < mind.speed)
+    wanted = min(mind.speed, GENTLE) if _close(mind, view) or _turns_soon(mind, view) else mind.speed
+    if abs(view.cruise - wanted) > 2.6:
+        return Physical(action=PhysicalAction.SPEED_CHANGE, up=view.cruise < wanted)
     if mind.lights is not None and mind.lights is not view.lights:
         return Physical(action=PhysicalAction.LIGHT_CHANGE, up=mind.lights)
     return None
@@ -221,8 +313,10 @@ _CONCERNS: tuple[Callable[[CoWizardMind, View], Physical | None], ...] = (
     _stand,
     _wish,
     _manoeuvre,
-    _turn,
+    _rest,
     _go,
+    _turn,
+    _pause,
     _comfort,
 )
 

@@ -10,11 +10,19 @@ from dorothie_gym.dialogue import Wording
 from dorothie_gym.ontology import DialogueMove, GoalStatus, LandmarkName, MentalAction, SlotValue, StreetName
 from dorothie_gym.policies.co_wizard.driving import place_ahead
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View
-from dorothie_gym.policies.journey import Journey
+from dorothie_gym.policies.co_wizard.uptake import musing
+from dorothie_gym.policies.journey import Journey, streets_named
 from dorothie_gym.policies.scenery import SeenLandmark
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.spaces import Mental
 from dorothie_gym.spaces import Place as MapPlace
+from dorothie_gym.world.town.routing import Place, router
+
+MOST_LANES = 40
+"""So many lanes of a street are looked at for the one that is reached first."""
+
+LOOKED = 8.0
+"""A place that has been guessed is given up when the car is this close to the guess [m]."""
 
 _COMMON = (LandmarkName.HOUSE, LandmarkName.PERSON)
 
@@ -33,6 +41,7 @@ def aim(mind: CoWizardMind, view: View, mark: SeenLandmark) -> None:
     """Makes a place on the map the goal and plans the way."""
     mind.goal, mind.place, mind.exact = mark.name, mark.place, True
     mind.directive, mind.wish, mind.nudge = None, None, None
+    mind.misses, mind.avoided = 0, ()
     mind.halted = mind.arrived = mind.creeping = False
     mind.note(Mental(action=MentalAction.GOAL_UPDATE, goals=(mark.name,)))
     mind.note_status(mark.name, GoalStatus.ONGOING)
@@ -44,7 +53,7 @@ def plan_way(mind: CoWizardMind, view: View) -> None:
     if mind.place is None or not mind.exact:
         mind.journey = None
         return
-    mind.journey = Journey.plan(mind.town, view.here, mind.place, mind.blocked)
+    mind.journey = Journey.plan(mind.town, view.here, mind.place, mind.blocked + mind.avoided)
     note_plan(mind)
 
 
@@ -93,8 +102,8 @@ def hear_goal(
         values: list[SlotValue] = [name]
         if streets and rng.random() < mind.style.echoes:
             values.append(mark.street)
-        move = DialogueMove.CONFIRM if rng.random() < 0.25 else DialogueMove.ACKNOWLEDGE
-        mind.voice = mind.voice.plan(remark(move, *values))
+        move = DialogueMove.CONFIRM if rng.random() < 0.4 else DialogueMove.ACKNOWLEDGE
+        mind.voice = mind.voice.plan(remark(move, *values), *musing(mind, rng, joined=True))
 
 
 def _unknown(mind: CoWizardMind, view: View, name: LandmarkName) -> None:
@@ -132,14 +141,44 @@ def hear_description(
     rng: np.random.Generator,
 ) -> None:  # fmt: skip
     """It is told where a place is: notes a guess if a place close to it is on the map, and says that it has heard."""
-    near = next((mark for name in landmarks if (mark := known(mind, view, name, ())) is not None), None)
-    if near is not None and mind.goal is not None and not mind.exact:
-        guess = Mental(
-            action=MentalAction.KNOWLEDGE_UPDATE, landmark=mind.goal, place=_map_place(near.lane, near.station)
-        )
-        mind.note(guess)
+    if mind.goal is not None and not mind.exact:
+        place = _described(mind, view, streets, landmarks)
+        if place is not None:
+            guess = Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=mind.goal, place=_map_place(*place))
+            mind.note(guess)
+            mind.journey = Journey.plan(mind.town, view.here, place, mind.blocked)
+            mind.directive = mind.wish = None
+            note_plan(mind)
+    if mind.goal is not None and not mind.exact and not mind.arrived:
+        mind.halted = False  # it goes where it is told to
     values: tuple[SlotValue, ...] = tuple(streets[:1]) if rng.random() < mind.style.echoes else ()
     mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, *values))
+
+
+def _described(
+    mind: CoWizardMind, view: View, streets: Sequence[StreetName], landmarks: Sequence[LandmarkName]
+) -> Place | None:
+    """Where to look for a place: by the landmark it is close to, else where its street is reached first."""
+    near = next((mark for name in landmarks if (mark := known(mind, view, name, ())) is not None), None)
+    if near is not None:
+        return near.place
+    named = frozenset(index for street in streets for index in streets_named(view.raw["street_names"], street))
+    lanes = [lane for lane in mind.town.lanes if lane.street in named and not lane.in_junction]
+    found: list[tuple[float, int]] = []
+    for lane in lanes[:MOST_LANES]:
+        route = router(mind.town).route(view.here, (lane.id, lane.length / 2), mind.blocked)
+        if route is not None:
+            found.append((route.length, lane.id))
+    if not found:
+        return None
+    _, nearest = min(found)
+    return nearest, mind.town.lanes[nearest].length / 2
+
+
+def search_on(mind: CoWizardMind, view: View) -> None:
+    """Gives the guess of a place up when it has come there: from now on it has to be guided."""
+    if mind.journey is not None and not mind.exact and mind.journey.left(view.station) < LOOKED:
+        mind.journey = None
 
 
 def _map_place(lane: int, station: float) -> MapPlace:

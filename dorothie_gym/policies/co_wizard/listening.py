@@ -24,7 +24,9 @@ from dorothie_gym.policies.co_wizard.driving import place_ahead
 from dorothie_gym.policies.co_wizard.goals import complete, doubt, give_up, hear_description, hear_goal, hear_stop_ahead
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, Directive, View, Wish
 from dorothie_gym.policies.co_wizard.obstacles import detour
-from dorothie_gym.policies.hearing import heard_utterance
+from dorothie_gym.policies.co_wizard.uptake import musing, take_up
+from dorothie_gym.policies.hearing import HeardUtterance, heard_utterance
+from dorothie_gym.policies.scenery import street_of
 from dorothie_gym.policies.speech import remark
 
 NUDGE = 4.0
@@ -38,6 +40,9 @@ _MOVES = frozenset(
 )
 _STOPS = frozenset({ActionValue.STOP, ActionValue.LANE_FOLLOW})
 _A_BIT = re.compile(r"\b(bit|little)\b")
+SLOW = 25
+"""Speed in bad weather [km/h]."""
+
 OPEN_ROAD = 20
 """A lower speed is for the moment only [km/h]."""
 
@@ -51,8 +56,11 @@ def listen(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
     if heard is None:
         return
     mind.heard_at = mind.idle_since = view.time
-    mind.voice = mind.voice.heard_other(view.time)
+    mind.voice = mind.voice.heard_other(view.time, heard.acts)
     before = mind.voice.queue
+    if _mishears(mind, heard, rng):
+        mind.voice = mind.voice.plan_first(remark(DialogueMove.CONFUSE))
+        return
     for act in heard.acts:
         react = _REACTIONS.get(act.move)
         if react is not None:
@@ -63,6 +71,15 @@ def listen(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
         item for k, item in enumerate(added) if not k or item.act.move is not DialogueMove.ACKNOWLEDGE or item.act.slots
     )
     mind.voice = mind.voice.cleared().plan(*before, *kept)
+
+
+def _mishears(mind: CoWizardMind, heard: HeardUtterance, rng: np.random.Generator) -> bool:
+    """Whether it does not catch what it is told: nothing urgent, and nothing that it would not be told again."""
+    act = heard.acts[0]
+    if len(heard.acts) > 1 or act.move is not DialogueMove.INSTRUCT or act.values(Slot.STATUS):
+        return False
+    plain = ActionValue.J_TURN in act.values(Slot.ACTION) or bool(act.values(Slot.LANDMARK))
+    return plain and not act.values(Slot.ACTION)[1:] and rng.random() < mind.style.mishears
 
 
 def _instruction(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
@@ -79,9 +96,12 @@ def _instruction(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard,
     elif actions:
         if mind.arrived and _MOVES & set(actions) and not _A_BIT.search(words.text.lower()):
             doubt(mind)
+        mind.proposed = None
+        if _MOVES & set(actions) and not mind.exact:
+            mind.journey = None  # it is guided, and need not look for the place by itself
         for action in actions:
             _OBEYED[action](mind, view, act, words)
-        _acknowledge_action(mind, actions[0], words, rng)
+        take_up(mind, actions[0], words, rng)
     elif streets:
         _told_street(mind, view, streets[0])
     elif mind.detour_at is not None:
@@ -125,24 +145,6 @@ def _told_street(mind: CoWizardMind, view: View, street: StreetName) -> None:
         return
     mind.directive, mind.halted = Directive(direction=None, street=street, junction=view.junction), False
     mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, street))
-
-
-def _acknowledge_action(mind: CoWizardMind, action: object, words: Heard, rng: np.random.Generator) -> None:
-    draw = rng.random()
-    assert isinstance(action, ActionValue)
-    if draw < mind.style.silent:
-        return
-    wording = Wording(
-        direction=words.direction,
-        faster=words.faster,
-        lights=words.lights,
-        speed=words.speed if action is ActionValue.SPEED_CHANGE else None,
-    )
-    if draw < mind.style.silent + mind.style.echoes * 0.6:
-        move = DialogueMove.CONFIRM if rng.random() < 0.3 else DialogueMove.ACKNOWLEDGE
-        mind.voice = mind.voice.plan(remark(move, action, wording=wording))
-    else:
-        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
 
 
 # --- what actions mean ----------------------------------------------------------------------------------------------
@@ -230,19 +232,25 @@ def _explanation(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard,
     landmarks = [name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName)]
     statuses = act.values(Slot.STATUS)
     name = landmarks[0] if landmarks else None
-    if GoalStatus.COMPLETE in statuses:
+    if _MOVES & set(act.values(Slot.ACTION)):
+        _instruction(mind, view, act, words, rng)  # "you should be turning left" is as good as a command
+    elif GoalStatus.COMPLETE in statuses:
         complete(mind, name)
         if rng.random() < 0.5:
             mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
     elif GoalStatus.ABANDONED in statuses:
         give_up(mind, name)
-        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+        values = (name,) if name is not None and rng.random() < mind.style.echoes else ()
+        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, *values), *musing(mind, rng, joined=True))
     elif act.values(Slot.STREET):
         hear_description(mind, view, _streets(act.values(Slot.STREET)), landmarks, rng)
     elif "wrong" in words.text.lower():
         mind.journey = None if not mind.exact else mind.journey
         mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, wording=Wording(topic="sorry")))
-    elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.3:
+    elif GoalStatus.PENDING in statuses and name is not None:
+        mind.note_status(name, GoalStatus.PENDING)
+        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+    elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.25:
         mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
 
 
@@ -254,12 +262,14 @@ def _reply(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: 
     if act.values(Slot.ACTION):
         _instruction(mind, view, act, words, rng)
     elif words.turns:
+        mind.proposed = None
+        mind.journey = mind.journey if mind.exact else None
         _do_turn(mind, view, act, words)
-        _acknowledge_action(mind, ActionValue.J_TURN, words, rng)
+        take_up(mind, ActionValue.J_TURN, words, rng)
     elif act.values(Slot.STREET) or act.values(Slot.LANDMARK):
         landmarks = [name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName)]
         clarified = act.move is DialogueMove.CLARIFY and landmarks and mind.goal is not landmarks[0]
-        if clarified or (mind.goal is None and landmarks):
+        if clarified or ((mind.goal is None or mind.arrived) and landmarks):
             hear_goal(mind, view, landmarks[0], _streets(act.values(Slot.STREET)), rng)
         else:
             hear_description(mind, view, _streets(act.values(Slot.STREET)), landmarks, rng)
@@ -270,10 +280,19 @@ def _reply(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: 
 def _yes(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
     if mind.detour_at is not None:
         detour(mind, view, rng)
+    elif mind.proposed is not None:
+        if mind.proposed.junction == view.junction and mind.directive is None:
+            mind.directive, mind.halted = mind.proposed, False
+        mind.proposed = None
+    elif mind.slower_asked:
+        mind.slower_asked, mind.speed = False, SLOW
+        wording = Wording(faster=False, speed=SLOW)
+        mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, ActionValue.SPEED_CHANGE, wording=wording))
 
 
 def _no(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
-    mind.detour_at = None
+    mind.detour_at = mind.proposed = None
+    mind.slower_asked = False
     if mind.arrived:
         doubt(mind)
     if words.turns and not act.values(Slot.ACTION):
@@ -289,15 +308,24 @@ def _alignment(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, r
 
 
 def _check(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
-    landmarks = act.values(Slot.LANDMARK)
+    landmarks, streets = act.values(Slot.LANDMARK), act.values(Slot.STREET)
     right = not landmarks or mind.goal in landmarks
-    mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM if right else DialogueMove.REPLY_N))
+    if streets and not landmarks:
+        right = street_of(view.raw, mind.town, view.lane) in streets
+    move = DialogueMove.CONFIRM if right else DialogueMove.REPLY_N
+    mind.voice = mind.voice.plan(remark(move), *musing(mind, rng, joined=True))
 
 
 def _confusion(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
     last = mind.voice.last
     if last is not None:
         mind.voice = mind.voice.plan(remark(DialogueMove.CLARIFY, *last.act.slots, wording=last.wording))
+
+
+def _small_talk(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+    if rng.random() < mind.style.chats:
+        move = DialogueMove.IRRELEVANT if rng.random() < 0.6 else DialogueMove.ACKNOWLEDGE
+        mind.voice = mind.voice.plan(remark(move))
 
 
 _REACTIONS: dict[DialogueMove, Callable[[CoWizardMind, View, DialogueAct, Heard, np.random.Generator], None]] = {
@@ -311,6 +339,7 @@ _REACTIONS: dict[DialogueMove, Callable[[CoWizardMind, View, DialogueAct, Heard,
     DialogueMove.ALIGN: _alignment,
     DialogueMove.CHECK: _check,
     DialogueMove.CONFUSE: _confusion,
+    DialogueMove.IRRELEVANT: _small_talk,
     DialogueMove.QUERY_YN: answer_yes_no,
     DialogueMove.QUERY_W: answer_open,
 }

@@ -42,21 +42,45 @@ class Style:
         checks: chance that a place without a street is checked.
         tells: chance that it says what it does by its own plan.
         silent: chance that a plain instruction is not acknowledged.
+        asks: chance that it asks for the way where it might as well go straight on.
+        proposes: chance that it proposes a way at a junction instead of asking for one.
+        mishears: chance that it does not catch an instruction.
+        careful: chance that it stops before a junction to ask.
+        chats: chance that it answers small talk.
+        eases: whether it slows down well before it turns.
+        rambles: chance that it tells what it is up to in the same breath as something else.
+        pace: speed at which it drives when nothing is said about it [km/h].
     """
 
     echoes: float
     checks: float
     tells: float
     silent: float
+    asks: float = 0.5
+    proposes: float = 0.0
+    mishears: float = 0.0
+    careful: float = 0.0
+    chats: float = 0.0
+    eases: bool = False
+    rambles: float = 0.0
+    pace: int = USUAL_SPEED
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> Style:
         """A style by chance."""
         return cls(
-            echoes=float(rng.uniform(0.1, 0.5)),
-            checks=float(rng.uniform(0.1, 0.5)),
-            tells=float(rng.uniform(0.05, 0.3)),
-            silent=float(rng.uniform(0.0, 0.15)),
+            echoes=float(rng.uniform(0.15, 0.5)),
+            checks=float(rng.uniform(0.1, 0.4)),
+            tells=float(rng.uniform(0.0, 0.25)),
+            silent=float(rng.uniform(0.2, 0.5)),
+            asks=float(rng.uniform(0.6, 1.0)),
+            proposes=float(rng.uniform(0.1, 0.6)),
+            mishears=float(rng.uniform(0.0, 0.04)),
+            careful=float(rng.uniform(0.2, 0.9)),
+            eases=bool(rng.random() < 0.4),
+            rambles=float(rng.uniform(0.05, 0.45)),
+            pace=int(rng.choice((30, 35, 40))),
+            chats=float(rng.uniform(0.1, 0.6)),
         )
 
 
@@ -119,12 +143,22 @@ class CoWizardMind:
         commanded_at: when a lane switch or U-turn was last commanded [s].
         stop_sent_at: when Stop was last commanded [s].
         asked: lane before the junction that was asked about.
+        considered: lane before the junction at which it has decided whether to ask.
         asked_at: when the last question was put [s].
         standing_since: since when the car has been standing [s].
         hazard_told: when a hazard was last explained [s].
         arrived: whether the car has stopped at its goal and waits for what comes next.
         idle_since: since when it has known nothing to do [s].
         heard_at: when the human last spoke [s].
+        proposed: way that it has proposed and waits for an answer to.
+        misses: how often it has driven past the goal.
+        avoided: places that it does not come by any more, for it missed the goal when it did.
+        rest_until: until when it stands for something in the way [s].
+        pausing: whether it stops before the junction ahead until it is told the way.
+        rested: whether it has decided whether to stop for good at the present hazard.
+        weather_told: whether it has remarked on the weather as it is.
+        slower_asked: whether it has proposed to slow down and waits for an answer.
+        lost_told: whether it has said that it does not know where it is.
     """
 
     seed: int
@@ -156,12 +190,22 @@ class CoWizardMind:
     commanded_at: float = -math.inf
     stop_sent_at: float = -math.inf
     asked: int = -1
+    considered: int = -1
     asked_at: float = -math.inf
     standing_since: float | None = 0.0
     hazard_told: float = -math.inf
     arrived: bool = False
     idle_since: float = 0.0
     heard_at: float = -math.inf
+    proposed: Directive | None = None
+    misses: int = 0
+    avoided: tuple[Place, ...] = ()
+    rest_until: float = -math.inf
+    pausing: bool = False
+    rested: bool = False
+    weather_told: bool = False
+    slower_asked: bool = False
+    lost_told: bool = False
 
     def note(self, mental: Mental) -> None:
         """Adds a belief update, unless the same one waits already."""
@@ -231,6 +275,12 @@ class View:
             waypoints=waypoints[np.any(waypoints != 0.0, axis=1)],
         )
         return _located(view, town)
+
+    @property
+    def position(self) -> tuple[float, float]:
+        """Where it believes the car to be [m]."""
+        x, y = self.raw["pose"][:2]
+        return float(x), float(y)
 
     @property
     def here(self) -> Place:

@@ -9,19 +9,27 @@ from typing import Any
 
 import numpy as np
 
+from dorothie_gym.dialogue import draw_style
 from dorothie_gym.ontology import ObjectClass, Role
-from dorothie_gym.policies.co_wizard.driving import creep, drive
-from dorothie_gym.policies.co_wizard.goals import note_plan
+from dorothie_gym.policies.co_wizard.driving import creep, drive, rest
+from dorothie_gym.policies.co_wizard.goals import note_plan, search_on
 from dorothie_gym.policies.co_wizard.listening import listen
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, Style, View
 from dorothie_gym.policies.co_wizard.obstacles import watch_road
-from dorothie_gym.policies.co_wizard.talking import speak_up, tell_action
+from dorothie_gym.policies.co_wizard.talking import scene_of, speak_up, tell_action
 from dorothie_gym.policies.policy import Policy
+from dorothie_gym.policies.speech import Voice
 from dorothie_gym.spaces import ActionDict, CoWizardAction, Mental, Motion, SpaceLimits
 from dorothie_gym.world.town import Town
 
 ASTRAY = 2
 """After so many decisions off the plan it is made anew."""
+
+CLOSE_BY = 150.0
+"""Who leaves the way with the goal nearer than this, [m]"""
+
+AROUND = 60.0
+"""and then is farther from it by more than this, has missed it [m]."""
 
 AFTER_RED = 15.0
 """A manoeuvre that was asked for is not given up before this time after a red light [s]."""
@@ -46,8 +54,10 @@ class ScriptedCoWizard(Policy[CoWizardMind]):
 
     def initial_state(self, seed: int, town: Town) -> CoWizardMind:
         """A Co-Wizard that has not been told anything yet."""
-        style = Style.draw(np.random.default_rng((seed, 0))) if self._style is None else self._style
-        return CoWizardMind(seed=seed, town=town, style=style)
+        rng = np.random.default_rng((seed, 0))
+        style = Style.draw(rng) if self._style is None else self._style
+        voice = Voice(role=Role.CO_WIZARD, style=draw_style(Role.CO_WIZARD, rng))
+        return CoWizardMind(seed=seed, town=town, style=style, voice=voice, speed=style.pace, usual=style.pace)
 
     def step(self, observation: Mapping[str, Any], state: CoWizardMind) -> tuple[ActionDict, CoWizardMind]:
         """Listens, looks, drives, and says something or nothing."""
@@ -58,11 +68,13 @@ class ScriptedCoWizard(Policy[CoWizardMind]):
         _notice(mind, view)
         listen(mind, view, rng)
         watch_road(mind, view, rng)
+        rest(mind, view, rng)
+        search_on(mind, view)
         creep(mind, view)
         physical = drive(mind, view)
         tell_action(mind, view, physical, rng)
         speak_up(mind, view, rng)
-        speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng)
+        speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng, scene_of(mind, view))
         return CoWizardAction(speech=speech, physical=physical, mental=_next_note(mind)).encode(self.limits), mind
 
 
@@ -77,10 +89,24 @@ def _notice(mind: CoWizardMind, view: View) -> None:
     _pass_junction(mind, view)
     if mind.journey is None or view.manoeuvring:
         return
+    before = mind.journey.left(view.station)
     mind.journey = mind.journey.followed(mind.town, view.lane, view.station)
     if mind.journey.astray >= ASTRAY:
-        mind.journey = mind.journey.replanned(mind.town, view.here, mind.blocked)
-        note_plan(mind)
+        _plan_anew(mind, view, before)
+
+
+def _plan_anew(mind: CoWizardMind, view: View, before: float) -> None:
+    """Plans another way; who has missed the goal again and again does not come to it as before."""
+    assert mind.journey is not None
+    former = mind.journey
+    mind.journey = former.replanned(mind.town, view.here, mind.blocked + mind.avoided)
+    if before < CLOSE_BY and mind.journey.left(view.station) > before + AROUND:
+        mind.misses += 1
+        way_in = former.way_in()
+        if mind.misses > 1 and way_in is not None:
+            mind.avoided = (*mind.avoided, way_in)
+            mind.journey = former.replanned(mind.town, view.here, mind.blocked + mind.avoided)
+    note_plan(mind)
 
 
 def _pass_junction(mind: CoWizardMind, view: View) -> None:

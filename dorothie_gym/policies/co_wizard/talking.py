@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dorothie_gym.dialogue import Direction, Wording
+from dorothie_gym.dialogue import Direction, Wording, WordingContext
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueMove,
@@ -14,20 +14,23 @@ from dorothie_gym.ontology import (
     SlotValue,
     StreetName,
 )
+from dorothie_gym.policies.co_wizard.conditions import mind_place, mind_weather
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
-from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View, Wish
-from dorothie_gym.policies.journey import direction_of
-from dorothie_gym.policies.scenery import street_of
+from dorothie_gym.policies.co_wizard.mind import CoWizardMind, Directive, View, Wish
+from dorothie_gym.policies.co_wizard.uptake import musing
+from dorothie_gym.policies.journey import Choice, direction_of
+from dorothie_gym.policies.scenery import nearest_landmark, street_of
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.spaces import Motion, Physical
+from dorothie_gym.world.town.model import LinkType
 
-ASK_DISTANCE = 40.0
+ASK_DISTANCE = 75.0
 """A way is asked for when the junction is this near [m]."""
 
 ASK_AGAIN = 8.0
 """A question without an answer is put again after this time [s]."""
 
-REASON = 3.0
+REASON = 5.0
 """A hazard is explained when it holds the car for longer than this [s]."""
 
 FIRST_WORD = 5.0
@@ -47,10 +50,21 @@ def speak_up(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
     """Plans at most one remark, if it has nothing to say yet."""
     if not mind.voice.idle or view.speaking > 0.0:
         return
-    for consider in (_give_up_wish, _ask_way, _say_arrived, _ask_goal, _explain_hazard):
+    for consider in (_give_up_wish, _ask_way, _say_arrived, _ask_goal, _explain_hazard, mind_weather, mind_place):
         consider(mind, view, rng)
         if not mind.voice.idle:
             return
+
+
+def scene_of(mind: CoWizardMind, view: View) -> WordingContext:
+    """What is in view as it speaks: its street, a place on the map close ahead, and whether something is wrong."""
+    landmark = nearest_landmark(view.landmarks, *view.position)
+    street = street_of(view.raw, mind.town, view.lane)
+    return WordingContext(
+        street=street if street is not StreetName.UNKNOWN else None,
+        landmark=landmark.name if landmark is not None else None,
+        exception=mind.detour_at is not None or (view.motion is Motion.HAZARD and view.hazard is ObjectClass.STATIC),
+    )
 
 
 def _give_up_wish(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
@@ -65,7 +79,7 @@ def _ask_way(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
         return
     if mind.wish is Wish.U_TURN or view.manoeuvring:
         return
-    waiting = view.motion is Motion.WAITING
+    waiting = view.motion is Motion.WAITING or (mind.pausing and view.motion is Motion.STOPPED)
     if not (waiting or choice.distance < ASK_DISTANCE) or wanted_exit(mind, view) is not None:
         return
     if mind.journey is not None:
@@ -77,14 +91,37 @@ def _ask_way(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
     asked = mind.asked == choice.lane
     if (asked and not waiting) or view.time - max(mind.asked_at, mind.heard_at) < ASK_AGAIN * asked:
         return
+    guided = mind.goal is not None and mind.journey is None
+    straight = any(way.type is LinkType.STRAIGHT for way in choice.exits)
+    if guided and straight and not waiting and mind.considered == choice.lane:
+        return
+    mind.considered = choice.lane
+    if guided and straight and not waiting and rng.random() > mind.style.asks:
+        return  # it goes straight on if it is not told otherwise
     mind.asked, mind.asked_at = choice.lane, view.time
-    options = [way for way in choice.exits if direction_of(way) is not Direction.STRAIGHT]
-    if options and rng.random() < 0.15:
-        way = options[int(rng.integers(len(options)))]
-        wording = Wording(direction=direction_of(way))
-        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_YN, ActionValue.J_TURN, wording=wording))
+    mind.pausing = mind.pausing or (mind.journey is None and bool(rng.random() < mind.style.careful))
+    if not asked and rng.random() < mind.style.proposes:
+        _propose_way(mind, view, choice, rng)
     else:
-        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, ActionValue.QUERIED))
+        mind.proposed = None
+        first = musing(mind, rng)
+        mind.voice = mind.voice.plan(*first, remark(DialogueMove.QUERY_W, ActionValue.QUERIED, joined=bool(first)))
+
+
+def _propose_way(mind: CoWizardMind, view: View, choice: Choice, rng: np.random.Generator) -> None:
+    """Asks whether one of the ways is meant."""
+    way = choice.exits[int(rng.integers(len(choice.exits)))]
+    direction = direction_of(way)
+    action = ActionValue.LANE_FOLLOW if direction is Direction.STRAIGHT else ActionValue.J_TURN
+    street = street_of(view.raw, mind.town, way.lane)
+    values: list[SlotValue] = [action]
+    if action is ActionValue.J_TURN and street is not StreetName.UNKNOWN and rng.random() < 0.3:
+        values.append(street)
+    move = DialogueMove.QUERY_YN if rng.random() < 0.7 else DialogueMove.CHECK
+    mind.proposed = Directive(direction=direction, junction=choice.junction)
+    first = musing(mind, rng)
+    question = remark(move, *values, wording=Wording(direction=direction), joined=bool(first))
+    mind.voice = mind.voice.plan(*first, question)
 
 
 def _say_arrived(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
@@ -93,7 +130,7 @@ def _say_arrived(mind: CoWizardMind, view: View, rng: np.random.Generator) -> No
     if mind.asked_at > mind.stop_sent_at:
         return
     mind.asked_at = view.time
-    if mind.exact and rng.random() < 0.6:
+    if mind.exact and rng.random() < 0.75:
         mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, mind.goal, wording=Wording(topic="arrived")))
     elif not mind.exact:
         mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_YN))
@@ -118,24 +155,28 @@ def _explain_hazard(mind: CoWizardMind, view: View, rng: np.random.Generator) ->
     if view.time - mind.standing_since < REASON or view.time - mind.hazard_told < TOLD_AGAIN:
         return
     mind.hazard_told = view.time
-    if view.hazard is ObjectClass.TRAFFIC_LIGHT and rng.random() < 0.6:
+    if rng.random() < (0.8 if view.hazard is ObjectClass.TRAFFIC_LIGHT else 0.5):
         return  # everybody sees a red light
     values: tuple[SlotValue, ...] = (view.hazard,)
-    if rng.random() < 0.5:
+    if mind.rest_until > view.time or rng.random() < 0.3:
         values = (ActionValue.STOP, view.hazard)
-    mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, *values))
+    mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, *values), *musing(mind, rng, joined=True))
 
 
 def tell_action(mind: CoWizardMind, view: View, physical: Physical | None, rng: np.random.Generator) -> None:
     """Says now and then what it does by its own plan."""
     if physical is None or not mind.voice.idle or view.speaking > 0.0 or mind.directive is not None:
         return
-    told = {PhysicalAction.J_TURN: ActionValue.J_TURN, PhysicalAction.U_TURN: ActionValue.U_TURN}
+    told = {
+        PhysicalAction.J_TURN: ActionValue.J_TURN,
+        PhysicalAction.U_TURN: ActionValue.U_TURN,
+        PhysicalAction.LANE_SWITCH: ActionValue.LANE_SWITCH,
+    }
     action = told.get(physical.action)
     if action is None or mind.wish is not None or rng.random() > mind.style.tells:
         return
     values: list[SlotValue] = [action]
-    direction = None
+    direction = Direction.LEFT if physical.angle > 0 else Direction.RIGHT
     if action is ActionValue.J_TURN:
         way = wanted_exit(mind, view)
         if way is None or direction_of(way) is Direction.STRAIGHT:

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from dorothie_gym.dialogue import Wording
-from dorothie_gym.ontology import DialogueMove, GoalStatus, SlotValue
+from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, SlotValue
 from dorothie_gym.policies.journey import Journey
 from dorothie_gym.policies.participant.mind import ParticipantMind, View
 from dorothie_gym.policies.scenery import SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.speech import Remark, remark
 from dorothie_gym.world.town.routing import router
+
+ROOM_TO_WAIT = 80.0
+"""A car that is nearer to its goal than this is not told to wait when something new comes up [m]."""
+
+THINKING = 9.0
+"""So long it waits then [s]."""
 
 UNANSWERED = 8.0
 """After this time without a word from the car it is asked whether it has understood [s]."""
@@ -25,7 +32,7 @@ def note_tasks(mind: ParticipantMind, view: View, rng: np.random.Generator) -> N
         if new.reached and not old.reached:
             _done(mind, view, new, rng)
         elif new.open and not old.live:
-            _added(mind, view, new)
+            _added(mind, view, new, rng)
         elif old.open and not new.live:
             _dropped(mind, view, old)
         elif new.open and new.landmark != old.landmark:
@@ -39,17 +46,32 @@ def _done(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.rando
     mind.voice = mind.voice.cleared().plan(remark(DialogueMove.EXPLAIN, *values, GoalStatus.COMPLETE, urgent=True))
     if subgoal.index == mind.target:
         forget_target(mind)
-        if rng.random() > mind.style.hurries:
+        mind.goes_on = bool(rng.random() < mind.style.hurries)
+        if not mind.goes_on:
             mind.voice = mind.voice.hold(view.time + 6.0)
 
 
-def _added(mind: ParticipantMind, view: View, subgoal: SeenSubgoal) -> None:
+def _added(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.random.Generator) -> None:
     landmark = view.landmark(subgoal.landmark)
     if landmark is None:
         return
-    mind.voice = mind.voice.plan(
-        remark(DialogueMove.INSTRUCT, landmark.name, GoalStatus.PENDING, wording=Wording(topic="added"))
-    )
+    news = remark(DialogueMove.INSTRUCT, landmark.name, GoalStatus.PENDING, wording=Wording(topic="added"))
+    far = mind.journey is not None and mind.journey.left(view.station) > ROOM_TO_WAIT
+    if view.speed > 2.0 and far and mind.voice.idle and rng.random() < mind.style.waits:
+        mind.go_at = view.time + THINKING
+        stop = remark(DialogueMove.INSTRUCT, ActionValue.STOP, urgent=True)
+        mind.voice = mind.voice.plan(stop, replace(news, joined=True))
+    else:
+        mind.voice = mind.voice.plan(news)
+
+
+def go_on(mind: ParticipantMind, view: View) -> None:
+    """Tells the car to go on that has been told to wait."""
+    if view.time < mind.go_at or not mind.voice.idle:
+        return
+    mind.go_at = math.inf
+    if view.standing:
+        mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.START))
 
 
 def _dropped(mind: ParticipantMind, view: View, subgoal: SeenSubgoal) -> None:
@@ -88,10 +110,10 @@ def _changed(mind: ParticipantMind, view: View, old: SeenSubgoal, new: SeenSubgo
 def forget_target(mind: ParticipantMind) -> None:
     """Leaves the present target."""
     mind.target, mind.goal, mind.journey = None, None, None
-    mind.told, mind.guiding, mind.best = False, False, math.inf
+    mind.told, mind.described, mind.guiding, mind.best = False, False, False, math.inf
     mind.guided, mind.repeats = None, 0
     mind.announced, mind.stop_text = False, ""
-    mind.misses, mind.eased = 0, False
+    mind.misses, mind.eased, mind.avoided = 0, False, ()
     mind.stopped_at = mind.nudged_at = -math.inf
 
 
@@ -130,14 +152,35 @@ def announcement(mind: ParticipantMind, view: View, rng: np.random.Generator) ->
     return remark(DialogueMove.INSTRUCT, *values, wording=Wording(topic=topic))
 
 
+def _announce(mind: ParticipantMind, view: View, goes_on: bool, rng: np.random.Generator) -> None:
+    """Names the target, perhaps with a reason for it, and what is to be done later."""
+    words = replace(announcement(mind, view, rng), joined=goes_on)
+    draw = rng.random()
+    if draw < mind.style.reasons:
+        reason = remark(DialogueMove.EXPLAIN, joined=goes_on)
+        mind.voice = mind.voice.plan(reason, replace(words, joined=True))
+    elif draw < 1.6 * mind.style.reasons:
+        mind.voice = mind.voice.plan(words, remark(DialogueMove.EXPLAIN, joined=True))
+    else:
+        mind.voice = mind.voice.plan(words)
+    later = [view.landmark(item.landmark) for item in view.subgoals if item.open and item.index != mind.target]
+    named = [mark for mark in later if mark is not None and mind.goal is not None and mark.name is not mind.goal.name]
+    if named and rng.random() < 0.25:
+        also = remark(DialogueMove.EXPLAIN, named[0].name, GoalStatus.PENDING, joined=True)
+        mind.voice = mind.voice.plan(also)
+    elif rng.random() < mind.style.aligns:
+        mind.voice = mind.voice.plan(remark(DialogueMove.ALIGN, joined=True))
+
+
 def tell_target(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     """Tells the car of the target when its turn has come, and again if it does not answer."""
-    if mind.goal is None or not mind.voice.idle:
+    goes_on, mind.goes_on = mind.goes_on, False
+    if mind.goal is None or not (mind.voice.idle or goes_on):
         return
     if not mind.told:
         mind.told, mind.told_at = True, view.time
         if not mind.guiding or rng.random() < mind.style.names_goal:
-            mind.voice = mind.voice.plan(announcement(mind, view, rng))
+            _announce(mind, view, goes_on and not mind.voice.idle, rng)
         return
     waiting = max(mind.told_at, mind.voice.last_end)
     unheard = mind.heard_at < mind.told_at and view.time - waiting > UNANSWERED

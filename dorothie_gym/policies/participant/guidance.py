@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,10 +26,19 @@ from dorothie_gym.world.town.routing import Entry
 TELL_DISTANCE = 110.0
 """A turn is told when it is this near [m]."""
 
+CLOSE_BY = 150.0
+"""A car that leaves the way with the place nearer than this, [m]"""
+
+AROUND = 60.0
+"""and then is farther from it by more than this, has gone past it [m]."""
+
+TOO_LATE = 48.0
+"""A turn is told when it is this near, even if the car has not asked [m]."""
+
 AGAIN = 9.0
 """What has not been done is told again after this time [s]."""
 
-SWITCHING = 5.0
+SWITCHING = 13.0
 """The car is given this long for a lane change before the next one is told [s]."""
 
 DECISION = 0.5
@@ -36,6 +46,9 @@ DECISION = 0.5
 
 FASTEST = 11.0
 """The car is not expected to get faster than this [m/s]."""
+
+TAKES_OVER = 150.0
+"""A car that looks for a place by itself is guided from here on [m]."""
 
 NEAR = 95.0
 """A place is announced when it is this near [m]."""
@@ -63,9 +76,15 @@ def follow_journey(mind: ParticipantMind, view: View) -> None:
     if passed:
         mind.guiding = True
     if mind.journey.astray >= 3 or passed:
-        if mind.guiding and before < 15.0:
+        former = mind.journey
+        mind.journey = former.replanned(mind.town, view.place, mind.blocked + mind.avoided)
+        gone_past = before < CLOSE_BY and mind.journey.left(view.station) > before + AROUND
+        if mind.guiding and (before < 15.0 or gone_past):
             mind.misses, mind.eased = mind.misses + 1, False
-        mind.journey = mind.journey.replanned(mind.town, view.place, mind.blocked)
+            way_in = former.way_in()
+            if mind.misses > 1 and way_in is not None:
+                mind.avoided = (*mind.avoided, way_in)
+                mind.journey = former.replanned(mind.town, view.place, mind.blocked + mind.avoided)
         mind.announced, mind.stop_text = False, ""
         missed = mind.guiding and mind.guided is not None and mind.guided[0] == "turn"
         if missed and mind.journey.left(view.station) > before + 60.0 and math.isfinite(before):
@@ -78,6 +97,9 @@ def follow_journey(mind: ParticipantMind, view: View) -> None:
 def watch(mind: ParticipantMind, view: View) -> None:
     """Takes over a car that goes far out of its way or does not get on by itself."""
     if mind.guiding or mind.journey is None or not mind.told:
+        return
+    if mind.described and mind.journey.left(view.station) < TAKES_OVER:
+        mind.guiding = True
         return
     standing = 0.0 if mind.standing_since is None else view.time - mind.standing_since
     lost = mind.journey.left(view.station) > mind.best + 350.0
@@ -102,6 +124,8 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     if _ease(mind, view):
         return
     near = distance < (_turning_distance(mind, view) if key[0] == "round" else TELL_DISTANCE)
+    if _left_to_ask(mind, view, key, distance, words.wording.direction is Direction.STRAIGHT, rng):
+        return
     waited = view.time - max(mind.guided_at, mind.heard_at)
     on_its_lane = key[0] == "round" and mind.journey.turns_round_on(view.lane)
     if on_its_lane and mind.standing_since is not None and view.time - mind.standing_since > 4.0:
@@ -111,11 +135,45 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
         key, words = ("on", view.lane, 0), remark(DialogueMove.INSTRUCT, ActionValue.START)
         near = True
     overdue = stuck or (key[0] != "turn" and waited > AGAIN)
-    if key[0] == "lane" and view.time - mind.guided_at < SWITCHING:
+    if key[0] == "lane" and (view.time - mind.guided_at < SWITCHING or view.time < mind.excused_until):
         return
     if near and (mind.guided != key or overdue):
+        again = mind.guided == key
+        if key[0] in ("round", "turn", "lane") and not again and rng.random() < mind.style.hints:
+            words = replace(words, act=DialogueAct(DialogueMove.EXPLAIN, words.act.slots))
         note_told(mind, view, key)
-        mind.voice = mind.voice.plan(words)
+        mind.voice = mind.voice.plan(*_rounded_off(mind, words, again, rng))
+
+
+def _rounded_off(mind: ParticipantMind, words: Remark, again: bool, rng: np.random.Generator) -> tuple[Remark, ...]:
+    """A step with what else is said in the same breath: a reason before it, or a question whether it was heard."""
+    draw = rng.random()
+    if again and rng.random() < 0.25:
+        return words, remark(DialogueMove.ALIGN, joined=True)
+    if draw < mind.style.aligns:
+        return words, remark(DialogueMove.ALIGN, joined=True)
+    if draw < mind.style.aligns + 0.7 * mind.style.reasons:
+        return words, remark(DialogueMove.EXPLAIN, joined=True)
+    return (words,)
+
+
+def _left_to_ask(
+    mind: ParticipantMind,
+    view: View,
+    key: tuple[str, int, int],
+    distance: float,
+    goes_straight: bool,
+    rng: np.random.Generator,
+) -> bool:
+    """Whether the way at a junction is kept back until the car asks; that it goes straight on need not be said."""
+    if key[0] != "turn" or mind.guided == key:
+        return False
+    standing = 0.0 if mind.standing_since is None else view.time - mind.standing_since
+    if mind.drawn_for != key:
+        mind.drawn_for, mind.left_to_ask = key, bool(rng.random() < mind.style.waits)
+    if not mind.left_to_ask or standing > AGAIN:
+        return False
+    return distance > TOO_LATE or goes_straight
 
 
 def _ease(mind: ParticipantMind, view: View) -> bool:
@@ -222,7 +280,7 @@ def _approach(mind: ParticipantMind, view: View, rng: np.random.Generator) -> bo
     if not mind.guiding:
         return left < NEAR
     if not mind.stop_text:
-        mind.stop_text = word_act(_STOP, Role.PARTICIPANT, rng, Wording(here=True))
+        mind.stop_text = word_act(_STOP, Role.PARTICIPANT, rng, Wording(here=True), style=mind.voice.style)
     if _time_to_stop(mind, view, left):
         if view.time - mind.stopped_at > 5.0 and left > 0.0:
             mind.stopped_at = view.time

@@ -42,6 +42,11 @@ class Style:
         hurries: chance that the next task follows in the same breath as the report of the last.
         patience: standing time after which it asks why [s].
         chat: seconds between remarks beside the matter, on average [s].
+        waits: chance that the way is told only when the car asks, or when it is nearly too late.
+        hints: chance that a step is not commanded, but said to be what one should do.
+        reasons: chance that a reason is given with a place, or a step.
+        aligns: chance that it makes sure to have been understood.
+        nods: chance that what the car explains is acknowledged.
     """
 
     guides: float
@@ -50,17 +55,27 @@ class Style:
     hurries: float
     patience: float
     chat: float
+    waits: float = 0.0
+    hints: float = 0.0
+    reasons: float = 0.0
+    aligns: float = 0.0
+    nods: float = 0.2
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> Style:
         """A style by chance: two in five guide most of the way themselves."""
         return cls(
-            guides=0.85 if rng.random() < 0.4 else 0.1,
+            guides=0.3 if rng.random() < 0.4 else 0.03,
             names_goal=float(rng.uniform(0.4, 1.0)),
             names_street=float(rng.uniform(0.1, 0.7)),
-            hurries=float(rng.uniform(0.2, 0.9)),
+            hurries=float(rng.uniform(0.1, 0.8)),
             patience=float(rng.uniform(7.0, 14.0)),
-            chat=float(rng.uniform(60.0, 200.0)),
+            chat=float(rng.uniform(40.0, 120.0)),
+            waits=float(rng.uniform(0.7, 1.0)),
+            hints=float(rng.uniform(0.0, 0.35)),
+            reasons=float(rng.uniform(0.05, 0.45)),
+            aligns=float(rng.uniform(0.0, 0.15)),
+            nods=float(rng.uniform(0.4, 0.9)),
         )
 
 
@@ -79,6 +94,7 @@ class ParticipantMind:
         goal: landmark of that subgoal.
         told: whether the car has been told of it.
         told_at: when [s].
+        described: whether the car, which does not know the place, has been told where it is.
         guiding: whether the way is told turn by turn.
         journey: the way to the target.
         best: least distance to the target so far [m].
@@ -87,6 +103,7 @@ class ParticipantMind:
         repeats: how often that has been repeated.
         announced: whether the car has been told that the place is near.
         misses: how often the car has gone past the place.
+        avoided: places that the car is not led by any more, for it went past the target when it was.
         eased: whether it has been told to go slowly because of that.
         stop_text: words to stop the car with.
         stopped_at: when they were said [s].
@@ -100,6 +117,11 @@ class ParticipantMind:
         lights_at: when lights were last talked about [s].
         chat_at: when to talk beside the matter next [s].
         speed_before: speed at the decision before [m/s].
+        left_to_ask: step that is told only when the car asks.
+        drawn_for: step for which it has been drawn whether it is.
+        goes_on: whether the next task is named in the breath that reports the last.
+        go_at: when the car, which has been told to wait, is to go on [s].
+        hurried: whether the car has been told to go faster.
     """
 
     seed: int
@@ -112,6 +134,7 @@ class ParticipantMind:
     goal: SeenLandmark | None = None
     told: bool = False
     told_at: float = -math.inf
+    described: bool = False
     guiding: bool = False
     journey: Journey | None = None
     best: float = math.inf
@@ -120,6 +143,7 @@ class ParticipantMind:
     repeats: int = 0
     announced: bool = False
     misses: int = 0
+    avoided: tuple[Place, ...] = ()
     eased: bool = False
     stop_text: str = ""
     stopped_at: float = -math.inf
@@ -133,6 +157,11 @@ class ParticipantMind:
     lights_at: float = -math.inf
     chat_at: float = math.inf
     speed_before: float = 0.0
+    left_to_ask: bool = False
+    drawn_for: tuple[str, int, int] | None = None
+    goes_on: bool = False
+    go_at: float = math.inf
+    hurried: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,6 +196,12 @@ class View:
             objects=read_objects(observation),
             turning=math.cos(across) < TURNED,
         )
+
+    @property
+    def position(self) -> tuple[float, float]:
+        """Where the car is [m]."""
+        x, y = self.raw["pose"][:2]
+        return float(x), float(y)
 
     @property
     def place(self) -> Place:

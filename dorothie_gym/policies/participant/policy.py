@@ -9,17 +9,22 @@ from typing import Any
 
 import numpy as np
 
+from dorothie_gym.dialogue import draw_style
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.journey import light_ahead
-from dorothie_gym.policies.participant.goals import choose_target, note_tasks, tell_target
+from dorothie_gym.policies.participant.goals import choose_target, go_on, note_tasks, tell_target
 from dorothie_gym.policies.participant.guidance import follow_journey, guide, watch
 from dorothie_gym.policies.participant.mind import ParticipantMind, Style, View
-from dorothie_gym.policies.participant.reactions import react
+from dorothie_gym.policies.participant.reactions import react, scene_of
 from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.policy import Policy
+from dorothie_gym.policies.speech import Voice
 from dorothie_gym.spaces import ActionDict, ParticipantAction, SpaceLimits
 from dorothie_gym.world.town import Town
 from dorothie_gym.world.town.lights import LightColour
+
+NEARLY_THERE = 45.0
+"""A car that has been stopped this near to the place does not stand because of a light [m]."""
 
 START = 8.0
 """A car is given this long to start after a light has turned green, for others may be before it [s]."""
@@ -46,7 +51,9 @@ class ScriptedParticipant(Policy[ParticipantMind]):
         """A participant who has not said anything yet."""
         rng = np.random.default_rng((seed, 0))
         style = Style.draw(rng) if self._style is None else self._style
-        return ParticipantMind(seed=seed, town=town, style=style, chat_at=float(rng.uniform(25.0, style.chat + 25.0)))
+        chat_at = float(rng.uniform(25.0, style.chat + 25.0))
+        voice = Voice(role=Role.PARTICIPANT, style=draw_style(Role.PARTICIPANT, rng))
+        return ParticipantMind(seed=seed, town=town, style=style, chat_at=chat_at, voice=voice)
 
     def step(self, observation: Mapping[str, Any], state: ParticipantMind) -> tuple[ActionDict, ParticipantMind]:
         """Listens, looks, and says something or nothing."""
@@ -66,17 +73,26 @@ class ScriptedParticipant(Policy[ParticipantMind]):
         follow_journey(mind, view)
         listen(mind, view, rng)
         tell_target(mind, view, rng)
+        go_on(mind, view)
         watch(mind, view)
         guide(mind, view, rng)
         react(mind, view, rng)
-        speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng)
+        speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng, scene_of(mind, view))
         mind.speed_before = view.speed
         return ParticipantAction(speech=speech).encode(self.limits), mind
 
 
 def _excuse_at_light(mind: ParticipantMind, view: View) -> None:
     """Nobody wonders about a car that waits before a red light, nor right after it has turned green."""
-    if not view.standing or light_ahead(mind.town, view.lane, view.station, view.time) in (None, LightColour.GREEN):
+    last_stretch = (
+        mind.guiding
+        and mind.journey is not None
+        and mind.journey.left(view.station) < NEARLY_THERE
+        and mind.journey.next_crossing(mind.town, view.station) is None
+    )
+    if not view.standing or last_stretch:
+        return
+    if light_ahead(mind.town, view.lane, view.station, view.time) in (None, LightColour.GREEN):
         return
     mind.standing_since = view.time
     mind.excused_until = max(mind.excused_until, view.time + START)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from dorothie_gym.dialogue import Wording
-from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, WeatherParameter
+from dorothie_gym.dialogue import Wording, WordingContext
+from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, StreetName, WeatherParameter
 from dorothie_gym.policies.participant.mind import ParticipantMind, View
-from dorothie_gym.policies.scenery import place_on_lanes, weather
-from dorothie_gym.policies.speech import remark
+from dorothie_gym.policies.scenery import nearest_landmark, place_on_lanes, street_of, weather
+from dorothie_gym.policies.speech import Remark, remark
 from dorothie_gym.world.town.routing import Place
 
 THICK_FOG = 35.0
@@ -22,6 +22,18 @@ SLOW, USUAL = 25.0, 40.0
 
 SIGHT = 80.0
 """How far ahead an obstacle is noticed [m]."""
+
+
+def scene_of(mind: ParticipantMind, view: View) -> WordingContext:
+    """What is in view as the participant speaks: the street, a place close by, and whether something is wrong."""
+    landmark = nearest_landmark(view.landmarks, *view.position)
+    street = street_of(view.raw, mind.town, view.lane)
+    fog, rain = (weather(view.raw, name) for name in (WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATION))
+    return WordingContext(
+        street=street if street is not StreetName.UNKNOWN else None,
+        landmark=landmark.name if landmark is not None else None,
+        exception=fog > THICK_FOG or rain > HEAVY_RAIN,
+    )
 
 
 def react(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
@@ -120,7 +132,7 @@ def _ask_why(mind: ParticipantMind, view: View) -> None:
 
 
 def _chat(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
-    if view.time < mind.chat_at or view.standing or mind.journey is None:
+    if view.time < mind.chat_at or view.standing or mind.journey is None or mind.goal is None:
         return
     crossing = mind.journey.next_crossing(mind.town, view.station)
     busy = mind.journey.left(view.station) < 130.0 or (
@@ -129,9 +141,29 @@ def _chat(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     if busy:
         return
     mind.chat_at = view.time + float(rng.exponential(mind.style.chat)) + 20.0
-    topics = [remark(DialogueMove.IRRELEVANT)]
+    options = _topics(mind, view, rng)
+    mind.voice = mind.voice.plan(*options[int(rng.integers(len(options)))])
+
+
+def _topics(mind: ParticipantMind, view: View, rng: np.random.Generator) -> list[tuple[Remark, ...]]:
+    """What could be talked about now."""
+    assert mind.goal is not None
+    found: list[tuple[Remark, ...]] = [
+        (remark(DialogueMove.IRRELEVANT),),
+        (remark(DialogueMove.IRRELEVANT), remark(DialogueMove.IRRELEVANT, joined=True)),
+        (remark(DialogueMove.QUERY_YN),),
+    ]
     if not mind.guiding:
-        topics.append(remark(DialogueMove.QUERY_W, ActionValue.QUERIED))
+        found.append((remark(DialogueMove.QUERY_W, ActionValue.QUERIED),))
+        found.append((remark(DialogueMove.CHECK, mind.goal.name),))
+        found.append((remark(DialogueMove.QUERY_YN, mind.goal.name),))
+        if rng.random() < 0.5 and not mind.hurried and not mind.slowed and view.speed > 5.0:
+            faster = Wording(faster=True, speed=USUAL + 5.0 if rng.random() < 0.5 else None)
+            mind.hurried = True
+            return [(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=faster),)]
     if view.objects:
-        topics.append(remark(DialogueMove.QUERY_YN, view.objects[0].kind))
-    mind.voice = mind.voice.plan(topics[int(rng.integers(len(topics)))])
+        found += [(remark(DialogueMove.QUERY_YN, view.objects[0].kind),)] * 2
+    street = street_of(view.raw, mind.town, view.lane)
+    if street is not StreetName.UNKNOWN:
+        found.append((remark(DialogueMove.CHECK, street),))
+    return found

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from dorothie_gym.dialogue import Wording
+from dorothie_gym.dialogue import Direction, Heard, Wording
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueAct,
@@ -21,17 +22,28 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies.hearing import heard_utterance
 from dorothie_gym.policies.participant.goals import announcement
-from dorothie_gym.policies.participant.guidance import next_step, note_told
+from dorothie_gym.policies.participant.guidance import NEAR, next_step, note_told
 from dorothie_gym.policies.participant.mind import ParticipantMind, View
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.scenery import SeenLandmark
-from dorothie_gym.policies.speech import remark
+from dorothie_gym.policies.speech import Remark, remark
+
+GUIDES_AT_ONCE = 0.25
+"""Chance that the way to a place that the car does not know is told from where it has been described."""
 
 ELSEWHERE = 40.0
 """A car that stands farther than this from the target has not come to it [m]."""
 
 JUST_TOLD = 5.0
 """A question that was put while the answer was being given needs no other one [s]."""
+
+_FREE = frozenset({ActionValue.LIGHT_CHANGE, ActionValue.SPEED_CHANGE, ActionValue.START})
+"""What the car may do as it likes."""
+
+_WAYS = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH})
+"""Actions that lead somewhere else."""
+
+_AHEAD = frozenset({ActionValue.LANE_FOLLOW, ActionValue.J_TURN})
 
 _FAMOUS = frozenset(LandmarkName) - {
     LandmarkName.HOUSE,
@@ -47,14 +59,14 @@ def listen(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     if heard is None:
         return
     mind.heard_at = view.time
-    mind.voice = mind.voice.heard_other(view.time)
+    mind.voice = mind.voice.heard_other(view.time, heard.acts)
     for act in heard.acts:
         answer = _ANSWERS.get(act.move)
         if answer is not None:
-            answer(mind, view, act, rng)
+            answer(mind, view, act, heard.words, rng)
 
 
-def _check(mind: ParticipantMind, view: View, act: DialogueAct, rng: np.random.Generator) -> None:
+def _check(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
     landmarks, streets = act.values(Slot.LANDMARK), act.values(Slot.STREET)
     if mind.goal is not None and landmarks:
         right = landmarks == (mind.goal.name,) and streets in ((), (mind.goal.street,))
@@ -64,30 +76,46 @@ def _check(mind: ParticipantMind, view: View, act: DialogueAct, rng: np.random.G
                 remark(DialogueMove.INSTRUCT, mind.goal.name, mind.goal.street, joined=True),
             )
             return
-    elif act.values(Slot.ACTION) and not _fits(mind, view, act, rng):
+    elif act.values(Slot.ACTION) and not _fits(mind, view, act, words, rng):
         _refuse_with_step(mind, view, rng)
         return
-    mind.voice = mind.voice.plan_first(remark(DialogueMove.CONFIRM))
+    if landmarks:
+        mind.guiding = False  # it knows the place
+    mind.voice = mind.voice.plan_first(remark(DialogueMove.CONFIRM), *_more(mind, rng))
 
 
-def _fits(mind: ParticipantMind, view: View, act: DialogueAct, rng: np.random.Generator) -> bool:
-    """Whether an action that the car names is what is to be done next."""
+def _fits(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> bool:
+    """Whether an action that the car names is what is to be done next, or what it has just been told to do."""
     step = next_step(mind, view, DialogueMove.INSTRUCT, rng)
     actions = set(act.values(Slot.ACTION))
-    free = {ActionValue.LIGHT_CHANGE, ActionValue.SPEED_CHANGE, ActionValue.START}
-    return step is None or bool(actions & free) or bool(actions & set(step[2].act.values(Slot.ACTION)))
+    if step is None or actions & _FREE:
+        return True
+    last = mind.voice.last
+    if last is not None and view.time - mind.voice.last_end < JUST_TOLD and actions & set(last.act.values(Slot.ACTION)):
+        return last.wording.direction in (None, words.direction)
+    meant, wanted = set(step[2].act.values(Slot.ACTION)), step[2].wording.direction
+    if wanted is Direction.STRAIGHT:
+        return bool(actions & _AHEAD) and words.direction in (None, Direction.STRAIGHT)
+    return bool(actions & meant) and (wanted is None or words.direction is wanted)
+
+
+def _more(mind: ParticipantMind, rng: np.random.Generator) -> tuple[Remark, ...]:
+    """What is added to a yes now and then."""
+    return (remark(DialogueMove.EXPLAIN, joined=True),) if rng.random() < mind.style.reasons else ()
 
 
 def _refuse_with_step(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     step = next_step(mind, view, DialogueMove.INSTRUCT, rng)
-    mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_N))
-    if step is not None:
-        key, _, words = step
-        note_told(mind, view, key)
-        mind.voice = mind.voice.plan(words)
+    refusal = remark(DialogueMove.REPLY_N)
+    if step is None:
+        mind.voice = mind.voice.plan_first(refusal)
+        return
+    key, _, words = step
+    note_told(mind, view, key)
+    mind.voice = mind.voice.plan_first(refusal, replace(words, joined=True))
 
 
-def _yes_or_no(mind: ParticipantMind, view: View, act: DialogueAct, rng: np.random.Generator) -> None:
+def _yes_or_no(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
     objects, landmarks = act.values(Slot.OBJECT), act.values(Slot.LANDMARK)
     if objects:
         seen = any(thing.kind in objects for thing in view.objects)
@@ -99,16 +127,32 @@ def _yes_or_no(mind: ParticipantMind, view: View, act: DialogueAct, rng: np.rand
             mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y))
         else:
             again = announcement(mind, view, rng)
-            mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_N), again)
-    elif act.values(Slot.ACTION) and mind.guiding and not _fits(mind, view, act, rng):
-        _refuse_with_step(mind, view, rng)
+            mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_N), replace(again, joined=True))
+    elif set(act.values(Slot.ACTION)) & _WAYS:
+        mind.guiding = True
+        _judge_proposal(mind, view, act, words, rng)
+    elif not objects and not landmarks and not act.values(Slot.ACTION) and _elsewhere(mind, view):
+        mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y))
     elif rng.random() < 0.05:
         mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_U), remark(DialogueMove.REPLY_Y))
     else:
-        mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y))
+        mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y), *_more(mind, rng))
 
 
-def _open_question(mind: ParticipantMind, view: View, act: DialogueAct, rng: np.random.Generator) -> None:
+def _judge_proposal(
+    mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator
+) -> None:
+    """Says yes to the right way, and no with the right one to another."""
+    if not _fits(mind, view, act, words, rng):
+        _refuse_with_step(mind, view, rng)
+        return
+    step = next_step(mind, view, DialogueMove.INSTRUCT, rng)
+    if step is not None:
+        note_told(mind, view, step[0])
+    mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y), *_more(mind, rng))
+
+
+def _open_question(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
     landmarks, streets, actions = act.values(Slot.LANDMARK), act.values(Slot.STREET), act.values(Slot.ACTION)
     if mind.goal is None:
         mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_U))
@@ -116,7 +160,10 @@ def _open_question(mind: ParticipantMind, view: View, act: DialogueAct, rng: np.
         return
     elif landmarks == (LandmarkName.QUERIED,):
         mind.told, mind.told_at = True, view.time
-        mind.voice = mind.voice.cleared().plan(announcement(mind, view, rng))
+        target = announcement(mind, view, rng).act.slots
+        mind.voice = mind.voice.cleared().plan(remark(DialogueMove.REPLY_W, *target), *_more(mind, rng))
+    elif actions and _just_named(mind, view):
+        return
     elif actions:
         mind.guiding = True
         _say_way(mind, view, DialogueMove.REPLY_W, rng)
@@ -126,22 +173,35 @@ def _open_question(mind: ParticipantMind, view: View, act: DialogueAct, rng: np.
         # "before or after ...?": what is under way is finished first
         mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_W, wording=Wording(topic="after")))
     else:
-        _describe(mind, view, DialogueMove.REPLY_W)
+        _describe(mind, view, DialogueMove.REPLY_W, rng)
+
+
+def _just_named(mind: ParticipantMind, view: View) -> bool:
+    """Whether the car has been told of the place a moment ago and cannot have taken it up yet."""
+    last = mind.voice.last
+    recent = mind.voice.has_just_spoken(view.time, JUST_TOLD)
+    return recent and last is not None and mind.goal is not None and mind.goal.name in last.act.values(Slot.LANDMARK)
 
 
 def _say_way(mind: ParticipantMind, view: View, move: DialogueMove, rng: np.random.Generator) -> None:
     step = next_step(mind, view, move, rng)
     if step is None:
         return
-    key, _, words = step
+    key, distance, words = step
+    if key[0] == "on" and distance < NEAR:
+        return  # the place is right ahead: that is what is to be said now
+    if move is DialogueMove.REPLY_W and mind.guided == key and view.time - mind.guided_at < JUST_TOLD:
+        return  # it was asked while the answer was being given
     note_told(mind, view, key)
-    mind.voice = mind.voice.cleared().plan(words)
+    more = _more(mind, rng) if move is DialogueMove.REPLY_W else ()
+    mind.voice = mind.voice.cleared().plan(words, *more)
 
 
-def _describe(mind: ParticipantMind, view: View, move: DialogueMove) -> None:
-    """Says where the target is, and goes on to tell the way."""
+def _describe(mind: ParticipantMind, view: View, move: DialogueMove, rng: np.random.Generator) -> None:
+    """Says where the target is; at once, or when the car is close to it, the way is told turn by turn."""
     assert mind.goal is not None
-    mind.guiding = True
+    mind.guiding = bool(mind.goal.street is StreetName.UNKNOWN or mind.described or rng.random() < GUIDES_AT_ONCE)
+    mind.described = True
     values: list[SlotValue] = [mind.goal.street] if mind.goal.street is not StreetName.UNKNOWN else []
     near = _near(mind.goal, view)
     if near is not None:
@@ -171,11 +231,10 @@ def _near(goal: SeenLandmark, view: View) -> SeenLandmark | None:
     return min(found)[2] if found and min(found)[0] < 90.0 else None
 
 
-def _explanation(mind: ParticipantMind, view: View, act: DialogueAct, rng: np.random.Generator) -> None:
+def _explanation(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
     landmarks, statuses = act.values(Slot.LANDMARK), act.values(Slot.STATUS)
     if GoalStatus.UNKNOWN in statuses and mind.goal is not None and mind.goal.name in landmarks:
-        if not mind.guiding:
-            _describe(mind, view, DialogueMove.EXPLAIN)
+        _describe(mind, view, DialogueMove.EXPLAIN, rng)
         return
     if mind.goal is not None and mind.goal.name in landmarks and not statuses and _elsewhere(mind, view):
         _not_here(mind, view)
@@ -184,37 +243,37 @@ def _explanation(mind: ParticipantMind, view: View, act: DialogueAct, rng: np.ra
         mind.excused_until = view.time + 30.0
         if ObjectClass.STATIC in act.values(Slot.OBJECT):
             note_blocked(mind, view, near=True)
-    if mind.voice.idle and rng.random() < 0.2:
-        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+    if mind.voice.idle and rng.random() < mind.style.nods:
+        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE), *_more(mind, rng))
 
 
-def _confusion(mind: ParticipantMind, view: View, act: DialogueAct, rng: np.random.Generator) -> None:
+def _confusion(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
     last = mind.voice.last
     if mind.guiding and mind.guided is not None:
         _say_way(mind, view, DialogueMove.CLARIFY, rng)
     elif mind.goal is not None and mind.told:
         mind.voice = mind.voice.plan_first(remark(DialogueMove.CLARIFY, mind.goal.name))
     elif last is not None:
-        mind.voice = mind.voice.plan_first(remark(DialogueMove.CLARIFY, *last.act.slots))
+        mind.voice = mind.voice.plan_first(remark(DialogueMove.CLARIFY, *last.act.slots, wording=last.wording))
 
 
-def _uptake(mind: ParticipantMind, view: View, act: DialogueAct, rng: np.random.Generator) -> None:
+def _uptake(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
     """A car that repeats the place knows it, and finds the way by itself."""
     if mind.goal is not None and mind.goal.name in act.values(Slot.LANDMARK):
         mind.guiding = False
 
 
-def _alignment(mind: ParticipantMind, view: View, act: DialogueAct, rng: np.random.Generator) -> None:
+def _alignment(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
     mind.voice = mind.voice.plan_first(remark(DialogueMove.ACKNOWLEDGE, wording=Wording(topic="align")))
 
 
-def _request(mind: ParticipantMind, view: View, act: DialogueAct, rng: np.random.Generator) -> None:
+def _request(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
     if mind.goal is not None:
         mind.guiding = True
         _say_way(mind, view, DialogueMove.INSTRUCT, rng)
 
 
-_ANSWERS: dict[DialogueMove, Callable[[ParticipantMind, View, DialogueAct, np.random.Generator], None]] = {
+_ANSWERS: dict[DialogueMove, Callable[[ParticipantMind, View, DialogueAct, Heard, np.random.Generator], None]] = {
     DialogueMove.CHECK: _check,
     DialogueMove.QUERY_YN: _yes_or_no,
     DialogueMove.QUERY_W: _open_question,
