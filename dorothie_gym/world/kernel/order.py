@@ -67,23 +67,26 @@ def _is_on_followed(town: TownArrays, vehicle: Records) -> bool:
 
 
 @inlined
-def _reach_aside(town: TownArrays, vehicle: Records) -> float:
-    """How far a vehicle's outline reaches to either side of its middle, across the lane that it follows [m]."""
-    here, there = town.points[vehicle.segment], town.points[vehicle.segment + 1]
-    across = abs(vehicle.sin * (there[0] - here[0]) - vehicle.cos * (there[1] - here[1])) / (there[2] - here[2])
-    along = math.sqrt(max(1.0 - across * across, 0.0))
-    return float(0.5 * (vehicle.width * along + vehicle.length * across))
-
-
-@inlined
 def _list_beside(town: TownArrays, nodes: Records, heads: NDArray[np.int32], vehicle: Records, body: int) -> None:
     """Lists a vehicle on the lane beside into which it reaches so far that nobody passes it there."""
     lane = town.lanes[vehicle.lane]
     if lane.left < 0 and lane.right < 0:
         return
-    reach = _reach_aside(town, vehicle)
-    if abs(vehicle.own_lateral) + reach <= lane.half_width:
-        return
+    here, there = town.points[vehicle.segment], town.points[vehicle.segment + 1]
+    across = abs(vehicle.sin * (there[0] - here[0]) - vehicle.cos * (there[1] - here[1]))
+    apart = there[2] - here[2]
+    free = lane.half_width - abs(vehicle.own_lateral) - 0.5 * vehicle.width
+    if 0.5 * vehicle.length * across > free * apart:  # else it is within its lane, as nearly always
+        _list_astride(town, nodes, heads, vehicle, body, across / apart)
+
+
+@compiled
+def _list_astride(
+    town: TownArrays, nodes: Records, heads: NDArray[np.int32], vehicle: Records, body: int, turned: float
+) -> None:
+    """See `_list_beside`; `turned` is the sine of the vehicle's angle to its lane."""
+    reach = 0.5 * (vehicle.width * math.sqrt(max(1.0 - turned * turned, 0.0)) + vehicle.length * turned)
+    lane = town.lanes[vehicle.lane]
     for side in (lane.left, lane.right):
         if side < 0:
             continue

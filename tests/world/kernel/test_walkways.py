@@ -40,11 +40,11 @@ def test_lanes_cross_every_crosswalk_where_people_walk_over_it(name):
     for lane, record in zip(town.lanes, arrays.lanes, strict=True):
         for passage in arrays.passages[record.passage : record.passage + record.passages]:
             x, y = lane.position(float(passage.start + passage.stop) / 2)
-            assert 0.4 < passage.stop - passage.start < 25.0
+            assert 0.0 <= passage.start <= passage.stop < passage.start + 25.0
             crossing = arrays.crossings[passage.crossing]
             across = (x - crossing.x[0]) * crossing.cos + (y - crossing.y[0]) * crossing.sin
             assert passage.across == pytest.approx(across, abs=1.0)
-            assert abs((y - crossing.y[0]) * crossing.cos - (x - crossing.x[0]) * crossing.sin) < 1.0
+            assert abs((y - crossing.y[0]) * crossing.cos - (x - crossing.x[0]) * crossing.sin) < 1.5  # half its depth
 
 
 @pytest.mark.parametrize("name", TOWNS)
