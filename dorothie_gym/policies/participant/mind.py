@@ -110,6 +110,7 @@ class ParticipantMind:
         nudged_at: when the car was last told to go a bit further [s].
         blocked: places that cannot be passed.
         standing_since: since when the car has been standing [s].
+        stood_since: when the car was last seen to move [s].
         heard_at: when the car last spoke [s].
         excused_until: until when a standing car is not asked about [s].
         asked_at: when it was last asked [s].
@@ -150,6 +151,7 @@ class ParticipantMind:
     nudged_at: float = -math.inf
     blocked: tuple[Place, ...] = ()
     standing_since: float | None = 0.0
+    stood_since: float = 0.0
     heard_at: float = 0.0
     excused_until: float = 0.0
     asked_at: float = -math.inf

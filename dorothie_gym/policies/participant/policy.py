@@ -23,6 +23,9 @@ from dorothie_gym.spaces import ActionDict, ParticipantAction, SpaceLimits
 from dorothie_gym.world.town import Town
 from dorothie_gym.world.town.lights import LightColour
 
+LONGEST_RED = 60.0
+"""A car that has been standing for longer than this does not stand because of a light [s]."""
+
 NEARLY_THERE = 45.0
 """A car that has been stopped this near to the place does not stand because of a light [m]."""
 
@@ -64,7 +67,7 @@ class ScriptedParticipant(Policy[ParticipantMind]):
         if view.turning and mind.standing_since is not None and view.time - mind.standing_since > 4.0:
             view = replace(view, turning=False)  # it does not go on turning by itself
         if not view.standing:
-            mind.standing_since = None
+            mind.standing_since, mind.stood_since = None, view.time
         elif mind.standing_since is None:
             mind.standing_since = view.time
         _excuse_at_light(mind, view)
@@ -90,7 +93,7 @@ def _excuse_at_light(mind: ParticipantMind, view: View) -> None:
         and mind.journey.left(view.station) < NEARLY_THERE
         and mind.journey.next_crossing(mind.town, view.station) is None
     )
-    if not view.standing or last_stretch:
+    if not view.standing or last_stretch or view.time - mind.stood_since > LONGEST_RED:
         return
     if light_ahead(mind.town, view.lane, view.station, view.time) in (None, LightColour.GREEN):
         return
