@@ -80,7 +80,8 @@ class ScriptedParticipant(Policy[ParticipantMind]):
         watch(mind, view)
         guide(mind, view, rng)
         react(mind, view, rng)
-        speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng, scene_of(mind, view))
+        scene = None if mind.voice.idle else scene_of(mind, view)
+        speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng, scene)
         mind.speed_before = view.speed
         return ParticipantAction(speech=speech).encode(self.limits), mind
 
