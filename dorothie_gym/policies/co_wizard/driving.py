@@ -42,7 +42,7 @@ UNLESS_TOLD = 24.0
 PAUSE_BEFORE = 8.0
 """A car that does not know the way stops this far before a junction [m]."""
 
-GENTLE = 25
+GENTLE = 20
 """Speed at which the car comes up to a place [km/h]."""
 
 EASE_WITHIN = 40.0

@@ -78,7 +78,7 @@ class Style:
             mishears=float(rng.uniform(0.0, 0.04)),
             careful=float(rng.uniform(0.4, 1.0)),
             eases=bool(rng.random() < 0.4),
-            rambles=float(rng.uniform(0.1, 0.5)),
+            rambles=float(rng.uniform(0.05, 0.45)),
             pace=int(rng.choice((30, 35, 40))),
             chats=float(rng.uniform(0.1, 0.6)),
         )

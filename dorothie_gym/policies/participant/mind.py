@@ -72,7 +72,7 @@ class Style:
             patience=float(rng.uniform(7.0, 14.0)),
             chat=float(rng.uniform(30.0, 90.0)),
             waits=float(rng.uniform(0.7, 1.0)),
-            hints=float(rng.uniform(0.05, 0.45)),
+            hints=float(rng.uniform(0.1, 0.55)),
             reasons=float(rng.uniform(0.05, 0.45)),
             aligns=float(rng.uniform(0.0, 0.15)),
             nods=float(rng.uniform(0.4, 0.9)),
