@@ -300,6 +300,8 @@ def _close(mind: CoWizardMind, view: View) -> bool:
 
 
 def _comfort(mind: CoWizardMind, view: View) -> Physical | None:
+    if mind.speed < mind.usual and view.time > mind.slow_until and not mind.creeping:
+        mind.speed = mind.usual
     wanted = min(mind.speed, GENTLE) if _close(mind, view) or _turns_soon(mind, view) else mind.speed
     if abs(view.cruise - wanted) > 2.6:
         return Physical(action=PhysicalAction.SPEED_CHANGE, up=view.cruise < wanted)

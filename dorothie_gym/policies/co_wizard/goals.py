@@ -102,7 +102,7 @@ def hear_goal(
         values: list[SlotValue] = [name]
         if streets and rng.random() < mind.style.echoes:
             values.append(mark.street)
-        move = DialogueMove.CONFIRM if rng.random() < 0.4 else DialogueMove.ACKNOWLEDGE
+        move = DialogueMove.CONFIRM if rng.random() < 0.5 else DialogueMove.ACKNOWLEDGE
         mind.voice = mind.voice.plan(remark(move, *values), *musing(mind, rng, joined=True))
 
 

@@ -46,6 +46,9 @@ SLOW = 25
 OPEN_ROAD = 20
 """A lower speed is for the moment only [km/h]."""
 
+MOMENT = 25.0
+"""So long a speed for the moment only is kept [s]."""
+
 _UNNAMED = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
 
 
@@ -207,6 +210,7 @@ def _do_speed(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) ->
     mind.speed = min(max(5 * round(mind.speed / 5), 10), 60)
     if mind.speed >= OPEN_ROAD:
         mind.usual = mind.speed
+    mind.slow_until = view.time + MOMENT
 
 
 def _do_lights(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> None:

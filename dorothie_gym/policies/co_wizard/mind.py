@@ -76,7 +76,7 @@ class Style:
             asks=float(rng.uniform(0.6, 1.0)),
             proposes=float(rng.uniform(0.1, 0.6)),
             mishears=float(rng.uniform(0.0, 0.04)),
-            careful=float(rng.uniform(0.2, 0.9)),
+            careful=float(rng.uniform(0.4, 1.0)),
             eases=bool(rng.random() < 0.4),
             rambles=float(rng.uniform(0.05, 0.45)),
             pace=int(rng.choice((30, 35, 40))),
@@ -131,6 +131,7 @@ class CoWizardMind:
         nudge: place to go on to and stop at again.
         creeping: whether the place is close and its guess is carried along.
         speed: cruise speed aimed at [km/h].
+        slow_until: until when a speed for the moment only is kept [s].
         usual: cruise speed on open road, as told last [km/h].
         not_there: places of houses and people that were done with, or that were not the ones meant.
         lights: lights aimed at, None if nothing was said.
@@ -178,6 +179,7 @@ class CoWizardMind:
     nudge: Place | None = None
     creeping: bool = False
     speed: int = USUAL_SPEED
+    slow_until: float = math.inf
     usual: int = USUAL_SPEED
     not_there: tuple[Place, ...] = ()
     lights: bool | None = None

@@ -74,7 +74,8 @@ class ScriptedCoWizard(Policy[CoWizardMind]):
         physical = drive(mind, view)
         tell_action(mind, view, physical, rng)
         speak_up(mind, view, rng)
-        speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng, scene_of(mind, view))
+        scene = None if mind.voice.idle else scene_of(mind, view)
+        speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng, scene)
         return CoWizardAction(speech=speech, physical=physical, mental=_next_note(mind)).encode(self.limits), mind
 
 

@@ -35,7 +35,7 @@ def take_up(mind: CoWizardMind, action: ActionValue, words: Heard, rng: np.rando
     elif rng.random() < mind.style.echoes:
         mind.voice = mind.voice.plan(*_repeated(action, wording, rng))
     else:
-        move = DialogueMove.CONFIRM if rng.random() < 0.4 else DialogueMove.ACKNOWLEDGE
+        move = DialogueMove.CONFIRM if rng.random() < 0.5 else DialogueMove.ACKNOWLEDGE
         mind.voice = mind.voice.plan(remark(move), *musing(mind, rng, joined=True))
 
 

@@ -70,9 +70,9 @@ class Style:
             names_street=float(rng.uniform(0.1, 0.7)),
             hurries=float(rng.uniform(0.1, 0.8)),
             patience=float(rng.uniform(7.0, 14.0)),
-            chat=float(rng.uniform(40.0, 120.0)),
+            chat=float(rng.uniform(30.0, 90.0)),
             waits=float(rng.uniform(0.7, 1.0)),
-            hints=float(rng.uniform(0.0, 0.35)),
+            hints=float(rng.uniform(0.1, 0.55)),
             reasons=float(rng.uniform(0.05, 0.45)),
             aligns=float(rng.uniform(0.0, 0.15)),
             nods=float(rng.uniform(0.4, 0.9)),
@@ -110,6 +110,7 @@ class ParticipantMind:
         nudged_at: when the car was last told to go a bit further [s].
         blocked: places that cannot be passed.
         standing_since: since when the car has been standing [s].
+        stood_since: when the car was last seen to move [s].
         heard_at: when the car last spoke [s].
         excused_until: until when a standing car is not asked about [s].
         asked_at: when it was last asked [s].
@@ -150,6 +151,7 @@ class ParticipantMind:
     nudged_at: float = -math.inf
     blocked: tuple[Place, ...] = ()
     standing_since: float | None = 0.0
+    stood_since: float = 0.0
     heard_at: float = 0.0
     excused_until: float = 0.0
     asked_at: float = -math.inf

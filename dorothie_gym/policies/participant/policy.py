@@ -23,6 +23,9 @@ from dorothie_gym.spaces import ActionDict, ParticipantAction, SpaceLimits
 from dorothie_gym.world.town import Town
 from dorothie_gym.world.town.lights import LightColour
 
+LONGEST_RED = 60.0
+"""A car that has been standing for longer than this does not stand because of a light [s]."""
+
 NEARLY_THERE = 45.0
 """A car that has been stopped this near to the place does not stand because of a light [m]."""
 
@@ -64,7 +67,7 @@ class ScriptedParticipant(Policy[ParticipantMind]):
         if view.turning and mind.standing_since is not None and view.time - mind.standing_since > 4.0:
             view = replace(view, turning=False)  # it does not go on turning by itself
         if not view.standing:
-            mind.standing_since = None
+            mind.standing_since, mind.stood_since = None, view.time
         elif mind.standing_since is None:
             mind.standing_since = view.time
         _excuse_at_light(mind, view)
@@ -77,7 +80,8 @@ class ScriptedParticipant(Policy[ParticipantMind]):
         watch(mind, view)
         guide(mind, view, rng)
         react(mind, view, rng)
-        speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng, scene_of(mind, view))
+        scene = None if mind.voice.idle else scene_of(mind, view)
+        speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng, scene)
         mind.speed_before = view.speed
         return ParticipantAction(speech=speech).encode(self.limits), mind
 
@@ -90,7 +94,7 @@ def _excuse_at_light(mind: ParticipantMind, view: View) -> None:
         and mind.journey.left(view.station) < NEARLY_THERE
         and mind.journey.next_crossing(mind.town, view.station) is None
     )
-    if not view.standing or last_stretch:
+    if not view.standing or last_stretch or view.time - mind.stood_since > LONGEST_RED:
         return
     if light_ahead(mind.town, view.lane, view.station, view.time) in (None, LightColour.GREEN):
         return

@@ -157,7 +157,7 @@ def _topics(mind: ParticipantMind, view: View, rng: np.random.Generator) -> list
         found.append((remark(DialogueMove.QUERY_W, ActionValue.QUERIED),))
         found.append((remark(DialogueMove.CHECK, mind.goal.name),))
         found.append((remark(DialogueMove.QUERY_YN, mind.goal.name),))
-        if rng.random() < 0.5 and not mind.hurried and not mind.slowed and view.speed > 5.0:
+        if rng.random() < 0.3 and not mind.hurried and not mind.slowed and view.speed > 5.0:
             faster = Wording(faster=True, speed=USUAL + 5.0 if rng.random() < 0.5 else None)
             mind.hurried = True
             return [(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=faster),)]

@@ -107,7 +107,8 @@ def _more(mind: ParticipantMind, rng: np.random.Generator) -> tuple[Remark, ...]
 def _refuse_with_step(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     step = next_step(mind, view, DialogueMove.INSTRUCT, rng)
     refusal = remark(DialogueMove.REPLY_N)
-    if step is None:
+    if step is None or view.time - mind.stopped_at < JUST_TOLD or (step[0][0] == "on" and step[1] < NEAR):
+        # it is to stop here, or right ahead, and is told so
         mind.voice = mind.voice.plan_first(refusal)
         return
     key, _, words = step
