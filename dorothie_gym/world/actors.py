@@ -55,6 +55,8 @@ class Actors:
         self._road, self._town_arrays, self._town = road, town, road.network.town
         self._bodies = Bodies(road, self)
         self._rng = np.random.default_rng(seed)
+        self._present_of: WorldArrays | None = None
+        self._present = np.zeros(0, dtype=np.bool_)
 
     @property
     def vehicles(self) -> list[TrafficVehicle]:
@@ -69,7 +71,16 @@ class Actors:
     @property
     def props(self) -> list[Prop]:
         """Things placed by the Ad-Wizard, in the order in which they came."""
+        if not self.has_props:
+            return []
         return sorted(self._bodies.props(), key=lambda prop: int(prop.key))
+
+    @property
+    def has_props(self) -> bool:
+        """Whether there is any prop."""
+        if self._present_of is not self.arrays:
+            self._present_of, self._present = self.arrays, self.arrays.props.view(np.ndarray)["present"]
+        return bool(self._present.any())
 
     # --- coming and going -------------------------------------------------------------------------------------------
 

@@ -16,7 +16,7 @@ from dorothie_gym.world.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
 from dorothie_gym.world.kernel import WorldArrays, empty_world, step, town_arrays
 from dorothie_gym.world.kernel.editing import add_car
 from dorothie_gym.world.kernel.parameters import FRAMES
-from dorothie_gym.world.kernel.records import TRACE, EventCode, plain
+from dorothie_gym.world.kernel.records import EventCode, plain
 from dorothie_gym.world.kernel.seeing import look_around
 from dorothie_gym.world.localizer import Localizer
 from dorothie_gym.world.network.network import TownNetwork
@@ -27,8 +27,6 @@ from dorothie_gym.world.town.model import Array, Town
 from dorothie_gym.world.visibility import Visibility
 from dorothie_gym.world.weather import Weather
 from dorothie_gym.world.wind import Wind
-
-_POSE = [TRACE.index(name) for name in ("x", "y", "heading", "speed", "height", "turning")]
 
 FAULT_SECONDS = 30.0
 """A sensor fault ends by itself after this long [s] (design)."""
@@ -122,7 +120,7 @@ class World:
         parts = [self._run(min(FRAMES, frames - first)) for first in range(0, frames, FRAMES)]
         trace = parts[0] if len(parts) == 1 else np.concatenate(parts)
         self.frames, self.offsets = trace[:, : len(FRAME_COLUMNS)], trace[:, -1]
-        poses[1:] = trace[:, _POSE]
+        poses[1:, :4], poses[1:, 4:] = trace[:, 1:5], trace[:, 9:11]  # by columns of `TRACE`, as in `kernel.rules`
         self.localizer.localize(poses, self.frame - frames, gps_from=self.faults.get(Sensor.GPS, 0))
         if self.faults:
             self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
@@ -223,7 +221,7 @@ class World:
 
     def _props_seen(self) -> tuple[tuple[float, float, float], ...]:
         """Where the props are that the car perceives: x, y and height [m]."""
-        if not self.actors.arrays.props.view(np.ndarray)["present"].any():
+        if not self.actors.has_props:
             return ()
         return tuple((body.x, body.y, body.height) for body in self.perceived() if body.kind is ObjectClass.STATIC)
 

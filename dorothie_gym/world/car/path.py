@@ -161,6 +161,7 @@ class Path:
             self.headings[-1] = segment[-1] + rate * (self.s[-1] - middle[-1])
         self.curvatures = np.gradient(self.headings, self.s)
         self._s = self.s.tolist()
+        self._asked, self._answer = math.nan, 0
         self._x, self._y = self.points[:, 0].tolist(), self.points[:, 1].tolist()
         self._headings = self.headings.tolist()
 
@@ -171,7 +172,9 @@ class Path:
 
     def index_at(self, s: float) -> int:
         """Number of the point at or before a distance along the path."""
-        return min(max(bisect_right(self._s, s) - 1, 0), len(self._s) - 1)
+        if s != self._asked:  # most ask where the car is, one after the other
+            self._asked, self._answer = s, min(max(bisect_right(self._s, s) - 1, 0), len(self._s) - 1)
+        return self._answer
 
     def project(self, x: float, y: float, near: float, window: float = 6.0) -> tuple[float, float]:
         """Closest place of the path to a position, looked for around a known place.
