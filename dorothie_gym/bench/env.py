@@ -31,8 +31,6 @@ ENV, STOCK, SUMO = "DuoWizardEnv", "intersection-v0", "SUMO"
 
 WITHOUT_SUMO = "SUMO is not installed; pip install 'dorothie-gym[sumo]' brings it"
 
-_CLOCKS: dict[str, Callable[[], float]] = {"cpu": time.process_time, "wall": time.perf_counter}
-
 
 class Session:
     """A session in which nobody does anything: three agents are observed in full, and the car follows its road.

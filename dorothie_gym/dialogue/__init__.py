@@ -1,5 +1,6 @@
 """Talk: utterances and their timing, exchanges, wording of acts and understanding of words."""
 
+from dorothie_gym.dialogue.annotation import Annotator
 from dorothie_gym.dialogue.conversation import Conversation
 from dorothie_gym.dialogue.directions import Turn
 from dorothie_gym.dialogue.exchanges import EXPECTATIONS, PATIENCE, Exchange, ExchangeState, ExchangeTracker
@@ -19,6 +20,7 @@ __all__ = [
     "PATIENCE",
     "SHORTEST_SPAN",
     "WORDS_PER_SECOND",
+    "Annotator",
     "Channel",
     "Conversation",
     "Direction",

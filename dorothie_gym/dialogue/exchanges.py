@@ -78,7 +78,7 @@ class Exchange:
         start: start of its first utterance [s].
         end: end of its last utterance [s].
         state: open, fulfilled or abandoned.
-        unprompted: whether it began with a response (or irrelevant talk) that nothing had asked for.
+        unprompted: whether it began with a response that nothing had asked for, the first words of all.
         acts: number of acts in it.
         confused: whether the other side has not understood and the initiator has to repair.
         asked_back: whether the other side has checked, or objected to, what it was told: the initiator has to answer.
@@ -129,18 +129,18 @@ class ExchangeTracker:
         self.exchanges: list[Exchange] = []
         self._waiting: dict[int, Exchange] = {}  # those that are open, by their ids
 
-    def update(self, utterance: Utterance) -> tuple[int, ...]:
+    def update(self, utterance: Utterance) -> tuple[int | None, ...]:
         """Places every act of a delivered utterance.
 
         Args:
             utterance: heard to its end; utterances come in the order of delivery.
 
         Returns:
-            The id of an exchange for each act, in order.
+            The id of an exchange for each act, in order; None for irrelevant talk outside of any.
         """
         opened: Exchange | None = None
         answered: Exchange | None = None
-        ids = []
+        ids: list[int | None] = []
         for act in utterance.acts:
             move = act.move
             if move is DialogueMove.EXPLAIN and answered is not None and opened is None:
@@ -148,7 +148,11 @@ class ExchangeTracker:
             elif move in EXPECTATIONS:
                 exchange = opened = self._initiate(utterance, move, opened)
             else:
-                exchange = answered = self._respond(utterance, move)
+                found = answered = self._respond(utterance, move)
+                if found is None:
+                    ids.append(None)
+                    continue
+                exchange = found
             exchange.acts += 1
             exchange.end = max(exchange.end, utterance.end)
             ids.append(exchange.id)
@@ -191,13 +195,16 @@ class ExchangeTracker:
                 return exchange
         return None
 
-    def _respond(self, utterance: Utterance, move: DialogueMove) -> Exchange:
+    def _respond(self, utterance: Utterance, move: DialogueMove) -> Exchange | None:
         exchange = self._awaiting(utterance, move)
         if exchange is not None:
             self._settle(exchange, utterance.speaker, move)
             return exchange
         last = self.exchanges[-1] if self.exchanges else None
-        if last is not None and utterance.start - last.end <= self.patience:
+        recent = last is not None and utterance.start - last.end <= self.patience
+        if move is DialogueMove.IRRELEVANT:
+            return last if recent else None
+        if last is not None:  # late, but there is nothing else that it could be about
             return last
         exchange = self._begin(utterance, move)
         exchange.unprompted = True

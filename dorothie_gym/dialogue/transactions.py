@@ -56,22 +56,23 @@ class TransactionTracker:
         self._current: Transaction | None = None
         self._by_exchange: dict[int, Transaction] = {}
 
-    def update(self, utterance: Utterance, exchanges: tuple[int, ...]) -> int:
+    def update(self, utterance: Utterance, exchanges: tuple[int | None, ...]) -> int:
         """Places a delivered utterance.
 
         Args:
             utterance: heard to its end; utterances come in the order of delivery.
-            exchanges: id of the exchange of each of its acts.
+            exchanges: id of the exchange of each of its acts, None for one that is in none.
 
         Returns:
             The id of its transaction.
         """
         aim = self._aim(utterance.acts)
+        placed = tuple(exchange for exchange in exchanges if exchange is not None)
         if aim is None:
-            transaction = self._unaimed(utterance.acts, exchanges)
+            transaction = self._unaimed(utterance.acts, placed)
         else:
             transaction = self._aimed(*aim)
-        for exchange in exchanges:
+        for exchange in placed:
             self._by_exchange.setdefault(exchange, transaction)
         return transaction.id
 

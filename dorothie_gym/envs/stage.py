@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from dorothie_gym.dialogue import Conversation, ExchangeTracker, Span, Utterance, guess_spans, word_act
+from dorothie_gym.dialogue import Annotator, Conversation, Span, Utterance, guess_spans, word_act
 from dorothie_gym.envs.adversary import Adversary
 from dorothie_gym.envs.beliefs import Beliefs
 from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.envs.headers import header_of
 from dorothie_gym.envs.masks import Masks
 from dorothie_gym.envs.prospect import Prospect
 from dorothie_gym.envs.scenario import Scenario
@@ -94,7 +94,9 @@ class Stage:
         self.beliefs = Beliefs(town, scenario)
         self._adversary = Adversary(self.world, self.task, limits.props)
         self._conversation = Conversation(config.words_per_second, limits.spans)
-        self._exchanges = ExchangeTracker()
+        self._annotator = Annotator(
+            scenario.storyboard.landmarks[subgoal.landmark].name for subgoal in scenario.storyboard.subgoals
+        )
         self._words = np.random.default_rng(word_seed)
         prospect = Prospect(self.world)
         self._views = Views(self.world, scenario, self.task, self.beliefs, limits, config.observe_acts, prospect)
@@ -268,19 +270,20 @@ class Stage:
 
     def _log_subgoal(self, i: int, cause: str) -> None:
         landmark = self.scenario.storyboard.landmarks[self.task.landmark_of(i)]
-        data = {"subgoal": i, "landmark": landmark.name.label, "status": self.task.status(i).label, "cause": cause}
+        status = self.task.status(i)
+        self._annotator.note(landmark.name, status)
+        data = {"subgoal": i, "landmark": landmark.name.label, "status": status.label, "cause": cause}
         self._log(EventType.SUBGOAL, Role.AGENT, data)
 
     def _new_moment(self, utterances: list[Utterance], message: str) -> Moment:
         heard: dict[Role, Utterance] = {}
         for utterance in utterances:
-            exchanges = self._exchanges.update(utterance)
             heard[utterance.speaker] = utterance
             self.said.append(utterance)
             self.beliefs.hear(utterance.speaker, self._understood(utterance))
-            self._log_utterance(utterance, exchanges)
+            self._log_utterance(utterance)
         now = self.world.time
-        self._exchanges.tick(now)
+        self._annotator.tick(now)
         speaking = {role: self._conversation.speaking(role, now) for role in ROLES}
         return Moment(heard=heard, message=message, speaking=speaking)
 
@@ -290,7 +293,8 @@ class Stage:
             return utterance.acts
         return tuple(span.act for span in guess_spans(utterance.text))
 
-    def _log_utterance(self, utterance: Utterance, exchanges: tuple[int, ...]) -> None:
+    def _log_utterance(self, utterance: Utterance) -> None:
+        exchanges, transaction = self._annotator.update(utterance)
         number = self.counts["utterances"]
         self.counts["utterances"] += 1
         for span, exchange in zip(utterance.spans, exchanges, strict=True):
@@ -302,6 +306,7 @@ class Stage:
                 "move": span.act.move.label,
                 "slots": {label: list(values) for label, values in span.act.slot_labels().items()},
                 "exchange": exchange,
+                "transaction": transaction,
                 "start": round(utterance.start, 3),
                 "end": round(utterance.end, 3),
             }
@@ -350,40 +355,7 @@ class Stage:
 
     def header(self) -> SessionHeader:
         """What is known of the session before it begins."""
-        storyboard = self.scenario.storyboard
-        return SessionHeader(
-            town=self.world.town.name,
-            storyboard=storyboard.name,
-            seed=self.scenario.seed,
-            decision_frequency=self.config.decision_frequency,
-            street_names=[name.label for name in self.scenario.street_names],
-            landmarks=[
-                {
-                    "name": landmark.name.label,
-                    "lane": landmark.lane,
-                    "station": landmark.station,
-                    "x": landmark.position[0],
-                    "y": landmark.position[1],
-                    "street": landmark.street,
-                    "hidden": landmark.hidden,
-                }
-                for landmark in storyboard.landmarks
-            ],
-            subgoals=[
-                {
-                    "description": subgoal.description,
-                    "landmark": subgoal.landmark,
-                    "after": subgoal.after,
-                    "trigger": subgoal.trigger,
-                    "delete": subgoal.delete,
-                    "change": subgoal.change,
-                }
-                for subgoal in storyboard.subgoals
-            ],
-            story=storyboard.story,
-            departure=self.scenario.departure,
-            config=asdict(self.config),
-        )
+        return header_of(self.scenario, self.world.town.name, self.config)
 
     def summary(self) -> dict[str, Any]:
         """How the session stands: success, subgoals, counts."""
@@ -395,5 +367,7 @@ class Stage:
             "infractions": self.infractions,
             "seconds": round(self.world.time, 3),
             **self.counts,
+            "exchanges": len(self._annotator.exchanges),
+            "transactions": len(self._annotator.transactions),
             **(self._outcome or {}),
         }

@@ -107,8 +107,7 @@ def test_a_response_to_nothing_joins_the_last_exchange_or_stands_unprompted():
     assert tracker.exchanges[0].unprompted
     assert tracker.exchanges[0].state is ExchangeState.FULFILLED
     assert tracker.update(said(C, 5.0, M.ACKNOWLEDGE)) == (0,)
-    assert tracker.update(said(C, 30.0, M.REPLY_Y)) == (1,)
-    assert tracker.exchanges[1].unprompted
+    assert tracker.update(said(C, 30.0, M.REPLY_Y)) == (0,)
 
 
 def test_irrelevant_talk_disturbs_no_exchange():
@@ -116,6 +115,14 @@ def test_irrelevant_talk_disturbs_no_exchange():
     tracker.update(said(C, 0.0, M.QUERY_W))
     assert tracker.update(said(P, 2.0, M.IRRELEVANT)) == (0,)
     assert tracker.exchanges[0].state is ExchangeState.OPEN
+
+
+def test_irrelevant_talk_after_a_silence_is_in_no_exchange():
+    tracker = ExchangeTracker()
+    assert tracker.update(said(P, 0.0, M.IRRELEVANT)) == (None,)
+    tracker.update(said(C, 5.0, M.QUERY_W))
+    assert tracker.update(said(P, 60.0, M.IRRELEVANT)) == (None,)
+    assert tracker.update(said(P, 70.0, M.INSTRUCT)) == (1,)
 
 
 def test_patience_must_be_positive():

@@ -28,10 +28,6 @@ from dorothie_gym.sessions.sdn.rows import frame_of, number_of, plain, read_csv,
 
 _PROP: Final = ("id", "x", "y", "z", "pitch", "yaw", "roll")
 _AREA: Final = ("x0", "x1", "y0", "y1")
-_PLAN_FIELDS: Final = (
-    ("junctions", MentalAction.PLAN_UPDATE, plan_of),
-    ("objective", MentalAction.GOAL_UPDATE, goals_of),
-)
 MESSAGE_TYPES: Final = ("message", "messages", "msg", "send_message")
 
 

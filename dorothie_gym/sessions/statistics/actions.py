@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from dorothie_gym.ontology import PhysicalAction, Role
-from dorothie_gym.sessions.events import EventType
 from dorothie_gym.sessions.records import ActionRecord
 from dorothie_gym.sessions.session import Session
 
@@ -33,8 +32,3 @@ def effective_actions(session: Session) -> Iterator[ActionRecord]:
                 continue
             last = action.action
         yield action
-
-
-def hazard_stops(session: Session) -> int:
-    """Returns how often the car stopped by itself."""
-    return len(session.of_type(EventType.HAZARD_STOP))

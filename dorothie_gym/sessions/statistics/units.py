@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from dorothie_gym.dialogue.exchanges import EXPECTATIONS, Exchange, ExchangeTracker
-from dorothie_gym.dialogue.transactions import TransactionTracker
+from dorothie_gym.dialogue.annotation import Annotator
+from dorothie_gym.dialogue.exchanges import EXPECTATIONS, Exchange
 from dorothie_gym.dialogue.utterances import Span, Utterance
 from dorothie_gym.ontology import GoalStatus, LandmarkName, OntologyError, Role, parse_goal_status, parse_landmark
 from dorothie_gym.sessions.events import Event, EventType
@@ -89,29 +89,27 @@ class Units:
             self._exchange = {move.index: move.exchange for move in moves if move.exchange is not None}
         if people and any(move.transaction is not None for move in moves):
             self._transaction = {move.index: move.transaction for move in moves if move.transaction is not None}
-        exchanges = ExchangeTracker()
-        transactions = TransactionTracker(goals_of(self.session))
+        annotator = Annotator(goals_of(self.session))
         period = 1.0 / self.session.header.decision_frequency
         place_exchanges, place_transactions = not self._exchange, not self._transaction
         for item in _in_order(self.session, self.utterances):
             if isinstance(item, Event):
                 changed = subgoal_of(item)
                 if changed is not None:
-                    transactions.note(*changed)
+                    annotator.note(*changed)
                 continue
             utterance = _spoken(item)
             # As in a session: exchanges were given up at the decisions before the one at which this was heard.
-            exchanges.tick(item.moves[0].frame / FRAME_RATE - period)
-            ids = exchanges.update(utterance)
-            transaction = transactions.update(utterance, ids)
+            annotator.tick(item.moves[0].frame / FRAME_RATE - period)
+            ids, transaction = annotator.update(utterance)
             for move, exchange in zip(item.moves, ids, strict=True):
-                if place_exchanges:
+                if place_exchanges and exchange is not None:
                     self._exchange[move.index] = exchange
                 if place_transactions:
                     self._transaction[move.index] = transaction
-        exchanges.tick(float("inf"))
+        annotator.tick(float("inf"))
         if place_exchanges:
-            self.states = {exchange.id: exchange for exchange in exchanges.exchanges}
+            self.states = {exchange.id: exchange for exchange in annotator.exchanges}
 
 
 def is_initiating(move: MoveRecord) -> bool:

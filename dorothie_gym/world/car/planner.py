@@ -116,14 +116,6 @@ class LocalPlanner:
         """Whether the car is off the centre lines: switching or turning round."""
         return bool(self.path.manoeuvre[self.path.index_at(self.s)])
 
-    def sweep(self) -> list[tuple[float, float]]:
-        """Places (x, y) that a car that is turning round has still to pass, every 2 m or so; else none."""
-        k = self.path.index_at(self.s)
-        if self._manoeuvre is not PhysicalAction.U_TURN or not self.path.manoeuvre[k] or self.s < BEGUN:
-            return []  # also while it waits for a gap: others go first
-        rest = self.path.points[k:][self.path.manoeuvre[k:]][::SWEEP_STEP]
-        return [(float(x), float(y)) for x, y in rest]
-
     @property
     def manoeuvre_end(self) -> float:
         """Where along the path the manoeuvre is over [m]."""

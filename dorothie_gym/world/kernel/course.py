@@ -111,10 +111,3 @@ def take_lanes(town: TownArrays, world: WorldArrays, vehicle: Records) -> None:
         for k in range(vehicle.planned):
             vehicle.plan[k] = car.run_lane[r + k]
         locate(town, vehicle)
-
-
-@inlined
-def place_on_lane(world: WorldArrays) -> float:
-    """How far along its lane the car is, by the path [m]."""
-    point, car = world.path[world.car[0].at], world.car[0]
-    return float(point.station if point.manoeuvre else point.station + (car.s - point.s))

@@ -2,6 +2,7 @@
 
 from dorothie_gym.world.town.catalogue import SEEN_TOWNS, UNSEEN_TOWNS, fold_of, load_town, town_names
 from dorothie_gym.world.town.describe import describe
+from dorothie_gym.world.town.errors import TownError
 from dorothie_gym.world.town.lights import LightColour, LightPhase, LightProgramme
 from dorothie_gym.world.town.model import (
     NO_JUNCTION,
@@ -18,7 +19,6 @@ from dorothie_gym.world.town.model import (
     Site,
     Street,
     Town,
-    TownError,
 )
 
 __all__ = [

@@ -6,7 +6,8 @@ from functools import lru_cache
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from dorothie_gym.world.town.model import Town, TownError
+from dorothie_gym.world.town.errors import TownError
+from dorothie_gym.world.town.model import Town
 from dorothie_gym.world.town.store import through_cache
 
 SEEN_TOWNS: tuple[str, ...] = ("midtown", "millbrook", "northgate")

@@ -265,17 +265,6 @@ class Sidewalk:
     street: int = NO_STREET
 
 
-class TownError(ValueError):
-    """A map cannot be read: names the file, the element and the reason."""
-
-    def __init__(self, source: str, element: str, reason: str) -> None:
-        super().__init__(source, element, reason)  # as they are, so that it can be copied and sent to other processes
-        self.source, self.element, self.reason = source, element, reason
-
-    def __str__(self) -> str:
-        return f"{self.source}: {self.element}: {self.reason}"
-
-
 def wrap_degrees(angle: float) -> float:
     """The same angle in [-180, 180) [degrees]."""
     return (angle + 180.0) % 360.0 - 180.0

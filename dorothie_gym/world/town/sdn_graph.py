@@ -21,9 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.world.town.errors import TownError
 from dorothie_gym.world.town.graph import EDGE_TYPES, END, LANE_ID, LENGTH, START, EdgeType, LaneGraph
 from dorothie_gym.world.town.junction_graph import GraphStreet, JunctionGraph, first_street
-from dorothie_gym.world.town.model import NO_JUNCTION, TownError
+from dorothie_gym.world.town.model import NO_JUNCTION
 from dorothie_gym.world.town.sdn_repair import repair
 
 _LOCATION, _ROTATION = ("x", "y", "z"), ("pitch", "yaw", "roll")

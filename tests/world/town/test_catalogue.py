@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from dorothie_gym.world.town.catalogue import load_town, town_names
-from dorothie_gym.world.town.model import TownError
+from dorothie_gym.world.town.errors import TownError
 
 LOOP = """\
 junctions: {a: [0, 0], b: [100, 0]}

@@ -10,7 +10,8 @@ import networkx as nx
 import pytest
 import yaml
 
-from dorothie_gym.world.town.model import SignalKind, Town, TownError
+from dorothie_gym.world.town.errors import TownError
+from dorothie_gym.world.town.model import SignalKind, Town
 from dorothie_gym.world.town.yaml_town import clearance, heights, layout, ramps, read_yaml_town, schema, signs, streets
 from dorothie_gym.world.town.yaml_town import sites as site_places
 

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.world.town.model import TownError
+from dorothie_gym.world.town.errors import TownError
 from dorothie_gym.world.town.opendrive import read_opendrive
 
 from .opendrive_text import geometry, lane, opendrive, road, section, shared_map

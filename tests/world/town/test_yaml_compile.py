@@ -7,8 +7,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from dorothie_gym.world.town.check import check_town
+from dorothie_gym.world.town.errors import TownError
 from dorothie_gym.world.town.lights import LightColour
-from dorothie_gym.world.town.model import LinkType, SignalKind, Town, TownError, wrap_degrees
+from dorothie_gym.world.town.model import LinkType, SignalKind, Town, wrap_degrees
 from tests.world.town.yaml_plans import AVENUES, CIRCUS, INTERCHANGE, PAIR, compiled, street_of, ways
 
 PLANS = {"avenues": AVENUES, "circus": CIRCUS, "pair": PAIR, "interchange": INTERCHANGE}

@@ -4,7 +4,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dorothie_gym.world.town.model import LinkType, TownError
+from dorothie_gym.world.town.errors import TownError
+from dorothie_gym.world.town.model import LinkType
 from dorothie_gym.world.town.yaml_town.arms import POCKET
 from dorothie_gym.world.town.yaml_town.courses import SMALLEST_RADIUS
 from dorothie_gym.world.town.yaml_town.movements import kinds_of

@@ -10,7 +10,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dorothie_gym.world.town.model import TownError
+from dorothie_gym.world.town.errors import TownError
 from dorothie_gym.world.town.yaml_town import read_yaml_town
 from dorothie_gym.world.town.yaml_town.schema import read_plan
 from tests.world.town.yaml_mistakes import MISPLACED, WRONG, WRONG_FILES

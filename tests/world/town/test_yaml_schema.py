@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.world.town.model import TownError
+from dorothie_gym.world.town.errors import TownError
 from dorothie_gym.world.town.yaml_town import source
 from dorothie_gym.world.town.yaml_town.plan import Bend, GreenPlan, StreetPlan, TownPlan
 from dorothie_gym.world.town.yaml_town.schema import read_plan

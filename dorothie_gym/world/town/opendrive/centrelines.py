@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dorothie_gym.world.town.model import Array, TownError
+from dorothie_gym.world.town.errors import TownError
+from dorothie_gym.world.town.model import Array
 from dorothie_gym.world.town.opendrive.records import SIDEWALK, OpenDriveRecords, RoadRecord
 from dorothie_gym.world.town.opendrive.topology import SHORTEST_LANE, Topology, runs_forward
 

@@ -9,7 +9,7 @@ from typing import NoReturn, TypeAlias
 import numpy as np
 from lxml import etree
 
-from dorothie_gym.world.town.model import TownError
+from dorothie_gym.world.town.errors import TownError
 from dorothie_gym.world.town.opendrive.geometry import NO_CUBICS, Cubics
 
 # The kind of XML node that lxml calls an element; its stubs name the class with an underscore.

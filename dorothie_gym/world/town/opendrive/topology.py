@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from dorothie_gym.world.town.model import TownError
+from dorothie_gym.world.town.errors import TownError
 from dorothie_gym.world.town.opendrive.records import ConnectionRecord, OpenDriveRecords, RoadRecord
 
 # Sections shorter than this are joints, not road: they are left out and what they link is linked directly [m].

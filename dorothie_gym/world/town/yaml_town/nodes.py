@@ -10,7 +10,7 @@ from typing import NoReturn
 
 import yaml
 
-from dorothie_gym.world.town.model import TownError
+from dorothie_gym.world.town.errors import TownError
 
 _NULL, _BOOL, _MERGE = (f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "merge"))
 _PLAIN_NUMBER = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?")

@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 
 import yaml
 
-from dorothie_gym.world.town.model import TownError
+from dorothie_gym.world.town.errors import TownError
 from dorothie_gym.world.town.yaml_town.nodes import Entry
 
 LARGEST_FILE = 1_000_000
