@@ -108,6 +108,7 @@ def measure(
     stock = StockIntersection(seed)
     substeps = round(FRAME_RATE / session.env.config.decision_frequency)
     with ExitStack() as stack:
+        stack.callback(stock.close)
         works: dict[str, Callable[[], float]] = {
             ENV: lambda: session.seconds(decisions, time.process_time) / decisions,
             STOCK: partial(_stock_seconds, stock, stock_steps),
@@ -120,7 +121,6 @@ def measure(
             worker = stack.enter_context(Worker("sumo", **settings, substeps=sumo_substeps))
             worker.wait()
             works[SUMO] = lambda: worker.run() / sumo_substeps
-        stack.callback(stock.close)
         timings = in_turns(works, repeats, lambda doing, share: progress(doing, 0.7 * share))
     scaling = _two_processes(town, vehicles, pedestrians, seed, decisions, repeats, progress)
     ours, theirs = timings[ENV], timings[STOCK]

@@ -27,6 +27,9 @@ INTERSECTION = "intersection-v0"
 _IDLE = 1
 """Its action that changes nothing."""
 
+_TASTE = ("DISTANCE_WANTED", "COMFORT_ACC_MAX", "COMFORT_ACC_MIN")
+"""What it changes of `IDMVehicle`."""
+
 
 def stock_road(network: TownNetwork, world: WorldArrays) -> Road:
     """highway-env's own network, lanes and IDM vehicles where those of a world are, and nothing else.
@@ -75,12 +78,16 @@ def run_stock(road: Road, substeps: int, dt: float) -> None:
 class StockIntersection:
     """`intersection-v0` with its own settings, in which the car drives on as it is.
 
+    Its `reset` writes its taste in driving into `IDMVehicle` itself, for every road of the process; `close` puts back
+    what was there.
+
     Attributes:
         seconds_per_step: simulated time of a step [s].
         substeps_per_step: of its physics.
     """
 
     def __init__(self, seed: int = 0) -> None:
+        self._taste = {name: getattr(IDMVehicle, name) for name in _TASTE}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # that there are newer versions of it
             self._env: Any = gymnasium.make(INTERSECTION, disable_env_checker=True)
@@ -108,5 +115,7 @@ class StockIntersection:
         self._ended = bool(terminated or truncated)
 
     def close(self) -> None:
-        """Lets it go."""
+        """Lets it go, and the vehicles of other roads drive as before."""
         self._env.close()
+        for name, value in self._taste.items():
+            setattr(IDMVehicle, name, value)

@@ -7,6 +7,8 @@ import pytest
 
 from dorothie_gym.bench import env as bench
 from dorothie_gym.bench.env import WITHOUT_SUMO, Session, measure
+from highway_env.vehicle.behavior import IDMVehicle
+
 from dorothie_gym.world.stock import StockIntersection
 
 KEYS = [
@@ -63,3 +65,11 @@ def test_the_stock_intersection_begins_anew_after_an_episode() -> None:
         stock.step()
     assert stock.vehicles > 1
     stock.close()
+
+
+def test_the_stock_intersection_leaves_the_vehicles_of_other_roads_as_they_were() -> None:
+    taste = {name: value for name, value in vars(IDMVehicle).items() if name.isupper()}
+    stock = StockIntersection(seed=0)
+    assert vars(IDMVehicle)["COMFORT_ACC_MAX"] != taste["COMFORT_ACC_MAX"]
+    stock.close()
+    assert {name: value for name, value in vars(IDMVehicle).items() if name.isupper()} == taste
