@@ -4,11 +4,10 @@ import json
 import time
 
 import pytest
+from highway_env.vehicle.behavior import IDMVehicle
 
 from dorothie_gym.bench import env as bench
 from dorothie_gym.bench.env import WITHOUT_SUMO, Session, measure
-from highway_env.vehicle.behavior import IDMVehicle
-
 from dorothie_gym.world.stock import StockIntersection
 
 KEYS = [
