@@ -12,6 +12,7 @@ from dorothie_gym.world.kernel import Footway, Walk, town_arrays
 from dorothie_gym.world.places import free_places
 from dorothie_gym.world.reports import WorldEventKind
 from dorothie_gym.world.town import LinkType
+from dorothie_gym.world.town.oncoming import oncoming_lanes
 from dorothie_gym.world.world import World
 from tests.world.driving import PROPS, long_lane, network, run, world_at
 from tests.world.forcing import park
@@ -57,6 +58,23 @@ def test_car_switches_lanes_round_a_roadblock() -> None:
     run(world, 30.0, lambda: world.planner.manoeuvre[0] is None)
     assert world.planner.lane == town.neighbour(lane, LinkType.LANE_CHANGE_LEFT)
     assert world.collisions == 0
+
+
+@pytest.mark.parametrize(
+    ("beyond", "refused"), [(-20.0, False), (-12.0, True), (11.5, True), (21.0, True), (30.0, False)]
+)
+def test_car_turns_round_only_where_it_can_get_away_from_a_roadblock_beyond(beyond: float, refused: bool) -> None:
+    town = network("brookside").town
+    lane, opposite = next(
+        (lane.id, oncoming)
+        for lane in town.lanes
+        if lane.length > 90.0 and (oncoming := oncoming_lanes(town).at(lane.id, 45.0)) is not None
+    )
+    world = world_at("brookside", lane, 45.0)
+    world.actors.add_prop(PropKind.STREET_BARRIER, opposite.lane, opposite.station + beyond)
+    world.step(1)
+    reason = world.planner.command(PhysicalAction.U_TURN, 0, 0.0)
+    assert reason == ("a roadblock is too close on the oncoming lane" if refused else None)
 
 
 @pytest.mark.parametrize("speed", [0.0, 3.0, 8.0])

@@ -14,7 +14,7 @@ from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.world.car.hazards import HEIGHT_MARGIN
 from dorothie_gym.world.car.lanes import HORIZON, LEAD, MIN_SWITCH, SWITCH_TIME, Lanes, Step
 from dorothie_gym.world.car.path import TURNING_RADIUS, U_TURN_REACH, Path, Piece, follow, u_turn
-from dorothie_gym.world.town.model import Exit, LinkType, Town
+from dorothie_gym.world.town.model import Exit, Lane, LinkType, Town
 from dorothie_gym.world.town.oncoming import Oncoming, oncoming_lanes
 
 BEGUN = 1.0
@@ -33,8 +33,8 @@ HALF_LENGTH = 2.5
 """Of the car [m]."""
 
 FROM_PROP = 16.5
-"""Where a lane switch ends, the car's middle is at least this far before that of a prop, less the way to stop [m]:
-`hazards.ROADBLOCK_GAP`, half the car and half the prop."""
+"""Where a lane switch or a U-turn ends, the car's middle is at least this far before that of a prop, less the way to
+stop [m]: `hazards.ROADBLOCK_GAP`, half the car and half the prop."""
 
 HARD_STOP = 5.0
 """Deceleration with which the car still stops before a junction when its plan is changed [m/s^2]."""
@@ -237,15 +237,17 @@ class LocalPlanner:
 
     def _leads_to_a_prop(self, target: int, speed: float) -> bool:
         """Whether a car that switches to a lane would come too close to a prop to get away from it again."""
-        if not self.props:
-            return False
         lane = self._town.lanes[target]
         here = lane.project(self._town.lanes[self.lane].position(self.station))[0]
-        until = here + LEAD + max(MIN_SWITCH, SWITCH_TIME * speed) + speed**2 / (2 * BRAKING) + FROM_PROP
+        way = LEAD + max(MIN_SWITCH, SWITCH_TIME * speed) + speed**2 / (2 * BRAKING)
+        return self._is_blocked(lane, here - HALF_LENGTH, here + way + FROM_PROP)
+
+    def _is_blocked(self, lane: Lane, begin: float, end: float) -> bool:
+        """Whether the car sees a prop on a lane between two stations [m]."""
         for x, y, height in self.props:
             station, lateral = lane.project(np.array((x, y)))
             level = abs(lane.height_at(station) - height) < HEIGHT_MARGIN
-            if level and abs(lateral) < lane.width_at(station) / 2 and here - HALF_LENGTH < station < until:
+            if level and abs(lateral) < lane.width_at(station) / 2 and begin < station < end:
                 return True
         return False
 
@@ -303,6 +305,9 @@ class LocalPlanner:
             return "the car is too fast to turn round before the roadblock"
         if begin > lane.length + 0.5:
             return "there is no room left to turn round"
+        landing = oncoming.station
+        if self._is_blocked(self._town.lanes[oncoming.lane], landing - U_TURN_REACH, landing + LANDING + FROM_PROP):
+            return "a roadblock is too close on the oncoming lane"
         return oncoming, min(begin, lane.length)
 
     def _turn(self, angle: int, speed: float) -> str | None:
