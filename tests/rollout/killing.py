@@ -46,6 +46,15 @@ def begin(
     )  # fmt: skip
 
 
+def _wait_for_work(process: subprocess.Popen[str], root: Path) -> None:
+    """Returns when something is written of a session, or the process has ended."""
+    began = time.time()
+    while process.poll() is None:
+        if any(path.stat().st_mtime > began for path in root.glob(".parts/*/*.journal")):
+            return
+        time.sleep(0.05)
+
+
 def kill_again_and_again(
     folder: Path, *, times: int, sessions: int, seconds: float, longest: float, seed: int = 0
 ) -> dict[str, Any]:
@@ -56,7 +65,7 @@ def kill_again_and_again(
         times: how often it is killed.
         sessions: of the corpus.
         seconds: simulated seconds after which a session is cut off.
-        longest: it is killed between 0.2 and so many seconds after its start.
+        longest: it is killed within so many seconds after its start, or mostly, after it has begun to play a session.
         seed: of the moments.
 
     Raises:
@@ -68,7 +77,9 @@ def kill_again_and_again(
     finished: list[int] = []
     for _ in range(times):
         process = begin(two, sessions=sessions, seconds=seconds, workers=2)
-        time.sleep(moments.uniform(0.2, longest))
+        if moments.random() < 0.8:  # the others die while they start
+            _wait_for_work(process, two)
+        time.sleep(moments.uniform(0.0, longest))
         os.killpg(process.pid, signal.SIGKILL)
         process.communicate()
         there = {name: found for name, found in contents(two).items() if name[0] in "tv"} if two.is_dir() else {}
@@ -88,7 +99,7 @@ def main() -> None:
     parser.add_argument("--times", type=int, default=50)
     parser.add_argument("--sessions", type=int, default=24)
     parser.add_argument("--seconds", type=float, default=60.0)
-    parser.add_argument("--longest", type=float, default=8.0)
+    parser.add_argument("--longest", type=float, default=3.0)
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         found = kill_again_and_again(

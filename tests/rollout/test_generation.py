@@ -91,7 +91,7 @@ def test_two_at_once_are_kept_apart(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_killed_at_random_moments_it_ends_in_the_bytes_of_an_undisturbed_run(tmp_path: Path) -> None:
-    kill_again_and_again(tmp_path, times=6, sessions=6, seconds=60.0, longest=8.0)
+    kill_again_and_again(tmp_path, times=6, sessions=6, seconds=60.0, longest=3.0)
 
 
 def test_two_workers_make_the_same_bytes_and_ctrl_c_tells_how_to_go_on(corpus: Path, tmp_path: Path) -> None:
