@@ -50,8 +50,11 @@ def _wait_for_work(process: subprocess.Popen[str], root: Path) -> None:
     """Returns when something is written of a session, or the process has ended."""
     began = time.time()
     while process.poll() is None:
-        if any(path.stat().st_mtime > began for path in root.glob(".parts/*/*.journal")):
-            return
+        try:
+            if any(path.stat().st_mtime > began for path in root.glob(".parts/*/*.journal")):
+                return
+        except FileNotFoundError:
+            return  # that one has just been finished
         time.sleep(0.05)
 
 
