@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
@@ -85,6 +86,17 @@ def test_the_report_is_told_in_words() -> None:
         "turn angles: positive left, agreement 1.0, turns 1", "lane switch values: 2 1, 3 1", "1 of 1 sessions written",
     ):  # fmt: skip
         assert part in told
+
+
+def test_sessions_become_tables() -> None:
+    for k, fold in enumerate(("train", "test/unseen")):
+        write(Path("corpus") / fold / f"seed_{k}", talk(), seed=k)
+    told = json.loads(converted("corpus", "tables", "--to", "tables", "--json").stdout)
+    utterances, decisions = (pq.read_table(path).to_pylist() for path in told["tables"])
+    assert len(utterances) == 14 and {row["fold"] for row in utterances} == {"train", "test/unseen"}
+    assert utterances[0]["text"] == "To the KFC please." and utterances[0]["landmark"] == ["KFC"]
+    assert len(decisions) == 10 and decisions[1]["angle"] == 88.0
+    assert "2 sessions: tables/utterances.parquet" in converted("corpus", "tables", "--to", "tables").stdout
 
 
 def test_what_cannot_be_read_is_named_and_the_rest_is_converted() -> None:

@@ -93,6 +93,18 @@ def test_every_phenomenon_is_in_the_table() -> None:
     assert "goal-level instruction" in stats("corpus", "--phenomena").stdout
 
 
+def test_what_the_paper_reports_is_told_claim_by_claim() -> None:
+    found = json.loads(stats(corpus(), "--behaviour", "--json").stdout)
+    assert found["sessions"] == 4
+    rows = {row["name"]: row for row in found["behaviour"]}
+    instructs = rows["human_mostly_instructs"]
+    # every move of the participants is an Instruct in all four sessions, so that every drawn corpus says the same
+    assert (instructs["difference"], instructs["low"], instructs["high"], instructs["holds"]) == (1.0, 1.0, 1.0, True)
+    assert rows["task_car_informs"]["difference"] is None and rows["task_car_informs"]["holds"] is False
+    shown = stats("corpus", "--behaviour").stdout
+    assert "humans: mostly Instruct" in shown and "+1.000 to +1.000  holds" in shown and "not so" in shown
+
+
 def test_consistent_annotation_passes() -> None:
     assert "4 of 4 sessions" in stats(corpus(), "--check").stdout
 
@@ -122,7 +134,7 @@ def test_kappa_of_different_sessions_is_refused() -> None:
 def test_mistakes_are_told_in_one_line() -> None:
     corpus()
     assert "dorothie-gym stats DIR" in refused()
-    assert "--check and --phenomena" in refused("corpus", "--phenomena", "--check")
+    assert "--phenomena and --check" in refused("corpus", "--phenomena", "--check")
     assert "nowhere" in refused("nowhere")
     assert "leave the folder out" in refused("corpus", "--kappa", "a", "b")
     assert ".png" in refused("corpus", "--picture", "figure.pdf")

@@ -17,6 +17,7 @@ from dorothie_gym.cli.listings import storyboards, towns
 from dorothie_gym.cli.optional import PictureCommand
 from dorothie_gym.cli.replay import replay
 from dorothie_gym.cli.run import run
+from dorothie_gym.cli.show import show
 from dorothie_gym.cli.stats import stats
 
 app = typer.Typer(
@@ -35,6 +36,7 @@ app.command()(convert)
 app.command(cls=PictureCommand)(stats)
 app.command()(generate)
 app.command()(replay)
+app.command()(show)
 
 
 def _tell_version(wanted: bool) -> None:

@@ -23,18 +23,21 @@ class Layout(enum.StrEnum):
 
     SDN = "sdn"
     NATIVE = "native"
+    TABLES = "tables"
 
 
 def convert(
     source: Annotated[Path, typer.Argument(metavar="IN", help="A session, or a folder of sessions or of folds.")],
     out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder to write, which must hold no such session yet.")],
-    to: Annotated[Layout, typer.Option("--to", help="Write the SDN release layout, or our own.")],
+    to: Annotated[Layout, typer.Option("--to", help="Write the SDN release layout, our own, or two Parquet tables.")],
     maps: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder with maps of towns that are not shipped (Town01.xodr).")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
 ) -> None:
     """Convert sessions: SDN (release, sample or hub layout) and our own, either way; reports what was not understood.
+
+    With --to tables it writes utterances.parquet and decision_points.parquet, for pandas and datasets.
 
     The layout of IN is told by its files. Sessions that cannot be read are named, and the exit code is 2 then.
     """
@@ -45,6 +48,9 @@ def convert(
 
         corpus = Corpus.load(source, maps=maps)
         _check_out(source, out)
+        if to is Layout.TABLES:
+            _write_tables(corpus, out, as_json=as_json)
+            return
         is_one = [entry.path for entry in corpus.entries] == [source]
         rows = _convert(corpus, out, to, maps, is_one=is_one, quiet=as_json)
     failed = {row["path"]: row["error"] for row in rows if "error" in row}
@@ -65,6 +71,15 @@ def _check_out(source: Path, out: Path) -> None:
         fail(f"{out}: lies within {source}; choose a folder outside of it")
     if out.exists() and not out.is_dir():
         fail(f"{out}: is a file; choose a folder")
+
+
+def _write_tables(corpus: Corpus, out: Path, *, as_json: bool) -> None:
+    """The tables of acts and of decision points, of all sessions: one that cannot be read fails the command."""
+    paths = [str(path) for path in corpus.export(out)]
+    if as_json:
+        print_json({"to": Layout.TABLES.value, "in": str(corpus.root), "out": str(out), "tables": paths})
+    else:
+        stdout().print(f"{len(corpus)} sessions: {', '.join(paths)}", markup=False, soft_wrap=True)
 
 
 def _convert(

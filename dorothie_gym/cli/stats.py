@@ -56,6 +56,9 @@ def stats(
     phenomena: Annotated[
         bool, typer.Option("--phenomena", help="In how many sessions each of the 24 phenomena of talk occurs.")
     ] = False,
+    behaviour: Annotated[
+        bool, typer.Option("--behaviour", help="What the paper reports of people and cars: does it hold here?")
+    ] = False,
     check: Annotated[
         bool, typer.Option("--check", help="Check that the annotation holds together; exit code 1 if not.")
     ] = False,
@@ -68,7 +71,7 @@ def stats(
     ] = None,
 ) -> None:
     """Count a corpus: table 2 of the paper and what makes its tasks easy or hard, found anew from the events."""
-    _check_choice(folder, picture, phenomena, check, kappa)
+    _check_choice(folder, kappa, picture=picture is not None, phenomena=phenomena, behaviour=behaviour, check=check)
     if picture is not None:
         picture = PICTURE if picture == Path(OWN_NAME) else picture
         check_picture(picture)
@@ -84,18 +87,15 @@ def stats(
             _check(corpus, as_json=as_json)
         elif phenomena:
             _phenomena(corpus, as_json=as_json)
+        elif behaviour:
+            _behaviour(corpus, as_json=as_json)
         else:
             _count(corpus, picture, as_json=as_json)
 
 
-def _check_choice(folder: Path | None, picture: Path | None, phenomena: bool, check: bool, kappa: object) -> None:
-    chosen = {
-        "--kappa": kappa is not None,
-        "--check": check,
-        "--phenomena": phenomena,
-        "--picture": picture is not None,
-    }
-    given = [name for name, is_given in chosen.items() if is_given]
+def _check_choice(folder: Path | None, kappa: object, **chosen: bool) -> None:
+    chosen = {"kappa": kappa is not None, **chosen}
+    given = [f"--{name}" for name, is_given in chosen.items() if is_given]
     if len(given) > 1:
         fail(f"{' and '.join(given)} exclude each other; give one of them")
     if kappa is not None and folder is not None:
@@ -225,6 +225,30 @@ def _phenomena(corpus: Corpus, *, as_json: bool) -> None:
         counts = (str(row["sessions"]), str(row["occurs"]), _percent(row["share"]))
         shown.add_row(str(row["number"]), row["title"], *counts, forms, style=style)
     stdout().print(shown)
+
+
+def _behaviour(corpus: Corpus, *, as_json: bool) -> None:
+    from dorothie_gym.sessions.statistics import verdicts_of
+    from dorothie_gym.sessions.statistics.behaviour import RESAMPLES
+
+    verdicts = verdicts_of(corpus)
+    if as_json:
+        print_json({"sessions": len(corpus), "behaviour": [verdict.to_json() for verdict in verdicts]})
+        return
+    shown = Table(box=None, pad_edge=False)
+    shown.add_column("what the paper reports")
+    for title in ("difference", "95 % interval", ""):
+        shown.add_column(title, justify="right" if title else "left", no_wrap=True)
+    for verdict in verdicts:
+        interval = "-" if verdict.low is None else f"{verdict.low:+.3f} to {verdict.high:+.3f}"
+        difference = "-" if verdict.difference is None else f"{verdict.difference:+.3f}"
+        told, style = ("holds", "") if verdict.holds else ("not so", "yellow")
+        shown.add_row(verdict.claim.title, difference, interval, told, style=style)
+    console = stdout()
+    console.print(shown)
+    console.print(
+        f"{len(corpus)} sessions, drawn {RESAMPLES:,} times; docs/statistics.md tells what is compared.", style="dim"
+    )
 
 
 def _check(corpus: Corpus, *, as_json: bool) -> None:

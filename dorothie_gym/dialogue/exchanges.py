@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from dorothie_gym.dialogue.utterances import Utterance
-from dorothie_gym.ontology import DialogueMove, Role
+from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, SlotValue
 
 PATIENCE = 10.0
 """An exchange that nobody answers for this long is abandoned [s] (spec of the dialogue, phenomenon 21)."""
@@ -55,6 +55,12 @@ _INSERTED: Mapping[DialogueMove, frozenset[DialogueMove]] = MappingProxyType(
 """For an open move, the initiating moves by which the other side goes on with it instead of beginning something new:
 it checks or objects to what it is told to do, or answers a question by telling what to do or how things are."""
 
+_GROUNDING = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
+"""Who takes something up by naming it again speaks of what named it."""
+
+_OPEN_LABELS = frozenset({"Unknown", "Queried"})
+"""Values that name nothing."""
+
 _REPAIRS = frozenset({DialogueMove.CLARIFY, DialogueMove.CONFIRM, DialogueMove.REPLY_W})
 """What the initiator says after a Confuse to get the exchange going again."""
 
@@ -82,6 +88,9 @@ class Exchange:
         acts: number of acts in it.
         confused: whether the other side has not understood and the initiator has to repair.
         asked_back: whether the other side has checked, or objected to, what it was told: the initiator has to answer.
+        act: the latest initiating act, of which `move` is the move.
+        taken_up: whether the other side has said something in it.
+        named: what was named in it, and by whom.
     """
 
     id: int
@@ -94,6 +103,9 @@ class Exchange:
     acts: int = field(default=0)
     confused: bool = False
     asked_back: bool = False
+    act: DialogueAct | None = None
+    taken_up: bool = False
+    named: set[tuple[Role, SlotValue]] = field(default_factory=set)
 
     def accepts(self, speaker: Role, move: DialogueMove) -> bool:
         """Returns whether `move` by `speaker` answers, or goes on with, this exchange."""
@@ -104,13 +116,19 @@ class Exchange:
             return answers or (self.confused and move in _REPAIRS)
         return move is DialogueMove.CONFUSE or move in EXPECTATIONS[self.move]
 
+    def names(self, speaker: Role, values: Iterable[SlotValue]) -> bool:
+        """Returns whether `speaker` has named one of the values in it."""
+        return any((speaker, value) in self.named for value in values)
+
 
 class ExchangeTracker:
     """Assigns each act to an exchange, as utterances are delivered.
 
     Initiating acts of one utterance share an exchange (a reason and the command it leads to are one initiative), and an
     Explain behind a response in the same breath elaborates on that response. Who is told to do something and asks back,
-    or who is asked and answers by a command or an explanation, goes on with the exchange that is open. Overlapping
+    or who is asked and answers by a command or an explanation, goes on with the exchange that is open; so does who then
+    explains or names the same once more, and who says the same again before there is an answer. Who acknowledges or
+    confirms something by its name speaks of the latest exchange in which the other side has named it. Overlapping
     exchanges are allowed: what begins while the other still speaks is a new one.
     """
 
@@ -146,14 +164,16 @@ class ExchangeTracker:
             if move is DialogueMove.EXPLAIN and answered is not None and opened is None:
                 exchange = answered
             elif move in EXPECTATIONS:
-                exchange = opened = self._initiate(utterance, move, opened)
+                exchange = opened = self._initiate(utterance, act, opened)
             else:
-                found = answered = self._respond(utterance, move)
+                found = answered = self._respond(utterance, act)
                 if found is None:
                     ids.append(None)
                     continue
                 exchange = found
             exchange.acts += 1
+            exchange.taken_up |= utterance.speaker is not exchange.initiator
+            exchange.named.update((utterance.speaker, value) for value in _names(act))
             exchange.end = max(exchange.end, utterance.end)
             ids.append(exchange.id)
         return tuple(ids)
@@ -169,25 +189,39 @@ class ExchangeTracker:
         """Returns the exchanges that still wait for an answer, oldest first."""
         return sorted(self._waiting.values(), key=lambda exchange: exchange.id)
 
-    def _initiate(self, utterance: Utterance, move: DialogueMove, opened: Exchange | None) -> Exchange:
+    def _initiate(self, utterance: Utterance, act: DialogueAct, opened: Exchange | None) -> Exchange:
+        move = act.move
         if opened is not None:
             # An Explain behind a question does not replace what the question expects.
             if move is not DialogueMove.EXPLAIN:
-                opened.move = move
+                opened.move, opened.act = move, act
             return opened
-        return self._insert(utterance, move) or self._begin(utterance, move)
+        found = self._say_again(utterance, act) or self._insert(utterance, act)
+        if found is None:
+            found = self._begin(utterance, move)
+            found.act = act
+        return found
 
-    def _insert(self, utterance: Utterance, move: DialogueMove) -> Exchange | None:
+    def _say_again(self, utterance: Utterance, act: DialogueAct) -> Exchange | None:
+        """Returns the open exchange whose initiating act, which nobody has answered, an act says again."""
+        last = self.exchanges[-1] if self.exchanges else None
+        if last is None or last.state is not ExchangeState.OPEN or last.taken_up:
+            return None
+        same = last.initiator is utterance.speaker and last.act == act
+        return last if same and utterance.start - last.end <= self.patience else None
+
+    def _insert(self, utterance: Utterance, act: DialogueAct) -> Exchange | None:
         """Returns the open exchange that an initiating move goes on with, if there is one."""
         for exchange in reversed(self.exchanges):
             waited = utterance.start - exchange.end
             if exchange.state is not ExchangeState.OPEN or exchange.unprompted or not 0.0 <= waited <= self.patience:
                 continue
             own = exchange.initiator is utterance.speaker
-            if own and exchange.asked_back and move is DialogueMove.EXPLAIN:
-                exchange.asked_back = False
-                return exchange
-            if not own and move in _INSERTED.get(exchange.move, ()):
+            if own and (exchange.asked_back or exchange.confused):
+                if act.move is DialogueMove.EXPLAIN or exchange.names(utterance.speaker, _names(act)):
+                    exchange.asked_back = exchange.confused = False
+                    return exchange
+            elif not own and act.move in _INSERTED.get(exchange.move, ()):
                 if exchange.move in _ASKING:
                     self._close(exchange, ExchangeState.FULFILLED)
                 else:
@@ -195,8 +229,9 @@ class ExchangeTracker:
                 return exchange
         return None
 
-    def _respond(self, utterance: Utterance, move: DialogueMove) -> Exchange | None:
-        exchange = self._awaiting(utterance, move)
+    def _respond(self, utterance: Utterance, act: DialogueAct) -> Exchange | None:
+        move = act.move
+        exchange = self._named(utterance, act) or self._awaiting(utterance, move)
         if exchange is not None:
             self._settle(exchange, utterance.speaker, move)
             return exchange
@@ -210,6 +245,15 @@ class ExchangeTracker:
         exchange.unprompted = True
         self._close(exchange, ExchangeState.FULFILLED)
         return exchange
+
+    def _named(self, utterance: Utterance, act: DialogueAct) -> Exchange | None:
+        """Returns the latest exchange, answered or not, whose initiator named what an act takes up by its name."""
+        values = _names(act) if act.move in _GROUNDING else frozenset()
+        for exchange in reversed(self.exchanges) if values else ():
+            in_time = utterance.start - exchange.end <= self.patience
+            if in_time and exchange.initiator is not utterance.speaker and exchange.names(exchange.initiator, values):
+                return exchange if exchange.accepts(utterance.speaker, act.move) else None
+        return None
 
     def _awaiting(self, utterance: Utterance, move: DialogueMove) -> Exchange | None:
         """Returns the latest exchange that `move` fits and that was still alive when the utterance began."""
@@ -241,3 +285,8 @@ class ExchangeTracker:
         self.exchanges.append(exchange)
         self._waiting[exchange.id] = exchange
         return exchange
+
+
+def _names(act: DialogueAct) -> frozenset[SlotValue]:
+    """What an act names."""
+    return frozenset(value for value in act.slots if value.label not in _OPEN_LABELS)

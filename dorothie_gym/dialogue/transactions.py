@@ -3,7 +3,7 @@
 The rule, over utterances and arrivals only, so that it can be applied while a session runs and again to its recording:
 
 1. An act aims at a landmark if it names one that is a goal, and commands, asks or checks, or speaks of a status. Of
-   several in one utterance, one that is not spoken of as over counts, the last of those.
+   several in one utterance, one that is not spoken of as over or as for later counts, the last of those.
 2. Who aims at a landmark continues its transaction, or begins one. Talk of what is to be done later (Pending) or is
    over (Complete, Abandoned) is of that transaction too, and leaves open the one that is going on.
 3. What aims at nothing belongs where the exchange that it is in belongs, else to what is going on.
@@ -104,7 +104,8 @@ class TransactionTracker:
                 status = next((status for status in statuses if status not in _ASIDE), None)
                 if status is None and statuses and len(goals) == 1:
                     status = statuses[0]
-                found = (fresh or goals)[-1], status
+                if found is None or status not in _ASIDE or found[1] in _ASIDE:
+                    found = (fresh or goals)[-1], status
         return found
 
     def _may_aim(self, move: DialogueMove) -> bool:

@@ -4,23 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Collection, Mapping
-from reprlib import Repr
 from typing import Any, TypeVar
 
-from dorothie_gym.sessions.errors import SessionError
+from dorothie_gym.sessions.errors import SessionError, shown
 
 _T = TypeVar("_T")
 
 _LARGEST = sys.float_info.max
 """A whole number of JSON may be larger, and is no float then."""
-
-
-class _Short(Repr):
-    """Shows a wrong value in a message, which it must not flood."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.maxstring = self.maxother = self.maxlong = 120
 
 
 class Fields:
@@ -99,8 +90,7 @@ class Fields:
 
     def error(self, name: str, expected: str) -> SessionError:
         """The error for a field that is not what is expected."""
-        shown = _Short().repr(self._values[name])
-        return SessionError(f"{self.where}: field {name!r} is {shown}; it must be {expected}")
+        return SessionError(f"{self.where}: field {name!r} is {shown(self._values[name])}; it must be {expected}")
 
     def if_given(self, name: str, read: Callable[[str], _T]) -> _T | None:
         """None where the field is missing or null, else what `read` makes of it."""

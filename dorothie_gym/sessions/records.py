@@ -15,7 +15,7 @@ from dorothie_gym.ontology import (
     parse_act,
     parse_physical_action,
 )
-from dorothie_gym.sessions.errors import SessionError
+from dorothie_gym.sessions.errors import SessionError, shown
 from dorothie_gym.sessions.events import INFRACTIONS, Event, EventType
 from dorothie_gym.sessions.fields import Fields
 
@@ -213,7 +213,7 @@ def _act(data: Fields) -> DialogueAct:
     slots = data.mapping("slots")
     for slot, values in slots.items():
         if not isinstance(values, list | tuple) or not all(isinstance(value, str) for value in values):
-            raise SessionError(f"{data.where}: field 'slots.{slot}' is {values!r}; it must be a list of texts")
+            raise SessionError(f"{data.where}: field 'slots.{slot}' is {shown(values)}; it must be a list of texts")
     return _parse(data.text("move"), slots, data.where)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from dorothie_gym.sessions.errors import SessionError
+from dorothie_gym.sessions.errors import SessionError, shown
 
 FORMAT_VERSION: Final = "2.0"
 """Version of the layout of a session folder, "major.minor".
@@ -31,7 +31,7 @@ def parse_version(value: object, where: str) -> tuple[int, int]:
     """
     match = _PATTERN.fullmatch(OLD_VERSION if value == 1 and type(value) is int else str(value))
     if match is None or isinstance(value, float):
-        raise SessionError(f"{where}: field 'format_version' is {value!r}; it must be like \"{FORMAT_VERSION}\"")
+        raise SessionError(f"{where}: field 'format_version' is {shown(value)}; it must be like \"{FORMAT_VERSION}\"")
     major, minor = int(match[1]), int(match[2])
     ours = int(FORMAT_VERSION.partition(".")[0])
     if major > ours or major < 1:

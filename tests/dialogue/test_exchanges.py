@@ -1,7 +1,7 @@
 import pytest
 
 from dorothie_gym.dialogue import EXPECTATIONS, ExchangeState, ExchangeTracker, Span, Utterance
-from dorothie_gym.ontology import DialogueAct, DialogueMove, Role
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role, SlotValue
 
 P, C = Role.PARTICIPANT, Role.CO_WIZARD
 M = DialogueMove
@@ -159,3 +159,59 @@ def test_a_command_given_while_the_other_still_asks_begins_an_exchange_of_its_ow
     tracker = ExchangeTracker()
     tracker.update(said(C, 0.0, M.QUERY_W, seconds=2.0))
     assert tracker.update(said(P, 1.0, M.INSTRUCT, seconds=2.0)) == (1,)
+
+
+def naming(speaker: Role, start: float, move: DialogueMove, *values: SlotValue) -> Utterance:
+    return Utterance(speaker, (Span("words", DialogueAct.of(move, *values)),), start, start + 1.0)
+
+
+def test_who_takes_something_up_by_its_name_speaks_of_what_named_it():
+    tracker = ExchangeTracker()
+    tracker.update(naming(C, 0.0, M.EXPLAIN, LandmarkName.PANERA))  # 0: nobody has taken it up yet
+    assert tracker.update(naming(P, 1.5, M.INSTRUCT, LandmarkName.HOUSE)) == (1,)
+    assert tracker.update(said(C, 3.0, M.ACKNOWLEDGE)) == (1,)
+    assert tracker.update(naming(C, 5.0, M.CONFIRM, LandmarkName.HOUSE)) == (1,)
+    assert tracker.update(naming(P, 7.0, M.ACKNOWLEDGE, LandmarkName.PANERA)) == (0,)
+
+
+@pytest.mark.parametrize("value", [LandmarkName.QUERIED, LandmarkName.UNKNOWN])
+def test_what_is_asked_for_is_not_named(value):
+    tracker = ExchangeTracker()
+    tracker.update(naming(P, 0.0, M.QUERY_W, value))
+    tracker.update(said(C, 1.5, M.REPLY_W))
+    tracker.update(said(P, 3.0, M.INSTRUCT))
+    assert tracker.update(naming(C, 4.5, M.ACKNOWLEDGE, value)) == (1,)
+
+
+def test_who_says_the_same_again_before_there_is_an_answer_begins_nothing_new():
+    tracker = ExchangeTracker()
+    tracker.update(naming(P, 0.0, M.INSTRUCT, ActionValue.STOP))
+    assert tracker.update(naming(P, 4.0, M.INSTRUCT, ActionValue.STOP)) == (0,)
+    assert tracker.update(naming(P, 8.0, M.INSTRUCT, ActionValue.U_TURN)) == (1,)
+    tracker.update(said(C, 10.0, M.ACKNOWLEDGE))
+    assert tracker.update(naming(P, 12.0, M.INSTRUCT, ActionValue.U_TURN)) == (2,)
+
+
+@pytest.mark.parametrize("puzzled", [M.CONFUSE, M.CHECK, M.EXPLAIN])
+def test_who_was_not_understood_and_names_the_same_once_more_goes_on(puzzled):
+    tracker = ExchangeTracker()
+    tracker.update(naming(P, 0.0, M.INSTRUCT, LandmarkName.COCO, ActionValue.U_TURN))
+    tracker.update(said(C, 2.0, puzzled))
+    assert tracker.update(naming(P, 4.0, M.INSTRUCT, LandmarkName.COCO)) == (0,)
+    assert tracker.exchanges[0].state is ExchangeState.OPEN
+    assert tracker.update(said(C, 6.0, M.CONFIRM)) == (0,)
+    assert tracker.exchanges[0].state is ExchangeState.FULFILLED
+
+
+def test_something_else_is_no_answer_to_a_check():
+    tracker = ExchangeTracker()
+    tracker.update(naming(P, 0.0, M.INSTRUCT, LandmarkName.COCO))
+    tracker.update(said(C, 2.0, M.CHECK))
+    assert tracker.update(naming(P, 4.0, M.INSTRUCT, ActionValue.STOP)) == (1,)
+
+
+def test_who_says_the_same_again_after_ten_seconds_begins_anew():
+    tracker = ExchangeTracker()
+    tracker.update(naming(P, 0.0, M.INSTRUCT, ActionValue.STOP))
+    tracker.tick(12.0)
+    assert tracker.update(naming(P, 12.0, M.INSTRUCT, ActionValue.STOP)) == (1,)

@@ -80,3 +80,12 @@ def test_a_hidden_place_that_is_never_named_is_found_when_it_is_reached() -> Non
     assert drive.say(0, M.INSTRUCT, ActionValue.LANE_FOLLOW) == 0
     drive.tracker.note(KFC, S.COMPLETE)
     assert drive.say(1, M.EXPLAIN, KFC, S.COMPLETE) == 0
+
+
+def test_where_to_go_now_counts_before_what_is_left_for_later_in_one_breath() -> None:
+    tracker = TransactionTracker((KFC, IKEA))
+    now, later = DialogueAct.of(M.INSTRUCT, KFC), DialogueAct.of(M.EXPLAIN, IKEA, S.PENDING)
+    for k, acts in enumerate(((now, later), (later, now))):
+        utterance = Utterance(Role.PARTICIPANT, tuple(Span("words", act) for act in acts), float(k), k + 0.5)
+        assert tracker.update(utterance, (k, k)) == 0
+    assert [each.landmark for each in tracker.transactions] == [KFC]

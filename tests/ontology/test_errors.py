@@ -19,3 +19,8 @@ def test_error_for_what_is_no_text_names_its_type() -> None:
 def test_error_is_a_value_error_and_survives_pickling() -> None:
     error = pickle.loads(pickle.dumps(OntologyError("message")))
     assert isinstance(error, ValueError) and str(error) == "message"
+
+
+def test_a_huge_text_is_neither_compared_nor_shown_as_a_whole() -> None:
+    for text in ("a" * 100_000, ["a"] * 100_000):
+        assert len(str(OntologyError.unknown(text, "slots", ["Action", "Street"]))) < 250

@@ -25,6 +25,9 @@ COLUMNS: Final = ("frame", "x", "y", "yaw", "junction_id", "road_id", "lane_id")
 _NEEDED: Final = COLUMNS[:4]
 _IDS: Final = COLUMNS[4:]
 
+FARTHEST: Final = 1e9
+"""A number of a place or a yaw beyond this is none [m, degrees]."""
+
 MOVED: Final = 0.2
 """A car that got this far from one frame to the next [m] drove where it looked."""
 
@@ -93,7 +96,7 @@ def _numbers(path: Path, lines: list[list[str]], start: int, names: list[str], r
         row = [math.nan if value is None else value for value in values[: len(names)]]
         row += [math.nan] * (len(names) - len(row))
         frame = row[needed[0]]
-        if any(math.isnan(row[k]) for k in needed) or not 0 <= frame < MAX_FRAME or frame != int(frame):
+        if any(not abs(row[k]) <= FARTHEST for k in needed[1:]) or not 0 <= frame < MAX_FRAME or frame != int(frame):
             bad += 1
         else:
             rows.append(row)

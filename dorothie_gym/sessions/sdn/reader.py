@@ -145,7 +145,11 @@ def _object(folder: Path, name: str, report: ReadReport) -> Row:
 
 
 def _log_rows(path: Path, report: ReadReport) -> tuple[list[Row], Row]:
-    """Returns the rows of a log, and what stands around them where it is no plain list (as the hub's may be)."""
+    """Returns the rows of a log, and what stands around them where it is no plain list (as the hub's may be).
+
+    Rows are the objects that have a field 'frame', or that stand in a list with such: of the list, if the file holds
+    one, else in the fields of its object.
+    """
     value = read_json(path, report)
     if isinstance(value, list):
         return objects(value, path.name, report), {}
@@ -154,7 +158,8 @@ def _log_rows(path: Path, report: ReadReport) -> tuple[list[Row], Row]:
     rows: list[Row] = []
     around: dict[str, Any] = {}
     for name, items in value.items():
-        found = objects(items, path.name, ReadReport()) if isinstance(items, list) else []
+        given = items if isinstance(items, list) else [items]
+        found = objects(given, path.name, ReadReport())
         if any("frame" in row for row in found):
             rows += found
         else:

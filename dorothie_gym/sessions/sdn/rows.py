@@ -27,15 +27,28 @@ APOSTROPHE: Final = "\u2019"
 def read_json(path: Path, report: ReadReport) -> Any:
     """Returns what a JSON file holds; NaN and infinite numbers become null, which is noted.
 
+    Of a file with an object on each line it returns the list of them.
+
     Raises:
         SessionError: it is not JSON, or too large, or nested too deeply; the message names the file and the place.
     """
     text = _text(path)
     if not text.strip():
         raise SessionError(f"{path}: is empty")
-    if not text.lstrip().startswith("["):
-        return _decode(text, _skip(text, 0), path, "", report)[0]
-    return read_list(path, report, text)
+    if text.lstrip().startswith("["):
+        return read_list(path, report, text)
+    value, place = _decode(text, _skip(text, 0), path, "", report)
+    place = _skip(text, place)
+    if place == len(text):
+        return value
+    items = [value]
+    while place < len(text):
+        _check_count(len(items), path)
+        item, place = _decode(text, place, path, f", item {len(items)}", report)
+        items.append(item)
+        place = _skip(text, place)
+    report.repair(f"{path.name}: a row on each line was read as a list")
+    return items
 
 
 def read_list(path: Path, report: ReadReport, text: str | None = None) -> list[Any]:
@@ -51,8 +64,7 @@ def read_list(path: Path, report: ReadReport, text: str | None = None) -> list[A
     items: list[Any] = []
     place = _skip(text, place + 1)
     while text[place : place + 1] != "]":
-        if len(items) >= MAX_EVENTS:
-            raise SessionError(f"{path}: holds more than {MAX_EVENTS} items, which no session does; it is not read")
+        _check_count(len(items), path)
         item, place = _decode(text, place, path, f", item {len(items)}", report)
         items.append(item)
         place = _skip(text, place)
@@ -64,6 +76,11 @@ def read_list(path: Path, report: ReadReport, text: str | None = None) -> list[A
     if text[place + 1 :].strip():
         report.repair(f"{path.name}: text after the end of the list was left out")
     return items
+
+
+def _check_count(count: int, path: Path) -> None:
+    if count >= MAX_EVENTS:
+        raise SessionError(f"{path}: holds more than {MAX_EVENTS} items, which no session does; it is not read")
 
 
 def read_rows(path: Path, report: ReadReport) -> list[Row]:

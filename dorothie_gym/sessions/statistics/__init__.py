@@ -2,6 +2,7 @@
 
 from dorothie_gym.sessions.statistics.agreement import Agreement, agreement
 from dorothie_gym.sessions.statistics.anchors import Anchors, anchors_of
+from dorothie_gym.sessions.statistics.behaviour import CLAIMS, Claim, Verdict, verdicts_of
 from dorothie_gym.sessions.statistics.census import Census, census_of, faults_of_corpus, phenomena_of
 from dorothie_gym.sessions.statistics.consistency import inconsistencies
 from dorothie_gym.sessions.statistics.counts import PAPER, PAPER_FOLDS, Counts
@@ -11,12 +12,14 @@ from dorothie_gym.sessions.statistics.profiles import Profile, Profiles
 from dorothie_gym.sessions.statistics.units import SaidUnit, Units
 
 __all__ = [
+    "CLAIMS",
     "PAPER",
     "PAPER_FOLDS",
     "PHENOMENA",
     "Agreement",
     "Anchors",
     "Census",
+    "Claim",
     "Counts",
     "Finding",
     "Handled",
@@ -26,6 +29,7 @@ __all__ = [
     "SaidUnit",
     "Talk",
     "Units",
+    "Verdict",
     "agreement",
     "anchors_of",
     "census_of",
@@ -34,4 +38,5 @@ __all__ = [
     "handling",
     "inconsistencies",
     "phenomena_of",
+    "verdicts_of",
 ]

@@ -2,20 +2,25 @@
 
 An exchange handles an exception if it begins after it, within `WINDOW`, and one of its acts refers to it:
 
-- weather: to speed or lights, or to what the weather covers (sky, ground, water);
+- weather: to speed or lights, to what the weather covers (sky, ground, water), or in words to fog, rain, night, ...;
 - vehicles or pedestrians that appear: to such;
-- something on the road: to an obstacle, a U-turn or another lane; the time counts anew from when the car comes near;
-- a sensor fault: begun by the car with a statement or a question that names no place;
+- something on the road: to an obstacle, in words to a way that is blocked or free again; the time counts anew from when
+  the car comes near, and from then on to a U-turn or another lane too;
+- a sensor fault: in words, to a sensor or to what it shows; or begun by the car within `FAULT` with a question what to
+  do, which it cannot see for itself;
 - a task: to the landmark of the task, or to what is given up or put off.
 
-A question that begins within `PATIENCE` after an exchange that handles an exception, and names no place, belongs to it.
-Where several fit, the latest counts.
+A question that begins within `PATIENCE` after an exchange that handles something on the road, and names no place,
+belongs to it; so does, after one that handles a task, a question of status or where to go. Where several fit, the
+latest counts.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
 from typing import Final
@@ -25,9 +30,9 @@ import numpy as np
 from dorothie_gym.dialogue.exchanges import PATIENCE
 from dorothie_gym.ontology import (
     ActionValue,
-    DialogueMove,
     ExceptionKind,
     GoalStatus,
+    LandmarkName,
     MoveGroup,
     ObjectClass,
     Role,
@@ -41,6 +46,9 @@ from dorothie_gym.world.config import FRAME_RATE
 
 WINDOW: Final = 60.0
 """An exception is handled within this time [s]."""
+
+FAULT: Final = 30.0
+"""A sensor fault ends by itself within this time [s] (spec: design)."""
 
 NEAR: Final = 60.0
 """The car has met something on the road when it comes this close to it [m]: it is seen from there by day."""
@@ -60,7 +68,8 @@ class Handled(StrEnum):
     NONE = "none"
 
 
-_ROADBLOCK: Final[frozenset[SlotValue]] = frozenset({*OBSTACLES, ActionValue.U_TURN, ActionValue.LANE_SWITCH})
+_AROUND: Final[frozenset[SlotValue]] = frozenset({ActionValue.U_TURN, ActionValue.LANE_SWITCH})
+"""How one gets around what is on the road: means it once the car is near."""
 
 _REFERENCES: Final[Mapping[ExceptionKind, frozenset[SlotValue]]] = MappingProxyType(
     {
@@ -72,11 +81,39 @@ _REFERENCES: Final[Mapping[ExceptionKind, frozenset[SlotValue]]] = MappingProxyT
         ),
         ExceptionKind.SPAWN_VEHICLES: frozenset({ObjectClass.VEHICLES}),
         ExceptionKind.SPAWN_PEDESTRIANS: frozenset({ObjectClass.PEDESTRIAN}),
-        ExceptionKind.PLACE_PROP: _ROADBLOCK,
-        ExceptionKind.MOVE_PROP: _ROADBLOCK,
-        ExceptionKind.DELETE_PROP: _ROADBLOCK,
+        ExceptionKind.PLACE_PROP: frozenset(OBSTACLES),
+        ExceptionKind.MOVE_PROP: frozenset(OBSTACLES),
+        ExceptionKind.DELETE_PROP: frozenset(OBSTACLES),
     }
 )  # fmt: skip
+
+_BLOCKED: Final = re.compile(
+    r"\b(?:road ?)?block(?:s|ed|ing|ade)?\b|\bobstacles?\b|\bbarriers?\b|\bcones?\b|\bdetour\b|\bdead end\b"
+    r"|\b(?:road|street|lane|way|it)(?:'s| is) (?:closed|shut|clear|free|open)\b|\bget (?:past|through|around)\b"
+    r"|\b(?:another|different|other) way\b|\bway (?:a)?round\b|\bin the (?:way|road)\b|\bacross the road\b"
+)
+_WORDS: Final[Mapping[ExceptionKind, re.Pattern[str]]] = MappingProxyType(
+    {
+        ExceptionKind.WEATHER: re.compile(
+            r"\bfog\w*|\bmist\w*|\brain\w*|\bpour(?:s|ing)\b|\bdrizzl\w*|\bstorm\w*|\bcloud\w*|\bwind(?:y|s)?\b"
+            r"|\bdark\w*|\bnight\w*|\bdusk\b|\bsun(?:set|light|shine|ny)?\b|\b(?:day|head)?lights? (?:on|off)\b"
+            r"|\bvisibility\b|\bwet\b|\bslippery\b|\bpuddles?\b|\bweather\b|\b(?:hardly|barely) see\b"
+            r"|\bclear(?:s|ed|ing)? up\b"
+        ),
+        ExceptionKind.SPAWN_VEHICLES: re.compile(r"\btraffic(?! lights?)\b|\bjam\b|\bcongest\w+|\bso many cars\b"),
+        ExceptionKind.SPAWN_PEDESTRIANS: re.compile(r"\bcrowd\w*|\bpedestrians?\b|\bso many people\b"),
+        ExceptionKind.PLACE_PROP: _BLOCKED,
+        ExceptionKind.MOVE_PROP: _BLOCKED,
+        ExceptionKind.DELETE_PROP: _BLOCKED,
+        ExceptionKind.SENSOR_FAULT: re.compile(
+            r"\bgps\b|\bsatellites?\b|\bpositioning\b|\b(?:my|our) position\b|\bcameras?\b"
+            r"|\b(?:the|my) (?:view|picture)\b|\bblur\w*|\bsensors?\b|\bwhere (?:we are|i am|we're|i'm)\b"
+            r"|\bcan(?:'t|not) see anything\b"
+        ),
+    }
+)
+"""Words that refer to an exception of a kind, in a text whose case is folded."""
+
 _PUT_OFF: Final = frozenset({GoalStatus.ABANDONED, GoalStatus.PENDING})
 _ASKING: Final = frozenset(MoveGroup.ASK.moves)
 
@@ -100,20 +137,25 @@ def time_met(session: Session, event: Event) -> float:
 def handled_by(units: Units) -> dict[int, Event]:
     """Returns for each exchange that handles an exception its number and the exception."""
     session = units.session
-    times = [
-        (event, kind, (event.time, time_met(session, event) if kind.is_plan_level else math.inf))
+    happened = [
+        _Happened(event, kind, time_met(session, event) if kind.is_plan_level else math.inf)
         for event in session.of_type(EventType.EXCEPTION)
         if (kind := kind_of(event)) is not None
     ]
     found: dict[int, Event] = {}
-    last: tuple[float, Event] | None = None
+    last: tuple[float, _Happened] | None = None
     for exchange in sorted(units.exchanges, key=lambda unit: unit.start):
-        event = next((e for e, kind, begun in reversed(times) if _handles(exchange, e, kind, begun)), None)
-        if event is None and last is not None and exchange.start - last[0] <= PATIENCE and _asks_on(exchange):
-            event = last[1]
-        if event is not None:
-            found[exchange.id] = event
-            last = exchange.end, event
+        cause = next((each for each in reversed(happened) if each.is_handled_in(exchange)), None)
+        if (
+            cause is None
+            and last is not None
+            and exchange.start - last[0] <= PATIENCE
+            and last[1].is_asked_on(exchange)
+        ):
+            cause = last[1]
+        if cause is not None:
+            found[exchange.id] = cause.event
+            last = exchange.end, cause
     return found
 
 
@@ -129,21 +171,45 @@ def handling(units: Units) -> dict[int, Handled]:
     }
 
 
-def _handles(exchange: SaidUnit, event: Event, kind: ExceptionKind, begun: tuple[float, float]) -> bool:
-    if not any(0.0 <= exchange.start - time <= WINDOW for time in begun):
-        return False
-    values = {value for move in exchange.moves for value in move.act.slots}
-    if kind.is_task:
-        return bool(_PUT_OFF & values) or any(
-            value.slot is Slot.LANDMARK and value.label == event.data.get("landmark") for value in values
-        )
-    if kind is ExceptionKind.SENSOR_FAULT:
-        first = exchange.moves[0]
-        tells = first.act.move is DialogueMove.EXPLAIN or first.act.move in _ASKING
-        return first.speaker is Role.CO_WIZARD and tells and not first.act.values(Slot.LANDMARK)
-    return bool(_REFERENCES.get(kind, frozenset()) & values)
+@dataclass(frozen=True)
+class _Happened:
+    """An exception, its kind, and when the car came near what it put on the road [s]."""
+
+    event: Event
+    kind: ExceptionKind
+    met: float
+
+    def is_handled_in(self, exchange: SaidUnit) -> bool:
+        """Whether an exchange is in time, and one of its acts refers to the exception."""
+        is_near = 0.0 <= exchange.start - self.met <= WINDOW
+        since = exchange.start - self.event.time
+        if not is_near and not 0.0 <= since <= WINDOW:
+            return False
+        values = {value for move in exchange.moves for value in move.act.slots}
+        if self.kind.is_task:
+            return bool(_PUT_OFF & values) or self._place() in values
+        if values & _REFERENCES.get(self.kind, frozenset()) or (is_near and values & _AROUND):
+            return True
+        words = _WORDS.get(self.kind)
+        if words is not None and any(words.search(move.span.casefold().replace("’", "'")) for move in exchange.moves):
+            return True
+        return self.kind is ExceptionKind.SENSOR_FAULT and since <= FAULT and _asks_what_to_do(exchange)
+
+    def is_asked_on(self, exchange: SaidUnit) -> bool:
+        """Whether an exchange, right after one that handles the exception, goes on with it by a question."""
+        first = exchange.moves[0].act
+        if first.move not in _ASKING:
+            return False
+        if self.kind.is_task:
+            return bool(first.values(Slot.STATUS)) or LandmarkName.QUERIED in first.slots
+        return self.kind.is_plan_level and not first.values(Slot.LANDMARK)
+
+    def _place(self) -> LandmarkName | None:
+        label = self.event.data.get("landmark")
+        return next((name for name in LandmarkName if name.label == label), None)
 
 
-def _asks_on(exchange: SaidUnit) -> bool:
-    first = exchange.moves[0].act
-    return first.move in _ASKING and not first.values(Slot.LANDMARK)
+def _asks_what_to_do(exchange: SaidUnit) -> bool:
+    first = exchange.moves[0]
+    asks = first.act.move in _ASKING and bool(first.act.values(Slot.ACTION))
+    return first.speaker is Role.CO_WIZARD and asks

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import wrap
 from typing import Any, Final
 
 from dorothie_gym.ontology import DialogueMove, Role
@@ -15,6 +16,9 @@ SIZE: Final = (12.0, 9.2)
 
 DOTS: Final = 130
 """Dots an inch."""
+
+LETTERS: Final = 17
+"""Letters in a line below a bar."""
 
 _INK, _SOFT, _GRID, _SHEET = "#2e3644", "#707783", "#e2ddd1", "#fbf8f1"
 _COLOURS: Final = {
@@ -54,7 +58,7 @@ def draw_profiles(profiles: Profiles, counts: Counts, title: str, path: Path) ->
         figure = Figure(figsize=SIZE, dpi=DOTS, facecolor=_SHEET)
         FigureCanvasAgg(figure)
         grid = figure.add_gridspec(
-            2, 2, left=0.06, right=0.98, top=0.84, bottom=0.075, hspace=0.42, wspace=0.13, width_ratios=(14, 8)
+            2, 2, left=0.06, right=0.98, top=0.84, bottom=0.09, hspace=0.42, wspace=0.13, width_ratios=(14, 8)
         )
         _words(figure, counts, title)
         _per_transaction(figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1]), profiles.transactions)
@@ -86,7 +90,9 @@ def _per_transaction(moves: Any, slots: Any, profile: Profile) -> None:
         slots.bar(at, [profile.mean_slot(role, slot) for slot in SLOTS], 0.38, color=colour)
     _dress(moves, "Moves in a transaction", [move.label for move in shown], slanted=True)
     _dress(slots, "Slot values in a transaction", [slot.label for slot in SLOTS])
-    moves.legend(frameon=False, fontsize=9, loc="upper right")
+    for axes in (moves, slots):
+        _give_room(axes, 1.06)
+    moves.legend(frameon=True, facecolor=_SHEET, edgecolor=_SHEET, framealpha=1.0, fontsize=9, loc="upper right")
 
 
 def _per_exchange(moves: Any, slots: Any, profiles: Profiles) -> None:
@@ -95,26 +101,35 @@ def _per_exchange(moves: Any, slots: Any, profiles: Profiles) -> None:
     for place, (kind, k, role) in enumerate(bars):
         profile, colour = profiles.exchanges[kind], _COLOURS[kind][k]
         offset = (place - (len(bars) - 1) / 2) * width
-        label = f"{_NAMES[kind]} ({profile.units:,}), {_SPEAKERS[k][1]}"
+        units = "" if k else f" ({_number(profile.units, 'exchange')})"
+        label = f"{_NAMES[kind]}, {_SPEAKERS[k][1]}{units}"
         heights = [profile.mean_move(role, *group) for group in CLASSES.values()]
         moves.bar([x + offset for x in range(len(CLASSES))], heights, width * 0.93, color=colour, label=label)
         heights = [profile.mean_slot(role, slot) for slot in SLOTS]
         slots.bar([x + offset for x in range(len(SLOTS))], heights, width * 0.93, color=colour)
-    _dress(moves, "Moves in an exchange, by the exception that it handles", list(CLASSES))
+    _dress(moves, "Moves in an exchange, by the exception that it handles", [_class_label(name) for name in CLASSES])
     _dress(slots, "Slot values in an exchange, likewise", [slot.label for slot in SLOTS])
     _give_room(moves)
-    moves.legend(frameon=False, fontsize=8.5, ncols=3, loc="upper center", columnspacing=2.5)
+    moves.legend(frameon=False, fontsize=8, ncols=3, loc="upper center", columnspacing=1.2)
 
 
-def _give_room(axes: Any) -> None:
-    """Leaves room above the bars for the legend."""
-    axes.set_ylim(0.0, axes.get_ylim()[1] * 1.22)
+def _class_label(name: str) -> str:
+    """Name of a class of moves, and below it the moves that are in it."""
+    moves = [move.label for move in CLASSES[name]]
+    if moves == [name]:
+        return name
+    return "\n".join([name, *wrap(", ".join(moves), LETTERS)])
+
+
+def _give_room(axes: Any, times: float = 1.22) -> None:
+    """Leaves room above the bars, for the legend where there is one."""
+    axes.set_ylim(0.0, axes.get_ylim()[1] * times)
 
 
 def _dress(axes: Any, title: str, labels: list[str], *, slanted: bool = False) -> None:
     axes.set_facecolor(_SHEET)
     axes.set_title(title, loc="left", fontsize=11, color=_INK, pad=10)
-    axes.set_xticks(range(len(labels)), labels, fontsize=9, color=_INK)
+    axes.set_xticks(range(len(labels)), labels, fontsize=9 if "\n" not in "".join(labels) else 7.5, color=_INK)
     if slanted:
         for label in axes.get_xticklabels():
             label.set(rotation=32, ha="right", rotation_mode="anchor")

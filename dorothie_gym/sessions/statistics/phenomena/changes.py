@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+import re
+from collections.abc import Collection, Iterator, Mapping
+from types import MappingProxyType
 
 from dorothie_gym.ontology import (
     ActionValue,
@@ -22,11 +25,21 @@ from dorothie_gym.sessions.statistics.phenomena.ways import asks_where_next
 
 M = DialogueMove
 
-DIM = (
-    WeatherParameter.FOG_DENSITY, WeatherParameter.FOG_DISTANCE, WeatherParameter.FOG_FALLOFF,
-    WeatherParameter.PRECIPITATION, WeatherParameter.SUN_ALTITUDE_ANGLE,
-)  # fmt: skip
-"""Weather that takes sight: fog, rain, night."""
+DIM: Mapping[WeatherParameter, float] = MappingProxyType(
+    {WeatherParameter.FOG_DENSITY: 30.0, WeatherParameter.PRECIPITATION: 30.0, WeatherParameter.SUN_ALTITUDE_ANGLE: 5.0}
+)
+"""Weather that takes sight: fog and rain from these values on [%], the sun at most so high [degrees]."""
+
+SLOWER = re.compile(r"\bslow\w*|\beasy\b|\bcareful\w*|\bnot so fast\b|\btoo fast\b|\bdown to\b|\bbrake\b")
+LIGHTS = re.compile(r"\blights?\b|\bheadlights?\b|\bbeams?\b")
+
+_COMPARES = re.compile(
+    r"\b(?:short|quick|fast|clos|near|saf|bett|long)(?:er|est)\b|\bblock\w*|\bclosed\b|\bon (?:the|our) way\b"
+    r"|\binstead\b|\bdetour\b|\bshortcut\b|\bother way\b|\bjam\b|\bavoid\b"
+)
+
+BEFORE = 10.0
+"""What is on the road may be seen this long before the car is near it [s]."""
 
 SOON = 60.0
 """What comes of a roadblock, or of a place that is not known, is settled within this time [s]."""
@@ -36,18 +49,22 @@ def hidden_place(talk: Talk) -> Iterator[Finding]:
     """8: the car says that it does not know a place, the participant describes it, the car marks a guess."""
     for turn in talk.by(CAR, M.EXPLAIN, M.QUERY_W, M.QUERY_YN, M.CHECK, M.CONFUSE, M.REPLY_N):
         unknown = turn.mentions(GoalStatus.UNKNOWN) and labels(turn.names(Slot.LANDMARK)) & talk.hidden_goals
-        if not unknown or not talk.believed(MentalAction.KNOWLEDGE_UPDATE, since=turn.start, until=turn.end + SOON):
+        described = (
+            next((a for a in talk.answers(turn, within=SOON) if _describes(a, unknown)), None) if unknown else None
+        )
+        if described is None:
             continue
-        described = next((a for a in talk.answers(turn, within=SOON) if _describes(a)), None)
-        if described is not None:
+        since = described.start
+        if talk.believed(MentalAction.KNOWLEDGE_UPDATE, since=since, until=described.end + SOON):
             steps = talk.answers(turn, M.INSTRUCT, within=3 * SOON)
             refined = any(a.number > described.number and a.names(Slot.ACTION) for a in steps)
             yield Finding(turn, "described, refined" if refined else "described")
 
 
-def _describes(turn: Turn) -> bool:
+def _describes(turn: Turn, places: Collection[str]) -> bool:
+    """Whether a turn tells where it is: on a street, or by another place than those."""
     tells = turn.does(M.REPLY_W, M.EXPLAIN, M.CLARIFY, M.INSTRUCT)
-    return tells and bool(turn.names(Slot.STREET) or turn.names(Slot.LANDMARK))
+    return tells and bool(turn.names(Slot.STREET) or labels(turn.names(Slot.LANDMARK)) - frozenset(places))
 
 
 def has_hidden_goal(talk: Talk) -> bool:
@@ -60,55 +77,67 @@ def roadblock(talk: Talk) -> Iterator[Finding]:
     for turn in talk.by(CAR, M.EXPLAIN):
         if not any(set(act.slots) & set(OBSTACLES) for act in turn.doing(M.EXPLAIN)):
             continue
+        if not any(-BEFORE <= turn.start - met <= SOON for met in talk.met_roadblocks):
+            continue
         following = [turn, *talk.later(turn, within=SOON)]
-        proposed = any(other.speaker is CAR and other.does(M.QUERY_YN, M.QUERY_W, M.CHECK) for other in following)
-        told = any(other.speaker is HUMAN and other.does(M.INSTRUCT, M.REPLY_W) for other in following)
-        until = turn.end + SOON
-        anew = talk.believed(MentalAction.PLAN_UPDATE, since=turn.start, until=until) or talk.did(
-            PhysicalAction.U_TURN, PhysicalAction.J_TURN, PhysicalAction.LANE_SWITCH, since=turn.start, until=until
-        )
-        if (proposed or told) and anew:
-            yield Finding(turn, "proposed" if proposed else "told")
+        proposal = next((t for t in following if t.speaker is CAR and t.does(M.QUERY_YN, M.QUERY_W, M.CHECK)), None)
+        told = next((t for t in following if t.speaker is HUMAN and t.does(M.INSTRUCT, M.REPLY_W)), None)
+        first = proposal or told
+        if first is not None and _goes_another_way(talk, since=turn.start, until=first.end + SOON):
+            yield Finding(turn, "proposed" if proposal is not None else "told")
+
+
+def _goes_another_way(talk: Talk, *, since: float, until: float) -> bool:
+    around = (PhysicalAction.U_TURN, PhysicalAction.J_TURN, PhysicalAction.LANE_SWITCH)
+    anew = talk.believed(MentalAction.PLAN_UPDATE, since=since, until=until)
+    return anew or talk.did(*around, since=since, until=until)
 
 
 def meets_roadblock(talk: Talk) -> bool:
     """Whether the car comes near something that the Ad-Wizard put on the road."""
-    return talk.met_roadblock is not None
+    return bool(talk.met_roadblocks)
 
 
 def dim_weather(talk: Talk) -> Iterator[Finding]:
-    """10: once fog, rain or dusk set in, the participant wants less speed or more light, and gets it or an answer."""
-    first = min((event.time for event in _dimming(talk)), default=None)
-    if first is None:
-        return
-    wishes = {
-        ActionValue.SPEED_CHANGE: (PhysicalAction.SPEED_CHANGE, "slower"),
-        ActionValue.LIGHT_CHANGE: (PhysicalAction.LIGHT_CHANGE, "lights"),
-    }
+    """10: in fog, rain or at night the participant wants less speed or more light, and gets it or an answer."""
+    stretches = tuple(_dim(talk))
+    wishes = (
+        (ActionValue.SPEED_CHANGE, SLOWER, PhysicalAction.SPEED_CHANGE, False, "slower"),
+        (ActionValue.LIGHT_CHANGE, LIGHTS, PhysicalAction.LIGHT_CHANGE, True, "lights"),
+    )
     for turn in talk.by(HUMAN, M.INSTRUCT, M.QUERY_YN, M.CHECK):
-        if turn.start < first:
+        if not any(since <= turn.start <= until for since, until in stretches):
             continue
-        for value, (action, form) in wishes.items():
-            done = talk.did(action, since=turn.start, until=turn.end + 15.0)
-            if turn.mentions(value) and (done or talk.answered(turn)):
+        for value, words, action, up, form in wishes:
+            done = talk.switched(action, up, since=turn.start, until=turn.end + 15.0)
+            if turn.mentions(value) and (done or (turn.says(words) and talk.answered(turn))):
                 yield Finding(turn, form)
 
 
 def has_dim_weather(talk: Talk) -> bool:
-    """Whether the Ad-Wizard brings fog, rain or night."""
-    return any(True for _ in _dimming(talk))
+    """Whether the Ad-Wizard brings fog, rain or night, and time is left to talk about it."""
+    return any(talk.session.duration - since > 10.0 for since, _ in _dim(talk))
 
 
-def _dimming(talk: Talk) -> Iterator[Event]:
-    names = {str(parameter) for parameter in DIM}
-    return (e for e in talk.exceptions(ExceptionKind.WEATHER) if str(e.data.get("parameter")) in names)
+def _dim(talk: Talk) -> Iterator[tuple[float, float]]:
+    """Stretches of time [s] in which fog, rain or night takes sight, each from an exception until it is taken back."""
+    since: dict[WeatherParameter, float] = {}
+    for event in talk.exceptions(ExceptionKind.WEATHER):
+        parameter = next((each for each in DIM if str(each) == event.data.get("parameter")), None)
+        value = event.data.get("value")
+        if parameter is None or not isinstance(value, int | float):
+            continue
+        low = parameter is WeatherParameter.SUN_ALTITUDE_ANGLE
+        if (value <= DIM[parameter]) if low else (value >= DIM[parameter]):
+            since.setdefault(parameter, event.time)
+        elif parameter in since:
+            yield since.pop(parameter), event.time
+    yield from ((begun, math.inf) for begun in since.values())
 
 
 def task_added(talk: Talk) -> Iterator[Finding]:
     """11: the participant tells of a new errand; the car takes it up, or asks when."""
-    for _, turn in _told(talk, ExceptionKind.TASK_TRIGGER):
-        if not turn.does(M.INSTRUCT, M.EXPLAIN):
-            continue
+    for _, turn in _told(talk, ExceptionKind.TASK_TRIGGER, M.INSTRUCT, M.EXPLAIN):
         question = next(talk.answers(turn, M.QUERY_W, M.QUERY_YN, M.CHECK), None)
         if question is not None and talk.answered(question):
             yield Finding(turn, "negotiated")
@@ -123,11 +152,11 @@ def task_changed(talk: Talk) -> Iterator[Finding]:
             if turn.start < event.time or not talk.answered(turn):
                 continue
             places = turn.names(Slot.LANDMARK)
+            if str(event.data.get("landmark")) not in labels(places):
+                continue
             if len(places) > 1 and turn.mentions(GoalStatus.ABANDONED, GoalStatus.ONGOING, GoalStatus.PENDING):
                 yield Finding(turn, "both named")
-            elif str(event.data.get("landmark")) in labels(places) and (
-                turn.mentions(GoalStatus.ABANDONED) or _gave_up(talk, turn)
-            ):
+            elif turn.mentions(GoalStatus.ABANDONED) or _gave_up(talk, turn):
                 yield Finding(turn, "in two steps")
 
 
@@ -149,10 +178,10 @@ def task_deleted(talk: Talk) -> Iterator[Finding]:
         yield Finding(turn, "resumed" if resumed else "given up")
 
 
-def _told(talk: Talk, kind: ExceptionKind) -> Iterator[tuple[Event, Turn]]:
-    """The participant's turns that name the landmark of a task's exception after it happened."""
+def _told(talk: Talk, kind: ExceptionKind, *moves: DialogueMove) -> Iterator[tuple[Event, Turn]]:
+    """The participant's turns, that do one of the moves, which name the landmark of a task's exception after it."""
     for event in talk.exceptions(kind):
-        for turn in talk.by(HUMAN):
+        for turn in talk.by(HUMAN, *moves):
             if turn.start >= event.time and str(event.data.get("landmark")) in labels(turn.names(Slot.LANDMARK)):
                 yield event, turn
 
@@ -168,7 +197,9 @@ def completion(talk: Talk) -> Iterator[Finding]:
         for turn in talk.turns:
             if not 0.0 <= turn.start - event.time <= SOON:
                 continue
-            if turn.speaker is HUMAN and turn.mentions(GoalStatus.COMPLETE) and turn.does(M.EXPLAIN):
+            places = labels(turn.names(Slot.LANDMARK))
+            is_it = not places or str(event.data.get("landmark")) in places
+            if turn.speaker is HUMAN and turn.mentions(GoalStatus.COMPLETE) and turn.does(M.EXPLAIN) and is_it:
                 yield Finding(turn, "told")
             elif turn.speaker is CAR and asks_where_next(talk, turn.number):
                 yield Finding(turn, "asked")
@@ -192,12 +223,20 @@ def negotiation(talk: Talk) -> Iterator[Finding]:
             act.values(Slot.ACTION) or act.values(Slot.STREET) or act.values(Slot.LANDMARK)
             for act in turn.doing(M.QUERY_YN, M.CHECK)
         )
-        grounds = turn.does(M.EXPLAIN) or any(
-            other.speaker is CAR and other.does(M.EXPLAIN) for other in talk.before(turn, within=10.0)
-        )
-        answer = next(talk.answers(turn, M.REPLY_Y, M.REPLY_N, M.CONFIRM, M.INSTRUCT, M.ACKNOWLEDGE), None)
-        if proposes and grounds and answer is not None:
+        if not proposes or not _has_grounds(talk, turn):
+            continue
+        answer = next(talk.replies(turn, M.REPLY_Y, M.REPLY_N, M.CONFIRM, M.INSTRUCT, M.ACKNOWLEDGE), None)
+        if answer is not None:
             yield Finding(turn, "accepted" if answer.does(M.REPLY_Y, M.CONFIRM, M.ACKNOWLEDGE) else "insisted")
+
+
+def _has_grounds(talk: Talk, turn: Turn) -> bool:
+    """Whether the car says what a proposal is for: soon after what changed, or by comparing."""
+    grounds = [turn, *(other for other in talk.before(turn, within=10.0) if other.speaker is CAR)]
+    grounds = [other for other in grounds if other.does(M.EXPLAIN)]
+    changed = [event.time for event in talk.exceptions(ExceptionKind.TASK_TRIGGER, ExceptionKind.TASK_CHANGE)]
+    fresh = any(0.0 <= turn.start - time <= SOON for time in (*changed, *talk.met_roadblocks))
+    return any(fresh or other.says(_COMPARES) or turn.says(_COMPARES) for other in grounds)
 
 
 def gives_cause_to_negotiate(talk: Talk) -> bool:

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 
 from dorothie_gym.dialogue.exchanges import EXPECTATIONS, PATIENCE
-from dorothie_gym.ontology import DialogueMove, PhysicalAction, Slot
+from dorothie_gym.ontology import DialogueMove, PhysicalAction, Slot, SlotValue
 from dorothie_gym.sessions.events import EventType
 from dorothie_gym.sessions.statistics.phenomena.query import CAR, HUMAN, Finding
 from dorothie_gym.sessions.statistics.phenomena.talk import Talk, Turn
-from dorothie_gym.sessions.statistics.phenomena.ways import is_why
+from dorothie_gym.sessions.statistics.phenomena.ways import asks_why
 from dorothie_gym.sessions.statistics.words import plain, words_of
 
 M = DialogueMove
@@ -19,6 +19,9 @@ M = DialogueMove
 QUESTIONS = (M.QUERY_YN, M.QUERY_W, M.CHECK, M.ALIGN)
 AGAIN = 30.0
 """A question that is put again is put within this time [s]."""
+
+LATELY = 45.0
+"""Who names a place that was named within this time [s] has not made it up."""
 
 _YES_NO: Mapping[DialogueMove, str] = MappingProxyType(
     {M.REPLY_Y: "yes", M.REPLY_N: "no", M.REPLY_U: "unsure"},
@@ -28,7 +31,7 @@ _YES_NO: Mapping[DialogueMove, str] = MappingProxyType(
 def yes_no(talk: Talk) -> Iterator[Finding]:
     """5: the car asks a yes/no question; the participant says yes, no, or is not sure."""
     for turn in talk.by(CAR, M.QUERY_YN):
-        answer = next(talk.answers(turn, *_YES_NO), None)
+        answer = next(talk.replies(turn, *_YES_NO), None)
         if answer is not None:
             yield Finding(turn, next(_YES_NO[act.move] for act in answer.doing(*_YES_NO)))
 
@@ -36,7 +39,7 @@ def yes_no(talk: Talk) -> Iterator[Finding]:
 def check(talk: Talk) -> Iterator[Finding]:
     """6: the car checks what it takes to be so, and the participant verifies or denies it."""
     for turn in talk.by(CAR, M.CHECK):
-        answer = next(talk.answers(turn, M.CONFIRM, M.REPLY_Y, M.REPLY_N, M.CLARIFY), None)
+        answer = next(talk.replies(turn, M.CONFIRM, M.REPLY_Y, M.REPLY_N, M.CLARIFY), None)
         if answer is not None:
             yield Finding(turn, "confirmed" if answer.does(M.CONFIRM, M.REPLY_Y) else "denied")
 
@@ -46,10 +49,10 @@ def align(talk: Talk) -> Iterator[Finding]:
     for turn in talk.turns:
         if not turn.does(M.ALIGN):
             continue
-        if talk.answered(turn, M.ACKNOWLEDGE, M.REPLY_Y):
+        if talk.replied(turn, M.ACKNOWLEDGE, M.REPLY_Y):
             yield Finding(turn, "understood")
             continue
-        puzzled = next(talk.answers(turn, M.CONFUSE, M.REPLY_N), None)
+        puzzled = next(talk.replies(turn, M.CONFUSE, M.REPLY_N), None)
         if puzzled is not None and talk.answered(puzzled, M.CLARIFY, M.INSTRUCT):
             yield Finding(turn, "repaired")
 
@@ -59,7 +62,7 @@ def perception(talk: Talk) -> Iterator[Finding]:
     for turn in talk.by(HUMAN, M.QUERY_YN):
         if not any(act.values(Slot.OBJECT) for act in turn.doing(M.QUERY_YN)):
             continue
-        answer = next(talk.answers(turn, M.REPLY_Y, M.REPLY_N, M.REPLY_U), None)
+        answer = next(talk.replies(turn, M.REPLY_Y, M.REPLY_N, M.REPLY_U), None)
         if answer is not None:
             yield Finding(turn, "seen" if answer.does(M.REPLY_Y) else "not seen")
 
@@ -67,7 +70,7 @@ def perception(talk: Talk) -> Iterator[Finding]:
 def reason(talk: Talk) -> Iterator[Finding]:
     """16: the participant asks why the car does what it does, and it gives a reason."""
     for turn in talk.by(HUMAN, M.QUERY_W, M.QUERY_YN):
-        if is_why(turn.text) and talk.answered(turn, M.REPLY_W, M.EXPLAIN):
+        if asks_why(turn) and talk.replied(turn, M.REPLY_W, M.EXPLAIN):
             yield Finding(turn, "explained")
 
 
@@ -94,6 +97,8 @@ def _answered_exchanges(talk: Talk) -> Iterator[Turn]:
     answered: dict[int | None, Turn] = {}
     for turn in talk.turns:
         for act, exchange in zip(turn.acts, turn.exchanges, strict=True):
+            if exchange is None:
+                continue
             if exchange not in opened:
                 opened[exchange] = turn
             elif opened[exchange].speaker is not turn.speaker and act.move not in EXPECTATIONS:
@@ -116,7 +121,7 @@ def abandoned(talk: Talk) -> Iterator[Finding]:
             said_by_both.setdefault(exchange, set()).add(turn.speaker)
     for turn in talk.turns:
         asked = [k for act, k in zip(turn.acts, turn.exchanges, strict=True) if act.move in QUESTIONS]
-        unanswered = any(len(said_by_both[k]) == 1 for k in asked)
+        unanswered = any(k is not None and len(said_by_both[k]) == 1 for k in asked)
         if not unanswered or talk.session.duration - turn.end < PATIENCE:
             continue
         answered = talk.answers(turn, *(set(M) - {M.IRRELEVANT, M.ALIGN}), within=PATIENCE)
@@ -150,12 +155,17 @@ def speech_trouble(talk: Talk) -> Iterator[Finding]:
             continue
         for answer in talk.answers(turn):
             puzzled = answer.does(M.CONFUSE)
-            said = turn.names(Slot.LANDMARK) | turn.names(Slot.STREET)
             got = answer.names(Slot.LANDMARK) | answer.names(Slot.STREET)
-            mistaken = bool(got) and not got & said
+            mistaken = bool(got) and not got & _said_lately(talk, turn)
             if (puzzled or mistaken) and _put_right(talk, turn, answer):
                 yield Finding(turn, "not understood" if puzzled else "misunderstood")
                 break
+
+
+def _said_lately(talk: Talk, turn: Turn) -> frozenset[SlotValue]:
+    """Places that were named in a turn, or by anybody shortly before it."""
+    turns = [turn, *talk.before(turn, within=LATELY)]
+    return frozenset(value for each in turns for slot in (Slot.LANDMARK, Slot.STREET) for value in each.names(slot))
 
 
 def _put_right(talk: Talk, turn: Turn, answer: Turn) -> bool:

@@ -53,6 +53,7 @@ class Turn:
         text: its words.
         recognised: what a recogniser heard, None where there was none.
         acts: its acts, in order.
+        spans: the words of each act.
         exchanges: number of the exchange of each act.
         start, end: when it was said [s].
     """
@@ -62,6 +63,7 @@ class Turn:
     text: str
     recognised: str | None
     acts: tuple[DialogueAct, ...]
+    spans: tuple[str, ...]
     exchanges: tuple[int | None, ...]
     start: float
     end: float
@@ -82,9 +84,16 @@ class Turn:
         """Whether one of its acts carries one of the values."""
         return any(value in act.slots for act in self.acts for value in values)
 
-    def says(self, pattern: re.Pattern[str]) -> bool:
-        """Whether its words contain the pattern."""
-        return pattern.search(self.text.casefold().replace("’", "'")) is not None
+    def says(self, pattern: re.Pattern[str], *moves: DialogueMove) -> bool:
+        """Whether the words of one of its acts, of those that do one of the moves if any is given, have the pattern.
+
+        Talk that is not about the drive has no say.
+        """
+        return any(
+            pattern.search(span.casefold().replace("’", "'"))
+            for act, span in zip(self.acts, self.spans, strict=True)
+            if act.move is not DialogueMove.IRRELEVANT and (not moves or act.move in moves)
+        )
 
 
 class Talk:
@@ -126,6 +135,21 @@ class Talk:
         """Whether there is such an answer."""
         return any(True for _ in self.answers(turn, *moves, within=within))
 
+    def replies(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER) -> Iterator[Turn]:
+        """Yields the answers that do one of the moves within an exchange that the turn is in.
+
+        Where the exchange is not known, any answer will do.
+        """
+        own = set(turn.exchanges)
+        for other in self.answers(turn, *moves, within=within):
+            placed = zip(other.acts, other.exchanges, strict=True)
+            if None in own or any(act.move in moves and (k is None or k in own) for act, k in placed):
+                yield other
+
+    def replied(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER) -> bool:
+        """Whether there is such a reply."""
+        return any(True for _ in self.replies(turn, *moves, within=within))
+
     def later(self, turn: Turn, *, within: float) -> Iterator[Turn]:
         """Yields the turns after a turn that begin at most `within` seconds after its end."""
         for k in range(turn.number + 1, len(self.turns)):
@@ -154,6 +178,13 @@ class Talk:
         """Whether the Co-Wizard did one of the actions in a stretch of time [s]."""
         return any(_falls(self._action_times.get(action, ()), since, until) for action in actions)
 
+    def switched(self, action: PhysicalAction, up: bool, *, since: float, until: float) -> bool:
+        """Whether the Co-Wizard did an action up (or on), or down (or off), in a stretch of time [s]."""
+        done = (each for each in self.session.physical_actions if each.source is Role.CO_WIZARD)
+        return any(
+            each.action is action and each.up is up and since <= each.frame / FRAME_RATE <= until for each in done
+        )
+
     def believed(self, *actions: MentalAction, since: float = 0.0, until: float = math.inf) -> bool:
         """Whether the Co-Wizard did one of the mental actions in a stretch of time [s]."""
         return any(_falls(self._belief_times.get(action.label, ()), since, until) for action in actions)
@@ -163,11 +194,10 @@ class Talk:
         return bool(self.session.of_type(*types))
 
     @cached_property
-    def met_roadblock(self) -> float | None:
-        """When the car first was near something that the Ad-Wizard had put on the road [s]; None if never."""
+    def met_roadblocks(self) -> tuple[float, ...]:
+        """When the car came near each thing that the Ad-Wizard had put on the road and that it met [s]."""
         props = self.exceptions(ExceptionKind.PLACE_PROP, ExceptionKind.MOVE_PROP)
-        met = min((time_met(self.session, event) for event in props), default=math.inf)
-        return met if math.isfinite(met) else None
+        return tuple(met for met in (time_met(self.session, event) for event in props) if math.isfinite(met))
 
     @cached_property
     def _action_times(self) -> dict[PhysicalAction, list[float]]:
@@ -198,6 +228,7 @@ class Talk:
             text=utterance.text,
             recognised=utterance.moves[0].recognised,
             acts=tuple(move.act for move in utterance.moves),
+            spans=tuple(move.span for move in utterance.moves),
             exchanges=tuple(self.units.exchange_of(move) for move in utterance.moves),
             start=utterance.start,
             end=utterance.end,
