@@ -43,6 +43,9 @@ _A_BIT = re.compile(r"\b(bit|little)\b")
 SLOW = 25
 """Speed in bad weather [km/h]."""
 
+JUST_PASSED = 40.0
+"""A place that the car was to stop at no longer ago than this must be near [s]."""
+
 OPEN_ROAD = 20
 """A lower speed is for the moment only [km/h]."""
 
@@ -180,7 +183,9 @@ def _do_follow(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -
 
 def _do_u_turn(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> None:
     mind.wish, mind.wish_until = Wish.U_TURN, view.time + WISH_TIME
-    mind.directive, mind.halted, mind.nudge, mind.creeping, mind.arrived = None, False, None, False, False
+    # who has been stopped for a place that is not on the map and then is turned round has gone past it
+    mind.creeping = mind.goal is not None and not mind.exact and view.time - mind.told_to_stop_at < JUST_PASSED
+    mind.directive, mind.halted, mind.nudge, mind.arrived = None, False, None, False
     mind.detour_at = None
 
 
@@ -191,6 +196,7 @@ def _do_switch(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -
 
 
 def _do_stop(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> None:
+    mind.told_to_stop_at = view.time
     mind.halted, mind.nudge, mind.wish = True, None, None
 
 

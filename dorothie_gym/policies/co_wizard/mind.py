@@ -76,10 +76,10 @@ class Style:
             asks=float(rng.uniform(0.6, 1.0)),
             proposes=float(rng.uniform(0.1, 0.6)),
             mishears=float(rng.uniform(0.0, 0.04)),
-            careful=float(rng.uniform(0.4, 1.0)),
-            eases=bool(rng.random() < 0.4),
+            careful=float(rng.uniform(0.6, 1.0)),
+            eases=bool(rng.random() < 0.12),
             rambles=float(rng.uniform(0.05, 0.45)),
-            pace=int(rng.choice((30, 35, 40))),
+            pace=int(rng.choice((35, 40, 40))),
             chats=float(rng.uniform(0.1, 0.6)),
         )
 
@@ -130,6 +130,7 @@ class CoWizardMind:
         halted: whether the car is to stand.
         nudge: place to go on to and stop at again.
         creeping: whether the place is close and its guess is carried along.
+        told_to_stop_at: when it was last told to stop [s].
         speed: cruise speed aimed at [km/h].
         slow_until: until when a speed for the moment only is kept [s].
         usual: cruise speed on open road, as told last [km/h].
@@ -155,6 +156,7 @@ class CoWizardMind:
         misses: how often it has driven past the goal.
         avoided: places that it does not come by any more, for it missed the goal when it did.
         rest_until: until when it stands for something in the way [s].
+        rest_for: what that is.
         pausing: whether it stops before the junction ahead until it is told the way.
         rested: whether it has decided whether to stop for good at the present hazard.
         weather_told: whether it has remarked on the weather as it is.
@@ -178,6 +180,7 @@ class CoWizardMind:
     halted: bool = False
     nudge: Place | None = None
     creeping: bool = False
+    told_to_stop_at: float = -math.inf
     speed: int = USUAL_SPEED
     slow_until: float = math.inf
     usual: int = USUAL_SPEED
@@ -203,6 +206,7 @@ class CoWizardMind:
     misses: int = 0
     avoided: tuple[Place, ...] = ()
     rest_until: float = -math.inf
+    rest_for: ObjectClass = ObjectClass.UNLABELED
     pausing: bool = False
     rested: bool = False
     weather_told: bool = False
