@@ -49,6 +49,8 @@ class Style:
         chats: chance that it answers small talk.
         eases: whether it slows down well before it turns.
         rambles: chance that it tells what it is up to in the same breath as something else.
+        offers: chance that it proposes to do a task first that is on the way.
+        reassures: chance that it makes sure to have heard a description right.
         pace: speed at which it drives when nothing is said about it [km/h].
     """
 
@@ -63,6 +65,8 @@ class Style:
     chats: float = 0.0
     eases: bool = False
     rambles: float = 0.0
+    offers: float = 0.0
+    reassures: float = 0.0
     pace: int = USUAL_SPEED
 
     @classmethod
@@ -75,10 +79,12 @@ class Style:
             silent=float(rng.uniform(0.2, 0.5)),
             asks=float(rng.uniform(0.6, 1.0)),
             proposes=float(rng.uniform(0.1, 0.6)),
-            mishears=float(rng.uniform(0.0, 0.04)),
+            mishears=float(rng.uniform(0.0, 0.05)),
             careful=float(rng.uniform(0.6, 1.0)),
             eases=bool(rng.random() < 0.12),
-            rambles=float(rng.uniform(0.05, 0.45)),
+            rambles=float(rng.uniform(0.05, 0.4)),
+            offers=float(rng.uniform(0.3, 1.0)),
+            reassures=float(rng.uniform(0.0, 0.3)),
             pace=int(rng.choice((35, 40, 40))),
             chats=float(rng.uniform(0.1, 0.6)),
         )
@@ -161,6 +167,8 @@ class CoWizardMind:
         rested: whether it has decided whether to stop for good at the present hazard.
         weather_told: whether it has remarked on the weather as it is.
         slower_asked: whether it has proposed to slow down and waits for an answer.
+        offer: place that it has proposed to go to first and waits for an answer about.
+        missed: act that it has not caught.
         lost_told: whether it has said that it does not know where it is.
     """
 
@@ -211,6 +219,8 @@ class CoWizardMind:
     rested: bool = False
     weather_told: bool = False
     slower_asked: bool = False
+    offer: LandmarkName | None = None
+    missed: bool = False
     lost_told: bool = False
 
     def note(self, mental: Mental) -> None:
