@@ -47,9 +47,9 @@ def take_up(mind: CoWizardMind, action: ActionValue, words: Heard, rng: np.rando
 
 def _repeated(action: ActionValue, wording: Wording, rng: np.random.Generator) -> tuple[Remark, ...]:
     draw = rng.random()
-    if draw < 0.4:
+    if draw < 0.25:
         return (remark(DialogueMove.CONFIRM, action, wording=replace(wording, topic="taken")),)
-    if draw < 0.55:
+    if draw < 0.35:
         return (remark(DialogueMove.ACKNOWLEDGE, action, wording=wording),)
     move = DialogueMove.ACKNOWLEDGE if draw < 0.85 else DialogueMove.CONFIRM
     words = remark(move, wording=Wording(topic="taken"))

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from dorothie_gym.dialogue import Wording
-from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, SlotValue
+from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, LandmarkName, SlotValue
 from dorothie_gym.policies.journey import Journey
 from dorothie_gym.policies.participant.mind import ParticipantMind, View
 from dorothie_gym.policies.scenery import SeenLandmark, SeenSubgoal
@@ -226,15 +226,23 @@ def announcement(mind: ParticipantMind, view: View, rng: np.random.Generator) ->
     return remark(DialogueMove.INSTRUCT, *values, wording=Wording(topic=topic))
 
 
+def reason_topic(mind: ParticipantMind) -> str | None:
+    """What a reason to go to the target is about: an errand in a shop, or whom one visits."""
+    if mind.goal is None:
+        return None
+    return "visit" if mind.goal.name in (LandmarkName.HOUSE, LandmarkName.PERSON) else "errand"
+
+
 def _announce(mind: ParticipantMind, view: View, goes_on: bool, rng: np.random.Generator) -> None:
     """Names the target, perhaps with a reason for it, and what is to be done later."""
     words = replace(announcement(mind, view, rng), joined=goes_on)
     draw = rng.random()
     if draw < mind.style.reasons:
-        reason = remark(DialogueMove.EXPLAIN, joined=goes_on)
+        reason = remark(DialogueMove.EXPLAIN, joined=goes_on, wording=Wording(topic=reason_topic(mind)))
         mind.voice = mind.voice.plan(reason, replace(words, joined=True))
     elif draw < 1.6 * mind.style.reasons:
-        mind.voice = mind.voice.plan(words, remark(DialogueMove.EXPLAIN, joined=True))
+        reason = remark(DialogueMove.EXPLAIN, joined=True, wording=Wording(topic=reason_topic(mind)))
+        mind.voice = mind.voice.plan(words, reason)
     else:
         mind.voice = mind.voice.plan(words)
     later = [view.landmark(item.landmark) for item in view.subgoals if item.open and item.index != mind.target]

@@ -167,7 +167,7 @@ def _rounded_off(mind: ParticipantMind, words: Remark, again: bool, rng: np.rand
     if draw < mind.style.aligns:
         return words, remark(DialogueMove.ALIGN, joined=True)
     if draw < mind.style.aligns + 0.7 * mind.style.reasons:
-        return words, remark(DialogueMove.EXPLAIN, joined=True)
+        return words, remark(DialogueMove.EXPLAIN, joined=True, wording=Wording(topic="hint"))
     return (words,)
 
 

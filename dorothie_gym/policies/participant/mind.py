@@ -75,14 +75,14 @@ class Style:
             names_street=float(rng.uniform(0.1, 0.7)),
             hurries=float(rng.uniform(0.4, 0.95)),
             patience=float(rng.uniform(7.0, 14.0)),
-            chat=float(rng.uniform(30.0, 90.0)),
+            chat=float(rng.uniform(40.0, 140.0)),
             waits=float(rng.uniform(0.7, 1.0)),
             hints=float(rng.uniform(0.1, 0.55)),
-            reasons=float(rng.uniform(0.05, 0.4)),
+            reasons=float(rng.uniform(0.05, 0.3)),
             aligns=float(rng.uniform(0.0, 0.15)),
-            nods=float(rng.uniform(0.05, 0.45)),
-            curious=float(rng.uniform(0.05, 0.5)),
-            puzzled=float(rng.uniform(0.0, 0.4)),
+            nods=float(rng.uniform(0.05, 0.35)),
+            curious=float(rng.uniform(0.05, 0.4)),
+            puzzled=float(rng.uniform(0.0, 0.35)),
         )
 
 

@@ -35,12 +35,16 @@ def not_caught(mind: ParticipantMind, view: View, heard: HeardUtterance, rng: np
     if heard.acts[0].move is DialogueMove.CLARIFY:
         return False
     spoke_meanwhile = mind.voice.last_end > view.time - speech_seconds(heard.words.text)
-    wants_it = any(act.move in _SPOKEN_INTO and act.slots for act in heard.acts)
+    wants_it = any(act.move in _SPOKEN_INTO and _names_something(act) for act in heard.acts)
     if not (spoke_meanwhile and wants_it and mind.voice.idle and rng.random() < mind.style.puzzled):
         return False
     mind.puzzled_by = heard
     mind.voice = mind.voice.plan_first(remark(DialogueMove.CONFUSE))
     return True
+
+
+def _names_something(act: DialogueAct) -> bool:
+    return any(value.label not in ("Unknown", "Queried") for value in act.slots)
 
 
 def misunderstood(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard) -> Remark | None:

@@ -23,7 +23,7 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies.hearing import heard_utterance
 from dorothie_gym.policies.journey import first_new_street
-from dorothie_gym.policies.participant.goals import announcement, route_length, switch_target
+from dorothie_gym.policies.participant.goals import announcement, reason_topic, route_length, switch_target
 from dorothie_gym.policies.participant.guidance import NEAR, about_to_arrive, next_step, note_told
 from dorothie_gym.policies.participant.mind import ParticipantMind, View
 from dorothie_gym.policies.participant.reactions import note_blocked
@@ -130,7 +130,10 @@ def _fits(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng
 
 def _more(mind: ParticipantMind, rng: np.random.Generator) -> tuple[Remark, ...]:
     """What is added to a yes now and then."""
-    return (remark(DialogueMove.EXPLAIN, joined=True),) if rng.random() < mind.style.reasons else ()
+    if rng.random() >= mind.style.reasons:
+        return ()
+    topic = "hint" if mind.guiding or rng.random() < 0.5 else reason_topic(mind)
+    return (remark(DialogueMove.EXPLAIN, joined=True, wording=Wording(topic=topic)),)
 
 
 def _refuse_with_step(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
