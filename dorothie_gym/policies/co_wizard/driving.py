@@ -54,7 +54,7 @@ GENTLE_WITHIN = 140.0
 """A place that was missed before is driven up to gently from here on [m]."""
 
 
-HELD_UP = 1.0
+HELD_UP = 0.4
 """A hazard that stops the car for longer than this holds it up [s]."""
 
 REST = 4.0
@@ -279,6 +279,9 @@ def _pause(mind: CoWizardMind, view: View) -> Physical | None:
         mind.pausing = False
     if not mind.pausing or mind.halted or view.motion is Motion.STOPPED or view.choice is None:
         return None
+    if view.motion is Motion.WAITING and view.standing and view.time - mind.stop_sent_at > PATIENCE:
+        mind.stop_sent_at = view.time
+        return Physical(action=PhysicalAction.STOP)
     near = view.choice.distance - stopping_distance(view.speed) < PAUSE_BEFORE
     if not near or view.manoeuvring or view.time - mind.stop_sent_at < PATIENCE:
         return None

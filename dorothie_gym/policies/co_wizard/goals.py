@@ -29,6 +29,9 @@ from dorothie_gym.world.town.routing import Place, router
 MOST_LANES = 40
 """So many lanes of a street are looked at for the one that is reached first."""
 
+CONFIRMS_CHANGES = 0.8
+"""Chance that a change of the tasks is confirmed, not only acknowledged."""
+
 LOOKED = 8.0
 """A place that has been guessed is given up when the car is this close to the guess [m]."""
 
@@ -106,7 +109,9 @@ def hear_goal(
     if dropped is not None:
         wording = Wording(topic="changed", dropped=dropped)
         mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, name, wording=wording))
-        if mind.journey is not None and mind.journey.changes_before(mind.journey.next_crossing(mind.town, view.station)):
+        if mind.journey is not None and mind.journey.changes_before(
+            mind.journey.next_crossing(mind.town, view.station)
+        ):
             mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, ActionValue.U_TURN, joined=True))
     elif corrected:
         mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, name, wording=Wording(topic="sorry")))
@@ -164,7 +169,7 @@ def hear_later(mind: CoWizardMind, view: View, name: LandmarkName, rng: np.rando
     if rng.random() < 0.5:
         mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, mind.goal, wording=Wording(topic="order")))
     else:
-        move = DialogueMove.CONFIRM if rng.random() < 0.5 else DialogueMove.ACKNOWLEDGE
+        move = DialogueMove.CONFIRM if rng.random() < CONFIRMS_CHANGES else DialogueMove.ACKNOWLEDGE
         mind.voice = mind.voice.plan(remark(move, name, GoalStatus.PENDING))
 
 

@@ -22,6 +22,7 @@ from dorothie_gym.ontology import (
 from dorothie_gym.policies.co_wizard.answers import answer_open, answer_yes_no
 from dorothie_gym.policies.co_wizard.driving import place_ahead
 from dorothie_gym.policies.co_wizard.goals import (
+    CONFIRMS_CHANGES,
     accept_offer,
     complete,
     doubt,
@@ -146,7 +147,7 @@ def _told_place(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, 
             hear_goal(mind, view, others[0], _streets(streets), rng, dropped=dropped)
         else:
             give_up(mind, dropped)
-            move = DialogueMove.CONFIRM if rng.random() < 0.6 else DialogueMove.ACKNOWLEDGE
+            move = DialogueMove.CONFIRM if rng.random() < CONFIRMS_CHANGES else DialogueMove.ACKNOWLEDGE
             mind.voice = mind.voice.plan(remark(move, dropped, GoalStatus.ABANDONED))
     elif GoalStatus.PENDING in statuses:
         hear_later(mind, view, landmarks[0], rng)
@@ -269,8 +270,9 @@ def _explanation(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard,
             mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
     elif GoalStatus.ABANDONED in statuses:
         give_up(mind, name)
-        values = (name,) if name is not None and rng.random() < mind.style.echoes else ()
-        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, *values), *musing(mind, rng, joined=True))
+        values = (name, GoalStatus.ABANDONED) if name is not None else ()
+        move = DialogueMove.CONFIRM if values and rng.random() < CONFIRMS_CHANGES else DialogueMove.ACKNOWLEDGE
+        mind.voice = mind.voice.plan(remark(move, *values))
     elif act.values(Slot.STREET):
         hear_description(mind, view, _streets(act.values(Slot.STREET)), landmarks, rng)
     elif "wrong" in words.text.lower():
@@ -300,7 +302,7 @@ def _reply(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: 
         clarified = act.move is DialogueMove.CLARIFY and landmarks and mind.goal is not landmarks[0]
         if clarified:
             hear_goal(mind, view, landmarks[0], _streets(act.values(Slot.STREET)), rng, corrected=True)
-        elif ((mind.goal is None or mind.arrived) and landmarks):
+        elif (mind.goal is None or mind.arrived) and landmarks:
             hear_goal(mind, view, landmarks[0], _streets(act.values(Slot.STREET)), rng)
         else:
             hear_description(mind, view, _streets(act.values(Slot.STREET)), landmarks, rng)

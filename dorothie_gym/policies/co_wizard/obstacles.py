@@ -51,7 +51,9 @@ def watch_road(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None
     )
     if mind.journey is not None:
         mind.detour_at = view.time
-        street = first_new_street(view.raw, mind.town, view.lane, mind.journey.replanned(mind.town, view.here, mind.blocked))
+        street = first_new_street(
+            view.raw, mind.town, view.lane, mind.journey.replanned(mind.town, view.here, mind.blocked)
+        )
         values: tuple[SlotValue, ...] = (street,) if street is not None and rng.random() < NAMES_STREET else ()
         if not values and rng.random() < 0.5:
             values = (ActionValue.U_TURN,) if _turns_round(mind, view) else ()

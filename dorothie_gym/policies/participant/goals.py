@@ -141,13 +141,11 @@ def _dropped(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.ra
         forget_target(mind)
         mind.goes_on = True
         mind.voice = mind.voice.cleared()
-    move = DialogueMove.INSTRUCT if rng.random() < 0.6 else DialogueMove.EXPLAIN
+    move = DialogueMove.INSTRUCT if rng.random() < 0.8 else DialogueMove.EXPLAIN
     mind.voice = mind.voice.plan(remark(move, landmark.name, GoalStatus.ABANDONED))
 
 
-def _changed(
-    mind: ParticipantMind, view: View, old: SeenSubgoal, new: SeenSubgoal, rng: np.random.Generator
-) -> None:
+def _changed(mind: ParticipantMind, view: View, old: SeenSubgoal, new: SeenSubgoal, rng: np.random.Generator) -> None:
     former, landmark = view.landmark(old.landmark), view.landmark(new.landmark)
     if former is None or landmark is None:
         return

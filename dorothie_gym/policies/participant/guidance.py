@@ -33,7 +33,7 @@ CLOSE_BY = 150.0
 AROUND = 60.0
 """and then is farther from it by more than this, has gone past it [m]."""
 
-TOO_LATE = 48.0
+TOO_LATE = 60.0
 """A turn is told when it is this near, even if the car has not asked [m]."""
 
 AGAIN = 9.0
@@ -48,7 +48,7 @@ DECISION = 0.5
 FASTEST = 11.0
 """The car is not expected to get faster than this [m/s]."""
 
-TAKES_OVER = 150.0
+TAKES_OVER = 130.0
 """A car that looks for a place by itself is guided from here on [m]."""
 
 NEAR = 95.0

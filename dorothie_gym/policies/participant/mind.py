@@ -70,17 +70,17 @@ class Style:
     def draw(cls, rng: np.random.Generator) -> Style:
         """A style by chance: two in five guide most of the way themselves."""
         return cls(
-            guides=0.3 if rng.random() < 0.4 else 0.03,
+            guides=0.2 if rng.random() < 0.4 else 0.02,
             names_goal=float(rng.uniform(0.4, 1.0)),
             names_street=float(rng.uniform(0.1, 0.7)),
             hurries=float(rng.uniform(0.4, 0.95)),
             patience=float(rng.uniform(7.0, 14.0)),
-            chat=float(rng.uniform(40.0, 140.0)),
-            waits=float(rng.uniform(0.7, 1.0)),
-            hints=float(rng.uniform(0.1, 0.55)),
+            chat=float(rng.uniform(50.0, 150.0)),
+            waits=float(rng.uniform(0.5, 0.95)),
+            hints=float(rng.uniform(0.2, 0.65)),
             reasons=float(rng.uniform(0.05, 0.3)),
             aligns=float(rng.uniform(0.0, 0.15)),
-            nods=float(rng.uniform(0.05, 0.35)),
+            nods=float(rng.uniform(0.1, 0.45)),
             curious=float(rng.uniform(0.05, 0.4)),
             puzzled=float(rng.uniform(0.0, 0.35)),
         )

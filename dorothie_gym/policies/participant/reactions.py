@@ -194,7 +194,7 @@ def _topics(mind: ParticipantMind, view: View, rng: np.random.Generator) -> list
     """What could be talked about now."""
     assert mind.goal is not None
     found: list[tuple[Remark, ...]] = [
-        (remark(DialogueMove.IRRELEVANT),),
+        *((remark(DialogueMove.IRRELEVANT),),) * 2,
         (remark(DialogueMove.IRRELEVANT), remark(DialogueMove.IRRELEVANT, joined=True)),
         (remark(DialogueMove.QUERY_YN),),
     ]

@@ -16,9 +16,7 @@ RECENT = 15.0
 _SPOKEN_INTO = frozenset({DialogueMove.EXPLAIN, DialogueMove.QUERY_YN, DialogueMove.CHECK, DialogueMove.QUERY_W})
 """What one would rather have said again than let pass."""
 
-_TAKEN_UP = frozenset(
-    {DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.EXPLAIN, DialogueMove.QUERY_W}
-)
+_TAKEN_UP = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.EXPLAIN, DialogueMove.QUERY_W})
 
 _SIDEWAYS = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)
 

@@ -31,13 +31,13 @@ from dorothie_gym.policies.participant.repairs import misunderstood, not_caught
 from dorothie_gym.policies.scenery import SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.speech import Remark, remark
 
-GUIDES_AT_ONCE = 0.25
+GUIDES_AT_ONCE = 0.12
 """Chance that the way to a place that the car does not know is told from where it has been described."""
 
 ELSEWHERE = 40.0
 """A car that stands farther than this from the target has not come to it [m]."""
 
-SAYS_IT_ALL = 0.5
+SAYS_IT_ALL = 0.85
 """Chance that the order of two tasks is told by naming the first one as well."""
 
 TELLS_LOOKS = 0.35
