@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.ontology import StreetName
+from dorothie_gym.policies.scenery import street_of
 from dorothie_gym.world.town import Town
 from dorothie_gym.world.town.lights import LightColour
 from dorothie_gym.world.town.model import Exit, LinkType, wrap_degrees
@@ -246,6 +248,10 @@ class Journey:
 
     def next_crossing(self, town: Town, station: float) -> Crossing | None:
         """The next junction with a choice on the route; None if the rest needs no choice."""
+        return next(self.crossings(town, station), None)
+
+    def crossings(self, town: Town, station: float) -> Iterator[Crossing]:
+        """Yields the junctions with a choice on the route, the next first."""
         legs = self.legs
         distance = 0.0
         for k, leg in enumerate(legs[:-1]):
@@ -254,8 +260,7 @@ class Journey:
             if following.entry is Entry.FOLLOW and is_choice(town, leg.lane):
                 way = next((way for way in town.exits(leg.lane) if way.connector == following.lane), None)
                 if way is not None:
-                    return Crossing(lane=leg.lane, exit=way, distance=distance)
-        return None
+                    yield Crossing(lane=leg.lane, exit=way, distance=distance)
 
     def next_manoeuvre(self, station: float) -> tuple[Entry, float] | None:
         """The first lane change or U-turn on the route before the next junction, and how far it is [m]."""
@@ -299,6 +304,22 @@ class Journey:
             if crossing is not None and leg.lane == crossing.exit.connector:
                 return False
         return False
+
+
+def first_new_street(
+    observation: Mapping[str, Any], town: Town, lane: int, journey: Journey | None
+) -> StreetName | None:
+    """The first street with a name on a journey that is another than that of the present lane; None if there is none.
+
+    Args:
+        observation: with the names of the streets.
+        town: the map.
+        lane: the present lane.
+        journey: None for no way at all.
+    """
+    here = street_of(observation, town, lane)
+    names = (street_of(observation, town, leg.lane) for leg in (journey.legs[1:] if journey is not None else ()))
+    return next((name for name in names if name not in (here, StreetName.UNKNOWN)), None)
 
 
 def streets_named(street_names: Iterable[int], name: StreetName) -> frozenset[int]:

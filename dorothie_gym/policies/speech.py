@@ -22,6 +22,9 @@ ANSWER_TIME = 3.0
 LONGEST_BREATH = 3
 """Most acts that are worded together."""
 
+MEMORY = 6
+"""So many of its latest remarks a speaker remembers."""
+
 _WANTS_ANSWER = frozenset(
     {DialogueMove.INSTRUCT, DialogueMove.ALIGN, DialogueMove.CHECK, DialogueMove.QUERY_YN, DialogueMove.QUERY_W}
 )
@@ -77,6 +80,7 @@ class Voice:
         last: what was said last, None at first.
         last_end: when that was over [s].
         style: how the speaker puts things; None for the middle of all.
+        said: the latest remarks, the last one at the end.
         heard: values that the other has just named: they may be referred to by "that one".
         other: the other's last move, None at first.
     """
@@ -87,6 +91,7 @@ class Voice:
     last: Remark | None = None
     last_end: float = -math.inf
     style: SpeakerStyle | None = None
+    said: tuple[Remark, ...] = ()
     heard: frozenset[SlotValue] = frozenset()
     other: DialogueMove | None = None
 
@@ -150,7 +155,12 @@ class Voice:
         end = now + speaking + speech_seconds(first.text)
         pause = ANSWER_TIME if first.act.move in _WANTS_ANSWER else PAUSE
         return Speech(act=first.act, text=first.text), replace(
-            self, queue=queue[1:], quiet_until=end + pause, last=first, last_end=end
+            self,
+            queue=queue[1:],
+            quiet_until=end + pause,
+            last=first,
+            last_end=end,
+            said=(*self.said[1 - MEMORY :], first),
         )
 
     def _worded(

@@ -48,8 +48,11 @@ SPACING = 35.0
 WINDOW = 240.0
 """Tricks are planned within this time from the first moment [s]."""
 
-TRIES = 24
-"""Decisions after which a trick that finds no moment is given up."""
+EXPIRES = 60.0
+"""A trick that finds no moment for this long is given up [s]."""
+
+LIKELY = {Trick.ROADBLOCK: 1.4, Trick.WEATHER: 1.2, Trick.TASK: 1.6, Trick.SENSOR: 0.5, Trick.CROWD: 0.5}
+"""How likely each trick is to be among those of a session, beside the others."""
 
 BAD_WEATHER = (80.0, 140.0)
 """How long bad weather lasts [s]."""
@@ -85,7 +88,6 @@ class AdWizardMind:
         planned: tricks to come.
         count: decisions taken.
         undo: what is to be put right again.
-        tries: decisions that the next trick has been waiting for its moment.
         roadblocks: how many have been placed.
         last: when the last trick was played [s].
     """
@@ -95,7 +97,6 @@ class AdWizardMind:
     planned: tuple[Planned, ...]
     count: int = 0
     undo: tuple[Undo, ...] = ()
-    tries: int = 0
     roadblocks: int = 0
     last: float = -math.inf
 
@@ -136,7 +137,8 @@ class ScriptedAdWizard(Policy[AdWizardMind]):
         if self._rate > 0.0 and self._kinds:
             count = 1 + int(rng.binomial(3, max(self._rate - 1.0, 0.0) / 3.0))
             times = np.sort(rng.uniform(FIRST, FIRST + WINDOW, size=count))
-            order = rng.permutation(len(self._kinds))
+            weights = np.array([LIKELY[kind] for kind in self._kinds])
+            order = rng.choice(len(self._kinds), size=len(self._kinds), replace=False, p=weights / weights.sum())
             for k, at in enumerate(times):
                 planned.append(Planned(trick=self._kinds[int(order[k % len(order)])], at=float(at)))
         return AdWizardMind(seed=seed, town=town, planned=tuple(planned))
@@ -153,15 +155,16 @@ class ScriptedAdWizard(Policy[AdWizardMind]):
     def _next_trick(
         self, mind: AdWizardMind, observation: Mapping[str, Any], now: float, rng: np.random.Generator
     ) -> AdWizardAction | None:
-        if not mind.planned or now < max(mind.planned[0].at, mind.last + SPACING):
+        if now < mind.last + SPACING:
             return None
-        action = _TRICKS[mind.planned[0].trick](mind, observation, now, rng)
-        mind.tries += 1
-        if action is not None or mind.tries >= TRIES:
-            mind.planned, mind.tries = mind.planned[1:], 0
-        if action is not None:
-            mind.last = now
-        return action
+        mind.planned = tuple(item for item in mind.planned if now < max(item.at, mind.last + SPACING) + EXPIRES)
+        for item in mind.planned:
+            action = _TRICKS[item.trick](mind, observation, now, rng) if now >= item.at else None
+            if action is not None:
+                mind.planned = tuple(other for other in mind.planned if other is not item)
+                mind.last = now
+                return action
+        return None
 
 
 def _put_right(mind: AdWizardMind, observation: Mapping[str, Any], now: float) -> AdWizardAction | None:
@@ -185,7 +188,6 @@ def _roadblock(
 ) -> AdWizardAction | None:
     """A barrier across the lane that the car is about to take, not too near to a place it may have to stop at."""
     if mind.roadblocks >= MOST_ROADBLOCKS:
-        mind.tries = TRIES
         return None
     if scalar(observation, "speed") < 3.0:
         return None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from dorothie_gym.dialogue import Direction, Heard, Wording
@@ -16,12 +18,19 @@ from dorothie_gym.ontology import (
     SlotValue,
     StreetName,
 )
+from dorothie_gym.policies.co_wizard.conditions import dim_topic
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View
 from dorothie_gym.policies.co_wizard.uptake import musing
 from dorothie_gym.policies.journey import direction_of
 from dorothie_gym.policies.scenery import street_of
-from dorothie_gym.policies.speech import remark
+from dorothie_gym.policies.speech import Remark, remark
+
+LONG_REST = 60.0
+"""Who has been standing for longer than this does not stand for what it stopped for at first [s]."""
+
+CROSSINGS = 6
+"""So many junctions of the plan are looked at for turns to tell of."""
 
 CLOSE = 120.0
 """A goal within this distance is close [m]."""
@@ -49,8 +58,16 @@ def answer_yes_no(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard
         yes = _doing(mind, view) in actions
     else:
         yes = mind.journey is not None and mind.journey.left(view.station) < CLOSE
-    more = musing(mind, rng, joined=True)
+    more = _why_not_seen(view, rng) if objects and not yes else musing(mind, rng, joined=True)
     mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_Y if yes else DialogueMove.REPLY_N), *more)
+
+
+def _why_not_seen(view: View, rng: np.random.Generator) -> tuple[Remark, ...]:
+    """What keeps it from seeing something, if anything does."""
+    bad = dim_topic(view)
+    if bad is None or rng.random() < 0.3:
+        return ()
+    return (remark(DialogueMove.EXPLAIN, wording=Wording(topic=bad), joined=True),)
 
 
 def _doing(mind: CoWizardMind, view: View) -> ActionValue:
@@ -68,6 +85,10 @@ def answer_open(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, 
     actions, landmarks = act.values(Slot.ACTION), act.values(Slot.LANDMARK)
     if ActionValue.STOP in actions:
         _why_standing(mind, view)
+    elif ActionValue.U_TURN in actions:
+        _why_round(mind)
+    elif ObjectClass.QUERIED in act.values(Slot.OBJECT):
+        _what_it_sees(mind, view)
     elif ActionValue.QUERIED in actions:
         _which_way(mind, view)
     elif landmarks:
@@ -81,9 +102,11 @@ def answer_open(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, 
 
 
 def _why_standing(mind: CoWizardMind, view: View) -> None:
-    if view.hazard is not ObjectClass.UNLABELED:
+    reason = view.hazard if view.hazard is not ObjectClass.UNLABELED else mind.rest_for
+    standing = view.time - (mind.standing_since if mind.standing_since is not None else view.time)
+    if reason is not ObjectClass.UNLABELED and (view.hazard is reason or standing < LONG_REST):
         mind.hazard_told = view.time
-        mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, view.hazard))
+        mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, reason))
     elif mind.arrived and mind.goal is not None:
         mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_YN, mind.goal))
     elif mind.goal is None and mind.directive is None:
@@ -93,14 +116,34 @@ def _why_standing(mind: CoWizardMind, view: View) -> None:
         mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_U))
 
 
+def _why_round(mind: CoWizardMind) -> None:
+    if mind.detour_at is not None or mind.blocked:
+        mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, ObjectClass.STATIC))
+    elif mind.goal is not None and mind.exact:
+        mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, mind.goal, wording=Wording(topic="behind")))
+    else:
+        mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, wording=Wording(topic="told")))
+
+
+def _what_it_sees(mind: CoWizardMind, view: View) -> None:
+    things = tuple(dict.fromkeys(thing.kind for thing in view.objects))[:2] or (ObjectClass.ROAD,)
+    mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, *things, wording=Wording(topic="seen")))
+
+
 def _which_way(mind: CoWizardMind, view: View) -> None:
+    turns = _turns(mind, view)
+    if mind.directive is None and turns:
+        for k, (values, direction) in enumerate(turns):
+            wording = Wording(direction=direction, topic="plan")
+            mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, *values, wording=wording, joined=k > 0))
+        return
     way = wanted_exit(mind, view)
     if way is None:
         if mind.journey is None:
             mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_U))
         else:
             action = ActionValue.U_TURN if mind.journey.changes_before(None) else ActionValue.LANE_FOLLOW
-            mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, action))
+            mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, action, wording=Wording(topic="plan")))
         return
     direction = direction_of(way)
     street = street_of(view.raw, mind.town, way.lane)
@@ -108,7 +151,21 @@ def _which_way(mind: CoWizardMind, view: View) -> None:
     values: list[SlotValue] = [action]
     if street is not StreetName.UNKNOWN:
         values.append(street)
-    mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, *values, wording=Wording(direction=direction)))
+    wording = Wording(direction=direction, topic="plan")
+    mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, *values, wording=wording))
+
+
+def _turns(mind: CoWizardMind, view: View) -> list[tuple[list[SlotValue], Direction]]:
+    """The next turns of the plan that lead elsewhere than straight on, at most two."""
+    if mind.journey is None or mind.journey.changes_before(mind.journey.next_crossing(mind.town, view.station)):
+        return []
+    found: list[tuple[list[SlotValue], Direction]] = []
+    for crossing in itertools.islice(mind.journey.crossings(mind.town, view.station), CROSSINGS):
+        street = street_of(view.raw, mind.town, crossing.exit.lane)
+        if crossing.direction in (Direction.LEFT, Direction.RIGHT):
+            values: list[SlotValue] = [ActionValue.J_TURN]
+            found.append((values + [street] * (street is not StreetName.UNKNOWN), crossing.direction))
+    return found[:2]
 
 
 def _where(mind: CoWizardMind, view: View) -> None:

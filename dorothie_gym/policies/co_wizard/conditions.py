@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dorothie_gym.dialogue import Wording
-from dorothie_gym.ontology import ActionValue, DialogueMove, WeatherParameter
+from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, WeatherParameter
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View
 from dorothie_gym.policies.scenery import weather
 from dorothie_gym.policies.speech import remark
@@ -26,21 +26,43 @@ FOUND = 9.0
 """Variance below which it knows again where it is [m^2]."""
 
 
+LEAVES_IT = 0.45
+"""Chance that the human is left to remark on the weather."""
+
+_SEEN_OF_WEATHER = {
+    "fog": (ObjectClass.ROAD_LINE, ObjectClass.ROAD),
+    "rain": (ObjectClass.WATER, ObjectClass.GROUND, ObjectClass.ROAD),
+    "night": (ObjectClass.SKY,),
+}
+"""What one sees of it, or does not see any more."""
+
+
+def dim_topic(view: View) -> str | None:
+    """What keeps it from seeing far: "fog", "rain" or "night"; None for clear weather by day."""
+    if weather(view.raw, WeatherParameter.FOG_DENSITY) > THICK_FOG:
+        return "fog"
+    if weather(view.raw, WeatherParameter.PRECIPITATION) > HEAVY_RAIN:
+        return "rain"
+    return "night" if weather(view.raw, WeatherParameter.SUN_ALTITUDE_ANGLE) < 0.0 else None
+
+
 def mind_weather(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
     """Remarks on fog, rain or darkness, and asks whether to slow down or switch on the lights."""
-    fog, rain = (weather(view.raw, name) for name in (WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATION))
+    topic = dim_topic(view)
+    bad = topic in ("fog", "rain")
     dark = weather(view.raw, WeatherParameter.SUN_ALTITUDE_ANGLE) < 0.0 and not view.lights
-    bad = fog > THICK_FOG or rain > HEAVY_RAIN
     if not bad and not dark:
         mind.weather_told = False
         return
     if mind.weather_told or view.standing:
         return
     mind.weather_told = True
-    if rng.random() < 0.3:
+    if rng.random() < LEAVES_IT:
         return  # the human may remark on it
-    topic = "fog" if fog > THICK_FOG else "rain" if rain > HEAVY_RAIN else "night"
-    mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, wording=Wording(topic=topic)))
+    things = _SEEN_OF_WEATHER[topic or "night"]
+    draw = int(rng.random() * (len(things) + 1))
+    values = (things[draw],) if draw < len(things) else ()
+    mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, *values, wording=Wording(topic=topic)))
     if bad and mind.speed > SLOW:
         mind.slower_asked = True
         wording = Wording(faster=False, speed=SLOW)

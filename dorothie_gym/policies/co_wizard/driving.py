@@ -18,10 +18,12 @@ from dorothie_gym.policies.journey import (
     find_exit,
     lanes_ahead,
     lanes_beside,
+    light_ahead,
     stopping_distance,
     streets_named,
 )
 from dorothie_gym.spaces import Motion, Physical
+from dorothie_gym.world.town.lights import LightColour
 from dorothie_gym.world.town.model import Exit, LinkType, wrap_degrees
 from dorothie_gym.world.town.oncoming import oncoming_lanes
 from dorothie_gym.world.town.routing import Entry, Place
@@ -43,20 +45,23 @@ PAUSE_BEFORE = 8.0
 """A car that does not know the way stops this far before a junction [m]."""
 
 GENTLE = 20
-"""Speed at which the car comes up to a place [km/h]."""
+"""Speed at which the car comes up to a place that it has missed before, and into turns by who eases [km/h]."""
 
 EASE_WITHIN = 40.0
 """Who eases into turns slows down when the junction is this near [m]."""
 
-GENTLE_WITHIN = 70.0
-"""A place on the map is driven up to gently from here on [m]."""
+GENTLE_WITHIN = 140.0
+"""A place that was missed before is driven up to gently from here on [m]."""
 
 
-HELD_UP = 2.0
+HELD_UP = 0.4
 """A hazard that stops the car for longer than this holds it up [s]."""
 
 REST = 4.0
 """So long it stands when it has stopped for good for something in the way [s]."""
+
+LONGEST_RED = 45.0
+"""Who has stopped for a red light goes on after this time at the latest [s]."""
 
 
 def drive(mind: CoWizardMind, view: View) -> Physical | None:
@@ -248,7 +253,16 @@ def rest(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
         return
     mind.rested = True
     if rng.random() < mind.style.careful:
-        mind.rest_until = view.time + REST
+        red = view.hazard is ObjectClass.TRAFFIC_LIGHT
+        mind.rest_until, mind.rest_for = view.time + (LONGEST_RED if red else REST), view.hazard
+
+
+def see_green(mind: CoWizardMind, view: View) -> None:
+    """Ends the stop before a traffic light that is red no more."""
+    if mind.rest_for is not ObjectClass.TRAFFIC_LIGHT or view.time >= mind.rest_until:
+        return
+    if light_ahead(mind.town, view.lane, view.station, view.time) in (None, LightColour.GREEN):
+        mind.rest_until = view.time
 
 
 def _rest(mind: CoWizardMind, view: View) -> Physical | None:
@@ -265,6 +279,9 @@ def _pause(mind: CoWizardMind, view: View) -> Physical | None:
         mind.pausing = False
     if not mind.pausing or mind.halted or view.motion is Motion.STOPPED or view.choice is None:
         return None
+    if view.motion is Motion.WAITING and view.standing and view.time - mind.stop_sent_at > PATIENCE:
+        mind.stop_sent_at = view.time
+        return Physical(action=PhysicalAction.STOP)
     near = view.choice.distance - stopping_distance(view.speed) < PAUSE_BEFORE
     if not near or view.manoeuvring or view.time - mind.stop_sent_at < PATIENCE:
         return None
@@ -289,14 +306,10 @@ def _turns_soon(mind: CoWizardMind, view: View) -> bool:
 
 
 def _close(mind: CoWizardMind, view: View) -> bool:
-    """Whether the goal is so near, with no junction before it, that the car should come up to it gently."""
+    """Whether a goal that the car has driven past before is so near that it should come up to it gently."""
     if mind.journey is None or not mind.exact:
         return False
-    if mind.misses:
-        return mind.journey.left(view.station) < 2.0 * GENTLE_WITHIN
-    if mind.journey.left(view.station) > GENTLE_WITHIN:
-        return False
-    return mind.journey.next_crossing(mind.town, view.station) is None
+    return bool(mind.misses) and mind.journey.left(view.station) < GENTLE_WITHIN
 
 
 def _comfort(mind: CoWizardMind, view: View) -> Physical | None:
@@ -325,9 +338,9 @@ _CONCERNS: tuple[Callable[[CoWizardMind, View], Physical | None], ...] = (
 
 def creep(mind: CoWizardMind, view: View) -> None:
     """Carries the guess of a place along that must be close, so that the car comes up to it slowly."""
-    if not mind.creeping or mind.place is None or mind.exact or mind.halted:
+    if not mind.creeping or mind.exact or mind.halted or view.manoeuvre is PhysicalAction.U_TURN:
         return
     landmark = mind.goal or LandmarkName.UNKNOWN
-    distance = distance_ahead(mind, view, mind.place)
+    distance = distance_ahead(mind, view, mind.place) if mind.place is not None else None
     if distance is None or distance < 6.0:
         mind.note_place(landmark, place_ahead(mind, view, 16.0))

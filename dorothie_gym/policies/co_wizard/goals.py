@@ -7,7 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from dorothie_gym.dialogue import Wording
-from dorothie_gym.ontology import DialogueMove, GoalStatus, LandmarkName, MentalAction, SlotValue, StreetName
+from dorothie_gym.ontology import (
+    ActionValue,
+    DialogueMove,
+    GoalStatus,
+    LandmarkName,
+    MentalAction,
+    SlotValue,
+    StreetName,
+)
 from dorothie_gym.policies.co_wizard.driving import place_ahead
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View
 from dorothie_gym.policies.co_wizard.uptake import musing
@@ -20,6 +28,9 @@ from dorothie_gym.world.town.routing import Place, router
 
 MOST_LANES = 40
 """So many lanes of a street are looked at for the one that is reached first."""
+
+CONFIRMS_CHANGES = 0.8
+"""Chance that a change of the tasks is confirmed, not only acknowledged."""
 
 LOOKED = 8.0
 """A place that has been guessed is given up when the car is this close to the guess [m]."""
@@ -75,6 +86,7 @@ def hear_goal(
     streets: Sequence[StreetName],
     rng: np.random.Generator,
     dropped: LandmarkName | None = None,
+    corrected: bool = False,
 ) -> None:
     """Takes up a place that it is told to go to.
 
@@ -85,28 +97,38 @@ def hear_goal(
         streets: streets named with it.
         rng: for the words.
         dropped: a place that is given up for it.
+        corrected: whether it had taken another place for it.
     """
     mark = known(mind, view, name, streets)
     if dropped is not None:
         mind.note_status(dropped, GoalStatus.ABANDONED)
     if mark is None:
-        _unknown(mind, view, name)
+        _unknown(mind, view, name, streets, rng)
         return
     aim(mind, view, mark)
     if dropped is not None:
         wording = Wording(topic="changed", dropped=dropped)
         mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, name, wording=wording))
+        if mind.journey is not None and mind.journey.changes_before(
+            mind.journey.next_crossing(mind.town, view.station)
+        ):
+            mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, ActionValue.U_TURN, joined=True))
+    elif corrected:
+        mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, name, wording=Wording(topic="sorry")))
     elif not streets and rng.random() < mind.style.checks * (2.0 if name in _COMMON else 0.6):
         mind.voice = mind.voice.plan(remark(DialogueMove.CHECK, name, mark.street))
     else:
         values: list[SlotValue] = [name]
         if streets and rng.random() < mind.style.echoes:
             values.append(mark.street)
-        move = DialogueMove.CONFIRM if rng.random() < 0.5 else DialogueMove.ACKNOWLEDGE
-        mind.voice = mind.voice.plan(remark(move, *values), *musing(mind, rng, joined=True))
+        move = DialogueMove.CONFIRM if rng.random() < 0.4 else DialogueMove.ACKNOWLEDGE
+        words = remark(move, *values, wording=Wording(topic="taken"))
+        mind.voice = mind.voice.plan(words, *musing(mind, rng, joined=True))
 
 
-def _unknown(mind: CoWizardMind, view: View, name: LandmarkName) -> None:
+def _unknown(
+    mind: CoWizardMind, view: View, name: LandmarkName, streets: Sequence[StreetName], rng: np.random.Generator
+) -> None:
     """The place is not on the map: says so, and goes where it is told to."""
     again = mind.goal is name and not mind.exact
     mind.goal, mind.place, mind.exact, mind.journey = name, None, False, None
@@ -114,10 +136,53 @@ def _unknown(mind: CoWizardMind, view: View, name: LandmarkName) -> None:
     mind.note_status(name, GoalStatus.UNKNOWN)
     if again:
         mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, name))
+        return
+    no_map = remark(DialogueMove.EXPLAIN, name, GoalStatus.UNKNOWN, wording=Wording(topic="no_map"))
+    draw = rng.random()
+    if draw < 0.25 and not streets:
+        which = remark(DialogueMove.QUERY_W, name, StreetName.QUERIED, joined=True)
+        mind.voice = mind.voice.plan(no_map, which)
+    elif draw < 0.4:
+        mind.voice = mind.voice.plan(no_map, remark(DialogueMove.QUERY_W, name, joined=True))
+    elif draw < 0.6:
+        mind.voice = mind.voice.plan(no_map, remark(DialogueMove.INSTRUCT, joined=True, wording=Wording(topic="help")))
     else:
-        mind.voice = mind.voice.plan(
-            remark(DialogueMove.EXPLAIN, name, GoalStatus.UNKNOWN, wording=Wording(topic="no_map"))
-        )
+        mind.voice = mind.voice.plan(no_map)
+
+
+def hear_later(mind: CoWizardMind, view: View, name: LandmarkName, rng: np.random.Generator) -> None:
+    """A place is to be gone to later: remembers it, asks when, or proposes to go there first if that is nearer."""
+    mind.note_status(name, GoalStatus.PENDING)
+    mark = known(mind, view, name, ())
+    if mind.goal is None or mind.goal is name:
+        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, name, GoalStatus.PENDING))
+        return
+    if mark is not None and mind.journey is not None and rng.random() < mind.style.offers:
+        route = router(mind.town).route(view.here, mark.place, mind.blocked)
+        if route is not None and route.length < mind.journey.left(view.station):
+            mind.offer = name
+            mind.voice = mind.voice.plan(
+                remark(DialogueMove.EXPLAIN, name, wording=Wording(topic="nearer")),
+                remark(DialogueMove.QUERY_YN, name, wording=Wording(topic="first"), joined=True),
+            )
+            return
+    if rng.random() < 0.5:
+        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, mind.goal, wording=Wording(topic="order")))
+    else:
+        move = DialogueMove.CONFIRM if rng.random() < CONFIRMS_CHANGES else DialogueMove.ACKNOWLEDGE
+        mind.voice = mind.voice.plan(remark(move, name, GoalStatus.PENDING))
+
+
+def accept_offer(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
+    """Goes first to the place that it has proposed; the one under way is for later."""
+    name, mind.offer = mind.offer, None
+    mark = known(mind, view, name, ()) if name is not None else None
+    if mark is None:
+        return
+    if mind.goal is not None:
+        mind.note_status(mind.goal, GoalStatus.PENDING)
+    aim(mind, view, mark)
+    mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, mark.name, wording=Wording(topic="taken")))
 
 
 def hear_stop_ahead(mind: CoWizardMind, view: View, name: LandmarkName | None, distance: float) -> None:
@@ -153,6 +218,8 @@ def hear_description(
         mind.halted = False  # it goes where it is told to
     values: tuple[SlotValue, ...] = tuple(streets[:1]) if rng.random() < mind.style.echoes else ()
     mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, *values))
+    if rng.random() < mind.style.reassures:
+        mind.voice = mind.voice.plan(remark(DialogueMove.ALIGN, joined=True))
 
 
 def _described(

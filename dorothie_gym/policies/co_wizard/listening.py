@@ -21,7 +21,18 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies.co_wizard.answers import answer_open, answer_yes_no
 from dorothie_gym.policies.co_wizard.driving import place_ahead
-from dorothie_gym.policies.co_wizard.goals import complete, doubt, give_up, hear_description, hear_goal, hear_stop_ahead
+from dorothie_gym.policies.co_wizard.goals import (
+    CONFIRMS_CHANGES,
+    accept_offer,
+    complete,
+    doubt,
+    give_up,
+    hear_description,
+    hear_goal,
+    hear_later,
+    hear_stop_ahead,
+    plan_way,
+)
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, Directive, View, Wish
 from dorothie_gym.policies.co_wizard.obstacles import detour
 from dorothie_gym.policies.co_wizard.uptake import musing, take_up
@@ -43,11 +54,21 @@ _A_BIT = re.compile(r"\b(bit|little)\b")
 SLOW = 25
 """Speed in bad weather [km/h]."""
 
+JUST_PASSED = 40.0
+"""A place that the car was to stop at no longer ago than this must be near [s]."""
+
 OPEN_ROAD = 20
 """A lower speed is for the moment only [km/h]."""
 
 MOMENT = 25.0
 """So long a speed for the moment only is kept [s]."""
+
+ASKED_LATELY = 12.0
+"""What is said no longer than this after a question should answer it [s]."""
+
+_ASKING = frozenset({DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK})
+
+_CAN_BE_REPEATED = _ASKING | {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W}
 
 _UNNAMED = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
 
@@ -117,17 +138,19 @@ def _told_place(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, 
     if GoalStatus.ABANDONED in statuses:
         dropped = next((name for name in words.dropped if name in landmarks), landmarks[0])
         others = [name for name in landmarks if name is not dropped]
-        if others:
+        if others and GoalStatus.PENDING in statuses:
+            mind.note_status(dropped, GoalStatus.ABANDONED)
+            mind.note_status(others[0], GoalStatus.PENDING)
+            wording = Wording(topic="changed", dropped=dropped)
+            mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, others[0], wording=wording))
+        elif others:
             hear_goal(mind, view, others[0], _streets(streets), rng, dropped=dropped)
         else:
             give_up(mind, dropped)
-            mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+            move = DialogueMove.CONFIRM if rng.random() < CONFIRMS_CHANGES else DialogueMove.ACKNOWLEDGE
+            mind.voice = mind.voice.plan(remark(move, dropped, GoalStatus.ABANDONED))
     elif GoalStatus.PENDING in statuses:
-        mind.note_status(landmarks[0], GoalStatus.PENDING)
-        if mind.goal is not None and rng.random() < 0.5:
-            mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, mind.goal, wording=Wording(topic="order")))
-        else:
-            mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, landmarks[0]))
+        hear_later(mind, view, landmarks[0], rng)
     elif landmarks[0] is mind.goal and mind.exact and not mind.arrived and not streets:
         mind.halted = False
         mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, landmarks[0]))
@@ -142,8 +165,8 @@ def _streets(values: tuple[object, ...]) -> tuple[StreetName, ...]:
 
 def _told_street(mind: CoWizardMind, view: View, street: StreetName) -> None:
     if mind.detour_at is not None:
-        mind.detour_at = None
-        mind.halted = False
+        mind.detour_at, mind.halted = None, False
+        plan_way(mind, view)
         mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, street, wording=Wording(topic="detour")))
         return
     mind.directive, mind.halted = Directive(direction=None, street=street, junction=view.junction), False
@@ -180,7 +203,9 @@ def _do_follow(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -
 
 def _do_u_turn(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> None:
     mind.wish, mind.wish_until = Wish.U_TURN, view.time + WISH_TIME
-    mind.directive, mind.halted, mind.nudge, mind.creeping, mind.arrived = None, False, None, False, False
+    # who has been stopped for a place that is not on the map and then is turned round has gone past it
+    mind.creeping = mind.goal is not None and not mind.exact and view.time - mind.told_to_stop_at < JUST_PASSED
+    mind.directive, mind.halted, mind.nudge, mind.arrived = None, False, None, False
     mind.detour_at = None
 
 
@@ -191,6 +216,7 @@ def _do_switch(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -
 
 
 def _do_stop(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> None:
+    mind.told_to_stop_at = view.time
     mind.halted, mind.nudge, mind.wish = True, None, None
 
 
@@ -244,8 +270,9 @@ def _explanation(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard,
             mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
     elif GoalStatus.ABANDONED in statuses:
         give_up(mind, name)
-        values = (name,) if name is not None and rng.random() < mind.style.echoes else ()
-        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, *values), *musing(mind, rng, joined=True))
+        values = (name, GoalStatus.ABANDONED) if name is not None else ()
+        move = DialogueMove.CONFIRM if values and rng.random() < CONFIRMS_CHANGES else DialogueMove.ACKNOWLEDGE
+        mind.voice = mind.voice.plan(remark(move, *values))
     elif act.values(Slot.STREET):
         hear_description(mind, view, _streets(act.values(Slot.STREET)), landmarks, rng)
     elif "wrong" in words.text.lower():
@@ -273,16 +300,22 @@ def _reply(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: 
     elif act.values(Slot.STREET) or act.values(Slot.LANDMARK):
         landmarks = [name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName)]
         clarified = act.move is DialogueMove.CLARIFY and landmarks and mind.goal is not landmarks[0]
-        if clarified or ((mind.goal is None or mind.arrived) and landmarks):
+        if clarified:
+            hear_goal(mind, view, landmarks[0], _streets(act.values(Slot.STREET)), rng, corrected=True)
+        elif (mind.goal is None or mind.arrived) and landmarks:
             hear_goal(mind, view, landmarks[0], _streets(act.values(Slot.STREET)), rng)
         else:
             hear_description(mind, view, _streets(act.values(Slot.STREET)), landmarks, rng)
+    elif view.time - mind.asked_at < ASKED_LATELY and words.order is None and not act.slots:
+        mind.voice = mind.voice.plan(remark(DialogueMove.CONFUSE))  # no answer to what it has asked
     elif rng.random() < 0.5:
         mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
 
 
 def _yes(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
-    if mind.detour_at is not None:
+    if mind.offer is not None:
+        accept_offer(mind, view, rng)
+    elif mind.detour_at is not None:
         detour(mind, view, rng)
     elif mind.proposed is not None:
         if mind.proposed.junction == view.junction and mind.directive is None:
@@ -295,7 +328,7 @@ def _yes(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np
 
 
 def _no(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
-    mind.detour_at = mind.proposed = None
+    mind.proposed = mind.offer = None
     mind.slower_asked = False
     if mind.arrived:
         doubt(mind)
@@ -321,9 +354,13 @@ def _check(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: 
 
 
 def _confusion(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
-    last = mind.voice.last
-    if last is not None:
-        mind.voice = mind.voice.plan(remark(DialogueMove.CLARIFY, *last.act.slots, wording=last.wording))
+    told = [item for item in mind.voice.said if item.act.move in _CAN_BE_REPEATED]
+    if not told:
+        return
+    last = told[-1]
+    open_question = last.act.move in _ASKING or not last.act.slots
+    move = last.act.move if open_question else DialogueMove.CLARIFY
+    mind.voice = mind.voice.plan(remark(move, *last.act.slots, wording=last.wording))
 
 
 def _small_talk(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:

@@ -49,6 +49,8 @@ class Style:
         chats: chance that it answers small talk.
         eases: whether it slows down well before it turns.
         rambles: chance that it tells what it is up to in the same breath as something else.
+        offers: chance that it proposes to do a task first that is on the way.
+        reassures: chance that it makes sure to have heard a description right.
         pace: speed at which it drives when nothing is said about it [km/h].
     """
 
@@ -63,6 +65,8 @@ class Style:
     chats: float = 0.0
     eases: bool = False
     rambles: float = 0.0
+    offers: float = 0.0
+    reassures: float = 0.0
     pace: int = USUAL_SPEED
 
     @classmethod
@@ -71,15 +75,17 @@ class Style:
         return cls(
             echoes=float(rng.uniform(0.15, 0.5)),
             checks=float(rng.uniform(0.1, 0.4)),
-            tells=float(rng.uniform(0.0, 0.25)),
+            tells=float(rng.uniform(0.0, 0.18)),
             silent=float(rng.uniform(0.2, 0.5)),
-            asks=float(rng.uniform(0.6, 1.0)),
+            asks=float(rng.uniform(0.5, 1.0)),
             proposes=float(rng.uniform(0.1, 0.6)),
-            mishears=float(rng.uniform(0.0, 0.04)),
-            careful=float(rng.uniform(0.4, 1.0)),
-            eases=bool(rng.random() < 0.4),
-            rambles=float(rng.uniform(0.05, 0.45)),
-            pace=int(rng.choice((30, 35, 40))),
+            mishears=float(rng.uniform(0.0, 0.05)),
+            careful=float(rng.uniform(0.8, 1.0)),
+            eases=bool(rng.random() < 0.3),
+            rambles=float(rng.uniform(0.1, 0.45)),
+            offers=float(rng.uniform(0.3, 1.0)),
+            reassures=float(rng.uniform(0.0, 0.3)),
+            pace=int(rng.choice((35, 40, 40))),
             chats=float(rng.uniform(0.1, 0.6)),
         )
 
@@ -130,6 +136,7 @@ class CoWizardMind:
         halted: whether the car is to stand.
         nudge: place to go on to and stop at again.
         creeping: whether the place is close and its guess is carried along.
+        told_to_stop_at: when it was last told to stop [s].
         speed: cruise speed aimed at [km/h].
         slow_until: until when a speed for the moment only is kept [s].
         usual: cruise speed on open road, as told last [km/h].
@@ -155,10 +162,13 @@ class CoWizardMind:
         misses: how often it has driven past the goal.
         avoided: places that it does not come by any more, for it missed the goal when it did.
         rest_until: until when it stands for something in the way [s].
+        rest_for: what that is.
         pausing: whether it stops before the junction ahead until it is told the way.
         rested: whether it has decided whether to stop for good at the present hazard.
         weather_told: whether it has remarked on the weather as it is.
         slower_asked: whether it has proposed to slow down and waits for an answer.
+        offer: place that it has proposed to go to first and waits for an answer about.
+        missed: act that it has not caught.
         lost_told: whether it has said that it does not know where it is.
     """
 
@@ -178,6 +188,7 @@ class CoWizardMind:
     halted: bool = False
     nudge: Place | None = None
     creeping: bool = False
+    told_to_stop_at: float = -math.inf
     speed: int = USUAL_SPEED
     slow_until: float = math.inf
     usual: int = USUAL_SPEED
@@ -203,10 +214,13 @@ class CoWizardMind:
     misses: int = 0
     avoided: tuple[Place, ...] = ()
     rest_until: float = -math.inf
+    rest_for: ObjectClass = ObjectClass.UNLABELED
     pausing: bool = False
     rested: bool = False
     weather_told: bool = False
     slower_asked: bool = False
+    offer: LandmarkName | None = None
+    missed: bool = False
     lost_told: bool = False
 
     def note(self, mental: Mental) -> None:

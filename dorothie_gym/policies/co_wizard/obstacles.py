@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from dorothie_gym.dialogue import Wording
-from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, StreetName
+from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, SlotValue
 from dorothie_gym.policies.co_wizard.goals import plan_way
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View
-from dorothie_gym.policies.journey import lanes_ahead
-from dorothie_gym.policies.scenery import SeenObject, place_on_lanes, street_of
+from dorothie_gym.policies.journey import first_new_street, lanes_ahead
+from dorothie_gym.policies.scenery import SeenObject, place_on_lanes
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.spaces import Motion
 
@@ -20,6 +20,9 @@ SIGHT = 70.0
 
 ON_PATH = 1.8
 """An obstacle closer than this to the waypoints is on the path [m]."""
+
+NAMES_STREET = 0.65
+"""Chance that it proposes a way round by the name of its street."""
 
 WAIT = 6.0
 """So long an answer about a way round is waited for [s]."""
@@ -48,11 +51,25 @@ def watch_road(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None
     )
     if mind.journey is not None:
         mind.detour_at = view.time
-        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_YN, wording=Wording(topic="detour"), joined=True))
+        street = first_new_street(
+            view.raw, mind.town, view.lane, mind.journey.replanned(mind.town, view.here, mind.blocked)
+        )
+        values: tuple[SlotValue, ...] = (street,) if street is not None and rng.random() < NAMES_STREET else ()
+        if not values and rng.random() < 0.5:
+            values = (ActionValue.U_TURN,) if _turns_round(mind, view) else ()
+        question = remark(DialogueMove.QUERY_YN, *values, wording=Wording(topic="detour"), joined=True)
+        mind.voice = mind.voice.plan(question)
     else:
         mind.asked_at = view.time
         mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, ActionValue.QUERIED, joined=True))
     mind.halted = True
+
+
+def _turns_round(mind: CoWizardMind, view: View) -> bool:
+    """Whether the way round begins with turning round."""
+    assert mind.journey is not None
+    way = mind.journey.replanned(mind.town, view.here, mind.blocked)
+    return way.changes_before(way.next_crossing(mind.town, view.station))
 
 
 def _on_path(view: View) -> SeenObject | None:
@@ -83,9 +100,7 @@ def detour(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
     plan_way(mind, view)
     if mind.journey is None or mind.journey.route is None:
         return
-    here = street_of(view.raw, mind.town, view.lane)
-    names = [street_of(view.raw, mind.town, leg.lane) for leg in mind.journey.legs[1:]]
-    street = next((name for name in names if name not in (here, StreetName.UNKNOWN)), None)
+    street = first_new_street(view.raw, mind.town, view.lane, mind.journey)
     if street is not None:
         mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, street, wording=Wording(topic="detour")))
     if mind.journey.changes_before(mind.journey.next_crossing(mind.town, view.station)) and rng.random() < 0.6:

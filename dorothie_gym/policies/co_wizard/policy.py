@@ -11,7 +11,7 @@ import numpy as np
 
 from dorothie_gym.dialogue import draw_style
 from dorothie_gym.ontology import ObjectClass, Role
-from dorothie_gym.policies.co_wizard.driving import creep, drive, rest
+from dorothie_gym.policies.co_wizard.driving import creep, drive, rest, see_green
 from dorothie_gym.policies.co_wizard.goals import note_plan, search_on
 from dorothie_gym.policies.co_wizard.listening import listen
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, Style, View
@@ -69,6 +69,7 @@ class ScriptedCoWizard(Policy[CoWizardMind]):
         listen(mind, view, rng)
         watch_road(mind, view, rng)
         rest(mind, view, rng)
+        see_green(mind, view)
         search_on(mind, view)
         creep(mind, view)
         physical = drive(mind, view)

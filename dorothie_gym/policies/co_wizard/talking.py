@@ -8,6 +8,7 @@ from dorothie_gym.dialogue import Direction, Wording, WordingContext
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueMove,
+    GoalStatus,
     LandmarkName,
     ObjectClass,
     PhysicalAction,
@@ -130,7 +131,7 @@ def _say_arrived(mind: CoWizardMind, view: View, rng: np.random.Generator) -> No
     if mind.asked_at > mind.stop_sent_at:
         return
     mind.asked_at = view.time
-    if mind.exact and rng.random() < 0.75:
+    if mind.exact and rng.random() < mind.style.echoes + 0.15:
         mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, mind.goal, wording=Wording(topic="arrived")))
     elif not mind.exact:
         mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_YN))
@@ -145,21 +146,32 @@ def _ask_goal(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
         return
     if view.time - mind.asked_at < ASK_AGAIN or not (mind.halted or view.standing):
         return
+    again = view.time - mind.asked_at < 2.0 * ASK_AGAIN
     mind.asked_at = view.time
-    mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, LandmarkName.QUERIED))
+    draw = rng.random()
+    if again and draw < 0.5:
+        mind.voice = mind.voice.plan(remark(DialogueMove.ALIGN))
+    elif mind.statuses and draw < 0.25:
+        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, GoalStatus.QUERIED))
+    else:
+        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, LandmarkName.QUERIED))
 
 
 def _explain_hazard(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
-    if view.motion is not Motion.HAZARD or mind.standing_since is None or view.hazard is ObjectClass.UNLABELED:
+    resting = view.time < mind.rest_until
+    hazard = mind.rest_for if resting else view.hazard
+    if not (resting or view.motion is Motion.HAZARD) or mind.standing_since is None:
+        return
+    if hazard is ObjectClass.UNLABELED:
         return
     if view.time - mind.standing_since < REASON or view.time - mind.hazard_told < TOLD_AGAIN:
         return
     mind.hazard_told = view.time
-    if rng.random() < (0.8 if view.hazard is ObjectClass.TRAFFIC_LIGHT else 0.5):
+    if rng.random() < (0.85 if hazard is ObjectClass.TRAFFIC_LIGHT else 0.4):
         return  # everybody sees a red light
-    values: tuple[SlotValue, ...] = (view.hazard,)
-    if mind.rest_until > view.time or rng.random() < 0.3:
-        values = (ActionValue.STOP, view.hazard)
+    values: tuple[SlotValue, ...] = (hazard,)
+    if resting or rng.random() < 0.3:
+        values = (ActionValue.STOP, hazard)
     mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, *values), *musing(mind, rng, joined=True))
 
 

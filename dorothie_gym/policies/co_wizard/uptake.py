@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from dorothie_gym.dialogue import Heard, Wording
 from dorothie_gym.ontology import ActionValue, DialogueMove
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind
 from dorothie_gym.policies.speech import Remark, remark
+
+CONFIRMS = 0.35
+"""Chance that a command that is not repeated is confirmed, not only acknowledged."""
 
 _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START})
 """What is done at once is not asked back about."""
@@ -35,18 +40,20 @@ def take_up(mind: CoWizardMind, action: ActionValue, words: Heard, rng: np.rando
     elif rng.random() < mind.style.echoes:
         mind.voice = mind.voice.plan(*_repeated(action, wording, rng))
     else:
-        move = DialogueMove.CONFIRM if rng.random() < 0.5 else DialogueMove.ACKNOWLEDGE
-        mind.voice = mind.voice.plan(remark(move), *musing(mind, rng, joined=True))
+        move = DialogueMove.CONFIRM if rng.random() < CONFIRMS else DialogueMove.ACKNOWLEDGE
+        words = remark(move, wording=Wording(topic="taken"))
+        mind.voice = mind.voice.plan(words, *musing(mind, rng, joined=True))
 
 
 def _repeated(action: ActionValue, wording: Wording, rng: np.random.Generator) -> tuple[Remark, ...]:
     draw = rng.random()
+    if draw < 0.25:
+        return (remark(DialogueMove.CONFIRM, action, wording=replace(wording, topic="taken")),)
     if draw < 0.35:
-        return (remark(DialogueMove.CONFIRM, action, wording=wording),)
-    if draw < 0.5:
         return (remark(DialogueMove.ACKNOWLEDGE, action, wording=wording),)
     move = DialogueMove.ACKNOWLEDGE if draw < 0.85 else DialogueMove.CONFIRM
-    return remark(move), remark(DialogueMove.EXPLAIN, action, wording=wording, joined=True)
+    words = remark(move, wording=Wording(topic="taken"))
+    return words, remark(DialogueMove.EXPLAIN, action, wording=wording, joined=True)
 
 
 def musing(mind: CoWizardMind, rng: np.random.Generator, *, joined: bool = False) -> tuple[Remark, ...]:
@@ -59,5 +66,8 @@ def musing(mind: CoWizardMind, rng: np.random.Generator, *, joined: bool = False
     """
     if rng.random() > mind.style.rambles:
         return ()
-    known = mind.journey is not None and rng.random() < 0.3
-    return (remark(DialogueMove.EXPLAIN, wording=Wording(topic="plan" if known else None), joined=joined),)
+    if mind.journey is not None and mind.exact:
+        topic = "plan" if rng.random() < 0.4 else "eta"
+    else:
+        topic = "search" if mind.goal is not None else "idle"
+    return (remark(DialogueMove.EXPLAIN, wording=Wording(topic=topic), joined=joined),)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from dorothie_gym.dialogue import Wording
-from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, SlotValue
+from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, LandmarkName, SlotValue
 from dorothie_gym.policies.journey import Journey
 from dorothie_gym.policies.participant.mind import ParticipantMind, View
 from dorothie_gym.policies.scenery import SeenLandmark, SeenSubgoal
@@ -20,6 +20,21 @@ ROOM_TO_WAIT = 80.0
 
 THINKING = 9.0
 """So long it waits then [s]."""
+
+BREATHER = (0.5, 2.5)
+"""Who has arrived says so after a time in this range [s]."""
+
+PAUSE = 9.0
+"""Who does not go on at once names the next task after this time [s]."""
+
+GOES_FIRST = 0.6
+"""Chance that a new task on the way to another one is done before it."""
+
+TELLS_AHEAD = 0.8
+"""Chance that the car is told at once that a later task has changed."""
+
+ANYHOW = 0.06
+"""Chance that it is left to the car, in so many words, how it gets to a place."""
 
 UNANSWERED = 8.0
 """After this time without a word from the car it is asked whether it has understood [s]."""
@@ -34,26 +49,31 @@ def note_tasks(mind: ParticipantMind, view: View, rng: np.random.Generator) -> N
         elif new.open and not old.live:
             _added(mind, view, new, rng)
         elif old.open and not new.live:
-            _dropped(mind, view, old)
+            _dropped(mind, view, old, rng)
         elif new.open and new.landmark != old.landmark:
-            _changed(mind, view, old, new)
+            _changed(mind, view, old, new, rng)
 
 
 def _done(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.random.Generator) -> None:
     landmark = view.landmark(subgoal.landmark)
     named = landmark is not None and rng.random() < 0.4
     values: tuple[SlotValue, ...] = (landmark.name,) if landmark is not None and named else ()
-    mind.voice = mind.voice.cleared().plan(remark(DialogueMove.EXPLAIN, *values, GoalStatus.COMPLETE, urgent=True))
+    done = remark(DialogueMove.EXPLAIN, *values, GoalStatus.COMPLETE)
+    # the car is left time to say that it has arrived
+    mind.voice = mind.voice.cleared().hold(view.time + float(rng.uniform(*BREATHER))).plan(done)
+    mind.put_off -= {subgoal.index}
     if subgoal.index == mind.target:
         forget_target(mind)
         mind.goes_on = bool(rng.random() < mind.style.hurries)
-        if not mind.goes_on:
-            mind.voice = mind.voice.hold(view.time + 6.0)
+        mind.next_at = -math.inf if mind.goes_on else view.time + PAUSE
 
 
 def _added(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.random.Generator) -> None:
     landmark = view.landmark(subgoal.landmark)
     if landmark is None:
+        return
+    if _is_on_the_way(mind, view, subgoal, landmark) and rng.random() < GOES_FIRST:
+        _go_first(mind, view, subgoal, landmark)
         return
     news = remark(DialogueMove.INSTRUCT, landmark.name, GoalStatus.PENDING, wording=Wording(topic="added"))
     far = mind.journey is not None and mind.journey.left(view.station) > ROOM_TO_WAIT
@@ -65,6 +85,44 @@ def _added(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.rand
         mind.voice = mind.voice.plan(news)
 
 
+def _is_on_the_way(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, landmark: SeenLandmark) -> bool:
+    """Whether a new task may be done now, and is nearer than the one under way, which the car knows of."""
+    if mind.goal is None or mind.journey is None or not mind.told or not subgoal.allowed:
+        return False
+    if mind.goal.name is landmark.name or mind.journey.left(view.station) < ROOM_TO_WAIT:
+        return False
+    return route_length(mind, view, landmark) < mind.journey.left(view.station)
+
+
+def route_length(mind: ParticipantMind, view: View, landmark: SeenLandmark) -> float:
+    """How far it is to a landmark from here [m]; infinity where there is no way."""
+    route = router(mind.town).route(view.place, landmark.place, mind.blocked)
+    return route.length if route is not None else math.inf
+
+
+def _go_first(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, landmark: SeenLandmark) -> None:
+    """Interrupts the task under way for one that has just come up."""
+    former = mind.goal
+    assert former is not None
+    switch_target(mind, view, subgoal, landmark)
+    first: list[SlotValue] = [landmark.name, GoalStatus.ONGOING]
+    if not view.unique(landmark):
+        first.append(landmark.street)
+    mind.voice = mind.voice.cleared().plan(
+        remark(DialogueMove.INSTRUCT, *first, wording=Wording(topic="added")),
+        remark(DialogueMove.INSTRUCT, former.name, GoalStatus.PENDING, joined=True),
+    )
+
+
+def switch_target(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, landmark: SeenLandmark) -> None:
+    """Puts the task under way off for another one, of which the car knows."""
+    if mind.target is not None:
+        mind.put_off |= {mind.target}
+    forget_target(mind)
+    _aim_at(mind, view, subgoal, landmark)
+    mind.told, mind.told_at, mind.guiding = True, view.time, False
+
+
 def go_on(mind: ParticipantMind, view: View) -> None:
     """Tells the car to go on that has been told to wait."""
     if view.time < mind.go_at or not mind.voice.idle:
@@ -74,20 +132,31 @@ def go_on(mind: ParticipantMind, view: View) -> None:
         mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.START))
 
 
-def _dropped(mind: ParticipantMind, view: View, subgoal: SeenSubgoal) -> None:
+def _dropped(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.random.Generator) -> None:
     landmark = view.landmark(subgoal.landmark)
     if landmark is None:
         return
+    mind.put_off -= {subgoal.index}
     if subgoal.index == mind.target:
         forget_target(mind)
+        mind.goes_on = True
         mind.voice = mind.voice.cleared()
-    mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, landmark.name, GoalStatus.ABANDONED))
+    move = DialogueMove.INSTRUCT if rng.random() < 0.8 else DialogueMove.EXPLAIN
+    mind.voice = mind.voice.plan(remark(move, landmark.name, GoalStatus.ABANDONED))
 
 
-def _changed(mind: ParticipantMind, view: View, old: SeenSubgoal, new: SeenSubgoal) -> None:
+def _changed(mind: ParticipantMind, view: View, old: SeenSubgoal, new: SeenSubgoal, rng: np.random.Generator) -> None:
     former, landmark = view.landmark(old.landmark), view.landmark(new.landmark)
-    if new.index != mind.target or former is None or landmark is None:
-        return  # the car is told of it when its turn has come
+    if former is None or landmark is None:
+        return
+    if new.index != mind.target:
+        busy = mind.goal is not None and mind.goal.name in (former.name, landmark.name)
+        if former.name is not landmark.name and not busy and rng.random() < TELLS_AHEAD:
+            values = (former.name, landmark.name, GoalStatus.ABANDONED, GoalStatus.PENDING)
+            mind.voice = mind.voice.plan(
+                remark(DialogueMove.INSTRUCT, *values, wording=Wording(topic="changed_later", dropped=former.name))
+            )
+        return  # else the car is told of it when its turn has come
     told = mind.told
     forget_target(mind)
     mind.voice = mind.voice.cleared()
@@ -128,8 +197,7 @@ def choose_target(mind: ParticipantMind, view: View, rng: np.random.Generator) -
     for subgoal in view.subgoals:
         landmark = view.landmark(subgoal.landmark)
         if subgoal.open and subgoal.allowed and landmark is not None:
-            route = router(mind.town).route(view.place, landmark.place, mind.blocked)
-            found.append((route.length if route else math.inf, subgoal.index, subgoal, landmark))
+            found.append((route_length(mind, view, landmark), subgoal.index, subgoal, landmark))
     if found:
         _, _, subgoal, landmark = min(found, key=lambda row: row[:2])
         _aim_at(mind, view, subgoal, landmark)
@@ -147,9 +215,20 @@ def announcement(mind: ParticipantMind, view: View, rng: np.random.Generator) ->
     values: list[SlotValue] = [mind.goal.name]
     if not view.unique(mind.goal) or rng.random() < mind.style.names_street:
         values.append(mind.goal.street)
+    if mind.target in mind.put_off:
+        return remark(DialogueMove.INSTRUCT, mind.goal.name, GoalStatus.ONGOING, wording=Wording(topic="resume"))
     more = sum(subgoal.open for subgoal in view.subgoals) > 2
     topic = "first" if more and len(values) == 1 and rng.random() < 0.5 else None
+    if topic is None and len(values) == 1 and rng.random() < ANYHOW:
+        values.append(ActionValue.UNKNOWN)
     return remark(DialogueMove.INSTRUCT, *values, wording=Wording(topic=topic))
+
+
+def reason_topic(mind: ParticipantMind) -> str | None:
+    """What a reason to go to the target is about: an errand in a shop, or whom one visits."""
+    if mind.goal is None:
+        return None
+    return "visit" if mind.goal.name in (LandmarkName.HOUSE, LandmarkName.PERSON) else "errand"
 
 
 def _announce(mind: ParticipantMind, view: View, goes_on: bool, rng: np.random.Generator) -> None:
@@ -157,10 +236,11 @@ def _announce(mind: ParticipantMind, view: View, goes_on: bool, rng: np.random.G
     words = replace(announcement(mind, view, rng), joined=goes_on)
     draw = rng.random()
     if draw < mind.style.reasons:
-        reason = remark(DialogueMove.EXPLAIN, joined=goes_on)
+        reason = remark(DialogueMove.EXPLAIN, joined=goes_on, wording=Wording(topic=reason_topic(mind)))
         mind.voice = mind.voice.plan(reason, replace(words, joined=True))
     elif draw < 1.6 * mind.style.reasons:
-        mind.voice = mind.voice.plan(words, remark(DialogueMove.EXPLAIN, joined=True))
+        reason = remark(DialogueMove.EXPLAIN, joined=True, wording=Wording(topic=reason_topic(mind)))
+        mind.voice = mind.voice.plan(words, reason)
     else:
         mind.voice = mind.voice.plan(words)
     later = [view.landmark(item.landmark) for item in view.subgoals if item.open and item.index != mind.target]
@@ -177,10 +257,12 @@ def tell_target(mind: ParticipantMind, view: View, rng: np.random.Generator) -> 
     goes_on, mind.goes_on = mind.goes_on, False
     if mind.goal is None or not (mind.voice.idle or goes_on):
         return
-    if not mind.told:
+    if not mind.told and view.time >= mind.next_at:
         mind.told, mind.told_at = True, view.time
         if not mind.guiding or rng.random() < mind.style.names_goal:
             _announce(mind, view, goes_on and not mind.voice.idle, rng)
+        return
+    if not mind.told:
         return
     waiting = max(mind.told_at, mind.voice.last_end)
     unheard = mind.heard_at < mind.told_at and view.time - waiting > UNANSWERED

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from dorothie_gym.dialogue import Direction, Wording, speech_seconds, word_act
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, SlotValue, StreetName
+from dorothie_gym.dialogue import Direction, SpeakerStyle, Wording, speech_seconds, word_act
+from dorothie_gym.dialogue.phrases import Register
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, Slot, SlotValue, StreetName
 from dorothie_gym.policies.journey import (
     BRAKING,
     U_TURN_SPEED_SQUARED,
@@ -32,7 +33,7 @@ CLOSE_BY = 150.0
 AROUND = 60.0
 """and then is farther from it by more than this, has gone past it [m]."""
 
-TOO_LATE = 48.0
+TOO_LATE = 60.0
 """A turn is told when it is this near, even if the car has not asked [m]."""
 
 AGAIN = 9.0
@@ -47,7 +48,7 @@ DECISION = 0.5
 FASTEST = 11.0
 """The car is not expected to get faster than this [m/s]."""
 
-TAKES_OVER = 150.0
+TAKES_OVER = 130.0
 """A car that looks for a place by itself is guided from here on [m]."""
 
 NEAR = 95.0
@@ -61,6 +62,15 @@ SLOW_WITHIN = 20.0
 
 SLOW_SPEED = 5.0
 """A car that is this slow need not be told to come up slowly [m/s]."""
+
+SETS_OFF, PULL = 0.6, 3.0
+"""A car that gains more speed than the first has just set off, and goes on gaining as much as the second [m/s^2]."""
+
+LATE_STOP = 1.0
+"""Who would stop the car further behind the place than this says less [m]."""
+
+LAST_STRETCH = 60.0
+"""With no junction and no manoeuvre before the place, nothing else is talked about from here on [m]."""
 
 WITHIN = 1.9
 """A car that stands this close to the place has arrived [m]."""
@@ -111,9 +121,11 @@ def watch(mind: ParticipantMind, view: View) -> None:
 
 def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     """Says what is to be done next, if it is time to."""
-    if mind.journey is None or not mind.told or not mind.voice.idle or view.speaking > 0.0 or view.turning:
+    if mind.journey is None or not mind.told or view.turning or mind.journey.astray:
         return
-    if mind.journey.astray:
+    if not mind.voice.idle and mind.guiding and about_to_arrive(mind, view):
+        mind.voice = mind.voice.cleared()  # there is no time for anything else
+    if not mind.voice.idle or view.speaking > 0.0:
         return
     if _approach(mind, view, rng) or not mind.guiding:
         return
@@ -148,12 +160,14 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
 def _rounded_off(mind: ParticipantMind, words: Remark, again: bool, rng: np.random.Generator) -> tuple[Remark, ...]:
     """A step with what else is said in the same breath: a reason before it, or a question whether it was heard."""
     draw = rng.random()
+    if words.act.values(Slot.ACTION) == (ActionValue.U_TURN,):
+        return (words,)  # it is not to miss the moment
     if again and rng.random() < 0.25:
         return words, remark(DialogueMove.ALIGN, joined=True)
     if draw < mind.style.aligns:
         return words, remark(DialogueMove.ALIGN, joined=True)
     if draw < mind.style.aligns + 0.7 * mind.style.reasons:
-        return words, remark(DialogueMove.EXPLAIN, joined=True)
+        return words, remark(DialogueMove.EXPLAIN, joined=True, wording=Wording(topic="hint"))
     return (words,)
 
 
@@ -281,6 +295,10 @@ def _approach(mind: ParticipantMind, view: View, rng: np.random.Generator) -> bo
         return left < NEAR
     if not mind.stop_text:
         mind.stop_text = word_act(_STOP, Role.PARTICIPANT, rng, Wording(here=True), style=mind.voice.style)
+    if _room_to_stop(mind, view, left, mind.stop_text)[0] < -LATE_STOP:
+        # there is only time for a shout
+        shouts = [word_act(_STOP, Role.PARTICIPANT, rng, Wording(), style=_SHOUTING) for _ in range(3)]
+        mind.stop_text = min(*shouts, mind.stop_text, key=speech_seconds)
     if _time_to_stop(mind, view, left):
         if view.time - mind.stopped_at > 5.0 and left > 0.0:
             mind.stopped_at = view.time
@@ -291,24 +309,45 @@ def _approach(mind: ParticipantMind, view: View, rng: np.random.Generator) -> bo
             wording = Wording(distance=max(left - view.speed * 3.0, 10.0))
             words = remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, mind.goal.name, wording=wording, urgent=True)
             mind.announced, mind.voice = True, mind.voice.plan(words)
-        elif left > 1.5 * view.speed + 5.0:
+        elif left > 3.0 * view.speed + 12.0:
             slower = remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=Wording(faster=False), urgent=True)
             mind.announced, mind.voice = True, mind.voice.plan(slower)
     return left < NEAR
 
 
 _STOP = DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.STOP)
+_SHOUTING = SpeakerStyle(register=Register.BLUNT, chattiness=0.0, indirectness=0.0)
+
+
+def about_to_arrive(mind: ParticipantMind, view: View) -> bool:
+    """Whether nothing but the last stretch to the place is left."""
+    journey = mind.journey
+    if journey is None or journey.left(view.station) > LAST_STRETCH:
+        return False
+    return journey.next_crossing(mind.town, view.station) is None and journey.next_manoeuvre(view.station) is None
 
 
 def _time_to_stop(mind: ParticipantMind, view: View, left: float) -> bool:
     """Whether the words, begun now, stop the car closer to the place than if begun at the next decision."""
     if mind.announced and left > SLOW_WITHIN:
         return False  # it is about to slow down
-    delay = math.ceil(speech_seconds(mind.stop_text) / DECISION - 1e-6) * DECISION
+    room, after = _room_to_stop(mind, view, left, mind.stop_text)
+    return room <= 0.0 or room < -after
+
+
+def _room_to_stop(mind: ParticipantMind, view: View, left: float, text: str) -> tuple[float, float]:
+    """How far before the place the car stands if it is told so now, or at the next decision [m]; negative: behind it."""
+    delay = math.ceil(speech_seconds(text) / DECISION - 1e-6) * DECISION
     gain = min(max((view.speed - mind.speed_before) / DECISION, -2.0), 2.0)
-    then = min(max(view.speed + gain * delay, 0.0), max(FASTEST, view.speed))
-    travel = (view.speed + then) / 2 * delay + stopping_distance(then)
-    return left - travel <= view.speed * DECISION / 2
+    if gain > SETS_OFF:
+        gain = PULL
+    now, top = view.speed, max(FASTEST, view.speed)
+    soon = min(max(now + gain * DECISION, 0.0), top)
+    rooms = []
+    for speed, ahead in ((now, left), (soon, left - (now + soon) / 2 * DECISION)):
+        then = min(max(speed + gain * delay, 0.0), top)
+        rooms.append(ahead - (speed + then) / 2 * delay - stopping_distance(then))
+    return rooms[0], rooms[1]
 
 
 def _from_standing(mind: ParticipantMind, view: View, left: float) -> bool:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from dorothie_gym.ontology import LandmarkName, Role
+from dorothie_gym.policies.hearing import HeardUtterance
 from dorothie_gym.policies.journey import Journey
 from dorothie_gym.policies.scenery import (
     SeenLandmark,
@@ -47,6 +48,8 @@ class Style:
         reasons: chance that a reason is given with a place, or a step.
         aligns: chance that it makes sure to have been understood.
         nods: chance that what the car explains is acknowledged.
+        curious: chance that it asks why the car does something unexpected.
+        puzzled: chance that it asks again what the car has said into its own words.
     """
 
     guides: float
@@ -60,22 +63,26 @@ class Style:
     reasons: float = 0.0
     aligns: float = 0.0
     nods: float = 0.2
+    curious: float = 0.0
+    puzzled: float = 0.0
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> Style:
         """A style by chance: two in five guide most of the way themselves."""
         return cls(
-            guides=0.3 if rng.random() < 0.4 else 0.03,
+            guides=0.2 if rng.random() < 0.4 else 0.02,
             names_goal=float(rng.uniform(0.4, 1.0)),
             names_street=float(rng.uniform(0.1, 0.7)),
-            hurries=float(rng.uniform(0.1, 0.8)),
+            hurries=float(rng.uniform(0.4, 0.95)),
             patience=float(rng.uniform(7.0, 14.0)),
-            chat=float(rng.uniform(30.0, 90.0)),
-            waits=float(rng.uniform(0.7, 1.0)),
-            hints=float(rng.uniform(0.1, 0.55)),
-            reasons=float(rng.uniform(0.05, 0.45)),
+            chat=float(rng.uniform(50.0, 150.0)),
+            waits=float(rng.uniform(0.5, 0.95)),
+            hints=float(rng.uniform(0.2, 0.65)),
+            reasons=float(rng.uniform(0.05, 0.3)),
             aligns=float(rng.uniform(0.0, 0.15)),
-            nods=float(rng.uniform(0.4, 0.9)),
+            nods=float(rng.uniform(0.1, 0.45)),
+            curious=float(rng.uniform(0.05, 0.4)),
+            puzzled=float(rng.uniform(0.0, 0.35)),
         )
 
 
@@ -115,6 +122,7 @@ class ParticipantMind:
         excused_until: until when a standing car is not asked about [s].
         asked_at: when it was last asked [s].
         slowed: whether the car was told to slow down for the weather.
+        dim_since: since when the weather has been such that it should [s].
         lights_at: when lights were last talked about [s].
         chat_at: when to talk beside the matter next [s].
         speed_before: speed at the decision before [m/s].
@@ -123,6 +131,10 @@ class ParticipantMind:
         goes_on: whether the next task is named in the breath that reports the last.
         go_at: when the car, which has been told to wait, is to go on [s].
         hurried: whether the car has been told to go faster.
+        next_at: the next task is not named before this time, unless the car asks [s].
+        put_off: subgoals that were interrupted by others, and are to be resumed.
+        puzzled_by: what the car said that was not caught.
+        wondered_at: when something unexpected was last asked about, or let pass [s].
     """
 
     seed: int
@@ -156,6 +168,7 @@ class ParticipantMind:
     excused_until: float = 0.0
     asked_at: float = -math.inf
     slowed: bool = False
+    dim_since: float = math.inf
     lights_at: float = -math.inf
     chat_at: float = math.inf
     speed_before: float = 0.0
@@ -164,6 +177,10 @@ class ParticipantMind:
     goes_on: bool = False
     go_at: float = math.inf
     hurried: bool = False
+    next_at: float = -math.inf
+    put_off: frozenset[int] = frozenset()
+    puzzled_by: HeardUtterance | None = None
+    wondered_at: float = -math.inf
 
 
 @dataclass(frozen=True, kw_only=True)

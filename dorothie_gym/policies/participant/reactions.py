@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from dorothie_gym.dialogue import Wording, WordingContext
@@ -19,6 +21,18 @@ HEAVY_RAIN = 55.0
 
 SLOW, USUAL = 25.0, 40.0
 """Speeds in bad weather and else [km/h]."""
+
+NOTICES = 3.0
+"""The car is left this long to remark on fog or rain [s]."""
+
+LONG_STOP = 8.0
+"""A car that stands for longer than this may be asked why [s]."""
+
+WONDERS_AGAIN = 25.0
+"""Nothing is wondered about again within this time [s]."""
+
+UNSEEN = 0.3
+"""Chance that a question about what the car sees is about something that is not to be seen."""
 
 SIGHT = 80.0
 """How far ahead an obstacle is noticed [m]."""
@@ -41,13 +55,10 @@ def react(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     note_blocked(mind, view)
     if not mind.voice.idle or view.speaking > 0.0 or not mind.told:
         return
-    _mind_weather(mind, view)
-    if mind.voice.idle:
-        _mind_light(mind, view, rng)
-    if mind.voice.idle:
-        _ask_why(mind, view)
-    if mind.voice.idle:
-        _chat(mind, view, rng)
+    for consider in (_mind_weather, _mind_light, _ask_why, _wonder, _chat):
+        consider(mind, view, rng)
+        if not mind.voice.idle:
+            return
 
 
 def note_blocked(mind: ParticipantMind, view: View, near: bool = False) -> None:
@@ -83,26 +94,39 @@ def note_blocked(mind: ParticipantMind, view: View, near: bool = False) -> None:
         )
 
 
-def _mind_weather(mind: ParticipantMind, view: View) -> None:
+def _mind_weather(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     fog = weather(view.raw, WeatherParameter.FOG_DENSITY)
     rain = weather(view.raw, WeatherParameter.PRECIPITATION)
-    if not mind.slowed and (fog > THICK_FOG or rain > HEAVY_RAIN):
+    bad = fog > THICK_FOG or rain > HEAVY_RAIN
+    mind.dim_since = min(mind.dim_since, view.time) if bad else math.inf
+    if not mind.slowed and view.time - mind.dim_since > NOTICES:
         mind.slowed = True
+        if view.speed < SLOW / 3.6 or view.time - mind.heard_at < NOTICES + 2.0:
+            return  # the car goes slowly anyway, or talks of it
         topic = "fog" if fog > THICK_FOG else "rain"
-        mind.voice = mind.voice.plan(
-            remark(DialogueMove.EXPLAIN, wording=Wording(topic=topic)),
-            remark(
-                DialogueMove.INSTRUCT,
-                ActionValue.SPEED_CHANGE,
-                wording=Wording(faster=False, speed=SLOW),
-                joined=True,
-            ),
-        )
+        wording = Wording(faster=False, speed=SLOW)
+        slower = remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=wording, joined=True)
+        mind.voice = mind.voice.plan(weather_remark(topic, rng), slower)
     elif mind.slowed and fog < THICK_FOG / 2 and rain < HEAVY_RAIN / 2:
         mind.slowed = False
-        mind.voice = mind.voice.plan(
-            remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=Wording(faster=True, speed=USUAL))
-        )
+        if rng.random() < 0.7:
+            wording = Wording(faster=True, speed=USUAL)
+            mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=wording))
+
+
+def weather_remark(topic: str, rng: np.random.Generator) -> Remark:
+    """A remark on fog, rain or night, now and then on what one sees of it, or does not see any more."""
+    things = _SEEN_OF_WEATHER[topic]
+    draw = rng.random() * (len(things) + 1)
+    values = (things[int(draw)],) if draw < len(things) else ()
+    return remark(DialogueMove.EXPLAIN, *values, wording=Wording(topic=topic))
+
+
+_SEEN_OF_WEATHER = {
+    "fog": (ObjectClass.ROAD_LINE,),
+    "rain": (ObjectClass.WATER, ObjectClass.GROUND),
+    "night": (ObjectClass.SKY,),
+}
 
 
 def _mind_light(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
@@ -116,12 +140,12 @@ def _mind_light(mind: ParticipantMind, view: View, rng: np.random.Generator) -> 
         )
         return
     mind.voice = mind.voice.plan(
-        remark(DialogueMove.EXPLAIN, wording=Wording(topic="night")),
+        weather_remark("night", rng),
         remark(DialogueMove.INSTRUCT, ActionValue.LIGHT_CHANGE, wording=Wording(lights=True), joined=True),
     )
 
 
-def _ask_why(mind: ParticipantMind, view: View) -> None:
+def _ask_why(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     if mind.standing_since is None or mind.guiding or view.time < mind.excused_until:
         return
     near = mind.journey is not None and mind.journey.left(view.station) < 45.0
@@ -129,6 +153,19 @@ def _ask_why(mind: ParticipantMind, view: View) -> None:
     if waited > mind.style.patience and not near and view.time - mind.asked_at > 40.0:
         mind.asked_at = view.time
         mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, ActionValue.STOP))
+
+
+def _wonder(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+    """Asks, once for each time, why the car turns round, or stands so long, by itself."""
+    if mind.guiding or view.time - mind.wondered_at < WONDERS_AGAIN or view.time - mind.heard_at < 4.0:
+        return
+    stands = mind.standing_since is not None and view.time - mind.stood_since > LONG_STOP
+    if not stands and not view.turning:
+        return
+    mind.wondered_at = view.time
+    if rng.random() < mind.style.curious:
+        action = ActionValue.U_TURN if view.turning else ActionValue.STOP
+        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, action))
 
 
 def _chat(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
@@ -145,11 +182,19 @@ def _chat(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     mind.voice = mind.voice.plan(*options[int(rng.integers(len(options)))])
 
 
+_BY_THE_ROAD = (
+    ObjectClass.BRIDGE, ObjectClass.BUILDING, ObjectClass.DYNAMIC, ObjectClass.FENCE, ObjectClass.POLE,
+    ObjectClass.ROAD, ObjectClass.SIDE_WALK, ObjectClass.UNLABELED, ObjectClass.VEGETATION, ObjectClass.WALL,
+    ObjectClass.TRAFFIC_SIGN, ObjectClass.STATIC,
+)  # fmt: skip
+"""What somebody may look for by the side of the road."""
+
+
 def _topics(mind: ParticipantMind, view: View, rng: np.random.Generator) -> list[tuple[Remark, ...]]:
     """What could be talked about now."""
     assert mind.goal is not None
     found: list[tuple[Remark, ...]] = [
-        (remark(DialogueMove.IRRELEVANT),),
+        *((remark(DialogueMove.IRRELEVANT),),) * 2,
         (remark(DialogueMove.IRRELEVANT), remark(DialogueMove.IRRELEVANT, joined=True)),
         (remark(DialogueMove.QUERY_YN),),
     ]
@@ -162,7 +207,11 @@ def _topics(mind: ParticipantMind, view: View, rng: np.random.Generator) -> list
             mind.hurried = True
             return [(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=faster),)]
     if view.objects:
-        found += [(remark(DialogueMove.QUERY_YN, view.objects[0].kind),)] * 2
+        near = view.objects[int(rng.integers(min(len(view.objects), 3)))].kind
+        thing = _BY_THE_ROAD[int(rng.integers(len(_BY_THE_ROAD)))] if rng.random() < UNSEEN else near
+        found += [(remark(DialogueMove.QUERY_YN, thing),)] * 2
+        found.append((remark(DialogueMove.QUERY_W, ObjectClass.QUERIED),))
+        found.append((remark(DialogueMove.EXPLAIN, near),))
     street = street_of(view.raw, mind.town, view.lane)
     if street is not StreetName.UNKNOWN:
         found.append((remark(DialogueMove.CHECK, street),))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -21,18 +22,29 @@ from dorothie_gym.ontology import (
     StreetName,
 )
 from dorothie_gym.policies.hearing import heard_utterance
-from dorothie_gym.policies.participant.goals import announcement
-from dorothie_gym.policies.participant.guidance import NEAR, next_step, note_told
+from dorothie_gym.policies.journey import first_new_street
+from dorothie_gym.policies.participant.goals import announcement, reason_topic, route_length, switch_target
+from dorothie_gym.policies.participant.guidance import NEAR, about_to_arrive, next_step, note_told
 from dorothie_gym.policies.participant.mind import ParticipantMind, View
 from dorothie_gym.policies.participant.reactions import note_blocked
-from dorothie_gym.policies.scenery import SeenLandmark
+from dorothie_gym.policies.participant.repairs import misunderstood, not_caught
+from dorothie_gym.policies.scenery import SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.speech import Remark, remark
 
-GUIDES_AT_ONCE = 0.25
+GUIDES_AT_ONCE = 0.12
 """Chance that the way to a place that the car does not know is told from where it has been described."""
 
 ELSEWHERE = 40.0
 """A car that stands farther than this from the target has not come to it [m]."""
+
+SAYS_IT_ALL = 0.85
+"""Chance that the order of two tasks is told by naming the first one as well."""
+
+TELLS_LOOKS = 0.35
+"""Chance that a place is described by what stands there, too."""
+
+NODS_FIRST = 0.6
+"""Chance that something that is about to be said begins with a word for what the car has said meanwhile."""
 
 JUST_TOLD = 5.0
 """A question that was put while the answer was being given needs no other one [s]."""
@@ -42,6 +54,15 @@ _FREE = frozenset({ActionValue.LIGHT_CHANGE, ActionValue.SPEED_CHANGE, ActionVal
 
 _WAYS = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH})
 """Actions that lead somewhere else."""
+
+_AFTER_A_NOD = frozenset({DialogueMove.EXPLAIN, DialogueMove.INSTRUCT})
+
+_FEATURES = (
+    ObjectClass.BUILDING, ObjectClass.FENCE, ObjectClass.WALL, ObjectClass.POLE, ObjectClass.VEGETATION,
+    ObjectClass.TRAFFIC_SIGN, ObjectClass.SIDE_WALK, ObjectClass.TERRAIN, ObjectClass.GROUND, ObjectClass.WATER,
+    ObjectClass.BRIDGE, ObjectClass.GUARD_RAIL, ObjectClass.RAIL_TRACK, ObjectClass.OTHER, ObjectClass.ROAD_LINE,
+)  # fmt: skip
+"""What stands by houses and people."""
 
 _AHEAD = frozenset({ActionValue.LANE_FOLLOW, ActionValue.J_TURN})
 
@@ -60,8 +81,16 @@ def listen(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
         return
     mind.heard_at = view.time
     mind.voice = mind.voice.heard_other(view.time, heard.acts)
+    if heard.acts and not_caught(mind, view, heard, rng):
+        return
+    if mind.puzzled_by is not None:
+        made_clear = any(act.move is DialogueMove.CLARIFY for act in heard.acts)
+        heard, mind.puzzled_by = (mind.puzzled_by if made_clear else heard), None
+    asked = any(act.move is DialogueMove.QUERY_W for act in heard.acts)
     for act in heard.acts:
         answer = _ANSWERS.get(act.move)
+        if asked and GoalStatus.UNKNOWN in act.slots:
+            continue  # the question that follows is what is answered
         if answer is not None:
             answer(mind, view, act, heard.words, rng)
 
@@ -101,7 +130,10 @@ def _fits(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng
 
 def _more(mind: ParticipantMind, rng: np.random.Generator) -> tuple[Remark, ...]:
     """What is added to a yes now and then."""
-    return (remark(DialogueMove.EXPLAIN, joined=True),) if rng.random() < mind.style.reasons else ()
+    if rng.random() >= mind.style.reasons:
+        return ()
+    topic = "hint" if mind.guiding or rng.random() < 0.5 else reason_topic(mind)
+    return (remark(DialogueMove.EXPLAIN, joined=True, wording=Wording(topic=topic)),)
 
 
 def _refuse_with_step(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
@@ -118,7 +150,12 @@ def _refuse_with_step(mind: ParticipantMind, view: View, rng: np.random.Generato
 
 def _yes_or_no(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
     objects, landmarks = act.values(Slot.OBJECT), act.values(Slot.LANDMARK)
-    if objects:
+    offered = _offered(mind, view, landmarks)
+    if offered is not None:
+        _judge_offer(mind, view, offered)
+    elif act.values(Slot.STREET) and not landmarks and not act.values(Slot.ACTION):
+        _judge_street(mind, view, act)
+    elif objects:
         seen = any(thing.kind in objects for thing in view.objects)
         mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y if seen else DialogueMove.REPLY_N))
     elif landmarks and mind.goal is not None:
@@ -140,6 +177,40 @@ def _yes_or_no(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard
         mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y), *_more(mind, rng))
 
 
+def _offered(mind: ParticipantMind, view: View, landmarks: tuple[SlotValue, ...]) -> SeenSubgoal | None:
+    """The task, other than the one under way, that the car proposes to do first."""
+    if mind.goal is None or mind.goal.name in landmarks:
+        return None
+    for subgoal in view.subgoals:
+        landmark = view.landmark(subgoal.landmark)
+        if subgoal.open and subgoal.allowed and landmark is not None and landmark.name in landmarks:
+            return subgoal
+    return None
+
+
+def _judge_offer(mind: ParticipantMind, view: View, offered: SeenSubgoal) -> None:
+    """Lets the car go to the place that it proposes if that is nearer, else insists on the one under way."""
+    assert mind.goal is not None
+    landmark = view.landmark(offered.landmark)
+    left = mind.journey.left(view.station) if mind.journey is not None else math.inf
+    if landmark is not None and route_length(mind, view, landmark) < left:
+        switch_target(mind, view, offered, landmark)
+        mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y))
+        return
+    first = remark(DialogueMove.INSTRUCT, mind.goal.name, wording=Wording(topic="first"), joined=True)
+    mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_N), first)
+
+
+def _judge_street(mind: ParticipantMind, view: View, act: DialogueAct) -> None:
+    """Agrees to a way round that is the participant's own, or insists on that."""
+    own = first_new_street(view.raw, mind.town, view.lane, mind.journey)
+    if own is None or own in act.values(Slot.STREET):
+        mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y))
+        return
+    instead = remark(DialogueMove.INSTRUCT, own, wording=Wording(topic="detour"), joined=True)
+    mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_N), instead)
+
+
 def _judge_proposal(
     mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator
 ) -> None:
@@ -157,6 +228,14 @@ def _open_question(mind: ParticipantMind, view: View, act: DialogueAct, words: H
     landmarks, streets, actions = act.values(Slot.LANDMARK), act.values(Slot.STREET), act.values(Slot.ACTION)
     if mind.goal is None:
         mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_U))
+    elif words.order is not None and landmarks:
+        _say_order(mind, rng)
+    elif _put_right(mind, view, act, words):
+        return
+    elif GoalStatus.QUERIED in act.values(Slot.STATUS):
+        mind.told, mind.told_at = True, view.time
+        target = announcement(mind, view, rng).act.slots
+        mind.voice = mind.voice.cleared().plan(remark(DialogueMove.REPLY_W, *target))
     elif landmarks == (LandmarkName.QUERIED,) and view.time - mind.told_at < JUST_TOLD:
         return
     elif landmarks == (LandmarkName.QUERIED,):
@@ -168,13 +247,17 @@ def _open_question(mind: ParticipantMind, view: View, act: DialogueAct, words: H
     elif actions:
         mind.guiding = True
         _say_way(mind, view, DialogueMove.REPLY_W, rng)
-    elif StreetName.QUERIED in streets:
-        mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_W, mind.goal.street))
-    elif landmarks and mind.goal.name not in landmarks:
-        # "before or after ...?": what is under way is finished first
-        mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_W, wording=Wording(topic="after")))
     else:
         _describe(mind, view, DialogueMove.REPLY_W, rng)
+
+
+def _say_order(mind: ParticipantMind, rng: np.random.Generator) -> None:
+    """To "before or after?": what is under way is finished first."""
+    assert mind.goal is not None
+    mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_W, wording=Wording(topic="after")))
+    if rng.random() < SAYS_IT_ALL:
+        first = remark(DialogueMove.INSTRUCT, mind.goal.name, wording=Wording(topic="first"), joined=True)
+        mind.voice = replace(mind.voice, queue=(mind.voice.queue[0], first, *mind.voice.queue[1:]))
 
 
 def _just_named(mind: ParticipantMind, view: View) -> bool:
@@ -207,7 +290,14 @@ def _describe(mind: ParticipantMind, view: View, move: DialogueMove, rng: np.ran
     near = _near(mind.goal, view)
     if near is not None:
         values.append(near.name)
-    mind.voice = mind.voice.plan_first(remark(move, *values, wording=Wording(topic="where")))
+    looks = (_looks(mind.goal),) if rng.random() < TELLS_LOOKS else ()
+    mind.voice = mind.voice.plan_first(remark(move, *values, wording=Wording(topic="where")), *looks)
+
+
+def _looks(goal: SeenLandmark) -> Remark:
+    """By what a place is known when one is there: the same for the same place."""
+    thing = _FEATURES[int(abs(goal.x) * 7.0 + abs(goal.y) * 3.0) % len(_FEATURES)]
+    return remark(DialogueMove.EXPLAIN, thing, wording=Wording(topic="looks"), joined=True)
 
 
 def _elsewhere(mind: ParticipantMind, view: View) -> bool:
@@ -234,6 +324,8 @@ def _near(goal: SeenLandmark, view: View) -> SeenLandmark | None:
 
 def _explanation(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
     landmarks, statuses = act.values(Slot.LANDMARK), act.values(Slot.STATUS)
+    if _put_right(mind, view, act, words):
+        return
     if GoalStatus.UNKNOWN in statuses and mind.goal is not None and mind.goal.name in landmarks:
         _describe(mind, view, DialogueMove.EXPLAIN, rng)
         return
@@ -244,8 +336,29 @@ def _explanation(mind: ParticipantMind, view: View, act: DialogueAct, words: Hea
         mind.excused_until = view.time + 30.0
         if ObjectClass.STATIC in act.values(Slot.OBJECT):
             note_blocked(mind, view, near=True)
-    if mind.voice.idle and rng.random() < mind.style.nods:
+    _nod(mind, view, rng)
+
+
+def _nod(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+    """Shows that it has heard: before what it was about to say anyway, else in a word of its own, now and then."""
+    waiting = mind.voice.queue
+    if waiting and not waiting[0].urgent and not waiting[0].text:
+        if waiting[0].act.move in _AFTER_A_NOD and rng.random() < NODS_FIRST:
+            first = replace(waiting[0], joined=True)
+            mind.voice = replace(mind.voice, queue=(remark(DialogueMove.ACKNOWLEDGE), first, *waiting[1:]))
+    elif mind.voice.idle and not (mind.guiding and about_to_arrive(mind, view)) and rng.random() < mind.style.nods:
         mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE), *_more(mind, rng))
+
+
+def _put_right(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard) -> bool:
+    """Says again what the car has taken for something else; tells whether it had to."""
+    again = misunderstood(mind, view, act, words)
+    if again is None:
+        return False
+    mind.told_at = view.time
+    refusal = (remark(DialogueMove.REPLY_N),) if act.move is DialogueMove.CONFIRM else ()
+    mind.voice = mind.voice.cleared().plan(*refusal, replace(again, joined=bool(refusal)))
+    return True
 
 
 def _confusion(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
@@ -259,7 +372,9 @@ def _confusion(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard
 
 
 def _uptake(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
-    """A car that repeats the place knows it, and finds the way by itself."""
+    """A car that repeats the place knows it, and finds the way by itself; one that names another has to be put right."""
+    if _put_right(mind, view, act, words):
+        return
     if mind.goal is not None and mind.goal.name in act.values(Slot.LANDMARK):
         mind.guiding = False
 

@@ -1,0 +1,104 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dorothie_gym.dialogue import Direction, Wording
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, Role
+from dorothie_gym.policies import ScriptedParticipant
+from dorothie_gym.policies.participant.mind import Style, View
+from dorothie_gym.policies.participant.repairs import misunderstood, not_caught
+from dorothie_gym.policies.participant.replies import listen
+from dorothie_gym.policies.speech import remark
+from tests.policies.said import heard, with_words
+
+M = DialogueMove
+CALM = Style(guides=0.0, names_goal=1.0, names_street=0.0, hurries=1.0, patience=60.0, chat=1e4, puzzled=1.0)
+
+
+class Human:
+    """A participant of brookside who has just told the car where to go."""
+
+    def __init__(self, seed: int = 4) -> None:
+        self.env = DuoWizardEnv(town="brookside")
+        observations, _ = self.env.reset(seed=seed)
+        self.observation = dict(observations["participant"])
+        policy = ScriptedParticipant(self.env.limits, style=CALM)
+        self.mind = policy.initial_state(seed, self.env.town)
+        _, self.mind = policy.step(self.observation, self.mind)
+        assert self.mind.goal is not None and self.mind.told
+        self.mind.voice = replace(self.mind.voice.cleared(), last_end=-100.0)  # it has stopped speaking long ago
+        self.rng = np.random.default_rng(0)
+
+    @property
+    def view(self) -> View:
+        return View.read(self.observation, self.env.town)
+
+    def another_place(self) -> LandmarkName:
+        assert self.mind.goal is not None
+        return next(name for name in (LandmarkName.KFC, LandmarkName.IKEA) if name is not self.mind.goal.name)
+
+    def hears(self, move: DialogueMove, *values, wording: Wording | None = None) -> None:
+        said = heard(self.observation, Role.CO_WIZARD, move, *values, wording=wording)
+        listen(self.mind, self.view_of(said), self.rng)
+
+    def view_of(self, said) -> View:
+        return replace(self.view, raw=with_words(self.observation, Role.CO_WIZARD, said.words.text, *said.acts))
+
+    def moves(self) -> list[DialogueMove]:
+        return [item.act.move for item in self.mind.voice.queue]
+
+
+@pytest.mark.parametrize("move", [M.ACKNOWLEDGE, M.CONFIRM])
+def test_a_car_that_takes_up_another_place_is_told_the_right_one_again(move):
+    human = Human()
+    human.hears(move, human.another_place())
+    clarified = [item.act for item in human.mind.voice.queue if item.act.move is M.CLARIFY]
+    assert clarified and human.mind.goal.name in clarified[0].slots
+
+
+def test_a_car_that_takes_up_the_right_place_is_not_corrected():
+    human = Human()
+    human.hears(M.ACKNOWLEDGE, human.mind.goal.name)
+    assert M.CLARIFY not in human.moves()
+
+
+def test_a_place_that_was_to_be_given_up_may_be_repeated():
+    human = Human()
+    other = human.another_place()
+    dropped = remark(M.INSTRUCT, human.mind.goal.name, wording=Wording(dropped=other))
+    human.mind.voice = replace(human.mind.voice, said=(dropped,))
+    said = heard(human.observation, Role.CO_WIZARD, M.CONFIRM, other)
+    assert misunderstood(human.mind, human.view, said.acts[0], said.words) is None
+
+
+def test_a_car_that_takes_up_the_other_side_is_told_the_side_again():
+    human = Human()
+    left = remark(M.INSTRUCT, ActionValue.J_TURN, wording=Wording(direction=Direction.LEFT))
+    human.mind.voice = replace(human.mind.voice, said=(left,), last_end=human.view.time)
+    wrong = heard(human.observation, Role.CO_WIZARD, M.CONFIRM, ActionValue.J_TURN, wording=Wording(direction="right"))
+    right = heard(human.observation, Role.CO_WIZARD, M.CONFIRM, ActionValue.J_TURN, wording=Wording(direction="left"))
+    again = misunderstood(human.mind, human.view, wrong.acts[0], wrong.words)
+    assert again is not None and again.act.move is M.CLARIFY and again.wording.direction is Direction.LEFT
+    assert misunderstood(human.mind, human.view, right.acts[0], right.words) is None
+
+
+@pytest.mark.parametrize(("ended", "caught"), [(0.0, False), (30.0, True)])
+def test_only_what_is_said_into_ones_own_words_is_not_caught(ended, caught):
+    human = Human()
+    human.observation["time"] = np.array([40.0])
+    human.mind.voice = replace(human.mind.voice, last_end=40.0 - ended)
+    question = heard(human.observation, Role.CO_WIZARD, M.CHECK, human.mind.goal.name)
+    assert not_caught(human.mind, human.view, question, human.rng) is not caught
+
+
+def test_a_question_that_was_not_caught_is_answered_once_it_is_made_clear():
+    human = Human()
+    human.observation["time"] = np.array([40.0])
+    human.mind.voice = replace(human.mind.voice, last_end=40.0)
+    human.hears(M.CHECK, human.mind.goal.name)
+    assert human.moves() == [M.CONFUSE]
+    human.mind.voice = replace(human.mind.voice.cleared(), last_end=0.0)
+    human.hears(M.CLARIFY, human.mind.goal.name)
+    assert M.CONFIRM in human.moves()
