@@ -51,7 +51,7 @@ class Bearings:
         path = self._path
         error = math.hypot(self._x - self._true_x, self._y - self._true_y)
         self.progress = write_path(
-            path.s, path.points, path.lanes, float(path.headings[0]), self._near, spacing,
+            path.s, path.points, path.lanes, path.heading, self._near, spacing,
             self._x, self._y, SEARCH + 2.0 * error, waypoints, path_lanes, believed_waypoints,
         )  # fmt: skip
 

@@ -91,8 +91,9 @@ class World:
         self._arrays = town_arrays(self.network)
         lane, station = departure
         state = empty_world(
-            self._arrays, vehicles=1 + config.vehicles, pedestrians=config.pedestrians, seed=chance_seed, driven=True
-        )
+            self._arrays, vehicles=1 + config.vehicles, pedestrians=config.pedestrians, props=0, seed=chance_seed,
+            driven=True,
+        )  # fmt: skip
         add_car(self._arrays, state, lane, station)
         state.car.collision_stop = round(config.collisions_stop * FRAME_RATE)
         self.road = TownRoad(self.network, np_random=np.random.default_rng(crowd_seed))
