@@ -178,7 +178,7 @@ class Path:
     @property
     def length(self) -> float:
         """Length of the path [m]."""
-        return self.s.item(-1)
+        return float(self.s[-1])
 
     @property
     def curvatures(self) -> Array:
