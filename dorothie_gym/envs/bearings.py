@@ -62,7 +62,7 @@ class Bearings:
         """
         turn = self._heading - self._true_heading
         write_objects(
-            *self._world.senses, self._world.frame, self._true_x, self._true_y, self._true_heading,
+            self._world.senses, self._world.frame, self._true_x, self._true_y, self._true_heading,
             self._x, self._y, math.cos(turn), math.sin(turn), objects, believed,
         )  # fmt: skip
 

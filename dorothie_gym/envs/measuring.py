@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from dorothie_gym.world.compiling import allocating
 from dorothie_gym.world.kernel.lanes import wrapped
-from dorothie_gym.world.kernel.records import Records
 from dorothie_gym.world.kernel.seeing import see
 from dorothie_gym.world.town.model import Array
+from dorothie_gym.world.world import Senses
 
 
 @allocating
@@ -119,11 +119,7 @@ def write_waypoints(s: Array, points: Array, heading: float, start: float, spaci
 
 @allocating
 def write_objects(
-    vehicles: Records,
-    pedestrians: Records,
-    props: Records,
-    seen: Records,
-    eyes: Records,
+    senses: Senses,
     frame: int,
     x: float,
     y: float,
@@ -138,11 +134,7 @@ def write_objects(
     """Looks at all bodies from the car, and writes those that are perceived as rows of `ObjectColumn`.
 
     Args:
-        vehicles: the first five are `world.Senses`.
-        pedestrians: see there.
-        props: see there.
-        seen: see there; written.
-        eyes: see there.
+        senses: what the car sees with, and what there is to be seen (numba takes records in tuples more quickly).
         frame: present frame.
         x: where the car is [m].
         y: where the car is [m].
@@ -154,9 +146,12 @@ def write_objects(
         objects: what is written (m, 8): bodies where they seem to be from the true pose,
         believed: and where they seem to be from the believed one.
     """
-    count = see(vehicles, pedestrians, props, seen, eyes[0], vehicles[0].x, vehicles[0].y, frame, 0)
+    car = senses.vehicles[0]
+    count = see(
+        senses.vehicles, senses.pedestrians, senses.props, senses.seen, senses.eye[0], car.x, car.y, frame, 0
+    )  # fmt: skip
     for row in range(min(count, len(objects))):
-        body = seen[row]
+        body = senses.seen[row]
         dx, dy = body.x - x, body.y - y
         distance, bearing = math.sqrt(dx * dx + dy * dy), wrapped(math.atan2(dy, dx) - heading)
         for table in (objects, believed):
