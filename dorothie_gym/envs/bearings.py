@@ -28,6 +28,7 @@ class Bearings:
 
     def __init__(self, world: World) -> None:
         car, planner = world.car, world.planner
+        self._world = world
         self.pose = world.localizer.pose
         self._x, self._y, self._heading = self.pose.tolist()
         self._true_x, self._true_y = car.position.tolist()
@@ -50,18 +51,18 @@ class Bearings:
         path = self._path
         error = math.hypot(self._x - self._true_x, self._y - self._true_y)
         self.progress = write_path(
-            path.s, path.points, path.lanes, float(path.headings[0]), self._near, spacing,
+            path.s, path.points, path.lanes, path.heading, self._near, spacing,
             self._x, self._y, SEARCH + 2.0 * error, waypoints, path_lanes, believed_waypoints,
         )  # fmt: skip
 
-    def write_objects(self, seen: Array, objects: Array, believed: Array) -> None:
-        """Writes bodies (rows of `World.seen`) where they are into one table, and where they are believed into another.
+    def write_objects(self, objects: Array, believed: Array) -> None:
+        """Writes bodies that the car perceives where they are into one table, where they are believed into another.
 
         Distance and bearing in both are those from the car.
         """
         turn = self._heading - self._true_heading
         write_objects(
-            seen, self._true_x, self._true_y, self._true_heading,
+            self._world.senses, self._world.frame, self._true_x, self._true_y, self._true_heading,
             self._x, self._y, math.cos(turn), math.sin(turn), objects, believed,
         )  # fmt: skip
 

@@ -12,7 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.world.compiling import allocating
+from dorothie_gym.world.kernel.lanes import wrapped
+from dorothie_gym.world.kernel.seeing import see
 from dorothie_gym.world.town.model import Array
+from dorothie_gym.world.world import Senses
 
 
 @allocating
@@ -116,7 +119,8 @@ def write_waypoints(s: Array, points: Array, heading: float, start: float, spaci
 
 @allocating
 def write_objects(
-    seen: Array,
+    senses: Senses,
+    frame: int,
     x: float,
     y: float,
     heading: float,
@@ -127,10 +131,11 @@ def write_objects(
     objects: Array,
     believed: Array,
 ) -> None:
-    """Writes the bodies that are seen as rows of `ObjectColumn`.
+    """Looks at all bodies from the car, and writes those that are perceived as rows of `ObjectColumn`.
 
     Args:
-        seen: rows of `World.seen` (n, 9), nearest first.
+        senses: what the car sees with, and what there is to be seen (numba takes records in tuples more quickly).
+        frame: present frame.
         x: where the car is [m].
         y: where the car is [m].
         heading: of the car [rad].
@@ -141,17 +146,18 @@ def write_objects(
         objects: what is written (m, 8): bodies where they seem to be from the true pose,
         believed: and where they seem to be from the believed one.
     """
-    for row in range(min(len(seen), len(objects))):
-        dx, dy = seen[row, 2] - x, seen[row, 3] - y
-        bearing = math.atan2(dy, dx) - heading
+    car = senses.vehicles[0]
+    count = see(
+        senses.vehicles, senses.pedestrians, senses.props, senses.seen, senses.eye[0], car.x, car.y, frame, 0
+    )  # fmt: skip
+    for row in range(min(count, len(objects))):
+        body = senses.seen[row]
+        dx, dy = body.x - x, body.y - y
+        distance, bearing = math.sqrt(dx * dx + dy * dy), wrapped(math.atan2(dy, dx) - heading)
         for table in (objects, believed):
-            table[row, 0] = seen[row, 1]
-            table[row, 3] = math.sqrt(dx * dx + dy * dy)
-            table[row, 4] = (bearing + math.pi) % (2 * math.pi) - math.pi
-            table[row, 5] = seen[row, 5]
-            table[row, 6] = seen[row, 6]
-            table[row, 7] = seen[row, 7]
-        objects[row, 1], objects[row, 2] = seen[row, 2], seen[row, 3]
+            table[row, 0], table[row, 3], table[row, 4] = body.kind, distance, bearing
+            table[row, 5], table[row, 6], table[row, 7] = body.length, body.width, body.speed
+        objects[row, 1], objects[row, 2] = body.x, body.y
         believed[row, 1] = believed_x + dx * cosine - dy * sine
         believed[row, 2] = believed_y + dx * sine + dy * cosine
 

@@ -108,7 +108,7 @@ class Views:
         bearings.write_path(
             WAYPOINT_SPACING, ad_wizard["waypoints"], ad_wizard["path_lanes"], co_wizard["waypoints"]
         )  # fmt: skip
-        bearings.write_objects(self._world.seen(), participant["objects"], co_wizard["objects"])
+        bearings.write_objects(participant["objects"], co_wizard["objects"])
         self._write_exits(co_wizard["exits"], bearings)
         participant["lights"] = co_wizard["lights"] = lights
         co_wizard["motion"] = ad_wizard["motion"] = motion
@@ -183,20 +183,18 @@ class Views:
     def _write_true_place(self, participant: Observation, ad_wizard: Observation) -> None:
         """Where the car is; both know it."""
         car, planner = self._world.car, self._world.planner
-        participant["pose"][:2], participant["pose"][2] = car.position, car.heading
-        ad_wizard["pose"][:] = participant["pose"]
-        participant["lane"] = ad_wizard["lane"] = self._numbers[planner.lane]
-        participant["station"][0] = ad_wizard["station"][0] = planner.station
+        pose, lane, station = (*car.position.tolist(), car.heading), self._numbers[planner.lane], planner.station
+        for view in (participant, ad_wizard):
+            view["pose"][:], view["lane"], view["station"][0] = pose, lane, station
 
     def _write_believed_place(self, view: Observation, pose: Table) -> None:
         """Where the Co-Wizard takes the car to be."""
         world = self._world
         view["pose"][:] = pose
         view["pose_covariance"][:] = world.localizer.covariance
-        index = world.network.get_closest_lane_index(pose, float(pose[2]), height=float(world.car.height))
-        lane = world.network.get_lane(index)
-        view["lane"] = self._numbers[lane.town_lane.id]
-        view["station"][0] = min(max(lane.local_coordinates(pose)[0], 0.0), lane.length)
+        x, y, heading = pose.tolist()
+        lane, view["station"][0] = world.network.closest_place(x, y, heading, world.car.height)
+        view["lane"] = self._numbers[lane]
 
     def _write_exits(self, table: Table, bearings: Bearings) -> None:
         options = self._prospect.options()

@@ -113,6 +113,8 @@ class FieldReader:
         """A text of the characters that the space has, not too long."""
         length, characters = self._table.texts[name]
         value = self._action[name]
+        if type(value) is str and not value:
+            return value
         if not isinstance(value, str):
             raise ValueError(f"field {name!r} is a {type(value).__name__}; it must be a text")
         if len(value) > length:

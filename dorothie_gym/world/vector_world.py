@@ -15,8 +15,10 @@ from dorothie_gym.world.town.model import Array
 
 
 class VectorWorld:
-    """Worlds of one town in one set of arrays; every thread steps its share of them in one compiled call.
+    """Worlds of one town in one set of arrays; every thread steps a share of them in one compiled call.
 
+    A thread that is done with a world takes the next one that nobody has: who wakes up late, or gets worlds with much
+    traffic, does fewer.
     What happens in a world depends on its own arrays only: not on the other worlds, its place among them, or the
     threads. Threads share nothing that is written to, and hold the interpreter's lock between calls only.
 
@@ -45,8 +47,6 @@ class VectorWorld:
         self.town = town
         self.arrays = stacked(world, worlds)
         self.threads = min(threads or available_processors(), worlds)
-        bounds = [worlds * k // self.threads for k in range(self.threads + 1)]
-        self._shares = list(zip(bounds[:-1], bounds[1:], strict=True))
         self._others = ThreadPoolExecutor(self.threads - 1, "worlds") if self.threads > 1 else None
 
     def __len__(self) -> int:
@@ -82,14 +82,19 @@ class VectorWorld:
         return np.array(np.broadcast_to(values, len(self)))
 
     def share(self, work: Callable[..., None], *arguments: Any) -> None:
-        """Calls `work(begin, end, *arguments)` for each thread's share of the worlds, and waits for all of them."""
-        (begin, end), *shares = self._shares
+        """Calls `work(turns, *arguments)` in every thread, and waits for all of them.
+
+        Args:
+            work: works on the worlds whose numbers it takes (`kernel.turns`) until there is none left.
+            arguments: for it.
+        """
+        turns = np.zeros(1, dtype=np.int64)
         if self._others is None:
-            work(begin, end, *arguments)
+            work(turns, *arguments)
             return
-        futures = [self._others.submit(work, *share, *arguments) for share in shares]
+        futures = [self._others.submit(work, turns, *arguments) for _ in range(self.threads - 1)]
         try:
-            work(begin, end, *arguments)
+            work(turns, *arguments)
         finally:
             errors = [future.exception() for future in futures]  # waits: nobody works on when this returns
         for error in errors:

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
-from dorothie_gym.ontology import ObjectClass, PhysicalAction, Sensor, WeatherParameter
+from dorothie_gym.ontology import ObjectClass, Sensor, WeatherParameter
 from dorothie_gym.world.actors import Actors
 from dorothie_gym.world.car.driver import Driver
 from dorothie_gym.world.car.hazards import Body, Hazard
 from dorothie_gym.world.car.planner import LocalPlanner
+from dorothie_gym.world.car.record import CarRecord
 from dorothie_gym.world.car.vehicle import Car
 from dorothie_gym.world.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
 from dorothie_gym.world.kernel import WorldArrays, empty_world, step, town_arrays
 from dorothie_gym.world.kernel.editing import add_car
 from dorothie_gym.world.kernel.parameters import FRAMES
-from dorothie_gym.world.kernel.records import EventCode, plain
+from dorothie_gym.world.kernel.records import EventCode, Records
+from dorothie_gym.world.kernel.rules import HEIGHT
 from dorothie_gym.world.kernel.seeing import look_around
 from dorothie_gym.world.localizer import Localizer
 from dorothie_gym.world.network.network import TownNetwork
@@ -33,6 +35,16 @@ FAULT_SECONDS = 30.0
 
 CLARITY = {Sensor.BLUR: 0.25, Sensor.VIEW: 0.0}
 """Share of the signal that a fault of the view leaves: blur halves the sight."""
+
+
+class Senses(NamedTuple):
+    """Arrays of a world that `kernel.seeing.see` takes, see `kernel.WorldArrays`."""
+
+    vehicles: Records
+    pedestrians: Records
+    props: Records
+    seen: Records
+    eye: Records
 
 
 class World:
@@ -79,8 +91,9 @@ class World:
         self._arrays = town_arrays(self.network)
         lane, station = departure
         state = empty_world(
-            self._arrays, vehicles=1 + config.vehicles, pedestrians=config.pedestrians, seed=chance_seed, driven=True
-        )
+            self._arrays, vehicles=1 + config.vehicles, pedestrians=config.pedestrians, props=0, seed=chance_seed,
+            driven=True,
+        )  # fmt: skip
         add_car(self._arrays, state, lane, station)
         state.car.collision_stop = round(config.collisions_stop * FRAME_RATE)
         self.road = TownRoad(self.network, np_random=np.random.default_rng(crowd_seed))
@@ -98,7 +111,6 @@ class World:
             np.random.default_rng(locate_seed),
         )  # fmt: skip
         self._record_of: WorldArrays | None = None
-        self._own_record: Any = None
         self.lights = False
         self.faults: dict[Sensor, int] = {}
         self.frame = 0
@@ -115,21 +127,22 @@ class World:
 
     def step(self, frames: int) -> list[WorldEvent]:
         """Lets the world run for a number of physics frames; returns what happened to the car."""
-        poses, before = np.empty((frames + 1, 6)), self._pose()
-        poses[0] = before
-        parts = [self._run(min(FRAMES, frames - first)) for first in range(0, frames, FRAMES)]
-        trace = parts[0] if len(parts) == 1 else np.concatenate(parts)
+        if frames <= FRAMES:
+            trace, poses = self._run(frames)
+        else:
+            parts = [self._run(min(FRAMES, frames - first)) for first in range(0, frames, FRAMES)]
+            trace = np.concatenate([part for part, _ in parts])
+            poses = np.concatenate([parts[0][1][:1], *(part[1:] for _, part in parts)])
         self.frames, self.offsets = trace[:, : len(FRAME_COLUMNS)], trace[:, -1]
-        poses[1:, :4], poses[1:, 4:] = trace[:, 1:5], trace[:, 9:11]  # by columns of `TRACE`, as in `kernel.rules`
         self.localizer.localize(poses, self.frame - frames, gps_from=self.faults.get(Sensor.GPS, 0))
         if self.faults:
             self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
         self.planner.props = self._props_seen()
-        stood = self.car.speed == 0.0 and before[:4] == (*self.car.position.tolist(), self.car.heading, 0.0)
+        stood = self.car.speed == 0.0 and bool((poses[0, :HEIGHT] == poses[-1, :HEIGHT]).all())
         return self.reports.close(poses, self.frame, stood=stood)
 
-    def _run(self, frames: int) -> Array:
-        """Steps all bodies by no more than `FRAMES` substeps; returns the car's way (frames, 12)."""
+    def _run(self, frames: int) -> tuple[Array, Array]:
+        """Steps all bodies by no more than `FRAMES` substeps; returns the car's way and poses, see `WorldArrays`."""
         arrays, record = self.actors.arrays, self._record
         self.planner.extend(self.car.speed)
         self.driver.brief(arrays, record)
@@ -138,30 +151,28 @@ class World:
         self.driver.debrief(record)
         self.car.refresh()
         self.frame += frames
-        if record["events"]:
-            self._report(arrays)
-        return arrays.trace[:frames].copy()
+        events, _ = record.outcome.item()
+        if events:
+            self._report(arrays.events[:events])
+        return arrays.trace[:frames].copy(), arrays.poses[: frames + 1].copy()
 
     @property
-    def _record(self) -> Any:
-        """What drives the car, `kernel.records.CAR`."""
+    def _record(self) -> CarRecord:
+        """What drives the car."""
         if self._record_of is not self.actors.arrays:
-            self._record_of = self.actors.arrays
-            self._own_record = plain(self._record_of.car)[0]
+            self._record_of, self._own_record = self.actors.arrays, CarRecord(self.actors.arrays)
         return self._own_record
 
     def _tell_weather(self, arrays: WorldArrays) -> None:
         """Writes what the weather does to grip, sight and course into the world's arrays, where it has changed."""
         visibility = self.visibility  # another one after any change of the weather
         if self._perception.open(arrays.eye, visibility):
-            car = self._record
-            car["friction"] = self.weather.friction
-            car["wind"] = self.weather.above_clear(WeatherParameter.WIND_INTENSITY)
-            car["wind_heading"], car["wind_phase"] = self.wind.heading, self.wind.phases
+            wind = self.weather.above_clear(WeatherParameter.WIND_INTENSITY)
+            self._record.air[()] = self.weather.friction, wind, self.wind.heading, tuple(self.wind.phases)
 
-    def _report(self, arrays: WorldArrays) -> None:
-        """Takes over what happened to the car."""
-        for event in arrays.events[: int(self._record["events"])]:
+    def _report(self, events: Records) -> None:
+        """Takes over what happened to the car, `kernel.records.EVENT`."""
+        for event in events:
             frame, kind = int(event.frame), ObjectClass(int(event.kind))
             if event.code == EventCode.HAZARD_STOP:
                 distance = round(float(event.value), 2)
@@ -179,13 +190,14 @@ class World:
     @property
     def hazard(self) -> Hazard | None:
         """What the car is braking or standing for, or None."""
-        kind = int(self._record["hazard"])
-        return Hazard(kind=ObjectClass(kind), gap=float(self._record["hazard_gap"])) if kind else None
+        kind, gap = self._record.hazard.item()
+        return Hazard(kind=ObjectClass(kind), gap=gap) if kind else None
 
     @property
     def collisions(self) -> int:
         """Collisions of the car's own making."""
-        return int(self._record["collisions"])
+        _, collisions = self._record.outcome.item()
+        return int(collisions)
 
     # --- perception -------------------------------------------------------------------------------------------------
 
@@ -212,8 +224,15 @@ class World:
             for key, kind, x, y, heading, length, width, speed, height in self.seen().tolist()
         ]  # fmt: skip
 
+    @property
+    def senses(self) -> Senses:
+        """What the car sees with now, and what there is to be seen."""
+        arrays = self.actors.arrays
+        self._tell_weather(arrays)
+        return Senses(arrays.vehicles, arrays.pedestrians, arrays.props, arrays.seen, arrays.eye)
+
     def seen(self) -> Array:
-        """The same in numbers (n, 9), columns `perception.BODY` [m, rad, m/s]."""
+        """What `perceived` tells in numbers (n, 9), columns `perception.BODY` [m, rad, m/s]."""
         arrays = self.actors.arrays
         self._tell_weather(arrays)
         table = np.empty((len(arrays.seen), len(BODY)))
@@ -224,12 +243,6 @@ class World:
         if not self.actors.has_props:
             return ()
         return tuple((body.x, body.y, body.height) for body in self.perceived() if body.kind is ObjectClass.STATIC)
-
-    def _pose(self) -> tuple[float, float, float, float, float, bool]:
-        """Of the car, in the columns of `kernel.rules`."""
-        turning = self.planner.manoeuvre[0] is PhysicalAction.U_TURN and self.planner.in_manoeuvre
-        x, y = self.car.position.tolist()
-        return x, y, self.car.heading, self.car.speed, self.car.height, turning
 
     # --- faults -----------------------------------------------------------------------------------------------------
 

@@ -12,6 +12,7 @@ import numpy as np
 from dorothie_gym.ontology import SPEED_STEP
 from dorothie_gym.world.car.path import Path
 from dorothie_gym.world.car.planner import U_TURN_SPEED, LocalPlanner
+from dorothie_gym.world.car.record import CarRecord
 from dorothie_gym.world.kernel.course import find_sides
 from dorothie_gym.world.kernel.parameters import CAR_LENGTH, CAR_WIDTH
 from dorothie_gym.world.kernel.records import plain
@@ -141,30 +142,29 @@ class Driver:
         self.goals = tuple(goals)
         self._told = None
 
-    def brief(self, arrays: Any, car: Any) -> None:
+    def brief(self, arrays: Any, record: CarRecord) -> None:
         """Writes what the car is to do into the arrays of a world, before it is stepped.
 
         Args:
             arrays: `kernel.WorldArrays`.
-            car: their `kernel.records.CAR`.
+            record: what drives the car in them.
         """
         planner = self.planner
         if planner.path is not self._told:
-            self._tell(arrays, car, anew=True)
+            self._tell(arrays, anew=True)
         elif self._told_until < min(planner.s + AHEAD, planner.path.length):
-            self._tell(arrays, car, anew=False)
+            self._tell(arrays, anew=False)
         action, _ = planner.manoeuvre
-        car["action"] = 0 if action is None else action.value
-        car["action_end"] = planner.manoeuvre_end
-        car["cruise"], car["held"] = self.cruise * KMH, planner.held
+        number = 0 if action is None else action.value
+        record.orders[()] = number, planner.manoeuvre_end, self.cruise * KMH, planner.held
 
-    def debrief(self, car: Any) -> None:
+    def debrief(self, record: CarRecord) -> None:
         """Takes over where the car is, after the world was stepped; see `brief`."""
-        self.planner.note(float(car["s"]), float(car["offset"]), float(car["roadblock"]))
+        self.planner.note(*record.place.item())
 
-    def _tell(self, arrays: Any, car: Any, *, anew: bool) -> None:
+    def _tell(self, arrays: Any, *, anew: bool) -> None:
         """Writes the stretch of path around the car; all else that follows from the path if that was laid anew."""
-        path, s = self.planner.path, self.planner.s
+        path, s, car = self.planner.path, self.planner.s, plain(arrays.car)[0]
         if anew:
             stop_at = path.length - self._length / 2 - END_GAP if self.planner.waits_at_end else None
             self._speeds = speed_profile(path, stop_at)

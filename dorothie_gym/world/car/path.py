@@ -128,52 +128,68 @@ def u_turn(source: Lane, target: Lane, start: float, radius: float = TURNING_RAD
 class Path:
     """Pieces joined to one line that a car can be steered along.
 
+    Only what is asked for in every decision is kept for each point.
+
     Attributes:
         s: distance along the path of each point (n,) [m].
         points: (n, 2) [m].
-        headings: (n,) [rad], unwrapped.
-        curvatures: (n,) [1/m], positive to the right.
+        heading: at the first point [rad].
         heights: (n,) [m].
         lanes: lane of each point (n,).
         stations: distance along that lane (n,) [m].
-        limits: speed limit of each point (n,) [m/s].
+        manoeuvre: whether each point is off the lanes' centre lines (n,).
     """
 
     def __init__(self, pieces: Sequence[Piece]) -> None:
         points = np.concatenate([piece.points for piece in pieces])
         keep = np.concatenate(([True], np.hypot(*np.diff(points, axis=0).T) > 1e-3))
+        piece_of = np.repeat(np.arange(len(pieces), dtype=np.int16), [len(piece.points) for piece in pieces])[keep]
         self.points = points[keep]
         self.heights = np.concatenate([piece.heights for piece in pieces])[keep]
         self.stations = np.concatenate([piece.stations for piece in pieces])[keep]
-        self.lanes = np.concatenate([np.full(len(piece.points), piece.lane) for piece in pieces])[keep]
-        self.limits = np.concatenate([np.full(len(piece.points), piece.limit) for piece in pieces])[keep]
-        self.manoeuvre = np.concatenate([np.full(len(piece.points), piece.manoeuvre) for piece in pieces])[keep]
+        self.lanes = np.array([piece.lane for piece in pieces])[piece_of]
+        self.manoeuvre = np.array([piece.manoeuvre for piece in pieces])[piece_of]
+        self._piece_of, self._limits = piece_of, np.array([piece.limit for piece in pieces])
         steps = np.diff(self.points, axis=0)
-        lengths = np.hypot(steps[:, 0], steps[:, 1])
-        self.s = np.concatenate(([0.0], np.cumsum(lengths)))
+        self.s = np.concatenate(([0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))))
+        self.heading = float(self.headings[0])
+        self._asked, self._answer = math.nan, 0
+
+    @property
+    def limits(self) -> Array:
+        """Speed limit of each point (n,) [m/s]."""
+        limits: Array = self._limits[self._piece_of]
+        return limits
+
+    @property
+    def headings(self) -> Array:
+        """Of each point (n,) [rad], unwrapped."""
+        steps = np.diff(self.points, axis=0)
         segment = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
         middle = (self.s[:-1] + self.s[1:]) / 2
-        # headings at the points, from those of the segments at their middles; the ends go on with the curvature
-        self.headings = np.interp(self.s, middle, segment)
+        # from those of the segments at their middles; the ends go on with the curvature
+        headings = np.interp(self.s, middle, segment)
         if len(segment) > 1:
-            self.headings[0] = segment[0] - (segment[1] - segment[0]) * (middle[0] - 0.0) / (middle[1] - middle[0])
+            headings[0] = segment[0] - (segment[1] - segment[0]) * (middle[0] - 0.0) / (middle[1] - middle[0])
             rate = (segment[-1] - segment[-2]) / (middle[-1] - middle[-2])
-            self.headings[-1] = segment[-1] + rate * (self.s[-1] - middle[-1])
-        self.curvatures = np.gradient(self.headings, self.s)
-        self._s = self.s.tolist()
-        self._asked, self._answer = math.nan, 0
-        self._x, self._y = self.points[:, 0].tolist(), self.points[:, 1].tolist()
-        self._headings = self.headings.tolist()
+            headings[-1] = segment[-1] + rate * (self.s[-1] - middle[-1])
+        return headings
 
     @property
     def length(self) -> float:
         """Length of the path [m]."""
-        return float(self._s[-1])
+        return float(self.s[-1])
+
+    @property
+    def curvatures(self) -> Array:
+        """Of each point (n,) [1/m], positive to the right."""
+        bends: Array = np.gradient(self.headings, self.s)
+        return bends
 
     def index_at(self, s: float) -> int:
         """Number of the point at or before a distance along the path."""
         if s != self._asked:  # most ask where the car is, one after the other
-            self._asked, self._answer = s, min(max(bisect_right(self._s, s) - 1, 0), len(self._s) - 1)
+            self._asked, self._answer = s, min(max(bisect_right(self.s, s) - 1, 0), len(self.s) - 1)
         return self._answer
 
     def project(self, x: float, y: float, near: float, window: float = 6.0) -> tuple[float, float]:
@@ -189,34 +205,35 @@ class Path:
             Distance along the path [m], and signed distance from it, positive right [m].
         """
         first = self.index_at(near - window)
-        last = min(self.index_at(near + window) + 1, len(self._s) - 1)
+        last = min(self.index_at(near + window) + 1, len(self.s) - 1)
+        s, points = self.s[first : last + 1].tolist(), self.points[first : last + 1].tolist()
         best, answer = math.inf, (near, 0.0)
-        for k in range(first, last):
-            ax, ay = self._x[k], self._y[k]
-            dx, dy = self._x[k + 1] - ax, self._y[k + 1] - ay
+        for k in range(last - first):
+            (ax, ay), (bx, by) = points[k], points[k + 1]
+            dx, dy = bx - ax, by - ay
             t = ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)
             # before the first and after the last point the path goes on straight
-            if (t < 0.0 and k > 0) or (t > 1.0 and k < len(self._s) - 2):
+            if (t < 0.0 and first + k > 0) or (t > 1.0 and first + k < len(self.s) - 2):
                 t = 0.0 if t < 0.0 else 1.0
             ox, oy = x - ax - t * dx, y - ay - t * dy
             distance = ox * ox + oy * oy
             if distance < best:
                 best = distance
                 side = 1.0 if dx * oy - dy * ox >= 0 else -1.0
-                answer = (self._s[k] + t * (self._s[k + 1] - self._s[k]), side * math.sqrt(distance))
+                answer = (s[k] + t * (s[k + 1] - s[k]), side * math.sqrt(distance))
         return answer
 
     def heading_at(self, s: float) -> float:
         """Direction of the path [rad]."""
-        return self._interpolate(self._headings, s)
+        return self._interpolate(self.headings, s)
 
     def position_at(self, s: float) -> tuple[float, float]:
         """Point of the path [m]."""
-        return self._interpolate(self._x, s), self._interpolate(self._y, s)
+        return self._interpolate(self.points[:, 0], s), self._interpolate(self.points[:, 1], s)
 
-    def _interpolate(self, values: list[float], s: float) -> float:
-        k = min(self.index_at(s), len(self._s) - 2)
-        t = (s - self._s[k]) / (self._s[k + 1] - self._s[k])
+    def _interpolate(self, values: Array, s: float) -> float:
+        k = min(self.index_at(s), len(self.s) - 2)
+        t = (s - self.s[k]) / (self.s[k + 1] - self.s[k])
         t = min(max(t, 0.0), 1.0)
         return float(values[k] + t * (values[k + 1] - values[k]))
 

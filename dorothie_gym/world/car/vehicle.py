@@ -9,7 +9,7 @@ import numpy as np
 from highway_env.vehicle.kinematics import Vehicle
 
 from dorothie_gym.world.car.control import Control
-from dorothie_gym.world.kernel.records import plain
+from dorothie_gym.world.kernel.records import fields, plain
 from dorothie_gym.world.kernel.world_arrays import WorldArrays
 from dorothie_gym.world.network.road import TownRoad
 from dorothie_gym.world.town.model import Array
@@ -26,7 +26,7 @@ class Car(Vehicle):
     def __init__(self, road: TownRoad, holder: Any) -> None:
         """Shows the first vehicle of `holder.arrays`, which may be replaced by others with more room."""
         self._holder = holder
-        self._row_of: Any = None
+        self._state_of: Any = None
         self._heading: float
         self._speed: float
         self._height: float
@@ -35,16 +35,20 @@ class Car(Vehicle):
 
     def refresh(self) -> None:
         """Looks again where the car is."""
-        row = self._row
-        self._position = np.array((row["x"], row["y"]))
-        self._heading, self._speed, self._height = row["heading"].item(), row["speed"].item(), row["height"].item()
+        x, y, self._heading, self._speed, self._height = self._state.item()
+        self._position = np.array((x, y))
+
+    @property
+    def _state(self) -> Any:
+        """Place, heading, speed and height in the arrays, see `fields`."""
+        arrays: WorldArrays = self._holder.arrays
+        if arrays is not self._state_of:
+            self._state_of, self._own_state = arrays, fields(arrays.vehicles, "x", "y", "heading", "speed", "height")
+        return self._own_state
 
     @property
     def _row(self) -> Any:
-        arrays: WorldArrays = self._holder.arrays
-        if arrays is not self._row_of:
-            self._row_of, self._own_row = arrays, plain(arrays.vehicles)[0]
-        return self._own_row
+        return plain(self._holder.arrays.vehicles)[0]
 
     @property
     def position(self) -> Array:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dorothie_gym.world.compiling import WITHOUT_COUNTS, concurrent
 from dorothie_gym.world.kernel.stepping import step
 from dorothie_gym.world.kernel.town_arrays import TownArrays
+from dorothie_gym.world.kernel.turns import take
 from dorothie_gym.world.kernel.world_arrays import WorldArrays
 from dorothie_gym.world.town.model import Array
 
@@ -74,8 +75,7 @@ def _compiled_rows(arrays: Any, number: int) -> Any:
 
 @concurrent
 def step_share(
-    begin: int,
-    end: int,
+    turns: NDArray[Any],
     town: TownArrays,
     batch: WorldArrays,
     substeps: int,
@@ -83,11 +83,10 @@ def step_share(
     acceleration: Array,
     steering: Array,
 ) -> None:
-    """Lets some worlds of a batch go on, each as `step` does.
+    """Lets worlds of a batch go on, each as `step` does, as long as there are any whose turn has not come.
 
     Args:
-        begin: the first one.
-        end: the first one behind them.
+        turns: numbers of the worlds, see `turns.take`; shared by all threads that work on the batch.
         town: arrays of the town.
         batch: arrays of all worlds.
         substeps: how many.
@@ -95,5 +94,7 @@ def step_share(
         acceleration: (worlds,) of each world's vehicles of the kind `Kind.EGO` [m/s^2].
         steering: (worlds,) angle of their front wheels, positive to the right [rad].
     """
-    for number in range(begin, end):
+    number = take(turns)
+    while number < len(acceleration):
         step(town, world_of(batch, number), substeps, dt, acceleration[number], steering[number])
+        number = take(turns)

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.world.compiling import compiled, concurrent
+from dorothie_gym.world.compiling import compiled, concurrent, inlined
 from dorothie_gym.world.kernel.batch import world_of
 from dorothie_gym.world.kernel.kinematics import View, observe
 from dorothie_gym.world.kernel.meta import NOTHING, control, decide, move, speed_along, take_helm
 from dorothie_gym.world.kernel.records import Records
 from dorothie_gym.world.kernel.stepping import find, step_around
+from dorothie_gym.world.kernel.turns import take
 from dorothie_gym.world.town.model import Array
 
 if TYPE_CHECKING:
@@ -70,14 +71,13 @@ def begin_one(number: int, town: TownArrays, batch: WorldArrays, view: View, ego
 
 @concurrent
 def play_share(
-    begin: int, end: int, town: TownArrays, batch: WorldArrays, view: View, egos: Egos, actions: NDArray[np.int32],
+    turns: NDArray[np.int64], town: TownArrays, batch: WorldArrays, view: View, egos: Egos, actions: NDArray[np.int32],
     playing: NDArray[np.bool_], substeps: int, dt: float,
 ) -> None:  # fmt: skip
-    """Plays a decision in some worlds.
+    """Plays a decision in worlds, as long as there are any whose turn has not come.
 
     Args:
-        begin: the first world.
-        end: the first one behind them.
+        turns: numbers of the worlds, see `turns.take`; shared by all threads that work on them.
         town: arrays of the town.
         batch: arrays of all worlds.
         view: what is observed.
@@ -87,20 +87,29 @@ def play_share(
         substeps: how many.
         dt: time of each [s].
     """
-    for number in range(begin, end):
-        if not playing[number]:
-            continue
-        world, helm, poses = world_of(batch, number), egos.helms[number], egos.poses[number]
-        vehicle = world.vehicles[0]
-        meta = len(egos.speeds) > 0
-        if meta and actions[number] != NOTHING:
-            decide(town, egos.beside, vehicle, helm, egos.speeds, actions[number])
-        for _ in range(substeps):
-            if meta:
-                control(town, vehicle, helm)
-            move(vehicle, helm, poses[0], dt)
-            step_around(town, world, dt, egos.rows, poses)
-        _report(number, town, batch, view, egos)
+    number = take(turns)
+    while number < len(playing):
+        if playing[number]:
+            _play(number, town, batch, view, egos, actions[number], substeps, dt)
+        number = take(turns)
+
+
+@inlined
+def _play(
+    number: int, town: TownArrays, batch: WorldArrays, view: View, egos: Egos, action: int, substeps: int, dt: float
+) -> None:
+    """Plays a decision in one world."""
+    world, helm, poses = world_of(batch, number), egos.helms[number], egos.poses[number]
+    vehicle = world.vehicles[0]
+    meta = len(egos.speeds) > 0
+    if meta and action != NOTHING:
+        decide(town, egos.beside, vehicle, helm, egos.speeds, action)
+    for _ in range(substeps):
+        if meta:
+            control(town, vehicle, helm)
+        move(vehicle, helm, poses[0], dt)
+        step_around(town, world, dt, egos.rows, poses)
+    _report(number, town, batch, view, egos)
 
 
 @compiled

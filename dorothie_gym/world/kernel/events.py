@@ -13,15 +13,23 @@ if TYPE_CHECKING:
 
 @inlined
 def trace(world: WorldArrays) -> None:
-    """Takes down where the car is after a substep, see `records.TRACE`."""
+    """Takes down where the car is after a substep, see `records.TRACE` and `records.POSE`."""
     car, vehicle = world.car[0], world.vehicles[0]
     rows, k = world.trace, int(car.frames)
     car.frames += 1
     rows[k, 0], rows[k, 1], rows[k, 2] = world.clock[0].frame, vehicle.x, vehicle.y
     rows[k, 3], rows[k, 4] = vehicle.heading, vehicle.speed
     rows[k, 5], rows[k, 6], rows[k, 7], rows[k, 8] = car.throttle, car.steer, car.brake, car.run_lane[car.run]
-    rows[k, 9], rows[k, 11] = vehicle.height, car.offset
-    rows[k, 10] = 1.0 if car.action == U_TURN and world.path[car.at].manoeuvre else 0.0
+    rows[k, 9] = car.offset
+    note_pose(world, k + 1)
+
+
+@inlined
+def note_pose(world: WorldArrays, k: int) -> None:
+    """Takes down the pose of the car in a row of its poses."""
+    car, vehicle, rows = world.car[0], world.vehicles[0], world.poses
+    rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = vehicle.x, vehicle.y, vehicle.heading, vehicle.speed
+    rows[k, 4], rows[k, 5] = vehicle.height, 1.0 if car.action == U_TURN and world.path[car.at].manoeuvre else 0.0
 
 
 @compiled

@@ -6,9 +6,9 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.ontology import ObjectClass
-from dorothie_gym.world.car.hazards import HEIGHT_MARGIN
+from dorothie_gym.world.car.hazards import HEIGHT_MARGIN, ROADBLOCK_GAP, STANDSTILL_GAP
 from dorothie_gym.world.car.path import U_TURN_REACH
-from dorothie_gym.world.car.planner import BEGUN, BRAKING
+from dorothie_gym.world.car.planner import BEGUN, BRAKING, FROM_PROP
 from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.conduct import CRITICAL_GAP, HARDEST_BRAKING
 from dorothie_gym.world.kernel.course import point_at
@@ -16,7 +16,16 @@ from dorothie_gym.world.kernel.driving import STEP_AHEAD, STEP_PAST
 from dorothie_gym.world.kernel.junctions import announce, close, request
 from dorothie_gym.world.kernel.lanes import project, value_near
 from dorothie_gym.world.kernel.obstacles import bodies_ahead, offer
-from dorothie_gym.world.kernel.records import PEDESTRIAN_CLASS, U_TURN, VEHICLES, Control, Records, Wait, Walk
+from dorothie_gym.world.kernel.records import (
+    PEDESTRIAN_CLASS,
+    STATIC,
+    U_TURN,
+    VEHICLES,
+    Control,
+    Records,
+    Wait,
+    Walk,
+)
 
 if TYPE_CHECKING:
     from dorothie_gym.world.kernel.town_arrays import TownArrays
@@ -43,6 +52,9 @@ REACHED = 0.2
 BESIDE = 7.0
 """Who is no farther before or behind the car than this is beside it [m], and who comes from behind in a second."""
 
+BEFORE_IT = 0.5
+"""The car waits this far before the place where the manoeuvre begins [m]."""
+
 SLOWEST = 1.0
 """Speed at which a car comes to a place at least [m/s]."""
 
@@ -64,12 +76,13 @@ def look(town: TownArrays, world: WorldArrays, seen: int) -> None:
     car = world.car[0]
     car.kind = 0
     best = bodies_ahead(world, seen)
-    way, other = _gap_to_traffic(town, world, seen, best <= 0.0)
+    way, other, kind = _gap_to_others(town, world, seen, best <= 0.0)
     safe, best = best, _crosswalk(town, world, best)
     if best > 0.0 or safe <= 0.0:
         best = _junction(town, world, best)
     if way < math.inf:
-        offer(car, best, VEHICLES, way + 2.0, 0.0, other, False, False)
+        margin = ROADBLOCK_GAP if kind == STATIC else STANDSTILL_GAP
+        offer(car, best, kind, way + (margin - BEFORE_IT), 0.0, other, False, False)
 
 
 # --- crosswalks and junctions -----------------------------------------------------------------------------------------
@@ -160,8 +173,8 @@ def _holder(town: TownArrays, wait: int, lane: int) -> int:
 
 
 @compiled
-def _gap_to_traffic(town: TownArrays, world: WorldArrays, seen: int, blocked: bool) -> tuple[float, int]:
-    """Before a lane switch or U-turn: way to the place where it begins [m], while others are in its way.
+def _gap_to_others(town: TownArrays, world: WorldArrays, seen: int, blocked: bool) -> tuple[float, int, int]:
+    """Before a lane switch or U-turn: way to the place where it begins [m], while somebody or something is in its way.
 
     Args:
         town: arrays of the town.
@@ -170,28 +183,31 @@ def _gap_to_traffic(town: TownArrays, world: WorldArrays, seen: int, blocked: bo
         blocked: whether the car stands behind something: it may be waiting for the junction, which stays open then.
 
     Returns:
-        The way, infinite if it may begin, and the key of who is in the way.
+        The way, infinite if it may begin, the key of who is in the way, and of which class that is.
     """
     car, vehicle, path = world.car[0], world.vehicles[0], world.path
     turning = car.action == U_TURN
     start = int(car.at)
     if path[start].manoeuvre and (car.s > BEGUN or vehicle.speed > STANDING):
         if not turning:
-            return _gap_beside(town, world, seen, int(path[start].lane))
+            way, other = _gap_beside(town, world, seen, int(path[start].lane))
+            return way, other, VEHICLES
         if not blocked:
             _close_junctions(town, world, start)
-        return math.inf, 0
+        return math.inf, 0, VEHICLES
     reach = BEFORE_MANOEUVRE + vehicle.speed * vehicle.speed / (2.0 * BRAKING)
     while start < car.points and not path[start].manoeuvre and path[start].s - car.s <= reach:
         start += 1
     if start >= car.points or not path[start].manoeuvre or path[start].s - car.s > reach:
-        return math.inf, 0
+        return math.inf, 0, VEHICLES
     ahead = path[start].s - car.s
     target = int(path[start].lane)
     meeting, _, _ = project(town, target, path[start].x, path[start].y)
     lanes = _find_upstream(town, world, target)
     for n in range(seen):
         body = world.seen[n]
+        if body.kind == STATIC and not turning and _leads_to(town, world, start, meeting, body):
+            return max(ahead, 0.0), int(body.key), STATIC
         if body.kind != VEHICLES:
             continue
         station = _place_towards(town, world, lanes, body)
@@ -201,11 +217,34 @@ def _gap_to_traffic(town: TownArrays, world: WorldArrays, seen: int, blocked: bo
             behind = 8.0 + 3.0 * max(body.speed - vehicle.speed, 0.0)
             station += body.speed * ahead / max(vehicle.speed, SLOWEST)  # where it is when the car comes there
         if -behind < station - meeting < 9.0:
-            return max(ahead, 0.0), int(body.key)
+            return max(ahead, 0.0), int(body.key), VEHICLES
     # asked for last: those who wait before the junction have to go first
     if turning and not blocked and not _close_junctions(town, world, start):
-        return max(ahead, 0.0), -2
-    return math.inf, 0
+        return max(ahead, 0.0), -2, VEHICLES
+    return math.inf, 0, VEHICLES
+
+
+@compiled
+def _leads_to(town: TownArrays, world: WorldArrays, start: int, meeting: float, prop: Records) -> bool:
+    """Whether a lane switch would lead the car too close to a prop on the new lane to get away from it again.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world.
+        start: point of the path at which the switch begins.
+        meeting: where that is along the new lane [m].
+        prop: a `records.SEEN`.
+    """
+    car, vehicle, path = world.car[0], world.vehicles[0], world.path
+    target, end = int(path[start].lane), start
+    while end + 1 < car.points and path[end].manoeuvre:
+        end += 1
+    station, lateral, segment = project(town, target, prop.x, prop.y)
+    until = path[end].s - path[start].s + vehicle.speed * vehicle.speed / (2.0 * BRAKING) + FROM_PROP
+    if abs(lateral) > town.lanes[target].half_width or not -0.5 * vehicle.length < station - meeting < until:
+        return False
+    height = value_near(town.points, town.lanes[target], segment, 4, station)
+    return bool(abs(height - prop.height) <= HEIGHT_MARGIN)
 
 
 @compiled

@@ -74,7 +74,7 @@ CLOSED = 4
 POINTS = 208
 """Most points of the car's path that the loops look at: 1 m apart, half a metre in U-turns."""
 
-EVENTS = 64
+EVENTS = 32
 """Most things that happen to the car within a call."""
 
 FRAMES = 15

@@ -29,6 +29,15 @@ def plain(records: Records) -> Any:
     return records.view(np.dtype((np.void, records.dtype)), np.ndarray)
 
 
+def fields(records: Records, *names: str) -> Any:
+    """Some fields of the first record as an array without axes, to be read or written all at once in Python.
+
+    ``fields(...).item()`` is a tuple of plain numbers, and ``fields(...)[()] = numbers`` takes one, either in about the
+    time that a single field of `plain` takes.
+    """
+    return records.view(np.ndarray)[list(names)][:1].reshape(())
+
+
 NOBODY: Any = np.int64(-1)
 """No lane, node or body. For a plain number numba would compile its readers twice: for this value, and for others."""
 
@@ -320,8 +329,11 @@ EVENT = np.dtype(
 )  # fmt: skip
 """Something that happened to the car: an `EventCode`, with the class, key and number of the counterpart."""
 
-TRACE = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "brake", "lane", "height", "turning", "offset")
+TRACE = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "brake", "lane", "offset")
 """Columns of the way of the car."""
+
+POSE = ("x", "y", "heading", "speed", "height", "turning")
+"""Columns of its poses: place [m], heading [rad], speed [m/s], height of the road [m], 1 if it turns round."""
 
 CLOCK = np.dtype(
     [("time", "f8"), ("frame", "i8"), ("collisions", "i8"), ("run_over", "i8"), ("random", "i8"), ("towed", "i8"),

@@ -18,7 +18,7 @@ from dorothie_gym.world.config import FRAME_RATE
 from dorothie_gym.world.kernel.cells import CELL, REACH, SLACK
 from dorothie_gym.world.kernel.conduct import AT_LINE, STANDING
 from dorothie_gym.world.kernel.lanes import closest_segment, coordinates, value_near
-from dorothie_gym.world.kernel.records import NOBODY, Records
+from dorothie_gym.world.kernel.records import NOBODY, POSE, Records
 from dorothie_gym.world.town.model import Array
 
 OFF_ROAD = 0.5
@@ -42,8 +42,8 @@ FORGET = 12.0
 WIDE = 2.0 * (REACH - 2.0 * OFF_ROAD - SLACK)
 """Of lanes wider than this a cell may not list all that a place is within `OFF_ROAD` of [m]."""
 
-X, Y, HEADING, SPEED, HEIGHT, TURNING = range(6)
-"""Columns of poses: place [m], heading [rad], speed [m/s], height of the road under it [m], 1 if it turns round."""
+X, Y, HEADING, SPEED, HEIGHT, TURNING = range(len(POSE))
+"""Columns of poses."""
 
 
 class Found(enum.IntEnum):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.collisions import collide
 from dorothie_gym.world.kernel.driving import drive
-from dorothie_gym.world.kernel.events import trace
+from dorothie_gym.world.kernel.events import note_pose, trace
 from dorothie_gym.world.kernel.guiding import guide
 from dorothie_gym.world.kernel.lanes import closest_lane, value_near
 from dorothie_gym.world.kernel.motion import move, slip_of
@@ -46,6 +46,8 @@ def step(
     """
     vehicles, slip = world.vehicles, slip_of(steering)
     world.car[0].events = world.car[0].frames = 0
+    if len(vehicles) > 0 and vehicles[0].kind == Kind.DRIVEN:
+        note_pose(world, 0)
     for _ in range(substeps):
         for i in range(len(vehicles)):
             if vehicles[i].kind == Kind.EGO:

@@ -190,9 +190,8 @@ def _crossings(network: TownNetwork, walks: Records, pavements: Sequence[Array])
             found.append((ends, sides))
     crossings = np.zeros(max(len(found), 1), dtype=CROSSING).view(np.recarray)
     by_walk: defaultdict[int, list[tuple[float, int, int]]] = defaultdict(list)
-    for k, (_, sides) in enumerate(found):
-        # one walks from pavement to pavement, not from kerb to kerb
-        ends = np.array([_at(town.sidewalks[walk], s) for _, walk, s in sides])
+    for k, (kerbs, sides) in enumerate(found):
+        ends = _as_far_as(kerbs, np.array([_at(town.sidewalks[walk], s) for _, walk, s in sides]))
         across = ends[1, :2] - ends[0, :2]
         length = float(np.hypot(*across))
         crossings[k].x, crossings[k].y = ends[:, 0], ends[:, 1]
@@ -217,6 +216,16 @@ def _ends(network: TownNetwork, crosswalk: Crosswalk) -> Array:
     reach = (crosswalk.outline[:, :2] - middle) @ across
     ends: Array = middle + np.array([reach.min(), reach.max()])[:, None] * across
     return ends
+
+
+def _as_far_as(ends: Array, places: Array) -> Array:
+    """Where the middle line of a crosswalk (2, 2) comes beside places on the two pavements (2, 3) [m].
+
+    One walks from pavement to pavement, not from kerb to kerb, and on the paint also where the pavement ends before it.
+    """
+    middle, across = ends.mean(axis=0), ends[1] - ends[0]
+    reach = (places[:, :2] - middle) @ across / (across @ across)
+    return np.column_stack((middle + reach[:, None] * across, places[:, 2]))
 
 
 def _nearest_walk(rows: Array, owners: NDArray[np.int64], place: Array) -> tuple[float, int, float]:

@@ -20,6 +20,7 @@ from dorothie_gym.world.kernel.records import (
     NODE,
     PEDESTRIAN,
     POINT,
+    POSE,
     PROP,
     SEEN,
     TRACE,
@@ -59,7 +60,8 @@ class WorldArrays(NamedTuple):
         path: `records.POINT`: the way that it follows.
         eye: one `records.EYE`: how well it sees.
         seen: `records.SEEN`: what it sees, nearest first.
-        trace: (f, 12) its way in the last call of `step`, see `records.TRACE`.
+        trace: (f, 10) its way in the last call of `step`, see `records.TRACE`.
+        poses: (f + 1, 6) its poses before that call and after each of its substeps, see `records.POSE`.
         events: `records.EVENT`: what happened to it then.
     """
 
@@ -80,6 +82,7 @@ class WorldArrays(NamedTuple):
     eye: Records
     seen: Records
     trace: Array
+    poses: Array
     events: Records
 
     @property
@@ -133,7 +136,8 @@ def empty_world(
         np.zeros(STACK, dtype=np.int32), np.zeros(STACK), records(1, CLOCK),
         records(1, CAR), records(POINTS if driven else 1, POINT), records(1, EYE),
         records(vehicles + pedestrians + props if driven else 1, SEEN),
-        np.zeros((FRAMES if driven else 1, len(TRACE))), records(EVENTS if driven else 1, EVENT),
+        np.zeros((FRAMES if driven else 1, len(TRACE))), np.zeros((1 + FRAMES if driven else 1, len(POSE))),
+        records(EVENTS if driven else 1, EVENT),
     )  # fmt: skip
     world.car.closed = NOBODY
     world.car.closed_at = -math.inf

@@ -7,7 +7,14 @@ import math
 import numpy as np
 
 from dorothie_gym.world.compiling import allocating
-from dorothie_gym.world.network.polyline import IntArray, LaneTable, closest_on_segment, distance, value_at
+from dorothie_gym.world.network.polyline import (
+    IntArray,
+    LaneTable,
+    closest_on_segment,
+    distance,
+    local_coordinates,
+    value_at,
+)
 from dorothie_gym.world.town.model import Array
 
 CELL = 8.0
@@ -57,6 +64,42 @@ class GridIndex:
         if row < 0:  # nothing at this height in the whole town
             return self.closest(x, y, heading if weight else None)
         return int(row)
+
+    def closest_place(self, x: float, y: float, heading: float, height: float) -> tuple[int, float]:
+        """The same row for a body that has a heading and a height, and its station on that lane [m].
+
+        Raises:
+            ValueError: the place is not a number.
+        """
+        table = self._table
+        row, station = _closest_place(
+            table.points, table.offsets, table.ends, table.boxes, self._cells, self._entries, *self._origin,
+            x, y, heading, height,
+        )  # fmt: skip
+        if row < 0:
+            raise ValueError(f"no lane is closest to ({x}, {y}), heading {heading}: these must be finite numbers")
+        return int(row), float(station)
+
+
+@allocating
+def _closest_place(
+    points: Array,
+    offsets: IntArray,
+    ends: Array,
+    boxes: Array,
+    cells: IntArray,
+    entries: IntArray,
+    x0: float,
+    y0: float,
+    x: float,
+    y: float,
+    heading: float,
+    height: float,
+) -> tuple[int, float]:
+    row = _closest(points, offsets, ends, boxes, cells, entries, x0, y0, x, y, heading, 1.0, height)
+    if row < 0:  # nothing at this height in the whole town
+        row = _closest(points, offsets, ends, boxes, cells, entries, x0, y0, x, y, heading, 1.0, math.nan)
+    return row, local_coordinates(points, offsets, ends, max(row, 0), x, y)[0]
 
 
 @allocating

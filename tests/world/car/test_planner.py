@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dorothie_gym.ontology import PhysicalAction
+from dorothie_gym.ontology import ObjectClass, PhysicalAction, PropKind
 from dorothie_gym.world.town import LinkType, town_names
 from tests.world.driving import drive, long_lane, network, off_centre, on_lane
 
@@ -186,6 +186,30 @@ def test_turn_changes_lanes_before_the_junction_only_where_another_lane_fits_muc
             changed += 1
     if not changed:
         pytest.skip("no lane of this map has another one beside it that leads elsewhere")
+
+
+def test_no_lane_is_changed_for_a_turn_while_a_prop_stands_on_the_new_lane() -> None:
+    roads = network("northgate")
+    town = roads.town
+    lane, beside, angle = next(
+        (lane.id, beside, way.angle)
+        for lane in town.lanes
+        for beside in (town.neighbour(lane.id, side) for side in (LEFT, RIGHT))
+        if beside is not None and not lane.in_junction and lane.length > 60.0 and len(town.exits(lane.id)) > 1
+        for way in town.exits(beside)
+        if min(abs((way.angle - own.angle + 180) % 360 - 180) for own in town.exits(lane.id)) > 60
+    )
+    world = on_lane(roads, lane, 2.0)
+    assert world.planner.command(PhysicalAction.J_TURN, angle, 0.0) is None
+    path = world.planner.path
+    first, last = np.flatnonzero(path.manoeuvre)[[0, -1]]
+    assert path.lanes[first] == beside
+    prop = world.actors.add_prop(PropKind.STREET_BARRIER, beside, float(path.stations[last]) + 12.0)
+    drive(world, lambda: False, 15.0)
+    assert off_centre(town, lane, world.car) < 0.3 and world.car.speed == 0.0
+    assert world.hazard is not None and world.hazard.kind is ObjectClass.STATIC
+    world.actors.remove_prop(prop)
+    assert drive(world, lambda: off_centre(town, beside, world.car) < 0.3, 30.0).arrived
 
 
 @pytest.mark.parametrize("name", ["brookside", "midtown"])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.world.kernel import Footway, town_arrays
+from dorothie_gym.world.kernel.walkways import KERB_REACH
 from dorothie_gym.world.network.network import TownNetwork
 from tests.world.network.towns import find_town
 
@@ -18,8 +19,6 @@ def test_every_crosswalk_joins_two_pavements_where_they_have_a_mouth(name):
     for number, crossing in enumerate(arrays.crossings):
         ends = np.column_stack((crossing.x, crossing.y))
         assert np.hypot(*(ends[1] - ends[0])) == pytest.approx(crossing.length)
-        middle = np.mean(np.asarray(town.crosswalks[number].outline)[:, :2], axis=0)
-        assert np.hypot(*(ends.mean(axis=0) - middle)) < 3.0
         for end in (0, 1):
             walk = arrays.walks[crossing.walk[end]]
             assert walk.kind == Footway.PAVEMENT
@@ -29,7 +28,20 @@ def test_every_crosswalk_joins_two_pavements_where_they_have_a_mouth(name):
             points = arrays.walk_points[walk.first : walk.last + 1]
             x = np.interp(mouth.station, points[:, 2], points[:, 0])
             y = np.interp(mouth.station, points[:, 2], points[:, 1])
-            assert np.hypot(x - ends[end, 0], y - ends[end, 1]) < 0.1
+            dx, dy = x - ends[end, 0], y - ends[end, 1]
+            assert abs(dx * crossing.cos + dy * crossing.sin) < 0.1  # beside the mouth, the crosswalk leads past it
+            assert np.hypot(dx, dy) < KERB_REACH
+
+
+@pytest.mark.parametrize("name", TOWNS)
+def test_people_walk_over_the_middle_of_the_paint(name):
+    town = find_town(name)
+    crossings = town_arrays(TownNetwork(town)).crossings
+    for crosswalk, crossing in zip(town.crosswalks, crossings, strict=True):
+        dx, dy = (crosswalk.outline[:, axis] - (crossing.x[0], crossing.y[0])[axis] for axis in (0, 1))
+        along, aside = dx * crossing.cos + dy * crossing.sin, dy * crossing.cos - dx * crossing.sin
+        assert -2.0 < along.min() < along.max() < crossing.length + 2.0  # from one pavement to the other
+        assert aside.max() + aside.min() == pytest.approx(0.0, abs=0.3)
 
 
 @pytest.mark.parametrize("name", TOWNS)
