@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
     from dorothie_gym.envs.scenario import Scenario, draw_scenario
     from dorothie_gym.evaluation.teacher_forced import NfDEnv, RfNEnv, UfNEnv
+    from dorothie_gym.navigation import NavigationAction, NavigationEnv, NavigationWeights
     from dorothie_gym.ontology import Role
     from dorothie_gym.policies import Policy, make_policy
     from dorothie_gym.sessions import Session, load_sessions
@@ -36,6 +37,9 @@ _HOME = {
     "EnvConfig": "envs.config",
     "FlattenAction": "wrappers.flatten",
     "FlattenObservation": "wrappers.flatten",
+    "NavigationAction": "navigation",
+    "NavigationEnv": "navigation",
+    "NavigationWeights": "navigation",
     "NfDEnv": "evaluation.teacher_forced",
     "Policy": "policies",
     "RecordSession": "wrappers.record_session",
@@ -66,6 +70,9 @@ __all__ = [
     "EnvConfig",
     "FlattenAction",
     "FlattenObservation",
+    "NavigationAction",
+    "NavigationEnv",
+    "NavigationWeights",
     "NfDEnv",
     "Policy",
     "RecordSession",
@@ -115,6 +122,7 @@ def _register() -> None:
         )
     for task in ("UfN", "RfN", "NfD"):
         gymnasium.register(f"dorothie_gym/{task}-v0", f"dorothie_gym.evaluation.teacher_forced:{task}Env")
+    gymnasium.register("dorothie_gym/Navigation-v0", "dorothie_gym.navigation.navigation_v0:NavigationEnv")
     gymnasium.register(
         "dorothie_gym/Town-v0",
         "dorothie_gym.world.town_env:TownEnv",

@@ -21,14 +21,16 @@ class Options(NamedTuple):
         exits: ways on, from right to left.
         rows: the same as rows of `ExitColumn` (n, 6), the distance still to be filled in.
         distance: to the junction along the path [m].
+        lane: at whose end it is; -1 where there is none.
     """
 
     exits: tuple[Exit, ...]
     rows: Array
     distance: float
+    lane: int
 
 
-NO_OPTIONS = Options((), np.zeros((0, len(ExitColumn))), 0.0)
+NO_OPTIONS = Options((), np.zeros((0, len(ExitColumn))), 0.0, -1)
 
 
 class Prospect:
@@ -59,7 +61,7 @@ class Prospect:
             return NO_OPTIONS
         lane = int(path.lanes[point])
         left = self._town.lanes[lane].length - float(path.stations[point])
-        return Options(self._town.exits(lane), self._rows_of(lane), float(path.s[point]) + left - s)
+        return Options(self._town.exits(lane), self._rows_of(lane), float(path.s[point]) + left - s, lane)
 
     def _rows_of(self, lane: int) -> Array:
         rows = self._rows.get(lane)

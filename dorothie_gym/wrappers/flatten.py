@@ -62,14 +62,18 @@ class FlattenAction(gym.Wrapper[Any, Flat, Any, Any], RecordConstructorArgs):
     def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Any, Info]:
         """Resets the environment and notes the mask of the first action."""
         observation, info = self.env.reset(seed=seed, options=options)
-        self._mask = info.get("action_mask", {})
+        self._note_mask(info)
         return observation, info
 
     def step(self, action: Flat) -> tuple[Any, Any, bool, bool, Info]:
         """Takes a flat action, and notes the mask of the next."""
         observation, reward, terminated, truncated, info = self.env.step(self.unflatten(action))
-        self._mask = info.get("action_mask", {})
+        self._note_mask(info)
         return observation, reward, terminated, truncated, info
+
+    def _note_mask(self, info: Info) -> None:
+        mask = info.get("action_mask", {})
+        self._mask = mask if isinstance(mask, Mapping) else {_WHOLE: mask}
 
     def unflatten(self, action: Flat) -> Any:
         """The environment's action for a flat one."""

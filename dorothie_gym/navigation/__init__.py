@@ -1,0 +1,18 @@
+"""The Co-Wizard's driving alone, for reinforcement learning: a participant who tells the way, small spaces, rewards."""
+
+from dorothie_gym.navigation.actions import NavigationAction
+from dorothie_gym.navigation.config import REWARDS, TRAFFIC, Guidance, NavigationConfig, NavigationWeights
+from dorothie_gym.navigation.navigation_v0 import NavigationEnv
+from dorothie_gym.navigation.observations import FIELDS, layout
+
+__all__ = [
+    "FIELDS",
+    "REWARDS",
+    "TRAFFIC",
+    "Guidance",
+    "NavigationAction",
+    "NavigationConfig",
+    "NavigationEnv",
+    "NavigationWeights",
+    "layout",
+]

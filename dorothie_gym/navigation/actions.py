@@ -1,0 +1,122 @@
+"""What the driver can do: one number a decision, and which numbers would not be refused."""
+
+from __future__ import annotations
+
+import enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.envs.prospect import Prospect
+from dorothie_gym.navigation.ways import SECTORS, Ways
+from dorothie_gym.ontology import PhysicalAction
+from dorothie_gym.spaces import Physical
+from dorothie_gym.world.car.driver import MAX_CRUISE, MIN_CRUISE
+from dorothie_gym.world.town import LinkType
+from dorothie_gym.world.world import World
+
+LEFT, RIGHT = 90, -90
+"""Angles of a lane switch [degrees]."""
+
+
+class NavigationAction(enum.IntEnum):
+    """An action of `Navigation-v0`; the last eight take the way on at the next junction that lies in a sector."""
+
+    NOTHING = 0
+    LANE_FOLLOW = 1
+    SWITCH_LEFT = 2
+    SWITCH_RIGHT = 3
+    U_TURN = 4
+    STOP = 5
+    START = 6
+    FASTER = 7
+    SLOWER = 8
+    LIGHTS = 9
+    """Switches the head lights."""
+    TURN_BACK = 10
+    TURN_SHARP_RIGHT = 11
+    TURN_RIGHT = 12
+    TURN_HALF_RIGHT = 13
+    TURN_STRAIGHT = 14
+    TURN_HALF_LEFT = 15
+    TURN_LEFT = 16
+    TURN_SHARP_LEFT = 17
+
+    @property
+    def sector(self) -> int | None:
+        """The sector of a turn, see `ways.SECTORS`; None for other actions."""
+        return int(self) - FIRST_TURN if int(self) >= FIRST_TURN else None
+
+    @classmethod
+    def turn(cls, sector: int) -> NavigationAction:
+        """The action that turns into a sector."""
+        return cls(FIRST_TURN + sector)
+
+
+FIRST_TURN = 10
+ACTIONS = tuple(NavigationAction)
+assert len(ACTIONS) == FIRST_TURN + len(SECTORS)
+
+_PLAIN = {
+    NavigationAction.LANE_FOLLOW: Physical(action=PhysicalAction.LANE_FOLLOW),
+    NavigationAction.SWITCH_LEFT: Physical(action=PhysicalAction.LANE_SWITCH, angle=LEFT),
+    NavigationAction.SWITCH_RIGHT: Physical(action=PhysicalAction.LANE_SWITCH, angle=RIGHT),
+    NavigationAction.U_TURN: Physical(action=PhysicalAction.U_TURN),
+    NavigationAction.STOP: Physical(action=PhysicalAction.STOP),
+    NavigationAction.START: Physical(action=PhysicalAction.START),
+    NavigationAction.FASTER: Physical(action=PhysicalAction.SPEED_CHANGE, up=True),
+    NavigationAction.SLOWER: Physical(action=PhysicalAction.SPEED_CHANGE, up=False),
+}
+
+
+class Controls:
+    """Reads actions and tells which would be carried out, for the car of a session."""
+
+    def __init__(self, world: World, ways: Ways) -> None:
+        self._world, self._ways = world, ways
+        self._prospect = Prospect(world)
+
+    @property
+    def choice(self) -> tuple[int, float] | None:
+        """The lane at whose end the car has to choose a way, and how far it is [m]; None if the path comes to none."""
+        options = self._prospect.options()
+        return (options.lane, options.distance) if options.exits else None
+
+    def read(self, action: NavigationAction) -> Physical | None:
+        """What the Co-Wizard does; None for nothing.
+
+        A turn into a sector without a way on is a turn with the sector's angle: the car refuses it, or takes the way
+        that fits best.
+        """
+        if action is NavigationAction.NOTHING:
+            return None
+        if action is NavigationAction.LIGHTS:
+            return Physical(action=PhysicalAction.LIGHT_CHANGE, up=not self._world.lights)
+        sector = action.sector
+        if sector is None:
+            return _PLAIN[action]
+        choice = self.choice
+        way = self._ways.after(choice[0])[sector] if choice is not None else None
+        return Physical(action=PhysicalAction.J_TURN, angle=way.angle if way is not None else SECTORS[sector])
+
+    def mask(self) -> NDArray[np.int8]:
+        """Which actions make a difference now (18,): 1 for those that do."""
+        world, planner = self._world, self._world.planner
+        speed, cruise = float(world.car.speed), world.driver.cruise
+        mask = np.zeros(len(ACTIONS), dtype=np.int8)
+        mask[NavigationAction.NOTHING] = mask[NavigationAction.LIGHTS] = 1
+        mask[NavigationAction.STOP], mask[NavigationAction.START] = not planner.held, planner.held
+        mask[NavigationAction.FASTER], mask[NavigationAction.SLOWER] = cruise < MAX_CRUISE, cruise > MIN_CRUISE
+        committed = planner.is_committed(speed)
+        if not (planner.in_manoeuvre or world.town.lanes[planner.lane].in_junction):
+            mask[NavigationAction.SWITCH_LEFT] = planner.may_switch(LinkType.LANE_CHANGE_LEFT, speed)
+            mask[NavigationAction.SWITCH_RIGHT] = planner.may_switch(LinkType.LANE_CHANGE_RIGHT, speed)
+            mask[NavigationAction.U_TURN] = planner.may_turn_round(speed)
+            leaves = planner.held or planner.manoeuvre[0] is not None
+            mask[NavigationAction.LANE_FOLLOW] = leaves and not committed
+        choice = None if committed else self.choice
+        if choice is not None:
+            planned = None if planner.held else planner.turn_ahead
+            for sector, way in enumerate(self._ways.after(choice[0])):
+                mask[FIRST_TURN + sector] = way is not None and way.angle != planned
+        return mask

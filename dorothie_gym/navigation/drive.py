@@ -1,0 +1,234 @@
+"""A session in which only the driving is open: instructor and Ad-Wizard play their parts, rewards are told."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from dorothie_gym.envs.scenario import Scenario, draw_scenario
+from dorothie_gym.envs.stage import STANDING, Stage
+from dorothie_gym.navigation.config import NavigationConfig
+from dorothie_gym.navigation.instructor import Instructor
+from dorothie_gym.navigation.observations import Heard, Vector, Viewpoint
+from dorothie_gym.navigation.ways import Ways
+from dorothie_gym.ontology import LandmarkName, MentalAction, Role
+from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
+from dorothie_gym.policies.scenery import read_landmarks
+from dorothie_gym.policies.seeds import policy_seed
+from dorothie_gym.spaces import (
+    ActionDecoder,
+    AdWizardAction,
+    CoWizardAction,
+    Mental,
+    Observation,
+    ParticipantAction,
+    RoleAction,
+    SpaceLimits,
+)
+from dorothie_gym.spaces import Place as Mark
+from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.world.config import FRAME_COLUMNS, FRAME_RATE
+from dorothie_gym.world.network.network import TownNetwork
+from dorothie_gym.world.reports import INFRACTION_KINDS, WorldEventKind
+from dorothie_gym.world.town import Town
+from dorothie_gym.world.town.routing import Place
+
+NEARER = 1.0
+"""Only a way left that is shorter by this counts as having come nearer [m]."""
+
+_SPEED = FRAME_COLUMNS.index("speed")
+_RULES = tuple(kind.value for kind in INFRACTION_KINDS if kind is not WorldEventKind.COLLISION)
+_SILENCE, _INTACT = ParticipantAction(), AdWizardAction()
+
+
+class Drive:
+    """A session in progress.
+
+    Attributes:
+        stage: the session.
+        ways: ways on at the town's junctions.
+        instructor: who tells the way.
+        reward: of the last decision.
+        terms: the same by terms.
+        terminated: whether the destination was reached, or the participant gave up.
+        truncated: whether time is up.
+    """
+
+    def __init__(self, stage: Stage, config: NavigationConfig, ways: Ways) -> None:
+        self.stage, self.ways, self._config = stage, ways, config
+        town = stage.world.town
+        self.instructor = Instructor(town, ways, config.guidance)  # type: ignore[arg-type]
+        self._viewpoint = Viewpoint(town, ways, config.max_seconds)
+        self._decoder = ActionDecoder(Role.AD_WIZARD, stage.limits)
+        self._adversary = ScriptedAdWizard(stage.limits, rate=config.exceptions) if config.exceptions > 0.0 else None
+        seed = policy_seed(stage.scenario.seed, Role.AD_WIZARD)
+        self._plans = self._adversary.initial_state(seed, town) if self._adversary is not None else None
+        self._heard, self._notes = Heard(), list[Mental]()
+        self._aim: tuple[Place | None, tuple[Place, ...]] = (None, ())  # what `_nearest` is measured to
+        self._seen: Mapping[str, Observation] = stage.observations()
+        marks = read_landmarks(self._seen[Role.CO_WIZARD], town)  # those on its map, for the whole session
+        self._known = frozenset(mark.place for mark in marks)
+        self._rules_broken, self._collisions = self._count_infractions(), 0
+        self._nearest, self._nearest_at = math.inf, 0.0
+        self.reward, self.terms = 0.0, dict.fromkeys(vars(config.weights), 0.0)
+        self.terminated = self.truncated = False
+        self.reason: str | None = None
+        self._listen()
+        self._left = self._way_left()
+
+    @classmethod
+    def begin(
+        cls, town: Town, network: TownNetwork, template: StoryboardTemplate | None, config: NavigationConfig,
+        seed: int, scenario: Scenario | None = None,
+    ) -> Drive:  # fmt: skip
+        """A new session.
+
+        Args:
+            town: the map.
+            network: its lanes.
+            template: of the storyboard; None draws one.
+            config: settings.
+            seed: of the scenario.
+            scenario: played in lieu of one that is drawn.
+
+        Raises:
+            ValueError: `scenario` is none.
+        """
+        if scenario is None:
+            scenario = draw_scenario(town, template, seed)
+        elif not isinstance(scenario, Scenario):
+            raise ValueError(f"option 'scenario' is a {type(scenario).__name__}; it must be a Scenario")
+        limits = SpaceLimits().grown_for(
+            lanes=len(town.lanes), junctions=len(town.junctions), streets=len(town.streets)
+        )
+        return cls(Stage(town, network, scenario, config.session, limits), config, Ways(town))
+
+    # --- a decision -------------------------------------------------------------------------------------------------
+
+    def play(self, action: CoWizardAction) -> None:
+        """Plays one decision; the Co-Wizard's next note goes with its action."""
+        if self.terminated or self.truncated:
+            from gymnasium.error import ResetNeeded
+
+            raise ResetNeeded("the session is over: call reset() first")
+        if self._notes:
+            action = replace(action, mental=self._notes.pop(0))
+        reached = self._count_reached()
+        self.stage.play({Role.PARTICIPANT: _SILENCE, Role.CO_WIZARD: action, Role.AD_WIZARD: self._interfere()})
+        self._seen = self.stage.observations()
+        driven = float(self.stage.world.frames[:, _SPEED].sum()) / FRAME_RATE
+        self._heard = replace(self._heard, driven=self._heard.driven + driven)
+        progress = self._progress()
+        self._listen()
+        self._left = self._way_left()
+        self._note_patience()
+        self._end()
+        self._reward(progress, self._count_reached() - reached)
+
+    def observe(self, choice: int | None) -> Vector:
+        """What the driver observes; `choice` is the lane at whose end it has to choose a way."""
+        return self._viewpoint.observe(self._seen[Role.CO_WIZARD], self._heard, choice, self.instructor.blocked)
+
+    def info(self) -> dict[str, Any]:
+        """What else the driver is told; everything in it is the taker's own."""
+        info: dict[str, Any] = {
+            "reward_terms": dict(self.terms),
+            "refused": list(self.stage.refused[Role.CO_WIZARD]),
+            "infractions": dict(self.stage.infractions),
+        }
+        if self.terminated or self.truncated:
+            info["is_success"], info["reason"] = self.stage.success, self.reason
+            info["subgoals"] = {"live": len(self.stage.task.live), "reached": self._count_reached()}
+        return info
+
+    # --- the others -------------------------------------------------------------------------------------------------
+
+    def _interfere(self) -> RoleAction:
+        if self._adversary is None or self._plans is None:
+            return _INTACT
+        action, self._plans = self._adversary.step(self._seen[Role.AD_WIZARD], self._plans)
+        return self._decoder(action)
+
+    def _listen(self) -> None:
+        """Lets the instructor speak, and notes what that says about the goal."""
+        planner = self.stage.world.planner
+        waits = planner.held and float(self.stage.world.car.speed) <= STANDING
+        goal = self.instructor.goal
+        said = self.instructor.instruct(
+            self._seen[Role.PARTICIPANT], self._known, waits=waits, turning=planner.in_manoeuvre
+        )
+        if self.instructor.goal is not goal:
+            self._heard = replace(self._heard, goal=None)
+            self._notes = [Mental(action=MentalAction.GOAL_UPDATE)]
+        if said is None:
+            return
+        self._heard = replace(self._heard, told=said, driven=0.0)
+        name = said.landmark
+        if name is not None:
+            self._note_goal(name, said.distance, by_name=said.action is None)
+
+    def _note_goal(self, name: LandmarkName, distance: float, *, by_name: bool) -> None:
+        """The Co-Wizard heads for a place: one that is on its map, or one so far ahead as was said."""
+        goal = self.instructor.goal
+        assert goal is not None
+        self._notes = [Mental(action=MentalAction.GOAL_UPDATE, goals=(name,))]
+        if by_name:
+            self._heard = replace(self._heard, goal=goal.place)
+        elif goal.place not in self._known:
+            path, s = self.stage.world.planner.path, self.stage.world.planner.s
+            k = path.index_at(min(s + distance, path.length))
+            lane, station = int(path.lanes[k]), float(path.stations[k])
+            mark = Mark(lane=lane, metres=int(station))
+            self._notes.append(Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=name, place=mark))
+
+    # --- what comes of it -------------------------------------------------------------------------------------------
+
+    def _way_left(self) -> float:
+        planner = self.stage.world.planner
+        return self.instructor.way_left.from_place(planner.lane, planner.station)
+
+    def _progress(self) -> float:
+        """By how much the way to the goal has got shorter [m]; to be asked before there is another goal."""
+        left = self._way_left()
+        return self._left - left if math.isfinite(left) and math.isfinite(self._left) else 0.0
+
+    def _note_patience(self) -> None:
+        now = self.stage.world.time
+        way = self.instructor.way_left
+        aim = way.goal, way.blocked
+        if aim != self._aim or self._left < self._nearest - NEARER:
+            self._aim, self._nearest, self._nearest_at = aim, self._left, now
+
+    def _end(self) -> None:
+        stage, now = self.stage, self.stage.world.time
+        arrived = stage.task.done
+        gave_up = not arrived and now - self._nearest_at >= self._config.patience - 1e-9
+        self.terminated = arrived or gave_up
+        self.truncated = not self.terminated and now >= self._config.max_seconds - 1e-9
+        if self.terminated or self.truncated:
+            self.reason = "arrived" if arrived else "gave up" if gave_up else "out of time"
+            stage.end(self.reason)
+
+    def _reward(self, progress: float, reached: int) -> None:
+        weights, stage = self._config.weights, self.stage
+        rules, collisions = self._count_infractions(), stage.world.collisions
+        self.terms = {
+            "progress": weights.progress * progress,
+            "subgoal": weights.subgoal * reached,
+            "success": weights.success * stage.success,
+            "collision": weights.collision * (collisions - self._collisions),
+            "infraction": weights.infraction * (rules - self._rules_broken),
+            "time": weights.time / self._config.decision_frequency,
+            "refusal": weights.refusal * len(stage.refused[Role.CO_WIZARD]),
+        }
+        self._rules_broken, self._collisions = rules, collisions
+        self.reward = float(sum(self.terms.values()))
+
+    def _count_reached(self) -> int:
+        return sum(self.stage.task.reached(i) for i in self.stage.task.live)
+
+    def _count_infractions(self) -> int:
+        infractions = self.stage.infractions
+        return sum(infractions[name] for name in _RULES)

@@ -1,0 +1,181 @@
+"""`Navigation-v0`: the Co-Wizard's driving alone, for reinforcement learning."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from dorothie_gym.navigation.actions import ACTIONS, Controls, NavigationAction
+from dorothie_gym.navigation.config import Guidance, NavigationConfig, NavigationWeights, weights_of
+from dorothie_gym.navigation.drive import Drive
+from dorothie_gym.navigation.observations import Vector, navigation_space
+from dorothie_gym.spaces import CoWizardAction
+from dorothie_gym.tasks import StoryboardTemplate, load_template
+from dorothie_gym.world.network.network import TownNetwork
+from dorothie_gym.world.town import Town, load_town
+
+Info = dict[str, Any]
+
+
+class NavigationEnv(gym.Env[Vector, np.int64]):
+    """The Co-Wizard drives; a participant tells the way, and the Ad-Wizard may interfere.
+
+    ## Description
+    A session of `DuoWizardEnv` with its town, storyboard, traffic and weather, in which nothing is left to the agent
+    but the Co-Wizard's physical actions. The participant is a built-in instructor who says, as a dialogue act with its
+    slots, where to go; the scripted Ad-Wizard plays the exceptions. The Co-Wizard's notes (mental actions) are kept
+    for it: it heads for the goal that was named, so that the car slows down near it.
+
+    ## Observation Space
+    `Box(-1, 1, (n,), float32)`: see `dorothie_gym.navigation.FIELDS`, and `layout()` for where each field is.
+    Everything follows from the Co-Wizard's observation, the map, and what was said.
+
+    ## Action Space
+    `Discrete(18)`: see `NavigationAction`. `info["action_mask"]` tells which would be carried out (int8, for
+    `action_space.sample(mask)`), and so does `action_masks()`, which sb3-contrib asks for. An action that cannot be
+    carried out is refused and told in `info["refused"]`.
+
+    ## Rewards
+    The sum of the terms in `info["reward_terms"]`, see `NavigationWeights`: progress, subgoals, success, collisions,
+    infractions, time, refusals.
+
+    ## Episode End
+    Terminates when the destination, the last subgoal, is reached (the car stands within 2 m of its waypoint), or when
+    the participant gives up: the car has come no nearer to its goal for `patience` seconds. Truncates after
+    `max_seconds`. Then `info["is_success"]` tells whether every subgoal was reached and nothing was hit, and
+    `info["reason"]` is "arrived", "gave up" or "out of time".
+
+    ## Arguments
+    - `town`: name of a town, path of an `.xodr` or `.yaml` file, or a `Town`.
+    - `storyboard`: name of a template, path of a `.json` file, or a `StoryboardTemplate`; None draws one each reset.
+    - `guidance`: "turns" (before each junction) or "goals" (by name, where the place is on the Co-Wizard's map).
+    - `traffic`: "none", "light", "medium" or "heavy".
+    - `exceptions`: of a session on average, 0 to 4.
+    - `reward`: "dense", "sparse" or `NavigationWeights`.
+    - `max_seconds`, `patience`: see above [s].
+    - `render_mode`: None, `"rgb_array"` or `"human"`.
+
+    `reset(seed=...)` has the scenario that `DuoWizardEnv` has for this seed; `reset(options={"scenario": Scenario})`
+    plays a given one.
+
+    ## Version History
+    - v0: first version.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 2,
+    }
+
+    def __init__(
+        self,
+        town: str | Path | Town = "brookside",
+        storyboard: str | Path | StoryboardTemplate | None = None,
+        *,
+        guidance: Guidance | str = Guidance.TURNS,
+        traffic: str = "light",
+        exceptions: float = 0.0,
+        reward: str | NavigationWeights = "dense",
+        max_seconds: float = 600.0,
+        patience: float = 120.0,
+        render_mode: str | None = None,
+    ) -> None:
+        config = NavigationConfig(
+            guidance=guidance, traffic=traffic, exceptions=exceptions, weights=weights_of(reward),
+            max_seconds=max_seconds, patience=patience,
+        )  # fmt: skip
+        self._begin(town, storyboard, config, render_mode)
+        self.action_space = spaces.Discrete(len(ACTIONS))
+        self.observation_space = navigation_space()
+        self._controls: Controls | None = None
+        self._mask = np.zeros(len(ACTIONS), dtype=np.int8)
+
+    def _begin(
+        self, town: str | Path | Town, storyboard: str | Path | StoryboardTemplate | None, config: NavigationConfig,
+        render_mode: str | None,
+    ) -> None:  # fmt: skip
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(
+                f"render_mode is {render_mode!r}; it must be None or one of {self.metadata['render_modes']}"
+            )
+        self.config, self.render_mode = config, render_mode
+        self.town = town if isinstance(town, Town) else load_town(town)
+        self.template = load_template(storyboard) if isinstance(storyboard, str | Path) else storyboard
+        self._network = TownNetwork(self.town)
+        self._drive: Drive | None = None
+        self._painter: Any = None
+
+    @property
+    def drive(self) -> Drive:
+        """The session being played; raises `gymnasium.error.ResetNeeded` before the first reset."""
+        if self._drive is None:
+            raise gym.error.ResetNeeded("no session is being played: call reset() first")
+        return self._drive
+
+    def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[Vector, Info]:
+        """Begins a session.
+
+        Args:
+            seed: of the session; without one it is drawn.
+            options: `scenario` plays a given `Scenario`; other options are ignored.
+        """
+        super().reset(seed=seed)
+        session = seed if seed is not None else int(self.np_random.integers(2**31))
+        scenario = (options or {}).get("scenario")
+        self._drive = Drive.begin(self.town, self._network, self.template, self.config, session, scenario)
+        self._controls = Controls(self._drive.stage.world, self._drive.ways)
+        if self.render_mode == "human":
+            self.render()
+        return self._observe(), self._info()
+
+    def step(self, action: np.int64 | int) -> tuple[Vector, float, bool, bool, Info]:
+        """Plays one decision.
+
+        Raises:
+            ValueError: the action is none of `NavigationAction`.
+            gymnasium.error.ResetNeeded: no session is being played, or it is over.
+        """
+        drive, controls = self.drive, self._controls
+        assert controls is not None
+        if not 0 <= int(action) < len(ACTIONS):
+            raise ValueError(f"action is {action}; it must be in 0..{len(ACTIONS) - 1}, see NavigationAction")
+        drive.play(CoWizardAction(physical=controls.read(NavigationAction(int(action)))))
+        if self.render_mode == "human":
+            self.render()
+        return self._observe(), drive.reward, drive.terminated, drive.truncated, self._info()
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Which actions would be carried out now (18,); sb3-contrib's algorithms ask for it."""
+        return self._mask.astype(np.bool_)
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Draws the aerial view: an array (800, 1280, 3), or in a window in human mode (then returns None)."""
+        if self.render_mode is None:
+            raise RuntimeError("render() needs render_mode='rgb_array' or 'human' when the environment is made")
+        from dorothie_gym.envs.painter import Painter
+
+        if self._painter is None:
+            self._painter = Painter(human=self.render_mode == "human")
+        frame: NDArray[np.uint8] | None = self._painter.paint(self.drive.stage)
+        return frame
+
+    def close(self) -> None:
+        """Closes the window, if there is one."""
+        if self._painter is not None:
+            self._painter.close()
+            self._painter = None
+
+    def _observe(self) -> Vector:
+        assert self._controls is not None
+        choice = self._controls.choice
+        self._mask = self._controls.mask()
+        return self.drive.observe(None if choice is None else choice[0])
+
+    def _info(self) -> Info:
+        return {"action_mask": self._mask.copy(), **self.drive.info()}
