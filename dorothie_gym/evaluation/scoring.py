@@ -67,12 +67,15 @@ def score_runs(labels: CorpusLabels, predictions: Iterable[TaskPredictions]) -> 
     """Scores predictions, each model and seed apart.
 
     Raises:
-        PredictionError: a session is unknown, an event is no point of the task, or a point of the split has no row;
-            the message names it and says what to do.
+        PredictionError: a session is unknown, an event is no point of the task, a point of the split has no row or
+            two, or a model, seed and task is given twice; the message names it and says what to do.
     """
     runs: dict[tuple[str, int], list[_Aligned]] = {}
     for given in predictions:
-        runs.setdefault((given.model, given.seed), []).append(_align(labels, given))
+        pieces = runs.setdefault((given.model, given.seed), [])
+        if any(piece.task is given.task for piece in pieces):
+            raise PredictionError(f"{_where(given)}: is given twice; leave one out, or give them other seeds")
+        pieces.append(_align(labels, given))
     return tuple(_score_run(labels, model, seed, pieces) for (model, seed), pieces in runs.items())
 
 

@@ -33,7 +33,7 @@ class ResultsTable:
         labels: what they were scored against.
         runs: the scores of each model and seed.
         missing: why a model could not be run ("no audio"), by its name; it keeps its row.
-        about: how the predictions were made, by model (encoders, configuration, hashes), JSON types.
+        about: how the predictions were made (encoders, configuration, hashes), by model or file, JSON types.
     """
 
     labels: CorpusLabels
@@ -105,7 +105,12 @@ class ResultsTable:
 
     def findings(self) -> tuple[Finding, ...]:
         """Returns how the paper's findings come out here."""
-        return tuple(finding for part in self.parts for finding in findings(self.estimate, part))
+        names = {paper_name(model): model for model in self.models}
+
+        def estimate(model: str, part: str, key: str) -> Estimate:
+            return self.estimate(names.get(model, model), part, key)
+
+        return tuple(finding for part in self.parts for finding in findings(estimate, part))
 
     def to_json(self) -> dict[str, Any]:
         """Returns everything as JSON types; None where a figure is undefined.
@@ -204,7 +209,7 @@ def evaluate_predictions(
         corpus: the labels (`labels_of`), or the corpus whose split is taken.
         split: see `labels_of`.
         missing: why models could not be run, by name.
-        about: how the predictions were made, by model.
+        about: how the predictions were made, by model or file.
 
     Raises:
         SessionError: the corpus cannot be read.

@@ -4,12 +4,15 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.evaluation import labels_of
+from dorothie_gym.evaluation import labels_of, score_task
 from dorothie_gym.ontology import PhysicalAction, Role
-from dorothie_gym.sessions import Event, EventType, SessionError, Task
+from dorothie_gym.sessions import Event, EventType, SessionError, Task, read_session
+from dorothie_gym.sessions.sdn import write_sdn
 from tests.evaluation.corpora import FOLDS, corpus
 from tests.sessions.builders import physical, write
 from tests.sessions.dialogues import talk
+
+JTURN = PhysicalAction.J_TURN
 
 
 def test_the_split_test_is_what_lies_in_its_folders_seen_and_unseen_apart(tmp_path: Path) -> None:
@@ -43,9 +46,6 @@ def test_flagged_events_that_are_no_points_are_named_with_the_reason(tmp_path: P
     assert reasons[1] == (None, "done by agent, not by the Co-Wizard")
     assert reasons[2] == (None, "SpeedChange is no navigation action")
     assert reasons[3][0] is Task.NFD and "does not know its angle" in reasons[3][1]
-
-
-JTURN = PhysicalAction.J_TURN
 
 
 def test_sessions_without_folds_are_divided_by_name(tmp_path: Path) -> None:
@@ -83,3 +83,17 @@ def test_two_sessions_of_one_name_are_refused(tmp_path: Path) -> None:
         write(tmp_path / fold / "same", talk())
     with pytest.raises(SessionError, match="same name.*rename one"):
         labels_of(tmp_path)
+
+
+def test_labels_of_a_corpus_in_sdns_layout_are_the_same(tmp_path: Path) -> None:
+    native = corpus(tmp_path / "native", ("test/seen",))
+    (tmp_path / "sdn/test/seen").mkdir(parents=True)
+    session = read_session(native / "test/seen/of-test-seen")
+    write_sdn(session, tmp_path / "sdn/test/seen/log_1")
+    ours, theirs = labels_of(native), labels_of(tmp_path / "sdn")
+    assert theirs.part_of == {"log_1": "seen"}
+    for task, labels in ours.tasks.items():
+        other = theirs.tasks[task]
+        assert other.events.tolist() == labels.events.tolist() and other.handled.tolist() == labels.handled.tolist()
+        scores = score_task(task, other.labels, labels.labels)
+        assert set(scores.values()) == {1.0}

@@ -116,3 +116,9 @@ def test_a_task_without_anything_to_learn_from_is_left_out_with_the_reason(tmp_p
     assert {skipped.reason for skipped in table.runs[0].left_out} == {
         "the sessions to learn from have no point of the task"
     }
+
+
+def test_findings_know_models_in_any_case(labels: CorpusLabels) -> None:
+    runs = [wrong_moves(labels, name, seed, 0.5) for seed in (0, 1) for name in ("toto", "toto (- current speech)")]
+    speech = evaluate_predictions(runs, labels).findings()[1]
+    assert speech.claims[0].difference.values == {0: 0.0, 1: 0.0}
