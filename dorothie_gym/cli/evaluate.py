@@ -38,6 +38,7 @@ def evaluate(
         str | None, typer.Option(help="majority or random: a floor; without predictions, majority.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="What the floor draws from.")] = 0,
+    seeds: Annotated[int, typer.Option(min=1, help="So many seeds of the floor, from --seed on.")] = 1,
     save: Annotated[
         Path | None, typer.Option(metavar="FILE.parquet", help="Write the floor's predictions into a file.")
     ] = None,
@@ -68,7 +69,7 @@ def evaluate(
             where = Corpus.load(_default_sessions() if corpus is None else corpus, maps=maps)
             labels = labels_of(where, part)
             if floor is not None:
-                read += _floor(floor, where, labels, seed, chosen, save)
+                read += _floor(floor, where, labels, range(seed, seed + seeds), chosen, save)
             about = {str(path): told for path in files if (told := read_about(path))}
             table = evaluate_predictions(read, labels, about=about)
             if out is not None:
@@ -94,11 +95,12 @@ def _read(files: Sequence[Path], tasks: Sequence[Task]) -> list[TaskPredictions]
 
 
 def _floor(
-    name: str, corpus: Corpus, labels: CorpusLabels, seed: int, tasks: Sequence[Task], save: Path | None
+    name: str, corpus: Corpus, labels: CorpusLabels, seeds: range, tasks: Sequence[Task], save: Path | None
 ) -> list[TaskPredictions]:
     from dorothie_gym.evaluation import labels_of, predict_floor, write_predictions
 
-    drawn = predict_floor(name, labels_of(corpus, "train"), labels, seed)
+    train = labels_of(corpus, "train")
+    drawn = [given for seed in seeds for given in predict_floor(name, train, labels, seed)]
     wanted = [given for given in drawn if given.task in tasks]
     if save is not None:
         write_predictions(save, wanted, about={"model": name, "corpus": str(corpus.root), "split": labels.split})

@@ -109,7 +109,12 @@ def markdown(table: ResultsTable) -> str:
         lines += ["", f"## {part_title(part)}", "", *_markdown_table(heads, rows)]
     tested = [finding for finding in table.findings() if any(claim.difference.seeds for claim in finding.claims)]
     if tested:
-        lines += ["", "## The paper's findings", "", "Differences are paired over seeds, with 95 % intervals."]
+        lines += [
+            "",
+            "## Findings",
+            "",
+            "The paper's, and what is above what. Differences are paired over seeds, with 95 % intervals.",
+        ]
         for finding in tested:
             lines += ["", *finding_lines(finding)]
     lines += ["", "## Points", "", *_markdown_table(*points_rows(table)), ""]
