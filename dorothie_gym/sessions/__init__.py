@@ -10,12 +10,14 @@ from dorothie_gym.sessions.header import LandmarkRow, SessionHeader, SubgoalRow
 from dorothie_gym.sessions.layout import SessionState, safe_name
 from dorothie_gym.sessions.manifest import manifest_row, write_manifest
 from dorothie_gym.sessions.points import (
+    ANGLE_TOLERANCE,
     CarState,
     DecisionPoint,
     InferencePoint,
     Point,
     Task,
     View,
+    angle_error,
     final_view,
     history_angle,
     label_angle,
@@ -52,6 +54,7 @@ from dorothie_gym.world.config import FRAME_RATE
 
 __all__ = [
     "ACTOR_DTYPE",
+    "ANGLE_TOLERANCE",
     "ActionRecord",
     "ActorKind",
     "CarState",
@@ -91,6 +94,7 @@ __all__ = [
     "UtteranceRecord",
     "View",
     "WEATHER_DTYPE",
+    "angle_error",
     "final_view",
     "first_difference",
     "history_angle",
