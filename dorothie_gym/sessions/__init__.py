@@ -10,14 +10,17 @@ from dorothie_gym.sessions.header import LandmarkRow, SessionHeader, SubgoalRow
 from dorothie_gym.sessions.layout import SessionState, safe_name
 from dorothie_gym.sessions.manifest import manifest_row, write_manifest
 from dorothie_gym.sessions.points import (
+    ANGLE_TOLERANCE,
     CarState,
     DecisionPoint,
     InferencePoint,
     Point,
     Task,
     View,
+    angle_error,
     final_view,
     history_angle,
+    label_angle,
     nfd_points,
     rfn_points,
     task_points,
@@ -51,6 +54,7 @@ from dorothie_gym.world.config import FRAME_RATE
 
 __all__ = [
     "ACTOR_DTYPE",
+    "ANGLE_TOLERANCE",
     "ActionRecord",
     "ActorKind",
     "CarState",
@@ -90,9 +94,11 @@ __all__ = [
     "UtteranceRecord",
     "View",
     "WEATHER_DTYPE",
+    "angle_error",
     "final_view",
     "first_difference",
     "history_angle",
+    "label_angle",
     "load_readable",
     "load_sessions",
     "manifest_row",

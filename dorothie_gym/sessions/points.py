@@ -12,7 +12,7 @@ import enum
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from dorothie_gym.sessions.header import LandmarkRow
 from dorothie_gym.sessions.records import ActionRecord, MoveRecord
 from dorothie_gym.sessions.session import Session
 from dorothie_gym.world.config import FRAME_RATE
+
+ANGLE_TOLERANCE: Final = 15.0
+"""The angle of a navigation action is right below this error [degrees] (paper, section 5, Evaluation)."""
 
 
 class Task(enum.StrEnum):
@@ -104,38 +107,40 @@ class DecisionPoint:
 Point: TypeAlias = InferencePoint | DecisionPoint
 
 
-def ufn_points(session: Session) -> Iterator[InferencePoint]:
-    """Yields a point for each flagged dialogue move of the participant."""
-    yield from _inference_points(session, Task.UFN, Role.PARTICIPANT)
+def ufn_points(session: Session, *, since: int = 0) -> Iterator[InferencePoint]:
+    """Yields a point for each flagged dialogue move of the participant; of events from number `since` on."""
+    yield from _inference_points(session, Task.UFN, Role.PARTICIPANT, since)
 
 
-def rfn_points(session: Session) -> Iterator[InferencePoint]:
-    """Yields a point for each flagged dialogue move of the Co-Wizard."""
-    yield from _inference_points(session, Task.RFN, Role.CO_WIZARD)
+def rfn_points(session: Session, *, since: int = 0) -> Iterator[InferencePoint]:
+    """Yields a point for each flagged dialogue move of the Co-Wizard; of events from number `since` on."""
+    yield from _inference_points(session, Task.RFN, Role.CO_WIZARD, since)
 
 
-def nfd_points(session: Session) -> Iterator[DecisionPoint]:
-    """Yields a point for each flagged navigation action of the Co-Wizard."""
+def nfd_points(session: Session, *, since: int = 0) -> Iterator[DecisionPoint]:
+    """Yields a point for each flagged navigation action of the Co-Wizard; of events from number `since` on."""
     history = _History(session, Task.NFD)
     for record in session.physical_actions:
+        if record.index < since:
+            continue
         if record.flagged and record.source is Role.CO_WIZARD and record.action in NAVIGATION_ACTIONS:
             yield DecisionPoint(
                 index=record.index,
                 view=history.view(record.frame),
                 action=record.action,
-                angle=_label_angle(record),
+                angle=label_angle(record),
             )
 
 
-def task_points(session: Session, task: Task) -> tuple[Point, ...]:
-    """Returns the points of a task in a session."""
+def task_points(session: Session, task: Task, *, since: int = 0) -> tuple[Point, ...]:
+    """Returns the points of a task in a session; of events from number `since` on."""
     match task:
         case Task.UFN:
-            return tuple(ufn_points(session))
+            return tuple(ufn_points(session, since=since))
         case Task.RFN:
-            return tuple(rfn_points(session))
+            return tuple(rfn_points(session, since=since))
         case Task.NFD:
-            return tuple(nfd_points(session))
+            return tuple(nfd_points(session, since=since))
 
 
 def final_view(session: Session, task: Task) -> View:
@@ -149,6 +154,18 @@ def history_angle(record: ActionRecord) -> float:
     if record.action is PhysicalAction.U_TURN:
         return U_TURN_ANGLE
     return _wrap(record.angle or 0.0)
+
+
+def label_angle(record: ActionRecord) -> float:
+    """Returns NfD's label of an action's argument [degrees]: 0 where it takes none, NaN where it is not known."""
+    if record.action.argument not in (ArgumentKind.ANGLE, ArgumentKind.SIDE):
+        return 0.0
+    return math.nan if record.angle is None else _wrap(record.angle)
+
+
+def angle_error(predicted: float, label: float) -> float:
+    """Returns how far an angle is off, on the circle [degrees], in [0, 180]: 179 and -179 differ by 2."""
+    return abs(_wrap(predicted - label))
 
 
 class _History:
@@ -200,21 +217,15 @@ class _History:
         )
 
 
-def _inference_points(session: Session, task: Task, speaker: Role) -> Iterator[InferencePoint]:
+def _inference_points(session: Session, task: Task, speaker: Role, since: int) -> Iterator[InferencePoint]:
     history = _History(session, task)
     for move in session.moves(speaker):
-        if move.flagged:
+        if move.flagged and move.index >= since:
             yield InferencePoint(index=move.index, view=history.view(move.frame, move), act=move.act)
 
 
 def _same_utterance(one: MoveRecord, other: MoveRecord) -> bool:
     return one.utterance == other.utterance and one.speaker is other.speaker
-
-
-def _label_angle(record: ActionRecord) -> float:
-    if record.action.argument not in (ArgumentKind.ANGLE, ArgumentKind.SIDE):
-        return 0.0
-    return math.nan if record.angle is None else _wrap(record.angle)
 
 
 def _wrap(degrees: float) -> float:
