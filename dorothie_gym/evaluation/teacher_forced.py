@@ -66,6 +66,7 @@ class TeacherForcedEnv(PointEnv):
     | `actions` | (16,) | last physical actions, 0 where there is none |
     | `action_angles`, `action_times` | (16,) each | angles [degrees, positive left], when [s] |
     | `pose`, `speed` | (3,), (1,) | car's x, y [m], heading [rad, clockwise]; speed [m/s] |
+    | `way`, `way_length` | (25, 4), a number | x, y, heading, speed every 0.4 s, and how many of them there are |
     | `street_names` | (streets,) | id of each street's `StreetName` |
     | `landmarks` | (landmarks, 6) | those that are not hidden, columns as in `LandmarkColumn` |
 

@@ -29,6 +29,8 @@ SESSIONS = 20
 
 SEED = 0
 
+CONFIG = EnvConfig()
+
 _LOG = logging.getLogger(__name__)
 
 
@@ -47,7 +49,7 @@ def cache_folder() -> Path:
     return (Path(base) if base else Path("~/.cache").expanduser()) / "dorothie_gym"
 
 
-def default_corpus(*, sessions: int = SESSIONS, seed: int = SEED, config: EnvConfig | None = None) -> Path:
+def default_corpus(*, sessions: int | None = None, seed: int = SEED, config: EnvConfig | None = None) -> Path:
     """Returns a folder with a corpus of the scripted roles; plays it the first time, with a progress bar on stderr.
 
     Its folds and towns are shared out as the paper's. It is kept in the user's cache under the version of the package
@@ -55,15 +57,16 @@ def default_corpus(*, sessions: int = SESSIONS, seed: int = SEED, config: EnvCon
     nobody ever reads a part of it.
 
     Args:
-        sessions: how many.
+        sessions: how many; `SESSIONS` where None.
         seed: of the corpus.
-        config: of the environment; the default's where None.
+        config: of the environment; `CONFIG` where None.
 
     Raises:
         CacheError: the cache cannot be written.
         ValueError: no sessions, or a negative seed.
     """
-    config = config or EnvConfig()
+    config = CONFIG if config is None else config
+    sessions = SESSIONS if sessions is None else sessions
     key = {"format": FORMAT_VERSION, "sessions": sessions, "seed": seed, "config": asdict(config)}
     digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:12]
     folder = cache_folder() / f"corpus-{__version__}-{digest}"

@@ -11,6 +11,8 @@ from dorothie_gym.sessions.layout import SessionState, safe_name
 from dorothie_gym.sessions.manifest import manifest_row, write_manifest
 from dorothie_gym.sessions.points import (
     ANGLE_TOLERANCE,
+    NO_SPEAKER,
+    WAY_LENGTH,
     CarState,
     DecisionPoint,
     InferencePoint,
@@ -20,11 +22,13 @@ from dorothie_gym.sessions.points import (
     angle_error,
     final_view,
     history_angle,
+    is_decision,
     label_angle,
     nfd_points,
     rfn_points,
     task_points,
     ufn_points,
+    unpointed_events,
 )
 from dorothie_gym.sessions.reading import read_session, session_folders
 from dorothie_gym.sessions.records import ActionRecord, InfractionRecord, MoveRecord, UtteranceRecord
@@ -77,6 +81,7 @@ __all__ = [
     "LandmarkRow",
     "MoveRecord",
     "NO_LANE",
+    "NO_SPEAKER",
     "Point",
     "ReadReport",
     "Scene",
@@ -93,11 +98,13 @@ __all__ = [
     "Trajectory",
     "UtteranceRecord",
     "View",
+    "WAY_LENGTH",
     "WEATHER_DTYPE",
     "angle_error",
     "final_view",
     "first_difference",
     "history_angle",
+    "is_decision",
     "label_angle",
     "load_readable",
     "load_sessions",
@@ -113,5 +120,6 @@ __all__ = [
     "task_points",
     "trajectory_of",
     "ufn_points",
+    "unpointed_events",
     "write_manifest",
 ]

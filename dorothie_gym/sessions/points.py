@@ -17,6 +17,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, U_TURN_ANGLE, ArgumentKind, DialogueAct, PhysicalAction, Role
+from dorothie_gym.sessions.events import Event, EventType
 from dorothie_gym.sessions.header import LandmarkRow
 from dorothie_gym.sessions.records import ActionRecord, MoveRecord
 from dorothie_gym.sessions.session import Session
@@ -24,6 +25,14 @@ from dorothie_gym.world.config import FRAME_RATE
 
 ANGLE_TOLERANCE: Final = 15.0
 """The angle of a navigation action is right below this error [degrees] (paper, section 5, Evaluation)."""
+
+
+WAY_LENGTH: Final = 25
+WAY_STEP: Final = 12
+"""States of the car in a view, and frames (30 Hz) from one to the next: 100 frames of 10 Hz, every fourth."""
+
+NO_SPEAKER: Final = "a dialogue move of neither the participant nor the Co-Wizard"
+"""Why a flagged dialogue move is no point."""
 
 
 class Task(enum.StrEnum):
@@ -60,6 +69,8 @@ class View:
         moves: past dialogue moves of both speakers, oldest first.
         actions: past physical actions, oldest first.
         car: the last recorded state of the car; None before the first.
+        way: where it was before, every `WAY_STEP` frames of the recording back from `car`, which is the last; at most
+            `WAY_LENGTH` states (the working memory of the paper, section 6: 10 s).
         utterance: words of the current utterance at a UfN point, else empty.
         street_names: label of each street's name.
         landmarks: those that are not hidden.
@@ -72,6 +83,7 @@ class View:
     moves: tuple[MoveRecord, ...]
     actions: tuple[ActionRecord, ...]
     car: CarState | None
+    way: tuple[CarState, ...]
     utterance: str
     street_names: tuple[str, ...]
     landmarks: tuple[LandmarkRow, ...]
@@ -121,9 +133,7 @@ def nfd_points(session: Session, *, since: int = 0) -> Iterator[DecisionPoint]:
     """Yields a point for each flagged navigation action of the Co-Wizard; of events from number `since` on."""
     history = _History(session, Task.NFD)
     for record in session.physical_actions:
-        if record.index < since:
-            continue
-        if record.flagged and record.source is Role.CO_WIZARD and record.action in NAVIGATION_ACTIONS:
+        if record.index >= since and is_decision(record):
             yield DecisionPoint(
                 index=record.index,
                 view=history.view(record.frame),
@@ -141,6 +151,35 @@ def task_points(session: Session, task: Task, *, since: int = 0) -> tuple[Point,
             return tuple(rfn_points(session, since=since))
         case Task.NFD:
             return tuple(nfd_points(session, since=since))
+
+
+def is_decision(record: ActionRecord) -> bool:
+    """Whether a physical action is a point of NfD."""
+    return record.flagged and record.source is Role.CO_WIZARD and record.action in NAVIGATION_ACTIONS
+
+
+def unpointed_events(session: Session) -> tuple[tuple[int, str], ...]:
+    """Returns the number of each flagged event that is a point of no task, and why it is none.
+
+    With the points of the three tasks they are all flagged events, each once.
+    """
+    acts = {act.index: act for act in session.physical_actions}
+    return tuple(
+        (index, reason)
+        for index, event in enumerate(session.events)
+        if event.flagged and (reason := _why_no_point(event, acts.get(index)))
+    )
+
+
+def _why_no_point(event: Event, act: ActionRecord | None) -> str:
+    """Why a flagged event is no point; empty if it is one."""
+    if act is not None:
+        if act.action not in NAVIGATION_ACTIONS:
+            return f"{act.action.label} is no navigation action"
+        return "" if is_decision(act) else f"{act.action.label} of {act.source.value}, not of the Co-Wizard"
+    if event.type is not EventType.DIALOGUE_MOVE:
+        return f"an event of type {event.type_name}: neither a dialogue move nor a physical action"
+    return "" if event.source in (Role.PARTICIPANT, Role.CO_WIZARD) else f"{NO_SPEAKER} ({event.source.value})"
 
 
 def final_view(session: Session, task: Task) -> View:
@@ -189,6 +228,7 @@ class _History:
         if move is not None and self._task is Task.UFN:
             utterance = move.text
             moves += tuple(past for past in self._moves if _same_utterance(past, move) and past.index < move.index)
+        way = self._way(frame)
         return View(
             task=self._task,
             session=self._session.name,
@@ -196,25 +236,25 @@ class _History:
             time=frame / FRAME_RATE,
             moves=moves,
             actions=self._actions[: bisect.bisect_left(self._action_frames, frame)],
-            car=self._car(frame),
+            car=way[-1] if way else None,
+            way=way,
             utterance=utterance,
             street_names=tuple(self._session.header.street_names),
             landmarks=self._landmarks,
         )
 
-    def _car(self, frame: int) -> CarState | None:
+    def _way(self, frame: int) -> tuple[CarState, ...]:
         trajectory = self._session.trajectory
-        row = int(np.searchsorted(trajectory["frame"], frame, side="left")) - 1
-        if row < 0:
-            return None
-        last = trajectory[row]
-        return CarState(
-            frame=int(last["frame"]),
-            x=float(last["x"]),
-            y=float(last["y"]),
-            heading=float(last["heading"]),
-            speed=float(last["speed"]),
-        )
+        last = int(np.searchsorted(trajectory["frame"], frame, side="left")) - 1
+        if last < 0:
+            return ()
+        wanted = int(trajectory["frame"][last]) - WAY_STEP * np.arange(WAY_LENGTH)[::-1]
+        rows = np.searchsorted(trajectory["frame"], wanted[wanted >= trajectory["frame"][0]])
+        states = trajectory[list(_STATE)][rows].tolist()
+        return tuple(CarState(**dict(zip(_STATE, state, strict=True))) for state in states)
+
+
+_STATE: Final = ("frame", "x", "y", "heading", "speed")
 
 
 def _inference_points(session: Session, task: Task, speaker: Role, since: int) -> Iterator[InferencePoint]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.evaluation.features.columns import CO_WIZARD, NO_TEXT, OBJECT_VALUES, PARTICIPANT, TENTHS
 from dorothie_gym.evaluation.features.perceived import perceived
-from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, GoalStatus, PhysicalAction, Role
+from dorothie_gym.ontology import LABELS, GoalStatus, Role
 from dorothie_gym.sessions import (
     FRAME_RATE,
     NO_LANE,
@@ -22,7 +22,9 @@ from dorothie_gym.sessions import (
     Scene,
     Session,
     history_angle,
+    is_decision,
     label_angle,
+    unpointed_events,
 )
 from dorothie_gym.sessions.sdn.scenes import scene_at
 from dorothie_gym.sessions.statistics.handling import Handled, handling
@@ -38,8 +40,6 @@ HEADING_STEP: Final = 1e-3
 SPEAKERS: Final = {Role.PARTICIPANT: PARTICIPANT, Role.CO_WIZARD: CO_WIZARD}
 HANDLINGS: Final = (Handled.NONE, Handled.TASK, Handled.ENVIRONMENTAL)
 """What the numbers in columns `handling` mean."""
-
-NO_SPEAKER: Final = "a dialogue move of neither participant nor Co-Wizard"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -87,7 +87,7 @@ def extract(session: Session, town: Town | None) -> SessionColumns:
         **_goals(session),
     }
     arrays["sessions.has_objects"] = np.array([len(session.scene.actors) > 0])
-    unpointed = tuple(_unpointed(session))
+    unpointed = unpointed_events(session)
     content = hashlib.sha256(repr((session.header.town, list(pool.texts), unpointed)).encode())
     for name in sorted(arrays):
         content.update(f"{name} {arrays[name].dtype} {arrays[name].shape}".encode() + arrays[name].tobytes())
@@ -167,36 +167,9 @@ def _done(session: Session, handled: _Handled) -> dict[str, NDArray[Any]]:
         "actions.angle": np.array([history_angle(act) for act in done], dtype=np.float32),
         "actions.up": _ints([0 if act.up is None else (1 if act.up else -1) for act in done]),
         "actions.label_angle": np.array([label_angle(act) for act in done], dtype=np.float32),
-        "actions.flagged": np.array([_is_point(act) for act in done], dtype=np.bool_),
+        "actions.flagged": np.array([is_decision(act) for act in done], dtype=np.bool_),
         "actions.handling": _ints([handled.of_action(act) for act in done]),
     }
-
-
-def _is_point(act: ActionRecord) -> bool:
-    return act.flagged and act.source is Role.CO_WIZARD and act.action in NAVIGATION_ACTIONS
-
-
-def _unpointed(session: Session) -> list[tuple[int, str]]:
-    """Flagged events that are no point of any task, and why."""
-    acts = {act.index: act for act in session.physical_actions}
-    found = []
-    for index, event in enumerate(session.events):
-        if not event.flagged:
-            continue
-        if event.type is EventType.DIALOGUE_MOVE:
-            if event.source not in SPEAKERS:
-                found.append((index, f"{NO_SPEAKER} ({event.source.value})"))
-        elif event.type is not EventType.PHYSICAL_ACTION:
-            found.append((index, f"an event of type {event.type_name}: neither a dialogue move nor a physical action"))
-        elif not _is_point(acts[index]):
-            found.append((index, _why_no_point(acts[index].action, event.source)))
-    return found
-
-
-def _why_no_point(action: PhysicalAction, source: Role) -> str:
-    if action not in NAVIGATION_ACTIONS:
-        return f"{action.label} is no navigation action"
-    return f"{action.label} of {source.value}, not of the Co-Wizard"
 
 
 def _frames(session: Session, town: Town | None) -> dict[str, NDArray[Any]]:

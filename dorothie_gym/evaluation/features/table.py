@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.evaluation.features.columns import CO_WIZARD, PARTICIPANT, Columns, Flags, Ints, Reals
-from dorothie_gym.evaluation.features.extraction import NO_SPEAKER
 from dorothie_gym.ontology import LABELS
-from dorothie_gym.sessions import FOLDS, Fold, Task
+from dorothie_gym.sessions import FOLDS, NO_SPEAKER, Fold, Task
 from dorothie_gym.sessions.folds import check_fold
 
 NO_ANGLE: Final = "the recording does not know its angle: only the action is scored"

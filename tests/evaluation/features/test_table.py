@@ -147,7 +147,7 @@ def test_every_flagged_event_is_a_point_or_listed_with_its_reason() -> None:
     assert len(reasons) == 5
     assert any("SpeedChange is no navigation action" in reason for reason in reasons)
     assert any("Stop of agent" in reason for reason in reasons)
-    assert any("neither participant nor Co-Wizard (ad_wizard)" in reason for reason in reasons)
+    assert any("neither the participant nor the Co-Wizard (ad_wizard)" in reason for reason in reasons)
     assert any("type Message" in reason for reason in reasons)
     assert any("angle" in reason for reason in reasons)
 
