@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.evaluation.catalogue import metrics_of
-from dorothie_gym.evaluation.labels import ALL, CorpusLabels, Skipped, TaskLabels
+from dorothie_gym.evaluation.labels import ALL, CorpusLabels, TaskLabels, Unscored
 from dorothie_gym.evaluation.metrics import confusion_matrix
 from dorothie_gym.evaluation.prediction_files import PredictionError, TaskPredictions
 from dorothie_gym.evaluation.predictions import ActPredictions, Predictions
@@ -54,7 +54,7 @@ class RunScore:
     seed: int
     parts: Mapping[str, Scores]
     handled: Mapping[tuple[str, Handled], Scores]
-    left_out: tuple[Skipped, ...]
+    left_out: tuple[Unscored, ...]
     ignored: int
 
 
@@ -94,7 +94,7 @@ class _Aligned:
     predicted: Predictions
     parts: NDArray[np.str_]
     handled: NDArray[np.str_]
-    left_out: tuple[Skipped, ...]
+    left_out: tuple[Unscored, ...]
     ignored: int
 
 
@@ -112,7 +112,7 @@ def _align(labels: CorpusLabels, given: TaskPredictions) -> _Aligned:
         else:
             _check_other(labels, truth, given, key)
     left_out = tuple(
-        Skipped(session=key[0], event=key[1], task=given.task, reason=reason)
+        Unscored(session=key[0], event=key[1], task=given.task, reason=reason)
         for key, reason in given.left_out.items()
         if key in rows
     )

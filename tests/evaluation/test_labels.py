@@ -2,9 +2,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from dorothie_gym.evaluation import labels_of, score_task
+from dorothie_gym.evaluation import ActPredictions, labels_of, score_task
+from dorothie_gym.evaluation.features import build, points
+from dorothie_gym.evaluation.features.extraction import HANDLINGS
 from dorothie_gym.ontology import PhysicalAction, Role
 from dorothie_gym.sessions import Event, EventType, SessionError, Task, read_session
 from dorothie_gym.sessions.sdn import write_sdn
@@ -42,8 +45,8 @@ def test_flagged_events_that_are_no_points_are_named_with_the_reason(tmp_path: P
     count = labels.counts[""]
     assert (count.flagged, count.skipped, count.points[Task.NFD]) == (4, 3, 1)
     reasons = {skipped.event: (skipped.task, skipped.reason) for skipped in labels.skipped}
-    assert reasons[0] == (None, "said by ad_wizard, neither the participant nor the Co-Wizard")
-    assert reasons[1] == (None, "done by agent, not by the Co-Wizard")
+    assert reasons[0] == (None, "a dialogue move of neither the participant nor the Co-Wizard (ad_wizard)")
+    assert reasons[1] == (None, "Stop of agent, not of the Co-Wizard")
     assert reasons[2] == (None, "SpeedChange is no navigation action")
     assert reasons[3][0] is Task.NFD and "does not know its angle" in reasons[3][1]
 
@@ -97,3 +100,20 @@ def test_labels_of_a_corpus_in_sdns_layout_are_the_same(tmp_path: Path) -> None:
         assert other.events.tolist() == labels.events.tolist() and other.handled.tolist() == labels.handled.tolist()
         scores = score_task(task, other.labels, labels.labels)
         assert set(scores.values()) == {1.0}
+
+
+def test_labels_are_those_of_the_features(tmp_path: Path) -> None:
+    path = corpus(tmp_path, ("test/seen", "test/unseen"))
+    labels, columns = labels_of(path), build(path, cache=False)
+    for task, of in labels.tasks.items():
+        table = points(columns, task)
+        names = [columns.sessions.names[number] for number in table.session]
+        rows = [of.rows()[key] for key in zip(names, table.event.tolist(), strict=True)]
+        assert sorted(rows) == list(range(len(of)))
+        assert [HANDLINGS[kind] for kind in table.handling] == of.handled[rows].tolist()
+        if isinstance(of.labels, ActPredictions):
+            assert table.label_move.tolist() == of.labels.moves[rows].tolist()
+            assert np.array_equal(table.label_slots, of.labels.slots[rows])
+        else:
+            assert table.label_action.tolist() == of.labels.actions[rows].tolist()
+            assert table.label_angle == pytest.approx(of.labels.angles[rows], nan_ok=True)
