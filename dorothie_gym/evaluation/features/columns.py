@@ -109,7 +109,7 @@ class Actions:
         up: 1 faster or on, -1 slower or off, 0 for other actions.
         label_angle: argument as NfD's label [degrees]: 0 for an action that takes none, NaN where it is not known.
         flagged: whether it is a point of NfD.
-        handling: as of `Moves`, of the exchange that began last before it.
+        handling: as of `Moves`, by the rule of `handling_of_events`.
     """
 
     session: Ints

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -14,25 +14,18 @@ from dorothie_gym.evaluation.features.columns import CO_WIZARD, NO_TEXT, OBJECT_
 from dorothie_gym.evaluation.features.perceived import perceived
 from dorothie_gym.ontology import LABELS, GoalStatus, Role
 from dorothie_gym.sessions import (
-    FRAME_RATE,
     NO_LANE,
-    ActionRecord,
     EventType,
-    MoveRecord,
-    Scene,
     Session,
     history_angle,
     is_decision,
     label_angle,
     unpointed_events,
 )
-from dorothie_gym.sessions.sdn.scenes import scene_at
-from dorothie_gym.sessions.statistics.handling import Handled, handling
+from dorothie_gym.sessions.statistics.handling import Handled, handling_of_events
 from dorothie_gym.sessions.statistics.units import Units
+from dorothie_gym.sessions.tenths import EACH, at_tenths
 from dorothie_gym.world.town import Town
-
-EACH: Final = FRAME_RATE // TENTHS
-"""Frames of a recording in a tenth of a second."""
 
 HEADING_STEP: Final = 1e-3
 """Headings are rounded to this [degrees], so that the last digits do not tell in which unit a file had them."""
@@ -63,22 +56,11 @@ class SessionColumns:
     signature: str
 
 
-def at_tenths(session: Session) -> Session:
-    """Returns a session as a recording at 10 Hz has it: events of a tenth stand at its beginning, frames between go."""
-    trajectory = session.trajectory[session.trajectory["frame"] % EACH == 0]
-    return replace(
-        session,
-        events=tuple(replace(event, frame=event.frame - event.frame % EACH) for event in session.events),
-        trajectory=trajectory,
-        scene=scene_at(session.scene, trajectory) if len(trajectory) else Scene(),
-    )
-
-
 def extract(session: Session, town: Town | None) -> SessionColumns:
     """Returns the columns of a session; `town` is None where it is not known."""
     session = at_tenths(session)
     pool = _Pool()
-    handled = _Handled(session)
+    handled = {event: HANDLINGS.index(kind) for event, kind in handling_of_events(Units(session)).items()}
     arrays = {
         **_places(session, pool),  # first: numbers of texts then do not depend on what is said later
         **_said(session, pool, handled),
@@ -112,26 +94,7 @@ class _Pool:
         return NO_TEXT if text is None else self.texts.setdefault(text, len(self.texts))
 
 
-class _Handled:
-    """What the exchanges of a session handle."""
-
-    def __init__(self, session: Session) -> None:
-        self._units = Units(session)
-        self._kinds = {number: HANDLINGS.index(kind) for number, kind in handling(self._units).items()}
-        begun = sorted((unit.start, unit.id) for unit in self._units.exchanges)
-        self._starts = [start for start, _ in begun]
-        self._ids = [number for _, number in begun]
-
-    def of_move(self, move: MoveRecord) -> int:
-        number = self._units.exchange_of(move)
-        return 0 if number is None else self._kinds[number]
-
-    def of_action(self, action: ActionRecord) -> int:
-        last = int(np.searchsorted(self._starts, action.frame / FRAME_RATE, side="left")) - 1
-        return 0 if last < 0 else self._kinds[self._ids[last]]
-
-
-def _said(session: Session, pool: _Pool, handled: _Handled) -> dict[str, NDArray[Any]]:
+def _said(session: Session, pool: _Pool, handled: Mapping[int, int]) -> dict[str, NDArray[Any]]:
     """Moves and utterances, by when the whole utterance was over."""
     spoken = [utterance for utterance in session.utterances() if utterance.speaker in SPEAKERS]
     spoken.sort(key=lambda utterance: (max(move.frame for move in utterance.moves), utterance.moves[0].index))
@@ -154,11 +117,11 @@ def _said(session: Session, pool: _Pool, handled: _Handled) -> dict[str, NDArray
         "moves.slots": np.array([move.act.vector for _, move in moves], dtype=np.bool_).reshape(-1, len(LABELS)),
         "moves.span_text": _ints([pool.number(move.span) for _, move in moves]),
         "moves.flagged": np.array([move.flagged for _, move in moves], dtype=np.bool_),
-        "moves.handling": _ints([handled.of_move(move) for _, move in moves]),
+        "moves.handling": _ints([handled[move.index] for _, move in moves]),
     }
 
 
-def _done(session: Session, handled: _Handled) -> dict[str, NDArray[Any]]:
+def _done(session: Session, handled: Mapping[int, int]) -> dict[str, NDArray[Any]]:
     done = session.physical_actions
     return {
         "actions.tenth": _ints([act.frame // EACH for act in done]),
@@ -168,7 +131,7 @@ def _done(session: Session, handled: _Handled) -> dict[str, NDArray[Any]]:
         "actions.up": _ints([0 if act.up is None else (1 if act.up else -1) for act in done]),
         "actions.label_angle": np.array([label_angle(act) for act in done], dtype=np.float32),
         "actions.flagged": np.array([is_decision(act) for act in done], dtype=np.bool_),
-        "actions.handling": _ints([handled.of_action(act) for act in done]),
+        "actions.handling": _ints([handled[act.index] for act in done]),
     }
 
 
