@@ -10,7 +10,7 @@ from __future__ import annotations
 import bisect
 import enum
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
@@ -151,6 +151,16 @@ def task_points(session: Session, task: Task, *, since: int = 0) -> tuple[Point,
             return tuple(rfn_points(session, since=since))
         case Task.NFD:
             return tuple(nfd_points(session, since=since))
+
+
+def corpus_points(sessions: Iterable[Session], task: Task) -> Iterator[Point]:
+    """Yields the points of a task in sessions, such as a `Corpus`; each session is read when it is its turn.
+
+    Raises:
+        SessionError: a session cannot be read.
+    """
+    for session in sessions:
+        yield from task_points(session, task)
 
 
 def is_decision(record: ActionRecord) -> bool:

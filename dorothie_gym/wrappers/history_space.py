@@ -77,7 +77,7 @@ def encode_view(view: View, limits: SpaceLimits) -> Observation:
         "action_angles": _padded([history_angle(action) for action in actions], 0.0),
         "action_times": _padded([action.frame / FRAME_RATE for action in actions], 0.0),
         "pose": np.array([car.x, car.y, car.heading] if car else [0.0, 0.0, 0.0]),
-        "speed": np.array([car.speed if car else 0.0]),
+        "speed": np.nan_to_num([car.speed if car else 0.0]),  # NaN: the recording does not know it
         "way": _way(view),
         "way_length": np.int64(len(view.way)),
         "street_names": _streets(view, limits),
@@ -123,7 +123,7 @@ def clean_text(text: str) -> str:
 def _way(view: View) -> NDArray[np.float64]:
     table = np.zeros((WAY_LENGTH, 4))
     states = [(state.x, state.y, state.heading, state.speed) for state in reversed(view.way)]
-    table[: len(states)] = np.array(states).reshape(-1, 4)
+    table[: len(states)] = np.nan_to_num(np.array(states).reshape(-1, 4))
     return table
 
 

@@ -185,6 +185,14 @@ def test_sessions_are_chosen_by_number_and_name(folder: Path) -> None:
             env.reset(options={"session": wrong})
 
 
+def test_several_environments_step_together(folder: Path) -> None:
+    envs = gym.make_vec("dorothie_gym/RfN-v0", 3, vectorization_mode="sync", corpus=folder, split="train")
+    envs.reset(seed=0)
+    _, rewards, *_ = envs.step(envs.action_space.sample())
+    assert rewards.shape == (3,)
+    envs.close()
+
+
 def test_same_seed_draws_the_same_session() -> None:
     env = UfNEnv([session(talk(), name=name) for name in "abcdef"])
     assert env.reset(seed=5)[1]["session"] == env.reset(seed=5)[1]["session"]

@@ -8,6 +8,7 @@ import pytest
 from dorothie_gym.ontology import PhysicalAction, Role
 from dorothie_gym.sessions import (
     Task,
+    corpus_points,
     final_view,
     history_angle,
     nfd_points,
@@ -25,6 +26,11 @@ def test_every_flagged_event_is_a_point_once() -> None:
     assert [point.act for point in ufn_points(talked)] == [TO_KFC, YES, STREET, DONE]
     assert [point.act for point in rfn_points(talked)] == [OKAY, TURNING, OKAY]
     assert [point.action.label for point in nfd_points(talked)] == ["Start", "JTurn", "UTurn", "JTurn", "Stop"]
+
+
+def test_points_of_a_corpus_come_session_by_session() -> None:
+    names = [point.view.session for point in corpus_points([session(talk()), session(talk(), name="two")], Task.RFN)]
+    assert names == ["one"] * 3 + ["two"] * 3
 
 
 def test_unflagged_events_are_history_and_no_points() -> None:

@@ -9,7 +9,7 @@ import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-from dorothie_gym import EnvConfig, TeacherForcing
+from dorothie_gym import EnvConfig, TeacherForcing, flatten
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
@@ -66,6 +66,14 @@ def test_answers_do_not_change_what_happens(task: Task) -> None:
 
 def test_gymnasium_accepts_the_environment() -> None:
     check_env(TeacherForcing(duo(10.0), "nfd"), skip_render_check=True)  # its warnings are errors here
+
+
+def test_learners_that_take_vectors_can_play() -> None:
+    env = flatten(TeacherForcing(duo(20.0), "nfd"))
+    observation, _ = env.reset(seed=SEED)
+    assert env.observation_space.contains(observation)
+    observation, reward, *_ = env.step(env.action_space.sample())
+    assert env.observation_space.contains(observation) and 0.0 <= reward <= 1.0
 
 
 def test_an_episode_is_a_session_and_the_next_is_another() -> None:

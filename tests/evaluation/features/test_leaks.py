@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from dorothie_gym.evaluation.features import BatchSpec, columns_of, gather, points
 from dorothie_gym.rollout import default_corpus
 from dorothie_gym.sessions import Corpus, Session, Task
-from tests.evaluation.features.played import play, seen, with_another_future
+from tests.evaluation.features.played import seen, with_another_future
 from tests.sessions.builders import session
 from tests.sessions.dialogues import talk
 
@@ -37,10 +35,9 @@ def test_no_point_of_a_talk_sees_its_future(task: Task) -> None:
     assert check(session(talk()), task) >= 3
 
 
-def test_points_of_a_played_session_see_no_future(tmp_path: Path) -> None:
-    recorded = play(tmp_path / "played", seconds=50.0)
-    assert len(recorded.scene.actors) and len(recorded.scene.lights)
-    assert sum(check(recorded, task, every=2) for task in Task) >= 5
+def test_points_of_a_played_session_see_no_future(played: Session) -> None:
+    assert len(played.scene.actors) and len(played.scene.lights)
+    assert sum(check(played, task, every=2) for task in Task) >= 5
 
 
 def test_the_check_finds_the_leak_of_the_published_features() -> None:

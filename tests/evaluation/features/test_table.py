@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.evaluation.features import BatchSpec, columns_of, gather, point_counts, points
+from dorothie_gym.evaluation.features.extraction import at_tenths
 from dorothie_gym.ontology import LABELS, PhysicalAction, Role
 from dorothie_gym.sessions import Event, EventType, Session, SessionError, Task, task_points
 from tests.sessions.builders import physical, session, utterance
@@ -61,6 +62,31 @@ def test_ufn_sees_earlier_acts_of_the_utterance_and_the_paper_s_leak_its_own() -
     assert tuple(leaked.move_slots[0][4].tolist()) == tuple(map(bool, STREET.vector))
     assert honest.utterance_mask.sum() == 2, "the current utterance is no history"
     assert columns.texts[int(honest.current_text[0])] == "Yes, left on Fuller."
+
+
+@pytest.mark.parametrize("task", list(Task))
+def test_a_played_session_has_the_histories_of_its_views(played: Session, task: Task) -> None:
+    """Two ways to the same: views of the session at 10 Hz, and rows of columns."""
+    tenths = at_tenths(played)
+    columns, expected = columns_of(played), task_points(tenths, task)
+    table = points(columns, task)
+    batch = gather(columns, table, np.arange(len(table)), BatchSpec(moves=99, actions=99))
+    assert table.event.tolist() == [point.index for point in expected] != []
+    for row, view in enumerate(point.view for point in expected):
+        assert batch.move[row][batch.move_mask[row]].tolist() == [int(move.act.move) for move in view.moves]
+        assert batch.action[row][batch.action_mask[row]].tolist() == [act.action.value - 1 for act in view.actions]
+        window = batch.window_pose[row][batch.window_mask[row]]
+        np.testing.assert_allclose(window[:, :2], [(state.x, state.y) for state in view.way], rtol=1e-5)
+
+
+def test_the_paper_s_leak_gives_every_label_away(played: Session) -> None:
+    columns = columns_of(played)
+    table = points(columns, Task.UFN)
+    rows = np.arange(len(table))
+    leaked = gather(columns, table, rows, BatchSpec(moves=99, paper_leak=True))
+    newest = leaked.move_mask.sum(axis=1) - 1
+    assert leaked.move[rows, newest].tolist() == table.label_move.tolist()
+    assert np.array_equal(leaked.move_slots[rows, newest], table.label_slots)
 
 
 @pytest.mark.parametrize("task", [Task.RFN, Task.NFD])
