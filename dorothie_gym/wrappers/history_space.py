@@ -20,7 +20,7 @@ from dorothie_gym.ontology import (
     parse_landmark,
     parse_street,
 )
-from dorothie_gym.sessions import FRAME_RATE, MoveRecord, Task, View, history_angle
+from dorothie_gym.sessions import FRAME_RATE, WAY_LENGTH, MoveRecord, Task, View, history_angle
 from dorothie_gym.spaces import NO_MOVE, LandmarkColumn, Observation, SpaceLimits
 from dorothie_gym.spaces.limits import TEXT_CHARACTERS
 from dorothie_gym.spaces.observations import MAX_UTTERANCE
@@ -53,6 +53,8 @@ def history_space(task: Task, limits: SpaceLimits) -> spaces.Dict:
             "action_times": _box(HISTORY, low=0.0),
             "pose": _box(3),
             "speed": _box(1),
+            "way": _box(WAY_LENGTH, 4),
+            "way_length": spaces.Discrete(WAY_LENGTH + 1),
             "street_names": spaces.MultiDiscrete([len(StreetName)] * limits.streets),
             "landmarks": _box(limits.landmarks, len(LandmarkColumn)),
         }
@@ -75,7 +77,9 @@ def encode_view(view: View, limits: SpaceLimits) -> Observation:
         "action_angles": _padded([history_angle(action) for action in actions], 0.0),
         "action_times": _padded([action.frame / FRAME_RATE for action in actions], 0.0),
         "pose": np.array([car.x, car.y, car.heading] if car else [0.0, 0.0, 0.0]),
-        "speed": np.array([car.speed if car else 0.0]),
+        "speed": np.nan_to_num([car.speed if car else 0.0]),  # NaN: the recording does not know it
+        "way": _way(view),
+        "way_length": np.int64(len(view.way)),
         "street_names": _streets(view, limits),
         "landmarks": _landmarks(view, limits),
     }
@@ -114,6 +118,13 @@ def check_action(action: object, space: spaces.Dict) -> Mapping[str, Any]:
 def clean_text(text: str) -> str:
     """Returns the text as a `Text` space takes it: unknown characters become "?", and its end is cut off if long."""
     return "".join(character if character in TEXT_CHARACTERS else "?" for character in text)[:MAX_UTTERANCE]
+
+
+def _way(view: View) -> NDArray[np.float64]:
+    table = np.zeros((WAY_LENGTH, 4))
+    states = [(state.x, state.y, state.heading, state.speed) for state in reversed(view.way)]
+    table[: len(states)] = np.nan_to_num(np.array(states).reshape(-1, 4))
+    return table
 
 
 def _padded(values: Sequence[float], filler: float) -> NDArray[Any]:
