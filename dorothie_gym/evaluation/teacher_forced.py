@@ -20,6 +20,7 @@ from dorothie_gym.evaluation.metrics import (
 from dorothie_gym.evaluation.predictions import ActionPredictions, ActPredictions
 from dorothie_gym.sessions import (
     Corpus,
+    CorpusEntry,
     DecisionPoint,
     Fold,
     InferencePoint,
@@ -27,11 +28,11 @@ from dorothie_gym.sessions import (
     Session,
     SessionError,
     Task,
-    View,
-    final_view,
     task_points,
 )
+from dorothie_gym.sessions.sdn.maps import find_town
 from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.world.town import Town
 from dorothie_gym.wrappers.point_env import PointEnv
 
 DEFAULT: Final = "default"
@@ -67,6 +68,8 @@ class TeacherForcedEnv(PointEnv):
     | `action_angles`, `action_times` | (16,) each | angles [degrees, positive left], when [s] |
     | `pose`, `speed` | (3,), (1,) | car's x, y [m], heading [rad, clockwise]; speed [m/s] |
     | `way`, `way_length` | (25, 4), a number | x, y, heading, speed every 0.4 s, and how many of them there are |
+    | `object_kinds` | (objects,) | what was perceived at the last look: 0 nothing, else 1 + `ObjectKind` |
+    | `objects` | (objects, 8) | the same, the nearest first, columns as in `OBJECT_VALUES` |
     | `street_names` | (streets,) | id of each street's `StreetName` |
     | `landmarks` | (landmarks, 6) | those that are not hidden, columns as in `LandmarkColumn` |
 
@@ -109,6 +112,7 @@ class TeacherForcedEnv(PointEnv):
         super().__init__(self.of_task, limits, render_mode)
         self._library = _Library(corpus, split, self.of_task, self.limits)
         self._session: Session | None = None
+        self._town: Town | None = None
         self._done: list[tuple[Mapping[str, Any], Any]] = []
         self._count = 0
 
@@ -119,6 +123,7 @@ class TeacherForcedEnv(PointEnv):
             self._session, points = self._library.read(number)
             if points:
                 self._done, self._count = [], len(points)
+                self._town = find_town(self._session.header.town, self._library.maps(number))
                 return iter(points)
         raise SessionError(f"none of the {len(order)} sessions has a point of the task {self.task.value}")
 
@@ -130,9 +135,9 @@ class TeacherForcedEnv(PointEnv):
             return wanted
         raise ValueError(f"option 'session' is {wanted!r}; it must be a number below {len(names)} or a session's name")
 
-    def _last_view(self) -> View:
+    def _now(self) -> tuple[Session, Town | None]:
         assert self._session is not None  # an episode has begun
-        return final_view(self._session, self.task)
+        return self._session, self._town
 
     def _info(self) -> dict[str, Any]:
         assert self._session is not None  # an episode has begun
@@ -223,6 +228,11 @@ class _Library:
     def __len__(self) -> int:
         return len(self.names)
 
+    def maps(self, number: int) -> Path | None:
+        """Returns the folder with maps that a session was given with."""
+        found = self._found[number]
+        return None if isinstance(found, Session) else found.maps
+
     def _read(self, number: int) -> tuple[Session, tuple[Point, ...]]:
         found = self._found[number]
         session = found if isinstance(found, Session) else found.load()
@@ -230,7 +240,7 @@ class _Library:
         return session, task_points(session, self._task)
 
 
-def _sessions(corpus: Corpus | Path | str | Sequence[Session], split: str) -> Sequence[Any]:
+def _sessions(corpus: Corpus | Path | str | Sequence[Session], split: str) -> Sequence[CorpusEntry | Session]:
     """Sessions, or entries that load them."""
     if isinstance(corpus, str) and corpus == DEFAULT:
         # Playing sessions needs the environments, which are slow to import: only where it is asked for.

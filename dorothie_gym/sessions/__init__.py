@@ -9,6 +9,7 @@ from dorothie_gym.sessions.folds import FOLDS, Fold
 from dorothie_gym.sessions.header import LandmarkRow, SessionHeader, SubgoalRow
 from dorothie_gym.sessions.layout import SessionState, safe_name
 from dorothie_gym.sessions.manifest import manifest_row, write_manifest
+from dorothie_gym.sessions.perceived import OBJECT_VALUES, ObjectKind, last_perceived
 from dorothie_gym.sessions.points import (
     ANGLE_TOLERANCE,
     NO_SPEAKER,
@@ -83,6 +84,8 @@ __all__ = [
     "MoveRecord",
     "NO_LANE",
     "NO_SPEAKER",
+    "OBJECT_VALUES",
+    "ObjectKind",
     "Point",
     "ReadReport",
     "Scene",
@@ -108,6 +111,7 @@ __all__ = [
     "history_angle",
     "is_decision",
     "label_angle",
+    "last_perceived",
     "load_readable",
     "load_sessions",
     "manifest_row",

@@ -20,10 +20,22 @@ from dorothie_gym.ontology import (
     parse_landmark,
     parse_street,
 )
-from dorothie_gym.sessions import FRAME_RATE, WAY_LENGTH, MoveRecord, Task, View, history_angle
+from dorothie_gym.sessions import (
+    FRAME_RATE,
+    OBJECT_VALUES,
+    WAY_LENGTH,
+    MoveRecord,
+    ObjectKind,
+    Session,
+    Task,
+    View,
+    history_angle,
+    last_perceived,
+)
 from dorothie_gym.spaces import NO_MOVE, LandmarkColumn, Observation, SpaceLimits
 from dorothie_gym.spaces.limits import TEXT_CHARACTERS
 from dorothie_gym.spaces.observations import MAX_UTTERANCE
+from dorothie_gym.world.town import Town
 
 HISTORY: Final = 16
 """Moves and physical actions of the history that are in an observation; the oldest are left out."""
@@ -55,6 +67,8 @@ def history_space(task: Task, limits: SpaceLimits) -> spaces.Dict:
             "speed": _box(1),
             "way": _box(WAY_LENGTH, 4),
             "way_length": spaces.Discrete(WAY_LENGTH + 1),
+            "object_kinds": spaces.MultiDiscrete([len(ObjectKind) + 1] * limits.objects),
+            "objects": _box(limits.objects, len(OBJECT_VALUES)),
             "street_names": spaces.MultiDiscrete([len(StreetName)] * limits.streets),
             "landmarks": _box(limits.landmarks, len(LandmarkColumn)),
         }
@@ -62,7 +76,7 @@ def history_space(task: Task, limits: SpaceLimits) -> spaces.Dict:
 
 
 def encode_view(view: View, limits: SpaceLimits) -> Observation:
-    """Returns the observation of a view, in `history_space` of its task."""
+    """Returns the observation of a view, in `history_space` of its task but for what `encode_objects` adds."""
     moves, actions = view.moves[: -HISTORY - 1 : -1], view.actions[: -HISTORY - 1 : -1]  # newest first
     car = view.car
     observation: Observation = {
@@ -86,6 +100,22 @@ def encode_view(view: View, limits: SpaceLimits) -> Observation:
     if view.task is Task.UFN:
         observation["utterance"] = clean_text(view.utterance)
     return observation
+
+
+def encode_objects(session: Session, frame: int, town: Town | None, limits: SpaceLimits) -> Observation:
+    """Returns the part of an observation that tells what was perceived around the car at the last look before a frame.
+
+    Args:
+        session: the session, as far as it has come.
+        frame: of the point.
+        town: the session's, where it is known: it tells where traffic lights are.
+        limits: how many objects there are room for, the nearest.
+    """
+    kinds, values = last_perceived(session, frame, town)
+    numbers, table = np.zeros(limits.objects, dtype=np.int64), np.zeros((limits.objects, len(OBJECT_VALUES)))
+    count = min(len(kinds), limits.objects)
+    numbers[:count], table[:count] = 1 + kinds[:count], values[:count]
+    return {"object_kinds": numbers, "objects": table}
 
 
 def act_space() -> spaces.Dict:

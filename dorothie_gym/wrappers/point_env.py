@@ -9,9 +9,10 @@ from typing import Any, ClassVar
 import gymnasium as gym
 from gymnasium.error import ResetNeeded
 
-from dorothie_gym.sessions import Point, Task, View
+from dorothie_gym.sessions import Point, Session, Task, View, final_view
 from dorothie_gym.spaces import Observation, SpaceLimits
-from dorothie_gym.wrappers.history_space import check_action, encode_view, history_space
+from dorothie_gym.world.town import Town
+from dorothie_gym.wrappers.history_space import check_action, encode_objects, encode_view, history_space
 from dorothie_gym.wrappers.point_rules import RULES
 
 
@@ -85,8 +86,8 @@ class PointEnv(gym.Env[Observation, dict[str, Any]]):
         """Begins a session that has a point, and yields its points as they come."""
 
     @abstractmethod
-    def _last_view(self) -> View:
-        """What may be seen when the session is over."""
+    def _now(self) -> tuple[Session, Town | None]:
+        """The session that is played, as far as it is known, and its town, where that is known."""
 
     @abstractmethod
     def _info(self) -> dict[str, Any]:
@@ -97,7 +98,8 @@ class PointEnv(gym.Env[Observation, dict[str, Any]]):
         return {}
 
     def _view(self) -> View:
-        return self._last_view() if self._point is None else self._point.view
+        return final_view(self._now()[0], self.task) if self._point is None else self._point.view
 
     def _observe(self) -> Observation:
-        return encode_view(self._view(), self.limits)
+        view, (session, town) = self._view(), self._now()
+        return {**encode_view(view, self.limits), **encode_objects(session, view.frame, town, self.limits)}

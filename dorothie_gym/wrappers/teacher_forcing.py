@@ -2,33 +2,41 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.envs.snapshot import LightStates, actors_around
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
 from dorothie_gym.policies.seeds import policy_seed
 from dorothie_gym.sessions import (
     Event,
     Point,
+    Scene,
+    SceneTable,
     Session,
     SessionError,
-    SessionHeader,
     Task,
-    View,
-    final_view,
     task_points,
     trajectory_of,
 )
+from dorothie_gym.sessions.scene import Rows, light_rows, weather_rows
 from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.world.town import Town
 from dorothie_gym.wrappers.point_env import PointEnv
 
 MOST_SILENT = 20
 """After so many sessions in a row without a point of the task, it is clear that the policies make none."""
+
+
+LOOKS: Final = 4
+"""Looks around that are kept: a point of a decision sees the one before, or the one before that."""
 
 
 class TeacherForcing(PointEnv):
@@ -108,10 +116,10 @@ class TeacherForcing(PointEnv):
             role: policy.initial_state(policy_seed(session_seed, role), self.duo.town)
             for role, policy in self.policies.items()
         }
-        self._record = _Record(self.duo.session_header())
+        self._record = _Record(self.duo)
         asked = -1
         while True:
-            if self._record.append(self.duo.last_events, self.duo.last_frames):
+            if self._record.append():
                 for point in task_points(self._record.session(), self.task, since=asked + 1):
                     asked = point.index
                     yield point
@@ -122,8 +130,8 @@ class TeacherForcing(PointEnv):
                 actions[str(role)], states[role] = policy.step(observations[str(role)], states[role])
             observations, *_ = self.duo.step(actions)
 
-    def _last_view(self) -> View:
-        return final_view(self._record.session(), self.task)
+    def _now(self) -> tuple[Session, Town | None]:
+        return self._record.session(), self.duo.town
 
     def _info(self) -> dict[str, Any]:
         header = self._record.header
@@ -131,27 +139,64 @@ class TeacherForcing(PointEnv):
 
 
 class _Record:
-    """What has happened so far in a session that is being played."""
+    """What has happened so far in a session that is being played, as `SessionRecorder` would write it down."""
 
-    def __init__(self, header: SessionHeader) -> None:
-        self.header = header
+    def __init__(self, env: DuoWizardEnv) -> None:
+        self.header = env.session_header()
+        self._env = env
+        self._lights = LightStates(env.town)
         self._events: list[Event] = []
         self._rows: list[NDArray[np.float64]] = []
+        self._looks: deque[_Look] = deque(maxlen=LOOKS)
         self._session: Session | None = None
 
-    def append(self, events: tuple[Event, ...], rows: NDArray[np.float64]) -> bool:
-        """Adds what a decision brought; returns whether there may be a point in it."""
+    def append(self) -> bool:
+        """Adds what the last decision brought; returns whether there may be a point in it."""
+        events, rows, world = self._env.last_events, self._env.last_frames, self._env.stage.world
         self._events += events
         self._rows.append(rows.copy())
+        if len(rows) and rows[-1, 0] == world.frame:
+            lights = light_rows(self._lights.at(world.time))
+            self._looks.append(_Look(world.frame, actors_around(world), lights, weather_rows(world.weather.values)))
         self._session = None
         return any(event.flagged for event in events)
 
     def session(self) -> Session:
-        """Returns the session so far."""
+        """Returns the session so far, of its surroundings the last looks only."""
         if self._session is None:
-            rows = trajectory_of(np.concatenate(self._rows))
-            self._session = Session(header=self.header, events=tuple(self._events), trajectory=rows, complete=False)
+            self._session = Session(
+                header=self.header,
+                events=tuple(self._events),
+                trajectory=trajectory_of(np.concatenate(self._rows)),
+                complete=False,
+                scene=self._scene(),
+            )
         return self._session
+
+    def _scene(self) -> Scene:
+        if not self._looks:
+            return Scene()
+        frames = np.array([look.frame for look in self._looks], dtype=np.int64)
+        return Scene(
+            actors=_table(frames, [look.actors for look in self._looks]),
+            lights=_table(frames, [look.lights for look in self._looks]),
+            weather=_table(frames, [look.weather for look in self._looks]),
+        )
+
+
+def _table(frames: NDArray[np.int64], rows: list[Rows]) -> SceneTable:
+    offsets = np.concatenate(([0], np.cumsum([len(part) for part in rows]))).astype(np.int64)
+    return SceneTable(frames, offsets, np.concatenate(rows))
+
+
+@dataclass(frozen=True)
+class _Look:
+    """What was around the car at a frame."""
+
+    frame: int
+    actors: Rows
+    lights: Rows
+    weather: Rows
 
 
 def _before(first: Point, others: Iterator[Point]) -> Iterator[Point]:

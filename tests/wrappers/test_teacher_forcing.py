@@ -11,6 +11,7 @@ from gymnasium.utils.env_checker import check_env
 
 from dorothie_gym import EnvConfig, TeacherForcing, flatten
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.evaluation import NfDEnv, RfNEnv, TeacherForcedEnv, UfNEnv
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
 from dorothie_gym.rollout import play_session
@@ -54,6 +55,21 @@ def test_live_points_are_those_of_the_recorded_session(task: Task, recorded: Ses
     views, _, rewards = play(TeacherForcing(duo(), task))
     assert views == [replace(point.view, session=views[0].session) for point in task_points(recorded, task)]
     assert set(rewards) == {1.0}, "the truth earns everything"
+
+
+@pytest.mark.parametrize(("task", "env_class"), [(Task.UFN, UfNEnv), (Task.RFN, RfNEnv), (Task.NFD, NfDEnv)])
+def test_live_observations_are_those_of_the_recorded_session(
+    task: Task, env_class: type[TeacherForcedEnv], recorded: Session
+) -> None:
+    _, live, _ = play(TeacherForcing(duo(), task))
+    env = env_class([recorded])
+    observation, _ = env.reset()
+    observations, done = [observation], False
+    while not done:
+        observation, _, done, _, _ = env.step(env.action_space.sample())
+        observations.append(observation)
+    np.testing.assert_equal(live, observations)
+    assert any(one["object_kinds"].any() for one in live)
 
 
 @pytest.mark.parametrize("task", list(Task))

@@ -10,8 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.evaluation.features.columns import CO_WIZARD, NO_TEXT, OBJECT_VALUES, PARTICIPANT, TENTHS
-from dorothie_gym.evaluation.features.perceived import perceived
+from dorothie_gym.evaluation.features.columns import CO_WIZARD, NO_TEXT, PARTICIPANT, TENTHS
 from dorothie_gym.ontology import LABELS, GoalStatus, Role
 from dorothie_gym.sessions import (
     NO_LANE,
@@ -22,6 +21,7 @@ from dorothie_gym.sessions import (
     label_angle,
     unpointed_events,
 )
+from dorothie_gym.sessions.perceived import OBJECT_VALUES, light_switches, perceived
 from dorothie_gym.sessions.statistics.handling import Handled, handling_of_events
 from dorothie_gym.sessions.statistics.units import Units
 from dorothie_gym.sessions.tenths import EACH, at_tenths
@@ -145,7 +145,7 @@ def _frames(session: Session, town: Town | None) -> dict[str, NDArray[Any]]:
     if len(rows) > 1:
         way = np.hypot(np.diff(rows["x"]), np.diff(rows["y"]))
         speed[1:] = way / (np.diff(tenths) / TENTHS)
-    looks = list(perceived(session, pose, rows["frame"], town))
+    looks = list(perceived(session.scene, pose, rows["frame"], light_switches(session), town))
     look_tenths = np.array([frame // EACH for frame, _, _ in looks], dtype=np.int64)
     kinds = [kind for _, kind, _ in looks]
     values = [value for _, _, value in looks]
@@ -157,7 +157,7 @@ def _frames(session: Session, town: Town | None) -> dict[str, NDArray[Any]]:
         "frames.look": (np.searchsorted(look_tenths, tenths, side="right") - 1).astype(np.int32),
         "looks.tenth": look_tenths.astype(np.int32),
         "looks.start": np.concatenate(([0], np.cumsum([len(kind) for kind in kinds]))).astype(np.int64)[:-1],
-        "objects.kind": np.concatenate(kinds or [np.empty(0)]).astype(np.int32),
+        "objects.kind": np.concatenate([*kinds, np.empty(0, dtype=np.int64)]).astype(np.int32),
         "objects.values": np.concatenate(values or [np.empty((0, len(OBJECT_VALUES)))]).astype(np.float32),
     }
 

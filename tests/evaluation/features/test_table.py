@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from dorothie_gym.evaluation.features import BatchSpec, columns_of, gather, point_counts, points
-from dorothie_gym.evaluation.features.extraction import at_tenths
 from dorothie_gym.ontology import LABELS, PhysicalAction, Role
 from dorothie_gym.sessions import Event, EventType, Session, SessionError, Task, task_points
+from dorothie_gym.sessions.perceived import last_perceived
+from dorothie_gym.sessions.tenths import at_tenths
+from dorothie_gym.world.town import load_town
 from tests.sessions.builders import physical, session, utterance
 from tests.sessions.dialogues import DONE, OKAY, STREET, TO_KFC, TURNING, YES, talk
 
@@ -77,6 +79,18 @@ def test_a_played_session_has_the_histories_of_its_views(played: Session, task: 
         assert batch.action[row][batch.action_mask[row]].tolist() == [act.action.value - 1 for act in view.actions]
         window = batch.window_pose[row][batch.window_mask[row]]
         np.testing.assert_allclose(window[:, :2], [(state.x, state.y) for state in view.way], rtol=1e-5)
+
+
+def test_objects_of_a_batch_are_those_that_environments_show(played: Session) -> None:
+    columns, tenths = columns_of(played), at_tenths(played)
+    table = points(columns, Task.NFD)
+    batch = gather(columns, table, np.arange(len(table)))
+    for row, tenth in enumerate(table.tenth.tolist()):
+        kinds, values = last_perceived(tenths, 3 * tenth, load_town("brookside"))
+        mask = batch.objects_mask[row]
+        assert batch.kind[row][mask].tolist() == kinds.tolist()
+        np.testing.assert_allclose(batch.values[row][mask], values, atol=2e-3)  # headings are rounded in columns
+    assert batch.objects_mask.any()
 
 
 def test_the_paper_s_leak_gives_every_label_away(played: Session) -> None:
