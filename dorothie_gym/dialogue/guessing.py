@@ -65,6 +65,10 @@ _CLAUSE = re.compile(
 )
 """The beginning of a clause that has a subject of its own."""
 
+_JOINTS = re.compile(r"(?<=\w) (?=(also |but |and )?(we|i|you|they|it|there)('ll| will| still| also| should)\b)", re.I)
+"""Behind a name, "we passed" tells which one is meant; "we still" begins anew."""
+
+_ALSO = re.compile(r"(?<=\w) (?=also (we|i|you|they|it|there|that)\b)", re.I)
 _OF_OTHERS = re.compile(r"(so |and |but |also |now |, )*(we|you|it|this|that|they|he|she|these|those|the \w+)\b( |'\w)")
 _VERB = re.compile(
     r"\b(is|are|was|were|am|be|been|has|have|had|do|does|did|can|could|will|would|should|must|may|might|\w{3,}(ing|ed)|"
@@ -233,7 +237,21 @@ def _pieces(sentence: str) -> list[str]:
         head, rest = ",".join(clauses[:number]).strip(), ",".join(clauses[number:]).strip()
         if head and rest and _parts(head, rest):
             return [f"{head},", *_pieces(rest)]
-    return [sentence.strip()]
+    return _run_on(sentence.strip())
+
+
+def _run_on(sentence: str) -> list[str]:
+    """Returns a sentence parted where a clause begins without a comma, as in what a recogniser writes.
+
+    "to the Ikea we still have the KFC for later" names two places in two clauses; "also we ..." goes on from anything.
+    """
+    joints = _JOINTS.finditer(sentence) if len(understand(sentence).landmarks) > 1 else _ALSO.finditer(sentence)
+    for joint in joints:
+        head, rest = sentence[: joint.start()], sentence[joint.end() :]
+        about, other = understand(head).landmarks, understand(rest).landmarks
+        if joint.re is _ALSO or (about and other and not set(about) & set(other)):
+            return [head, *_run_on(rest)]
+    return [sentence]
 
 
 def _parts(head: str, rest: str) -> bool:
