@@ -65,6 +65,17 @@ _CLAUSE = re.compile(
 )
 """The beginning of a clause that has a subject of its own."""
 
+_JOINTS = re.compile(r"(?<=\w) (?=(also |but |and )?(we|i|you|they|it|there)('ll| will| still| also| should)\b)", re.I)
+"""Behind a name, "we passed" tells which one is meant; "we still" begins anew."""
+
+_ALSO = re.compile(r"(?<=\w) (?=also (we|i|you|they|it|there|that)\b)", re.I)
+_OF_OTHERS = re.compile(r"(so |and |but |also |now |, )*(we|you|it|this|that|they|he|she|these|those|the \w+)\b( |'\w)")
+_VERB = re.compile(
+    r"\b(is|are|was|were|am|be|been|has|have|had|do|does|did|can|could|will|would|should|must|may|might|\w{3,}(ing|ed)|"
+    r"\w+'(s|m|re|ve|ll|d)|\w+n't|\w+ (it|him|her|them|us|me)|went|got|took|saw|made|told|said)\b|#act|#status"
+)
+"""What a sentence with a verb of its own has."""
+
 _SUBORDINATE = re.compile(
     r"(and |so |then |, )*(when|if|once|after|before|because|as|while|since|until|till|unless|where)\b"
 )
@@ -136,12 +147,19 @@ def act_of(heard: Heard, after: DialogueMove | None = None) -> DialogueAct:
     move = _move_of(heard)
     if move is DialogueMove.INSTRUCT and GoalStatus.COMPLETE in heard.statuses and heard.masked.startswith("#status"):
         move = DialogueMove.EXPLAIN  # "skip the Ikea" is a command, "made it to the Ikea" is none
+    elif move is DialogueMove.EXPLAIN and _is_bare_place(heard):
+        move = DialogueMove.INSTRUCT  # "first things first, the Ikea"
     if after is not None:
         changes = _cues().answers.get(after)
         # Small talk stays small talk, unless it is a bare answer: "the blue one".
         if changes is not None and (move is not DialogueMove.IRRELEVANT or not _is_small_talk(heard)):
             move = changes.get(move, move)
     return DialogueAct(move, _slots(heard, move))
+
+
+def _is_bare_place(heard: Heard) -> bool:
+    """Returns whether words only name a place to go to: there is no verb, and nothing else is named."""
+    return bool(heard.landmarks) and not heard.objects and not heard.question and not _VERB.search(heard.acted)
 
 
 def _move_of(heard: Heard) -> DialogueMove:
@@ -158,8 +176,16 @@ def _move_of(heard: Heard) -> DialogueMove:
             return rule.move
         if rule.domain and not words.isdisjoint(_cues().domain):
             return rule.move
-    # No cue at all: a bare command ("lights on") if something is to be done, else nothing we understand.
-    return DialogueMove.INSTRUCT if heard.actions else DialogueMove.IRRELEVANT
+    return _by_form(heard, sentence)
+
+
+def _by_form(heard: Heard, sentence: str) -> DialogueMove:
+    """Returns the move of words without any cue, by their form alone."""
+    if heard.actions:
+        return DialogueMove.INSTRUCT  # a bare command: "lights on"
+    if _OF_OTHERS.match(sentence):
+        return DialogueMove.EXPLAIN  # a statement that is not about the speaker
+    return DialogueMove.ACKNOWLEDGE if sentence.isalpha() else DialogueMove.IRRELEVANT
 
 
 def _is_small_talk(heard: Heard) -> bool:
@@ -211,7 +237,21 @@ def _pieces(sentence: str) -> list[str]:
         head, rest = ",".join(clauses[:number]).strip(), ",".join(clauses[number:]).strip()
         if head and rest and _parts(head, rest):
             return [f"{head},", *_pieces(rest)]
-    return [sentence.strip()]
+    return _run_on(sentence.strip())
+
+
+def _run_on(sentence: str) -> list[str]:
+    """Returns a sentence parted where a clause begins without a comma, as in what a recogniser writes.
+
+    "to the Ikea we still have the KFC for later" names two places in two clauses; "also we ..." goes on from anything.
+    """
+    joints = _JOINTS.finditer(sentence) if len(understand(sentence).landmarks) > 1 else _ALSO.finditer(sentence)
+    for joint in joints:
+        head, rest = sentence[: joint.start()], sentence[joint.end() :]
+        about, other = understand(head).landmarks, understand(rest).landmarks
+        if joint.re is _ALSO or (about and other and not set(about) & set(other)):
+            return [head, *_run_on(rest)]
+    return [sentence]
 
 
 def _parts(head: str, rest: str) -> bool:

@@ -115,6 +115,13 @@ def test_the_move_before_tells_what_an_answer_is(text, after, move):
         ("It's on Murfin, past the SevenEleven.", ["Explain"]),
         ("no, don't turn left", ["ReplyN"]),
         ("There's a barrier ahead. Shall I find another way?", ["Explain", "QueryYN"]),
+        ("so to the Shell we still have that house for later", ["Instruct", "Explain"]),
+        ("it should be on Bishop also it's on the other side", ["Explain", "Explain"]),
+        ("the house we passed on the way to the Ikea", ["Explain"]),
+        ("Turn left, did you get that?", ["Instruct", "Align"]),
+        ("We are done here, so the Ikea next.", ["Explain", "Instruct"]),
+        ("The house, on Beal, we'll do the Shell later.", ["Instruct", "Explain"]),
+        ("Yes, that one.", ["Confirm"]),
         ("  ", []),
     ],
 )

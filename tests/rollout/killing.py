@@ -89,6 +89,7 @@ def kill_again_and_again(
         assert kept.items() <= there.items(), "no finished session is lost or changed"
         kept = there
         finished.append(finished_sessions(two, sessions=sessions, seed=5))
+        print(f"killed {len(finished)} times, {finished[-1]} of {sessions} sessions finished", file=sys.stderr)
     process = begin(two, sessions=sessions, seconds=seconds, workers=2)
     _, errors = process.communicate()
     assert process.returncode == 0, errors
