@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from dorothie_gym.dialogue.utterances import Utterance
-from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, SlotValue
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, SlotValue
 
 PATIENCE = 10.0
 """An exchange that nobody answers for this long is abandoned [s] (spec of the dialogue, phenomenon 21)."""
@@ -58,7 +58,10 @@ it checks or objects to what it is told to do, or answers a question by telling 
 _GROUNDING = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 """Who takes something up by naming it again speaks of what named it."""
 
-_OPEN_LABELS = frozenset({"Unknown", "Queried"})
+_UNKNOWN = ActionValue.UNKNOWN.label
+"""In every slot the label of what a speaker does not know."""
+
+_OPEN_LABELS = frozenset({_UNKNOWN, ActionValue.QUERIED.label})
 """Values that name nothing."""
 
 _REPAIRS = frozenset({DialogueMove.CLARIFY, DialogueMove.CONFIRM, DialogueMove.REPLY_W})
@@ -116,6 +119,11 @@ class Exchange:
             return answers or (self.confused and move in _REPAIRS)
         return move is DialogueMove.CONFUSE or move in EXPECTATIONS[self.move]
 
+    def is_told(self, move: DialogueMove) -> bool:
+        """Returns whether `move` by the other side tells what the initiator says is not known."""
+        puzzles = self.act is not None and any(value.label == _UNKNOWN for value in self.act.slots)
+        return puzzles and self.move is DialogueMove.EXPLAIN and move is DialogueMove.EXPLAIN
+
     def names(self, speaker: Role, values: Iterable[SlotValue]) -> bool:
         """Returns whether `speaker` has named one of the values in it."""
         return any((speaker, value) in self.named for value in values)
@@ -126,10 +134,10 @@ class ExchangeTracker:
 
     Initiating acts of one utterance share an exchange (a reason and the command it leads to are one initiative), and an
     Explain behind a response in the same breath elaborates on that response. Who is told to do something and asks back,
-    or who is asked and answers by a command or an explanation, goes on with the exchange that is open; so does who then
-    explains or names the same once more, and who says the same again before there is an answer. Who acknowledges or
-    confirms something by its name speaks of the latest exchange in which the other side has named it. Overlapping
-    exchanges are allowed: what begins while the other still speaks is a new one.
+    or who is asked, or told that something is not known, and answers by a command or an explanation, goes on with the
+    exchange that is open; so does who then explains or names the same once more, and who says the same again before
+    there is an answer. Who acknowledges or confirms something by its name speaks of the latest exchange in which the
+    other side has named it. Overlapping exchanges are allowed: what begins while the other still speaks is a new one.
     """
 
     def __init__(self, patience: float = PATIENCE) -> None:
@@ -221,8 +229,8 @@ class ExchangeTracker:
                 if act.move is DialogueMove.EXPLAIN or exchange.names(utterance.speaker, _names(act)):
                     exchange.asked_back = exchange.confused = False
                     return exchange
-            elif not own and act.move in _INSERTED.get(exchange.move, ()):
-                if exchange.move in _ASKING:
+            elif not own and (act.move in _INSERTED.get(exchange.move, ()) or exchange.is_told(act.move)):
+                if exchange.move is not DialogueMove.INSTRUCT:
                     self._close(exchange, ExchangeState.FULFILLED)
                 else:
                     exchange.asked_back = True
