@@ -157,15 +157,19 @@ def _counts(facts: dict[str, Any]) -> Iterator[tuple[str, ...]]:
     for fold, count in facts["folds"].items():
         yield f"sessions in {fold}", f"{count:,}", ""
     diversity = facts["diversity"]
-    yield "distinct_utterance_ratio", f"{facts['distinct_utterance_ratio']:.3f}", ""
-    yield "share of the commonest utterance", f"{diversity['commonest_utterance_share']:.3f}", ""
-    yield "trigram perplexity, train on test", f"{diversity['perplexity']:.1f}", ""
+    yield "distinct_utterance_ratio", _shown(facts["distinct_utterance_ratio"]), ""
+    yield "share of the commonest utterance", _shown(diversity["commonest_utterance_share"]), ""
+    yield "trigram perplexity, train on test", _shown(diversity["perplexity"]), ""
 
 
 def _shares(facts: dict[str, Any]) -> Iterator[tuple[str, ...]]:
     for name, row in facts["anchors"].items():
         label = f" ({row['label']})" if row.get("label") else ""
-        yield name.replace("_", " ") + label, f"{row['share']:.3f}", f"{row['paper']:.3f}"
+        yield name.replace("_", " ") + label, _shown(row["share"]), _shown(row["paper"])
+
+
+def _shown(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
 
 
 def _behaviour(corpus: Corpus) -> Iterator[tuple[str, ...]]:
