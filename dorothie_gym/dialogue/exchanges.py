@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable, Mapping
+import itertools
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -12,6 +13,9 @@ from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, 
 
 PATIENCE = 10.0
 """An exchange that nobody answers for this long is abandoned [s] (spec of the dialogue, phenomenon 21)."""
+
+RECENT = 50
+"""Exchanges that began after another one until nothing belongs to that any more: far more than patience allows."""
 
 EXPECTATIONS: Mapping[DialogueMove, frozenset[DialogueMove]] = MappingProxyType(
     {
@@ -197,6 +201,10 @@ class ExchangeTracker:
         """Returns the exchanges that still wait for an answer, oldest first."""
         return sorted(self._waiting.values(), key=lambda exchange: exchange.id)
 
+    def _recent(self) -> Iterator[Exchange]:
+        """Yields the exchanges that something may still belong to, latest first."""
+        return itertools.islice(reversed(self.exchanges), RECENT)
+
     def _initiate(self, utterance: Utterance, act: DialogueAct, opened: Exchange | None) -> Exchange:
         move = act.move
         if opened is not None:
@@ -220,7 +228,7 @@ class ExchangeTracker:
 
     def _insert(self, utterance: Utterance, act: DialogueAct) -> Exchange | None:
         """Returns the open exchange that an initiating move goes on with, if there is one."""
-        for exchange in reversed(self.exchanges):
+        for exchange in self._recent():
             waited = utterance.start - exchange.end
             if exchange.state is not ExchangeState.OPEN or exchange.unprompted or not 0.0 <= waited <= self.patience:
                 continue
@@ -257,7 +265,7 @@ class ExchangeTracker:
     def _named(self, utterance: Utterance, act: DialogueAct) -> Exchange | None:
         """Returns the latest exchange, answered or not, whose initiator named what an act takes up by its name."""
         values = _names(act) if act.move in _GROUNDING else frozenset()
-        for exchange in reversed(self.exchanges) if values else ():
+        for exchange in self._recent() if values else ():
             in_time = utterance.start - exchange.end <= self.patience
             if in_time and exchange.initiator is not utterance.speaker and exchange.names(exchange.initiator, values):
                 return exchange if exchange.accepts(utterance.speaker, act.move) else None
@@ -265,7 +273,7 @@ class ExchangeTracker:
 
     def _awaiting(self, utterance: Utterance, move: DialogueMove) -> Exchange | None:
         """Returns the latest exchange that `move` fits and that was still alive when the utterance began."""
-        for exchange in reversed(self.exchanges):
+        for exchange in self._recent():
             # `tick` may have given an exchange up while its answer was already in the air: the start decides.
             in_time = utterance.start - exchange.end <= self.patience
             if exchange.state is not ExchangeState.FULFILLED and in_time and exchange.accepts(utterance.speaker, move):
