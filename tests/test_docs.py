@@ -1,9 +1,12 @@
 """The examples in docs/ are accepted by the package."""
 
 import dataclasses
+import importlib.util
 import json
 import re
+import sys
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -116,3 +119,44 @@ def test_the_tasks_page_names_every_field_of_a_batch() -> None:
     text = (DOCS / "tasks.md").read_text(encoding="utf-8")
     missing = [field.name for field in dataclasses.fields(Batch) if f"`{field.name}`" not in text]
     assert missing == []
+
+
+def pages() -> ModuleType:
+    """The script that writes pages, which is in no package."""
+    spec = importlib.util.spec_from_file_location("pages", DOCS / "pages.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["pages"] = module  # where its dataclasses look for their types
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_figures_of_the_data_sheet_are_those_of_a_corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for fold in ("train", "test/unseen"):
+        write(tmp_path / "corpus" / fold / "one", talk())
+    made = {"sessions": 2, "seed": 41, "package_version": "9.9"}
+    (tmp_path / "corpus" / "generation.json").write_text(json.dumps(made), encoding="utf-8")
+    sheet = tmp_path / "data-sheet.md"
+    sheet.write_text((DOCS / "data-sheet.md").read_text(encoding="utf-8"), encoding="utf-8")
+    script = pages()
+    monkeypatch.setattr(script, "DATA_SHEET", sheet)
+    for _ in range(2):  # written anew, the old figures are gone
+        script.main(["figures", str(tmp_path / "corpus")])
+    page = sheet.read_text(encoding="utf-8")
+    assert page.count("dorothie-gym generate --sessions 2 --seed 41 --out CORPUS") == 1
+    assert "| utterances | 10 | 8,415 |" in page and "| 24 | speech trouble repaired | 0 | - |" in page
+    assert page.startswith("# Data sheet") and page.count(script.BEGIN) == page.count(script.END) == 1
+
+
+def test_the_page_of_transcripts_shows_three_sessions_of_different_kinds() -> None:
+    page = (DOCS / "transcripts.md").read_text(encoding="utf-8")
+    easy, environmental, task = page.split("\n## ")[1:]
+    assert "(env)" not in easy and "(task)" not in easy
+    assert environmental.count("(env)") >= 3 and task.count("(task)") >= 2
+    for section in (easy, environmental, task):
+        assert "dorothie-gym show S" in section and "Ended with success" in section
+
+
+def test_every_page_is_in_the_navigation() -> None:
+    navigation = (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8")
+    assert [path.name for path in DOCS.glob("*.md") if f": {path.name}" not in navigation] == []

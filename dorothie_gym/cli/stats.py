@@ -171,8 +171,10 @@ def _folds(folds: Mapping[str, int]) -> Table:
 
 
 def _anchors(anchors: Mapping[str, Any]) -> Table:
+    from dorothie_gym.sessions.statistics.anchors import TOLERANCE
+
     shown = Table(box=None, pad_edge=False)
-    for title in ("how easy the tasks are", "here", "paper", "unseen"):
+    for title in ("how easy the tasks are", "here", "allowed", "paper", "unseen"):
         shown.add_column(title, justify="left" if title.startswith("how") else "right", no_wrap=True)
     shown.add_column("", no_wrap=True)
     for title, key in _ANCHORS:
@@ -180,7 +182,10 @@ def _anchors(anchors: Mapping[str, Any]) -> Table:
         note = row.get("label") or ""
         if row["within"] is False:
             note += f"{', ' if note else ''}out of range"
-        shown.add_row(title, _percent(row["share"]), _percent(row["paper"]), _percent(row["paper_unseen"]), note)
+        allowed = f"{100 * (row['paper'] - TOLERANCE):.1f} to {100 * (row['paper'] + TOLERANCE):.1f} %"
+        shown.add_row(
+            title, _percent(row["share"]), allowed, _percent(row["paper"]), _percent(row["paper_unseen"]), note
+        )
     return shown
 
 

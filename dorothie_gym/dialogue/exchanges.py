@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable, Mapping
+import itertools
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from dorothie_gym.dialogue.utterances import Utterance
-from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, SlotValue
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, SlotValue
 
 PATIENCE = 10.0
 """An exchange that nobody answers for this long is abandoned [s] (spec of the dialogue, phenomenon 21)."""
+
+RECENT = 50
+"""Exchanges that began after another one until nothing belongs to that any more: far more than patience allows."""
 
 EXPECTATIONS: Mapping[DialogueMove, frozenset[DialogueMove]] = MappingProxyType(
     {
@@ -58,7 +62,10 @@ it checks or objects to what it is told to do, or answers a question by telling 
 _GROUNDING = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 """Who takes something up by naming it again speaks of what named it."""
 
-_OPEN_LABELS = frozenset({"Unknown", "Queried"})
+_UNKNOWN = ActionValue.UNKNOWN.label
+"""In every slot the label of what a speaker does not know."""
+
+_OPEN_LABELS = frozenset({_UNKNOWN, ActionValue.QUERIED.label})
 """Values that name nothing."""
 
 _REPAIRS = frozenset({DialogueMove.CLARIFY, DialogueMove.CONFIRM, DialogueMove.REPLY_W})
@@ -116,6 +123,11 @@ class Exchange:
             return answers or (self.confused and move in _REPAIRS)
         return move is DialogueMove.CONFUSE or move in EXPECTATIONS[self.move]
 
+    def is_told(self, move: DialogueMove) -> bool:
+        """Returns whether `move` by the other side tells what the initiator says is not known."""
+        puzzles = self.act is not None and any(value.label == _UNKNOWN for value in self.act.slots)
+        return puzzles and self.move is DialogueMove.EXPLAIN and move is DialogueMove.EXPLAIN
+
     def names(self, speaker: Role, values: Iterable[SlotValue]) -> bool:
         """Returns whether `speaker` has named one of the values in it."""
         return any((speaker, value) in self.named for value in values)
@@ -126,10 +138,10 @@ class ExchangeTracker:
 
     Initiating acts of one utterance share an exchange (a reason and the command it leads to are one initiative), and an
     Explain behind a response in the same breath elaborates on that response. Who is told to do something and asks back,
-    or who is asked and answers by a command or an explanation, goes on with the exchange that is open; so does who then
-    explains or names the same once more, and who says the same again before there is an answer. Who acknowledges or
-    confirms something by its name speaks of the latest exchange in which the other side has named it. Overlapping
-    exchanges are allowed: what begins while the other still speaks is a new one.
+    or who is asked, or told that something is not known, and answers by a command or an explanation, goes on with the
+    exchange that is open; so does who then explains or names the same once more, and who says the same again before
+    there is an answer. Who acknowledges or confirms something by its name speaks of the latest exchange in which the
+    other side has named it. Overlapping exchanges are allowed: what begins while the other still speaks is a new one.
     """
 
     def __init__(self, patience: float = PATIENCE) -> None:
@@ -189,6 +201,10 @@ class ExchangeTracker:
         """Returns the exchanges that still wait for an answer, oldest first."""
         return sorted(self._waiting.values(), key=lambda exchange: exchange.id)
 
+    def _recent(self) -> Iterator[Exchange]:
+        """Yields the exchanges that something may still belong to, latest first."""
+        return itertools.islice(reversed(self.exchanges), RECENT)
+
     def _initiate(self, utterance: Utterance, act: DialogueAct, opened: Exchange | None) -> Exchange:
         move = act.move
         if opened is not None:
@@ -212,7 +228,7 @@ class ExchangeTracker:
 
     def _insert(self, utterance: Utterance, act: DialogueAct) -> Exchange | None:
         """Returns the open exchange that an initiating move goes on with, if there is one."""
-        for exchange in reversed(self.exchanges):
+        for exchange in self._recent():
             waited = utterance.start - exchange.end
             if exchange.state is not ExchangeState.OPEN or exchange.unprompted or not 0.0 <= waited <= self.patience:
                 continue
@@ -221,8 +237,8 @@ class ExchangeTracker:
                 if act.move is DialogueMove.EXPLAIN or exchange.names(utterance.speaker, _names(act)):
                     exchange.asked_back = exchange.confused = False
                     return exchange
-            elif not own and act.move in _INSERTED.get(exchange.move, ()):
-                if exchange.move in _ASKING:
+            elif not own and (act.move in _INSERTED.get(exchange.move, ()) or exchange.is_told(act.move)):
+                if exchange.move is not DialogueMove.INSTRUCT:
                     self._close(exchange, ExchangeState.FULFILLED)
                 else:
                     exchange.asked_back = True
@@ -249,7 +265,7 @@ class ExchangeTracker:
     def _named(self, utterance: Utterance, act: DialogueAct) -> Exchange | None:
         """Returns the latest exchange, answered or not, whose initiator named what an act takes up by its name."""
         values = _names(act) if act.move in _GROUNDING else frozenset()
-        for exchange in reversed(self.exchanges) if values else ():
+        for exchange in self._recent() if values else ():
             in_time = utterance.start - exchange.end <= self.patience
             if in_time and exchange.initiator is not utterance.speaker and exchange.names(exchange.initiator, values):
                 return exchange if exchange.accepts(utterance.speaker, act.move) else None
@@ -257,7 +273,7 @@ class ExchangeTracker:
 
     def _awaiting(self, utterance: Utterance, move: DialogueMove) -> Exchange | None:
         """Returns the latest exchange that `move` fits and that was still alive when the utterance began."""
-        for exchange in reversed(self.exchanges):
+        for exchange in self._recent():
             # `tick` may have given an exchange up while its answer was already in the air: the start decides.
             in_time = utterance.start - exchange.end <= self.patience
             if exchange.state is not ExchangeState.FULFILLED and in_time and exchange.accepts(utterance.speaker, move):

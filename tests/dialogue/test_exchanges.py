@@ -1,7 +1,16 @@
 import pytest
 
 from dorothie_gym.dialogue import EXPECTATIONS, ExchangeState, ExchangeTracker, Span, Utterance
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role, SlotValue
+from dorothie_gym.ontology import (
+    ActionValue,
+    DialogueAct,
+    DialogueMove,
+    GoalStatus,
+    LandmarkName,
+    Role,
+    SlotValue,
+    StreetName,
+)
 
 P, C = Role.PARTICIPANT, Role.CO_WIZARD
 M = DialogueMove
@@ -215,3 +224,13 @@ def test_who_says_the_same_again_after_ten_seconds_begins_anew():
     tracker.update(naming(P, 0.0, M.INSTRUCT, ActionValue.STOP))
     tracker.tick(12.0)
     assert tracker.update(naming(P, 12.0, M.INSTRUCT, ActionValue.STOP)) == (1,)
+
+
+def test_who_explains_what_the_other_does_not_know_answers():
+    tracker = ExchangeTracker()
+    tracker.update(naming(C, 0.0, M.EXPLAIN, LandmarkName.HOUSE, GoalStatus.UNKNOWN))
+    assert tracker.update(naming(P, 2.0, M.EXPLAIN, StreetName.FULLER)) == (0,)
+    assert tracker.exchanges[0].state is ExchangeState.FULFILLED
+    assert tracker.update(said(C, 4.0, M.ACKNOWLEDGE)) == (0,)
+    tracker.update(naming(C, 20.0, M.EXPLAIN, LandmarkName.HOUSE))
+    assert tracker.update(naming(P, 22.0, M.EXPLAIN, StreetName.FULLER)) == (2,), "nothing was unknown"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import bisect
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -17,6 +19,9 @@ WORDS_A_SECOND: Final = 2.5
 
 NEAR: Final = 20
 """Frames (10 Hz) between a stretch of speech and a move that belongs to it."""
+
+AT_ONCE: Final = 50
+"""Stretches of one speaker that are looked at for a move, those that began last."""
 
 _ACT_FIELDS: Final = {"move", "slots", "exchange", "transaction", "span", "utterance", "start", "end", MORE}
 
@@ -43,8 +48,10 @@ class MoveReader:
 
     def __init__(self, speech: Iterable[Speech], first_frame: int, report: ReadReport, *, audio: bool = True) -> None:
         self._audio = audio
-        self._speech = tuple(speech)
-        self._files = {stretch.file: stretch for stretch in self._speech}
+        self._files = {stretch.file: stretch for stretch in speech}
+        self._by_speaker: dict[Role, list[Speech]] = defaultdict(list)
+        for stretch in sorted(self._files.values(), key=lambda each: (each.start, each.file)):
+            self._by_speaker[stretch.speaker].append(stretch)
         self._first = first_frame
         self._report = report
         self._last: tuple[Any, ...] | None = None
@@ -138,13 +145,14 @@ class MoveReader:
         file = row.get("utterance_filename")
         if isinstance(file, str) and file in self._files:
             return self._files[file]
+        own = self._by_speaker[speaker]
+        begun = bisect.bisect_right(own, frame + NEAR, key=lambda stretch: stretch.start)
         near = [
-            (max(stretch.start - frame, frame - stretch.end, 0), -stretch.start, k)
-            for k, stretch in enumerate(self._speech)
-            if stretch.speaker is speaker
+            (max(stretch.start - frame, frame - stretch.end, 0), -stretch.start, stretch.file)
+            for stretch in own[max(begun - AT_ONCE, 0) : begun]
         ]
         best = min(near, default=None)
-        return self._speech[best[2]] if best is not None and best[0] <= NEAR else None
+        return self._files[best[2]] if best is not None and best[0] <= NEAR else None
 
     def _times(self, act: Row, stretch: Speech | None, frame: int, text: str) -> tuple[float, float]:
         start, end = number_of(act.get("start")), number_of(act.get("end"))

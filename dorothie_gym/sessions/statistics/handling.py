@@ -143,10 +143,14 @@ def handled_by(units: Units) -> dict[int, Event]:
         for event in session.of_type(EventType.EXCEPTION)
         if (kind := kind_of(event)) is not None
     ]
+    times = [each.event.time for each in happened]
+    met = [k for k, each in enumerate(happened) if math.isfinite(each.met)]
     found: dict[int, Event] = {}
     last: tuple[float, _Happened] | None = None
     for exchange in sorted(units.exchanges, key=lambda unit: unit.start):
-        cause = next((each for each in reversed(happened) if each.is_handled_in(exchange)), None)
+        fresh = range(bisect.bisect_left(times, exchange.start - WINDOW), bisect.bisect_right(times, exchange.start))
+        latest = (happened[k] for k in sorted({*fresh, *met}, reverse=True))
+        cause = next((each for each in latest if each.is_handled_in(exchange)), None)
         if (
             cause is None
             and last is not None

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
+from sklearn.metrics import cohen_kappa_score
 
 from dorothie_gym.ontology import ActionValue, DialogueAct, LandmarkName
 from dorothie_gym.sessions import Event, Session, SessionError
@@ -33,6 +35,15 @@ def test_kappa_of_slots_worked_by_hand() -> None:
     # Two pieces of five slots: both leave 8 empty, agree on KFC, differ on Ikea. Agreement 9/10, by chance
     # (8/10)(8/10) + (1/10)(2/10) = 0.66; so 0.24 / 0.34.
     assert agreement(labelled(kfc, ikea), labelled(kfc, kfc)).slots == pytest.approx(0.24 / 0.34)
+
+
+def test_kappa_is_that_of_scikit_learn() -> None:
+    rng = np.random.default_rng(5)
+    moves = [GO, TELL, YES, act(M.CHECK), act(M.IRRELEVANT)]
+    first, second = (rng.integers(len(moves), size=40) for _ in range(2))
+    second = np.where(rng.random(40) < 0.6, first, second)
+    found = agreement(labelled(*(moves[k] for k in first)), labelled(*(moves[k] for k in second)))
+    assert found.moves == pytest.approx(cohen_kappa_score(first, second)) and 0.3 < found.moves < 0.95
 
 
 def test_an_annotation_agrees_with_itself() -> None:
