@@ -123,9 +123,7 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     """Says what is to be done next, if it is time to."""
     if mind.journey is None or not mind.told or view.turning or mind.journey.astray:
         return
-    if not mind.voice.idle and mind.guiding and about_to_arrive(mind, view):
-        mind.voice = mind.voice.cleared()  # there is no time for anything else
-    if not mind.voice.idle or view.speaking > 0.0:
+    if not _may_speak(mind, view):
         return
     if _approach(mind, view, rng) or not mind.guiding:
         return
@@ -155,6 +153,13 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
             words = replace(words, act=DialogueAct(DialogueMove.EXPLAIN, words.act.slots))
         note_told(mind, view, key)
         mind.voice = mind.voice.plan(*_rounded_off(mind, words, again, rng))
+
+
+def _may_speak(mind: ParticipantMind, view: View) -> bool:
+    """Whether it is free to say a step: close to the place there is no time for anything else."""
+    if mind.guiding and about_to_arrive(mind, view):
+        mind.voice = mind.voice.cleared()
+    return mind.voice.idle and view.speaking <= 0.0
 
 
 def _rounded_off(mind: ParticipantMind, words: Remark, again: bool, rng: np.random.Generator) -> tuple[Remark, ...]:
@@ -336,7 +341,7 @@ def _time_to_stop(mind: ParticipantMind, view: View, left: float) -> bool:
 
 
 def _room_to_stop(mind: ParticipantMind, view: View, left: float, text: str) -> tuple[float, float]:
-    """How far before the place the car stands if it is told so now, or at the next decision [m]; negative: behind it."""
+    """How far before the place the car stands if told so now, and at the next decision [m]; negative: behind it."""
     delay = math.ceil(speech_seconds(text) / DECISION - 1e-6) * DECISION
     gain = min(max((view.speed - mind.speed_before) / DECISION, -2.0), 2.0)
     if gain > SETS_OFF:
