@@ -91,6 +91,18 @@ class TestRun:
         assert len(session.utterances()) == facts["utterances"] > 0
         assert len(session.all_moves) == facts["acts"]
 
+    def test_word_errors_are_recorded_beside_what_was_said_and_come_out_again(self) -> None:
+        loaded("run", "--seed", 3, "--max-seconds", 60, "--word-errors", 0.3, "--out", "s", "--json")
+        session = Session.load("s")
+        assert session.header.config["word_error_rate"] == 0.3
+        moves = session.moves()
+        assert moves and any(move.recognised != move.text for move in moves)
+        assert call("replay", "s", "--check").exit_code == 0
+        assert call("convert", "s", "sdn", "--to", "sdn").exit_code == 0
+        assert call("convert", "sdn", "back", "--to", "native").exit_code == 0
+        heard = [(move.text, move.recognised) for move in Session.load("back").moves()]
+        assert heard == [(move.text, move.recognised) for move in moves]
+
     def test_roles_can_be_silenced(self) -> None:
         silent = ("--participant", "silent", "--co-wizard", "silent", "--ad-wizard", "silent")
         facts = loaded("run", "--max-seconds", 5, "--json", *silent)

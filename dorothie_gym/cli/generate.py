@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dorothie_gym.cli.options import WordErrors, env_config
 from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ def generate(
     max_seconds: Annotated[
         float | None, typer.Option(min=1.0, max=86400.0, help="Cut sessions off after so many simulated seconds.")
     ] = None,
+    word_errors: WordErrors = 0.0,
     as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
 ) -> None:
     """Make a corpus: the scripted three play many sessions, divided into train, val and test, seen and unseen towns.
@@ -37,10 +39,9 @@ def generate(
     The same bytes come out whatever the number of workers. When it is stopped, the same command goes on.
     """
     with told_plainly():
-        from dorothie_gym.envs.config import EnvConfig
         from dorothie_gym.rollout import ProcessError, generate_corpus
 
-        config = EnvConfig() if max_seconds is None else EnvConfig(max_seconds=max_seconds)
+        config = env_config(max_seconds, word_errors)
         begun = time.perf_counter()
         try:
             with _progress(quiet=as_json) as on_session:
@@ -53,7 +54,7 @@ def generate(
                     on_session=on_session,
                 )
         except KeyboardInterrupt:
-            _tell_interruption(out, sessions, seed, max_seconds)
+            _tell_interruption(out, sessions, seed, max_seconds, word_errors)
         except ProcessError as error:
             fail(str(error), _FAILED)
     facts = _facts(made, seed, time.perf_counter() - begun)
@@ -73,13 +74,15 @@ def _processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _tell_interruption(out: Path, sessions: int, seed: int, max_seconds: float | None) -> None:
+def _tell_interruption(out: Path, sessions: int, seed: int, max_seconds: float | None, word_errors: float) -> None:
     from dorothie_gym.rollout import finished_sessions
 
     done = finished_sessions(out, sessions=sessions, seed=seed)
     command = f"dorothie-gym generate --sessions {sessions} --seed {seed} --out {out}"
     if max_seconds is not None:
         command += f" --max-seconds {max_seconds:g}"
+    if word_errors:
+        command += f" --word-errors {word_errors:g}"
     stderr().print(
         f"Interrupted with {done} of {sessions} sessions finished; go on with: {command}", markup=False, soft_wrap=True
     )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dorothie_gym.cli.options import WordErrors, env_config
 from dorothie_gym.cli.output import (
     INTERRUPTED,
     check_picture,
@@ -44,6 +45,7 @@ class _Plan:
     video: Path | None
     players: tuple[str, str, str]
     max_seconds: float | None
+    word_errors: float
 
 
 def run(
@@ -71,6 +73,7 @@ def run(
     max_seconds: Annotated[
         float | None, typer.Option(min=1.0, max=86400.0, help="Cut the session off after so many simulated seconds.")
     ] = None,
+    word_errors: WordErrors = 0.0,
     as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
 ) -> None:
     """Play one session: three roles talk while the car drives. The seed is 0 unless you give another."""
@@ -85,6 +88,7 @@ def run(
         video=video,
         players=(participant, co_wizard, ad_wizard),
         max_seconds=max_seconds,
+        word_errors=word_errors,
     )
     _check_outputs(plan)
     with told_plainly():
@@ -108,16 +112,14 @@ def _check_outputs(plan: _Plan) -> None:
 
 def _play(plan: _Plan, *, quiet: bool) -> dict[str, Any]:
     """Plays the session and returns what --json writes."""
-    from dorothie_gym.envs.config import EnvConfig
     from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
     from dorothie_gym.ontology import AGENT_ROLES, Role
     from dorothie_gym.policies import make_policy
     from dorothie_gym.rollout import play_session
     from dorothie_gym.spaces import noop
 
-    config = EnvConfig() if plan.max_seconds is None else EnvConfig(max_seconds=plan.max_seconds)
     with compiling():
-        env = DuoWizardEnv(plan.town, plan.storyboard, config=config)
+        env = DuoWizardEnv(plan.town, plan.storyboard, config=env_config(plan.max_seconds, plan.word_errors))
         env.reset(seed=plan.seed)
         env.step({agent: noop(Role(agent), env.limits) for agent in env.agents})
     try:

@@ -9,6 +9,7 @@ from dorothie_gym.dialogue.guessing import act_of, guess_act, guess_spans
 from dorothie_gym.dialogue.lexicon import Lexicon, LexiconError, load_lexicon
 from dorothie_gym.dialogue.mishearing import Channel, word_error_rate
 from dorothie_gym.dialogue.phrases import Register
+from dorothie_gym.dialogue.recognising import Recogniser
 from dorothie_gym.dialogue.styles import SpeakerStyle, draw_style
 from dorothie_gym.dialogue.understanding import Heard, understand
 from dorothie_gym.dialogue.utterances import SHORTEST_SPAN, WORDS_PER_SECOND, Span, Utterance, speech_seconds
@@ -30,6 +31,7 @@ __all__ = [
     "Heard",
     "Lexicon",
     "LexiconError",
+    "Recogniser",
     "Register",
     "Span",
     "SpeakerStyle",

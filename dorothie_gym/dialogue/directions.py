@@ -16,6 +16,9 @@ _BACK = re.compile(
     r"|\b(doubl(e|ing)|turning|driving) back\b|\bflip(ping)? around\b|\bturn(ing)? the car around\b"
 )
 _AFTER_NEXT = re.compile(r"\b(the one after|one after the next|after next)\b")
+_RIGHT_OPENS = frozenset({"you", "so", "well", "ho", "i"})
+"""Behind these a "right" that opens a sentence is no direction: "right you are"."""
+
 _DOUBT = frozenset({"sure", "know", "certain", "idea", "clue", "wonder"})
 _CLAUSE_ENDS = frozenset({",", "?", "then", "and"})
 _TURNING_WORDS = frozenset({"left", "right", "straight", "turn", "turning", "back", "around", "way", "round"})
@@ -72,7 +75,8 @@ def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:
         before = words[place - 1] if place else ","
         after = words[place + 1] if place + 1 < len(words) else ""
         if word == "right":
-            masked[place] = _right(before, after, place, lists)
+            following = words[place + 2] if place + 2 < len(words) else ""
+            masked[place] = _right(before, after, following, place, lists)
         elif word == "left" and before in lists.left_not_after:
             masked[place] = "#left"
         elif word == "straight" and after == "away":
@@ -80,10 +84,12 @@ def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:
     return masked
 
 
-def _right(before: str, after: str, place: int, lists: WordLists) -> str:
+def _right(before: str, after: str, following: str, place: int, lists: WordLists) -> str:
     if after == "?" and place > 0 and (before == "," or before not in lists.turning):
         return "#tag"
     if before in lists.right_not_after or after in lists.right_never_before or (place == 0 and after == ","):
+        return "#ok"
+    if place == 0 and (after in _RIGHT_OPENS or (after == "then" and following in (",", ""))):
         return "#ok"
     turning = before in lists.turning and (before != "," or place == 0)
     return "#ok" if after in lists.right_not_before and not turning else "right"

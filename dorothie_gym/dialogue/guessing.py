@@ -17,13 +17,16 @@ from dorothie_gym.ontology import (
     DialogueAct,
     DialogueMove,
     GoalStatus,
+    ObjectClass,
     OntologyError,
+    Slot,
     SlotValue,
     parse_move,
 )
 
 _SENTENCE_END = re.compile(r"(?<=[.?!])\s+")
 _DOMAIN_RULE = "%domain"
+_WORD_LISTS = ("domain", "small_talk", "reports")
 
 _HEADS = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.EXPLAIN})
 """Moves behind which a command stands on its own: "no, stop"; "I can hardly see, slow down"."""
@@ -53,6 +56,24 @@ _STATEMENT = re.compile(
     r"|(there's|there is|there are|i can't|i cannot|i have to|we can't|we have to|the (road|way)|my (gps|map))\b"
 )
 """The beginning of a statement of its own; others behind "okay," or "yes," only say what is okay."""
+
+_CLAUSE = re.compile(
+    r"(so |and |but |also |now |then |, )*(also )?"
+    r"((i|we|you|it|this|that|there|he|she|they|every(body|one)|some(body|one)|nobody|who)\b"
+    r"(?! (one|place|stop|street|road|way|side|#\w+))('s|'m|'re|'ve|'ll|'d| )"
+    r"|(the |my |our |your )?(#landmark|#street|#object|road|way|map|gps|car) (is|has|was|comes|can|will|#status)\b)"
+)
+"""The beginning of a clause that has a subject of its own."""
+
+_SUBORDINATE = re.compile(
+    r"(and |so |then |, )*(when|if|once|after|before|because|as|while|since|until|till|unless|where)\b"
+)
+_SO = re.compile(r"(so|now|and now|so now)\b,? ?(?!that\b|far\b|much\b)", re.IGNORECASE)
+_TOLD = frozenset({DialogueMove.EXPLAIN, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.IRRELEVANT})
+_ANSWERED = frozenset({DialogueMove.CONFIRM, DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_W})
+_AIMED = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W})
+
+_ASKED_FOR = (ActionValue.QUERIED, ObjectClass.QUERIED)
 
 _MOVING = frozenset({ActionValue.STOP, ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_SWITCH})
 """Actions whose denial is a command to drive on: "don't stop here"."""
@@ -86,14 +107,17 @@ class Cues:
         answers: for the move before, what the guess becomes in its light.
         domain: words of rides.
         small_talk: words of other things.
+        reports: words by which somebody's wish is told, which is no small talk.
     """
 
     rules: tuple[Rule, ...]
     answers: Mapping[DialogueMove, Mapping[DialogueMove, DialogueMove]]
     domain: frozenset[str]
     small_talk: frozenset[str]
+    reports: frozenset[str]
 
 
+@functools.lru_cache(maxsize=4096)
 def guess_act(text: str, after: DialogueMove | None = None) -> DialogueAct:
     """Guesses move and slots from words.
 
@@ -110,6 +134,8 @@ def guess_act(text: str, after: DialogueMove | None = None) -> DialogueAct:
 def act_of(heard: Heard, after: DialogueMove | None = None) -> DialogueAct:
     """Returns the act that fits what was heard; see `guess_act`."""
     move = _move_of(heard)
+    if move is DialogueMove.INSTRUCT and GoalStatus.COMPLETE in heard.statuses and heard.masked.startswith("#status"):
+        move = DialogueMove.EXPLAIN  # "skip the Ikea" is a command, "made it to the Ikea" is none
     if after is not None:
         changes = _cues().answers.get(after)
         # Small talk stays small talk, unless it is a bare answer: "the blue one".
@@ -137,16 +163,21 @@ def _move_of(heard: Heard) -> DialogueMove:
 
 
 def _is_small_talk(heard: Heard) -> bool:
-    """Returns whether there is a word of small talk, and nothing that has to do with the ride."""
-    if heard.actions or heard.streets or heard.statuses or heard.objects:
+    """Returns whether there is a word of small talk, and nothing that has to do with the ride or somebody's wishes."""
+    if heard.actions or heard.streets or heard.objects or heard.landmarks:
         return False
-    return not _cues().small_talk.isdisjoint(heard.masked.split()) and not heard.landmarks
+    if any(status is not GoalStatus.PENDING for status in heard.statuses):  # "later" is said of anything
+        return False
+    words = set(heard.masked.split())
+    return not words.isdisjoint(_cues().small_talk) and words.isdisjoint(_cues().reports)
 
 
 def _slots(heard: Heard, move: DialogueMove) -> frozenset[SlotValue]:
     if move is DialogueMove.IRRELEVANT:
         return frozenset()
     values = set(heard.values)
+    if move is DialogueMove.CONFUSE:
+        values -= set(_ASKED_FOR)  # "what was that?" asks for words, not for what there is
     if heard.denied and move is DialogueMove.INSTRUCT:
         values -= set(heard.denied)
         if not any(isinstance(value, ActionValue) for value in values) and not _MOVING.isdisjoint(heard.denied):
@@ -188,35 +219,68 @@ def _parts(head: str, rest: str) -> bool:
     if rest.lower().strip(" .?!,") in word_lists().vocatives:
         return False
     first, second = guess_act(head), guess_act(rest)
+    if second.move is DialogueMove.ALIGN:
+        # "turn left, did you get that?"; but "hello, can you hear me?" asks one thing.
+        return bool(first.slots) and first.move not in _QUESTIONS
     if second.move is DialogueMove.INSTRUCT:
-        if _BARE_NAME.match(understand(rest).masked):
-            return False
-        if first.move is DialogueMove.INSTRUCT:
-            # "turn left, then right"; but "stop here, at the light" is one command.
-            return _GOING_ON.match(rest) is not None
-        return first.move in _HEADS and understand(rest).affirms is not False
+        return _commands_anew(head, rest, first)
     if second.move in _QUESTIONS:
         return first.move in _BEFORE_QUESTIONS and _ASKS_ANEW.match(rest.lower()) is not None
     if second.move is DialogueMove.EXPLAIN:
-        return first.move in _BEFORE_REASONS and not first.slots and _STATEMENT.match(rest.lower()) is not None
+        return _tells_anew(head, rest, first, second)
     return False
+
+
+def _commands_anew(head: str, rest: str, first: DialogueAct) -> bool:
+    """Returns whether what follows the comma is a command of its own."""
+    if _is_clause(head) and first.move in _TOLD and _SO.match(rest):
+        return True  # "we are done here, so the Ikea next"
+    heard = understand(rest)
+    if _BARE_NAME.match(heard.masked):
+        return False
+    if first.move is DialogueMove.INSTRUCT:
+        # "turn left, then right"; but "stop here, at the light" is one command.
+        return _GOING_ON.match(rest) is not None
+    return first.move in _HEADS and heard.affirms is not False
+
+
+def _tells_anew(head: str, rest: str, first: DialogueAct, second: DialogueAct) -> bool:
+    """Returns whether what follows the comma is a statement of its own."""
+    if first.move in _BEFORE_REASONS and not first.slots and _STATEMENT.match(rest.lower()) is not None:
+        return True
+    if not _is_clause(rest) or _SUBORDINATE.match(understand(head).masked):
+        return False
+    if first.move in _AIMED or first.move in _ANSWERED:
+        return True
+    # Two statements are told apart by what they are about.
+    about, other = first.values(Slot.LANDMARK), second.values(Slot.LANDMARK)
+    return bool(about) and bool(other) and not set(about) & set(other)
+
+
+def _is_clause(text: str) -> bool:
+    return _CLAUSE.match(understand(text).masked) is not None
 
 
 @functools.cache
 def _cues() -> Cues:
     data = read_data("cues.yaml")
-    soft = data.get("soft", "")
-    rules = tuple(_rule(f"cues.yaml: moves[{number}]", rule, soft) for number, rule in enumerate(data.get("moves", [])))
+    terms = {
+        "{soft}": data.get("soft", ""),
+        "{verb}": f"(?:{'|'.join(strings('cues.yaml: verbs', data.get('verbs')))})",
+    }
+    rules = tuple(_rule(f"cues.yaml: moves[{n}]", rule, terms) for n, rule in enumerate(data.get("moves", [])))
     answers = {
         parse_move(before): {parse_move(guess): parse_move(move) for guess, move in changes.items()}
         for before, changes in data.get("answers", {}).items()
     }
-    words = {name: frozenset(strings(f"cues.yaml: {name}", data.get(name))) for name in ("domain", "small_talk")}
-    return Cues(rules, answers, words["domain"], words["small_talk"])
+    words = {name: frozenset(strings(f"cues.yaml: {name}", data.get(name))) for name in _WORD_LISTS}
+    return Cues(rules, answers, **words)
 
 
-def _rule(where: str, rule: Mapping[str, Any], soft: str) -> Rule:
-    texts = [text.replace("{soft}", soft) for text in strings(f"{where}.cues", rule.get("cues"))]
+def _rule(where: str, rule: Mapping[str, Any], terms: Mapping[str, str]) -> Rule:
+    texts = list(strings(f"{where}.cues", rule.get("cues")))
+    for name, expression in terms.items():
+        texts = [text.replace(name, expression) for text in texts]
     try:
         move = parse_move(rule["move"])
         acted = _either([text[1:] for text in texts if text.startswith("@")])

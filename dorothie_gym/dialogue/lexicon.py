@@ -62,13 +62,22 @@ class Lexicon:
 
 
 _TYPOGRAPHY = str.maketrans({"\u2019": "'", "\u2018": "'", "-": " ", "/": " "})
+_CONTRACTED = {
+    "y'all": ("you",), "ya'll": ("you",), "yall": ("you",), "lemme": ("let", "me"), "gimme": ("give", "me"),
+    "'em": ("them",), "cuz": ("because",), "'cause": ("because",), "imma": ("i'll",), "dont": ("don't",),
+    "cant": ("can't",), "thats": ("that's",), "wont": ("won't",), "didnt": ("didn't",), "im": ("i'm",),
+}  # fmt: skip
+"""Words run together, or written without their apostrophe, as people type and recognisers write them."""
 _STOP = re.compile(r"[.;:!\u2014\u2026]+(?=\s|$)")
 _WORD = re.compile(r"[a-z0-9']+|\?|,")
 
 
 def split_words(text: str) -> list[str]:
-    """Returns lower-case words; "?" and "," stand alone, other stops become ",", hyphens part words."""
-    return _WORD.findall(_STOP.sub(" , ", text.lower().translate(_TYPOGRAPHY)))
+    """Returns lower-case words; "?" and "," stand alone, other stops become ",", hyphens part words, "lemme" is two."""
+    words = _WORD.findall(_STOP.sub(" , ", text.lower().translate(_TYPOGRAPHY)))
+    if _CONTRACTED.keys().isdisjoint(words):
+        return words
+    return [part for word in words for part in _CONTRACTED.get(word, (word,))]
 
 
 def read_data(name: str) -> dict[str, Any]:

@@ -101,6 +101,11 @@ def word_error_rate(said: Sequence[str], heard: Sequence[str]) -> float:
     return edits / words if words else math.nan
 
 
+def same_words(said: str, heard: str) -> bool:
+    """Returns whether two texts have the same words, case and punctuation aside."""
+    return _bare(said) == _bare(heard)
+
+
 def misheard(word: str, draw: Callable[[], float]) -> str:
     """Returns a word that may be heard for another: one that sounds much like it, more probably the more alike.
 

@@ -19,6 +19,9 @@ _STREET_KINDS = frozenset({"street", "st", "road", "rd", "avenue", "ave", "drive
 _SHORTEST = 4
 """Names of fewer letters are understood only as they are."""
 
+_VERB_ENDINGS = ("'ll", "'re", "'ve", "'d", "n't")
+"""No name ends so, whatever it sounds like: "she'll"."""
+
 _ALIKE = 84.0
 """Least likeness of a misspelt name, in percent of letters that need no change (rapidfuzz's ratio)."""
 
@@ -81,7 +84,7 @@ def _at(words: tuple[str, ...], place: int) -> tuple[SlotValue | None, int]:
     word = words[place].removesuffix("'s")
     if word != words[place] and (word,) in load_lexicon().names:
         return load_lexicon().names[word,], 1
-    if len(word) >= _SHORTEST and word not in _known_words():
+    if len(word) >= _SHORTEST and word not in _known_words() and not word.endswith(_VERB_ENDINGS):
         return nearest_name(word), 1
     return None, 1
 

@@ -37,6 +37,9 @@ class EnvConfig:
         max_seconds: the session is cut off (truncated) after this long [s].
         words_per_second: how fast everybody speaks.
         observe_acts: whether others' words come with their acts (move and slots), or as text only.
+        word_error_rate: how badly the participant and the Co-Wizard hear each other, in [0, 1): errors of a recogniser
+            per word that is said. They then observe its transcript, and of words that were misheard no act but the one
+            that rules read from the transcript. The Ad-Wizard observes what was said.
         world: traffic, pedestrians and the like.
         rewards: weights of the reward's terms.
     """
@@ -45,6 +48,7 @@ class EnvConfig:
     max_seconds: float = 900.0
     words_per_second: float = 2.5
     observe_acts: bool = True
+    word_error_rate: float = 0.0
     world: WorldConfig = field(default_factory=WorldConfig)
     rewards: RewardWeights = field(default_factory=RewardWeights)
 
@@ -59,6 +63,8 @@ class EnvConfig:
             raise ValueError(f"EnvConfig.max_seconds is {self.max_seconds}; it must be in 1..86400 s")
         if not 0.5 <= self.words_per_second <= 20.0:
             raise ValueError(f"EnvConfig.words_per_second is {self.words_per_second}; it must be in 0.5..20")
+        if not 0.0 <= self.word_error_rate < 1.0:
+            raise ValueError(f"EnvConfig.word_error_rate is {self.word_error_rate}; it must be at least 0 and below 1")
 
     @property
     def frames(self) -> int:

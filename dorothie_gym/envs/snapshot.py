@@ -71,9 +71,8 @@ class LightStates:
         if not self._since <= time < self._until:
             remaining = (_remaining(programme, time) for programme in self._programmes)
             self._since, self._until = time, time + min(remaining, default=math.inf) - _CLOSE
-            self._states = {
-                signal: programme.colour(signal, time) for programme in self._programmes for signal in programme.signals
-            }
+            phases = [(programme.phase_at(time), programme.signals) for programme in self._programmes]
+            self._states = {signal: phase.colour(signal) for phase, signals in phases for signal in signals}
         return self._states
 
 

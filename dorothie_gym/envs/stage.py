@@ -8,7 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from dorothie_gym.dialogue import Annotator, Conversation, Span, Utterance, guess_spans, word_act
+from dorothie_gym.dialogue import (
+    Annotator,
+    Channel,
+    Conversation,
+    Recogniser,
+    Span,
+    Utterance,
+    draw_style,
+    guess_spans,
+    word_act,
+)
 from dorothie_gym.envs.adversary import Adversary
 from dorothie_gym.envs.beliefs import Beliefs
 from dorothie_gym.envs.config import EnvConfig
@@ -88,7 +98,8 @@ class Stage:
         self, town: Town, network: TownNetwork, scenario: Scenario, config: EnvConfig, limits: SpaceLimits
     ) -> None:
         self.scenario, self.config, self.limits = scenario, config, limits
-        world_seed, word_seed = np.random.SeedSequence([scenario.seed, 1]).spawn(2)
+        # One more subsystem is one more child: those before it keep theirs.
+        world_seed, word_seed, ear_seed, style_seed = np.random.SeedSequence([scenario.seed, 1]).spawn(4)
         self.world = World(town, config.world, seed=world_seed, departure=scenario.departure, network=network)
         self.task = TaskState(scenario.storyboard)
         self.beliefs = Beliefs(town, scenario)
@@ -97,7 +108,9 @@ class Stage:
         self._annotator = Annotator(
             scenario.storyboard.landmarks[subgoal.landmark].name for subgoal in scenario.storyboard.subgoals
         )
-        self._words = np.random.default_rng(word_seed)
+        self._words, styles = np.random.default_rng(word_seed), np.random.default_rng(style_seed)
+        self._styles = {role: draw_style(role, styles) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
+        self._recogniser = Recogniser(Channel(rate=config.word_error_rate), np.random.default_rng(ear_seed))
         prospect = Prospect(self.world)
         self._views = Views(self.world, scenario, self.task, self.beliefs, limits, config.observe_acts, prospect)
         self.masks = Masks(self.world, self.task, limits, prospect)
@@ -181,11 +194,15 @@ class Stage:
         speech = action.speech
         if speech is None:
             return False
-        text = speech.text.strip() or plain_text(word_act(speech.act, role, self._words), UTTERANCE_LENGTH)
+        text = speech.text.strip() or self._worded(speech.act, role)
         reason = self._conversation.say(role, Span(text, speech.act), self.world.time)
         if reason is not None:
             self._refuse(role, "speech", reason)
         return reason is None
+
+    def _worded(self, act: DialogueAct, role: Role) -> str:
+        """Words for an act that came without, in the speaker's style."""
+        return plain_text(word_act(act, role, self._words, style=self._styles[role]), UTTERANCE_LENGTH)
 
     def _play_co_wizard(self, action: RoleAction) -> None:
         assert isinstance(action, CoWizardAction)
@@ -276,16 +293,19 @@ class Stage:
         self._log(EventType.SUBGOAL, Role.AGENT, data)
 
     def _new_moment(self, utterances: list[Utterance], message: str) -> Moment:
+        said: dict[Role, Utterance] = {}
         heard: dict[Role, Utterance] = {}
         for utterance in utterances:
-            heard[utterance.speaker] = utterance
+            speaker = utterance.speaker
+            said[speaker], heard[speaker] = utterance, self._recogniser.hear(utterance)
             self.said.append(utterance)
-            self.beliefs.hear(utterance.speaker, self._understood(utterance))
-            self._log_utterance(utterance)
+            # The Co-Wizard's beliefs are of what it takes itself, and the human, to have said.
+            self.beliefs.hear(speaker, self._understood(utterance if speaker is Role.CO_WIZARD else heard[speaker]))
+            self._log_utterance(utterance, heard[speaker])
         now = self.world.time
         self._annotator.tick(now)
         speaking = {role: self._conversation.speaking(role, now) for role in ROLES}
-        return Moment(heard=heard, message=message, speaking=speaking)
+        return Moment(said=said, heard=heard, message=message, speaking=speaking)
 
     def _understood(self, utterance: Utterance) -> tuple[DialogueAct, ...]:
         """What the Co-Wizard may take from an utterance: its acts, or where they do not show, what words sound like."""
@@ -293,15 +313,17 @@ class Stage:
             return utterance.acts
         return tuple(span.act for span in guess_spans(utterance.text))
 
-    def _log_utterance(self, utterance: Utterance) -> None:
+    def _log_utterance(self, utterance: Utterance, heard: Utterance) -> None:
         exchanges, transaction = self._annotator.update(utterance)
         number = self.counts["utterances"]
         self.counts["utterances"] += 1
+        transcript = {"recognised": heard.text} if self.config.word_error_rate else {}
         for span, exchange in zip(utterance.spans, exchanges, strict=True):
             self.counts["acts"] += 1
             data = {
                 "utterance": number,
                 "text": utterance.text,
+                **transcript,
                 "span": span.text,
                 "move": span.act.move.label,
                 "slots": {label: list(values) for label, values in span.act.slot_labels().items()},

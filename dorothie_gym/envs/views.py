@@ -45,11 +45,13 @@ class Moment:
     """What changed in the decision that a view is of.
 
     Attributes:
-        heard: utterances that ended, by speaker.
+        said: utterances that ended, by speaker.
+        heard: the same, as the one who is spoken to hears them.
         message: of the Ad-Wizard to the participant.
         speaking: seconds that each role has still to speak.
     """
 
+    said: Mapping[Role, Utterance]
     heard: Mapping[Role, Utterance]
     message: str
     speaking: Mapping[Role, float]
@@ -117,8 +119,9 @@ class Views:
         co_wizard["speaking"][0] = moment.speaking[Role.CO_WIZARD]
         self._write_driving(co_wizard)
         self._write_props(ad_wizard["props"])
-        self._write_heard(Role.CO_WIZARD, moment, participant, ad_wizard)
-        self._write_heard(Role.PARTICIPANT, moment, co_wizard, ad_wizard)
+        for speaker, listener in ((Role.CO_WIZARD, participant), (Role.PARTICIPANT, co_wizard)):
+            self._write_heard(speaker, moment.heard.get(speaker), listener)
+            self._write_heard(speaker, moment.said.get(speaker), ad_wizard)
         return dict(zip(self._agents, views, strict=True))
 
     def motion(self) -> Motion:
@@ -218,19 +221,15 @@ class Views:
         for row, prop in zip(table, self._world.actors.props, strict=False):
             row[:] = _PROP_NUMBERS[prop.kind], prop.position[0], prop.position[1], prop.heading
 
-    def _write_heard(self, speaker: Role, moment: Moment, *views: Observation) -> None:
-        utterance = moment.heard.get(speaker)
+    def _write_heard(self, speaker: Role, utterance: Utterance | None, view: Observation) -> None:
         if utterance is None:
-            for view in views:
-                view[_TEXT[speaker]] = ""
+            view[_TEXT[speaker]] = ""
             return
-        text = plain_text(utterance.text, MAX_UTTERANCE)
-        for view in views:
-            view[_TEXT[speaker]] = text
-            if self._observe_acts:
-                for k, act in enumerate(utterance.acts[: self._limits.spans]):
-                    view[f"{speaker}_moves"][k] = int(act.move)
-                    view[f"{speaker}_slots"][k] = encode_slots(act.slots)
+        view[_TEXT[speaker]] = plain_text(utterance.text, MAX_UTTERANCE)
+        if self._observe_acts:
+            for k, act in enumerate(utterance.acts[: self._limits.spans]):
+                view[f"{speaker}_moves"][k] = int(act.move)
+                view[f"{speaker}_slots"][k] = encode_slots(act.slots)
 
 
 _TEXT = {role: f"{role}_text" for role in Role}

@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import yaml
+
 from dorothie_gym.dialogue import guess_act
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, parse_act, parse_move
 
@@ -39,14 +41,11 @@ def read_act(label: str) -> DialogueAct:
 
 def read_annotated(name: str) -> list[Annotated]:
     found = []
-    for line in (DATA / f"heard_{name}.txt").read_text(encoding="utf-8").splitlines():
-        if line and not line.startswith("#"):
-            speaker, after, text, acts = (field.strip() for field in line.split(" | "))
-            spans = tuple(part.strip() for part in text.split("//"))
-            labels = tuple(read_act(part) for part in acts.split("//"))
-            assert len(spans) == len(labels), line
-            role = Role.PARTICIPANT if speaker == "P" else Role.CO_WIZARD
-            found.append(Annotated(role, None if after == "-" else parse_move(after), spans, labels))
+    for row in yaml.safe_load((DATA / f"heard_{name}.yaml").read_text(encoding="utf-8")):
+        spans, acts = tuple(row["says"]), tuple(read_act(label) for label in row["acts"])
+        assert len(spans) == len(acts), row
+        after = parse_move(row["after"]) if "after" in row else None
+        found.append(Annotated(Role(row["by"]), after, spans, acts))
     return found
 
 

@@ -9,9 +9,9 @@ from dorothie_gym.dialogue import guess_spans, understand
 from tests.dialogue.heard import read_annotated, score
 
 
-@pytest.mark.parametrize("half", ["dev", "test"])
-def test_hand_written_utterances_are_understood(half):
-    annotated = read_annotated(half)
+@pytest.mark.parametrize("name", ["dev", "test", "voices", "more"])
+def test_hand_written_utterances_are_understood(name):
+    annotated = read_annotated(name)
     assert len(annotated) >= 75
     alone = score(annotated, context=False)
     assert alone.moves >= 0.8 and alone.f1 >= 0.8, alone.wrong
@@ -19,9 +19,16 @@ def test_hand_written_utterances_are_understood(half):
     assert score(annotated).moves >= alone.moves
 
 
-@pytest.mark.parametrize("half", ["dev", "test"])
-def test_hand_written_utterances_are_parted_into_their_acts(half):
-    annotated = read_annotated(half)
+def test_utterances_that_no_rule_was_written_for_are_understood():
+    annotated = read_annotated("unseen")
+    assert len(annotated) >= 60
+    found = score(annotated)
+    assert found.moves >= 0.75 and found.f1 >= 0.65, found.wrong
+
+
+@pytest.mark.parametrize("name", ["dev", "test", "voices", "more", "unseen"])
+def test_hand_written_utterances_are_parted_into_their_acts(name):
+    annotated = read_annotated(name)
     right = sum(len(guess_spans(item.text, item.after)) == len(item.acts) for item in annotated)
     assert right / len(annotated) >= 0.85
 

@@ -77,6 +77,17 @@ def with_hidden_landmarks_moved(scenario: Scenario, env: DuoWizardEnv, rng: np.r
     return dataclasses.replace(scenario, storyboard=dataclasses.replace(board, landmarks=tuple(landmarks)))
 
 
+def with_other_errands(scenario: Scenario) -> Scenario:
+    """The scenario with a story of its own, and with every errand at the place of another one."""
+    board = scenario.storyboard
+    places = [subgoal.landmark for subgoal in board.subgoals]
+    subgoals = tuple(
+        dataclasses.replace(subgoal, landmark=place, description=f"errand {k}")
+        for k, (subgoal, place) in enumerate(zip(board.subgoals, places[1:] + places[:1], strict=True))
+    )
+    return dataclasses.replace(scenario, storyboard=dataclasses.replace(board, story="A story.", subgoals=subgoals))
+
+
 def digest(value: Any) -> str:
     """A hash of dicts, tuples, arrays, numbers and texts, to the last bit."""
     found = hashlib.sha256()

@@ -13,7 +13,13 @@ from dorothie_gym.envs.scenario import draw_scenario
 from dorothie_gym.ontology import Role
 from dorothie_gym.spaces import SubgoalColumn, noop
 from dorothie_gym.world.config import WorldConfig
-from tests.envs.sessions_played import play_at_random, play_by_script, replay, with_hidden_landmarks_moved
+from tests.envs.sessions_played import (
+    play_at_random,
+    play_by_script,
+    replay,
+    with_hidden_landmarks_moved,
+    with_other_errands,
+)
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +56,54 @@ def test_places_of_hidden_landmarks_do_not_show(env: DuoWizardEnv, play: Any, de
 @pytest.mark.parametrize(("play", "decisions"), [(play_at_random, 120), (play_by_script, 600)])
 def test_places_of_hidden_landmarks_never_show(env: DuoWizardEnv, play: Any, decisions: int, seed: int) -> None:
     check_that_hidden_places_do_not_show(env, play, seed, decisions)
+
+
+@pytest.mark.parametrize("config", [{"word_error_rate": 0.25}, {"word_error_rate": 0.25, "observe_acts": False}])
+def test_places_of_hidden_landmarks_do_not_show_in_what_is_misheard(config: dict[str, Any]) -> None:
+    noisy = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2), **config))
+    check_that_hidden_places_do_not_show(noisy, play_by_script, seed=2, decisions=120)
+
+
+def check_that_errands_do_not_show(env: DuoWizardEnv, play: Any, seed: int, decisions: int) -> None:
+    """Plays a session, and plays its actions again with other errands and another story, up to the first arrival.
+
+    Actions of the Ad-Wizard on the task are left out: whether one is refused tells of the task, and is told to it.
+    """
+    played = list(play(env, seed=seed, decisions=decisions))
+    idle = noop(Role.AD_WIZARD, env.limits)
+    actions = [{**actions, "ad_wizard": idle} for _, _, actions in played if actions]
+    runs = []
+    for scenario in (env.scenario, with_other_errands(env.scenario)):
+        run = []
+        for observations, infos in replay(env, scenario, actions):
+            run.append((observations, infos))
+            if any(event.type == "Subgoal" for event in env.last_events):
+                break
+        runs.append(run)
+    role = str(Role.CO_WIZARD)
+    assert min(len(run) for run in runs) > 10
+    for k, ((observations, infos), (others, other_infos)) in enumerate(zip(*runs, strict=False)):
+        for field, value in observations[role].items():
+            np.testing.assert_array_equal(others[role][field], value, err_msg=f"{field}, decision {k}")
+        for field in ("action_mask", "refused"):
+            np.testing.assert_equal(other_infos[role][field], infos[role][field])
+        assert others["participant"]["story"] != observations["participant"]["story"]
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.25])
+@pytest.mark.parametrize("play", [play_at_random, play_by_script])
+def test_errands_do_not_show_to_the_co_wizard(play: Any, rate: float) -> None:
+    env = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2), word_error_rate=rate))
+    check_that_errands_do_not_show(env, play, seed=3, decisions=60)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(200, 215))
+@pytest.mark.parametrize("rate", [0.0, 0.2])
+@pytest.mark.parametrize("play", [play_at_random, play_by_script])
+def test_errands_never_show_to_the_co_wizard(play: Any, rate: float, seed: int) -> None:
+    env = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2), word_error_rate=rate))
+    check_that_errands_do_not_show(env, play, seed=seed, decisions=400)
 
 
 def play_in_silence(env: DuoWizardEnv, seed: int, decisions: int = 4) -> list[dict[str, Any]]:

@@ -2,10 +2,7 @@ from __future__ import annotations
 
 import json
 import os
-import random
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -14,23 +11,9 @@ import pytest
 from dorothie_gym.envs.config import EnvConfig
 from dorothie_gym.rollout import generate_corpus
 from dorothie_gym.sessions import Corpus, SessionError
+from tests.rollout.killing import begin, contents, kill_again_and_again
 
-ROOT = Path(__file__).parents[2]
 SHORT = EnvConfig(max_seconds=8.0)
-COMMAND = [sys.executable, "-m", "dorothie_gym.cli", "generate", "--seed", "5", "--sessions", "6"]
-
-
-def contents(root: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(root)): path.read_bytes() for path in sorted(root.rglob("*")) if path.is_file()}
-
-
-def begin(out: Path, *, seconds: float, workers: int) -> subprocess.Popen[str]:
-    arguments = ["--out", str(out), "--max-seconds", str(seconds), "--workers", str(workers)]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    return subprocess.Popen(
-        [*COMMAND, *arguments], env=environment, text=True, start_new_session=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +54,18 @@ def test_session_that_is_missing_is_played_anew_with_the_same_bytes(corpus: Path
     assert contents(corpus) == before
 
 
+def test_corpus_with_word_errors_has_transcripts_and_says_so(tmp_path: Path) -> None:
+    settings = EnvConfig(max_seconds=40.0, word_error_rate=0.4)
+    process = begin(tmp_path / "one", sessions=2, seconds=40.0, workers=1, more={"word-errors": 0.4})
+    _, errors = process.communicate()
+    assert process.returncode == 0, errors
+    made = generate_corpus(tmp_path / "two", sessions=2, seed=5, config=settings)
+    assert made.played == 2 and contents(tmp_path / "one") == contents(tmp_path / "two")
+    moves = [move for session in Corpus.load(tmp_path / "two") for move in session.moves()]
+    assert all(move.recognised is not None for move in moves)
+    assert any(move.recognised != move.text for move in moves)
+
+
 @pytest.mark.parametrize("change", [{"seed": 6}, {"sessions": 7}, {"config": EnvConfig(max_seconds=9.0)}])
 def test_corpus_of_other_settings_is_not_gone_on_with(corpus: Path, change: dict[str, object]) -> None:
     settings: dict[str, object] = {"sessions": 6, "seed": 5, "config": SHORT, **change}
@@ -96,25 +91,12 @@ def test_two_at_once_are_kept_apart(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_killed_at_random_moments_it_ends_in_the_bytes_of_an_undisturbed_run(tmp_path: Path) -> None:
-    generate_corpus(tmp_path / "one", sessions=6, seed=5, config=EnvConfig(max_seconds=60.0))
-    moments, kept = random.Random(0), 0
-    for _ in range(5):
-        process = begin(tmp_path / "two", seconds=60, workers=2)
-        time.sleep(moments.uniform(2.0, 8.0))
-        os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
-        finished = len(list((tmp_path / "two").glob("[tv]*/**/session.json")))
-        assert finished >= kept, "no finished session is lost"
-        kept = finished
-    process = begin(tmp_path / "two", seconds=60, workers=2)
-    _, errors = process.communicate()
-    assert process.returncode == 0, errors
-    assert contents(tmp_path / "two") == contents(tmp_path / "one")
+    kill_again_and_again(tmp_path, times=6, sessions=6, seconds=60.0, longest=3.0)
 
 
 def test_two_workers_make_the_same_bytes_and_ctrl_c_tells_how_to_go_on(corpus: Path, tmp_path: Path) -> None:
     out = tmp_path / "two"
-    process = begin(out, seconds=8, workers=2)
+    process = begin(out, sessions=6, seconds=8, workers=2)
     while process.poll() is None and not list(out.glob("[tv]*/**/session.json")):
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGINT)

@@ -1,11 +1,16 @@
-"""What the package promises of its scripted three: errands are done by talk, and nothing is hit."""
+"""What the package promises of its scripted three: errands are done by talk, and nothing is hit.
+
+`python -m tests.rollout.promises` measures the same over as many sessions as one likes.
+"""
 
 from pathlib import Path
 
 import pytest
 
 from dorothie_gym import DuoWizardEnv, Role, make_policy
+from dorothie_gym.envs.config import EnvConfig
 from dorothie_gym.rollout import play_session
+from tests.rollout.promises import Promise, success
 
 MAPS = Path(__file__).parents[2] / "../shared/maps"
 
@@ -27,3 +32,30 @@ def test_nineteen_of_twenty_sessions_succeed_exceptions_included(town: str) -> N
         if not summary["success"]:
             failures.append((seed, summary))
     assert len(failures) <= 1, failures
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_words_alone_are_enough() -> None:
+    """Acts are withheld: the car and the human read each other's words."""
+    found = success(Promise(config=EnvConfig(observe_acts=False)), sessions=20)
+    assert found["success"] >= 0.85, found["failed"]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_errands_are_done_by_talk_and_not_without() -> None:
+    found = success(Promise(config=EnvConfig(max_seconds=600.0), cut=True), sessions=20)
+    assert found["success"] < 0.2 and found["utterances"] == 0
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_what_is_misheard_is_mostly_put_right() -> None:
+    found = success(Promise(config=EnvConfig(word_error_rate=0.1)), sessions=20)
+    assert found["success"] >= 0.75, found["failed"]
+
+
+def test_mute_wizards_and_participants_say_nothing() -> None:
+    found = success(Promise(config=EnvConfig(max_seconds=15.0), cut=True), sessions=1)
+    assert found["utterances"] == 0 and found["success"] == 0

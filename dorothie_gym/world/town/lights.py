@@ -30,6 +30,12 @@ class LightPhase:
     green: tuple[int, ...] = ()
     yellow: tuple[int, ...] = ()
 
+    def colour(self, signal: int) -> LightColour:
+        """What a signal shows while the phase lasts."""
+        if signal in self.green:
+            return LightColour.GREEN
+        return LightColour.YELLOW if signal in self.yellow else LightColour.RED
+
 
 @dataclass(frozen=True, kw_only=True)
 class LightProgramme:
@@ -67,7 +73,4 @@ class LightProgramme:
 
     def colour(self, signal: int, time: float) -> LightColour:
         """What a signal shows at a simulated time [s]."""
-        phase = self.phase_at(time)
-        if signal in phase.green:
-            return LightColour.GREEN
-        return LightColour.YELLOW if signal in phase.yellow else LightColour.RED
+        return self.phase_at(time).colour(signal)

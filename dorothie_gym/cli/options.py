@@ -1,0 +1,33 @@
+"""Options that several commands have, and what they mean for an environment."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from dorothie_gym.envs.config import EnvConfig
+
+WordErrors = Annotated[
+    float,
+    typer.Option(
+        min=0.0,
+        max=0.95,
+        help="Word error rate of the recogniser through which the participant and the Co-Wizard hear each other.",
+    ),
+]
+
+
+def env_config(max_seconds: float | None, word_errors: float) -> EnvConfig:
+    """The configuration of an environment that a command line asks for.
+
+    Args:
+        max_seconds: simulated seconds after which a session is cut off; None for what is usual.
+        word_errors: word error rate of the recogniser.
+    """
+    from dorothie_gym.envs.config import EnvConfig
+
+    if max_seconds is None:
+        return EnvConfig(word_error_rate=word_errors)
+    return EnvConfig(max_seconds=max_seconds, word_error_rate=word_errors)
