@@ -13,7 +13,7 @@ from dorothie_gym.policies.speech import Remark, remark
 GUIDES_AT_ONCE = 0.12
 """Chance that the way to a place that the car does not know is told from where it has been described."""
 
-TELLS_LOOKS = 0.35
+TELLS_LOOKS = 0.5
 """Chance that a place is described by what stands there, too."""
 
 _FAMOUS = frozenset(LandmarkName) - {

@@ -80,8 +80,8 @@ class Style:
             hints=float(rng.uniform(0.2, 0.65)),
             reasons=float(rng.uniform(0.15, 0.45)),
             aligns=float(rng.uniform(0.0, 0.15)),
-            nods=float(rng.uniform(0.35, 0.8)),
-            curious=float(rng.uniform(0.05, 0.4)),
+            nods=float(rng.uniform(0.2, 0.55)),
+            curious=float(rng.uniform(0.02, 0.25)),
             puzzled=float(rng.uniform(0.0, 0.35)),
         )
 
