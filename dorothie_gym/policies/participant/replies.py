@@ -335,7 +335,10 @@ def _alignment(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard
 
 
 def _request(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
-    if mind.goal is not None:
+    """A car that wants to be guided is; one that names a place, or a turn, only repeats what it was told."""
+    if act.values(Slot.LANDMARK):
+        _uptake(mind, view, act, words, rng)
+    elif mind.goal is not None and not act.values(Slot.ACTION):
         mind.guiding = True
         _say_way(mind, view, DialogueMove.INSTRUCT, rng)
 
