@@ -82,7 +82,7 @@ class Style:
             asks=float(rng.uniform(0.5, 1.0)),
             proposes=float(rng.uniform(0.1, 0.6)),
             mishears=float(rng.uniform(0.0, 0.05)),
-            careful=float(rng.uniform(0.8, 1.0)),
+            careful=float(rng.uniform(0.9, 1.0)),
             eases=bool(rng.random() < 0.3),
             gentle=bool(rng.random() < 0.25),
             rambles=float(rng.uniform(0.05, 0.4)),

@@ -77,10 +77,10 @@ class Style:
             patience=float(rng.uniform(7.0, 14.0)),
             chat=float(rng.uniform(40.0, 120.0)),
             waits=float(rng.uniform(0.5, 0.95)),
-            hints=float(rng.uniform(0.2, 0.65)),
-            reasons=float(rng.uniform(0.15, 0.45)),
+            hints=float(rng.uniform(0.3, 0.75)),
+            reasons=float(rng.uniform(0.2, 0.5)),
             aligns=float(rng.uniform(0.0, 0.15)),
-            nods=float(rng.uniform(0.2, 0.55)),
+            nods=float(rng.uniform(0.35, 0.7)),
             curious=float(rng.uniform(0.02, 0.25)),
             puzzled=float(rng.uniform(0.0, 0.35)),
         )

@@ -37,7 +37,7 @@ ELSEWHERE = 40.0
 SAYS_IT_ALL = 0.85
 """Chance that the order of two tasks is told by naming the first one as well."""
 
-NODS_FIRST = 0.6
+NODS_FIRST = 0.85
 """Chance that something that is about to be said begins with a word for what the car has said meanwhile."""
 
 JUST_TOLD = 5.0
