@@ -296,6 +296,10 @@ class Journey:
             for way in choice.exits
         )
 
+    def turns_round_first(self, town: Town, station: float) -> bool:
+        """Whether the route turns round before its next junction with a choice."""
+        return self.changes_before(self.next_crossing(town, station))
+
     def changes_before(self, crossing: Crossing | None) -> bool:
         """Whether the route turns round before the given junction (or before the goal, where None)."""
         for leg in self.legs[1:]:

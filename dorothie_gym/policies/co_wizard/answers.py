@@ -133,9 +133,9 @@ def _what_it_sees(mind: CoWizardMind, view: View) -> None:
 def _which_way(mind: CoWizardMind, view: View) -> None:
     turns = _turns(mind, view)
     if mind.directive is None and turns:
-        for k, (values, direction) in enumerate(turns):
-            wording = Wording(direction=direction, topic="plan")
-            mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, *values, wording=wording, joined=k > 0))
+        for k, (told, side) in enumerate(turns):
+            wording = Wording(direction=side, topic="plan")
+            mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, *told, wording=wording, joined=k > 0))
         return
     way = wanted_exit(mind, view)
     if way is None:
@@ -157,7 +157,7 @@ def _which_way(mind: CoWizardMind, view: View) -> None:
 
 def _turns(mind: CoWizardMind, view: View) -> list[tuple[list[SlotValue], Direction]]:
     """The next turns of the plan that lead elsewhere than straight on, at most two."""
-    if mind.journey is None or mind.journey.changes_before(mind.journey.next_crossing(mind.town, view.station)):
+    if mind.journey is None or mind.journey.turns_round_first(mind.town, view.station):
         return []
     found: list[tuple[list[SlotValue], Direction]] = []
     for crossing in itertools.islice(mind.journey.crossings(mind.town, view.station), CROSSINGS):

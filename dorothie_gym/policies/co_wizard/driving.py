@@ -45,13 +45,13 @@ PAUSE_BEFORE = 8.0
 """A car that does not know the way stops this far before a junction [m]."""
 
 GENTLE = 20
-"""Speed at which the car comes up to a place that it has missed before, and into turns by who eases [km/h]."""
+"""Speed at which the gentle come up to a place, and those who ease into turns [km/h]."""
 
 EASE_WITHIN = 40.0
 """Who eases into turns slows down when the junction is this near [m]."""
 
-GENTLE_WITHIN = 140.0
-"""A place that was missed before is driven up to gently from here on [m]."""
+GENTLE_WITHIN = 70.0
+"""Who drives gently comes up slowly to a place on the map from here on, if no junction comes before it [m]."""
 
 
 HELD_UP = 0.4
@@ -306,10 +306,13 @@ def _turns_soon(mind: CoWizardMind, view: View) -> bool:
 
 
 def _close(mind: CoWizardMind, view: View) -> bool:
-    """Whether a goal that the car has driven past before is so near that it should come up to it gently."""
+    """Whether the goal is so near that who drives gently, or has driven past it before, comes up to it slowly."""
     if mind.journey is None or not mind.exact:
         return False
-    return bool(mind.misses) and mind.journey.left(view.station) < GENTLE_WITHIN
+    left = mind.journey.left(view.station)
+    if mind.misses:
+        return left < 2.0 * GENTLE_WITHIN
+    return mind.style.gentle and left < GENTLE_WITHIN and mind.journey.next_crossing(mind.town, view.station) is None
 
 
 def _comfort(mind: CoWizardMind, view: View) -> Physical | None:

@@ -109,9 +109,7 @@ def hear_goal(
     if dropped is not None:
         wording = Wording(topic="changed", dropped=dropped)
         mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, name, wording=wording))
-        if mind.journey is not None and mind.journey.changes_before(
-            mind.journey.next_crossing(mind.town, view.station)
-        ):
+        if mind.journey is not None and mind.journey.turns_round_first(mind.town, view.station):
             mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, ActionValue.U_TURN, joined=True))
     elif corrected:
         mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, name, wording=Wording(topic="sorry")))

@@ -60,7 +60,7 @@ JUST_PASSED = 40.0
 OPEN_ROAD = 20
 """A lower speed is for the moment only [km/h]."""
 
-MOMENT = 25.0
+MOMENT = 40.0
 """So long a speed for the moment only is kept [s]."""
 
 ASKED_LATELY = 12.0

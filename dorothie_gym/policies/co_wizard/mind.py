@@ -48,6 +48,7 @@ class Style:
         careful: chance that it stops before a junction to ask.
         chats: chance that it answers small talk.
         eases: whether it slows down well before it turns.
+        gentle: whether it slows down well before a place on the map.
         rambles: chance that it tells what it is up to in the same breath as something else.
         offers: chance that it proposes to do a task first that is on the way.
         reassures: chance that it makes sure to have heard a description right.
@@ -64,6 +65,7 @@ class Style:
     careful: float = 0.0
     chats: float = 0.0
     eases: bool = False
+    gentle: bool = False
     rambles: float = 0.0
     offers: float = 0.0
     reassures: float = 0.0
@@ -76,16 +78,17 @@ class Style:
             echoes=float(rng.uniform(0.15, 0.5)),
             checks=float(rng.uniform(0.1, 0.4)),
             tells=float(rng.uniform(0.0, 0.18)),
-            silent=float(rng.uniform(0.2, 0.5)),
+            silent=float(rng.uniform(0.3, 0.6)),
             asks=float(rng.uniform(0.5, 1.0)),
             proposes=float(rng.uniform(0.1, 0.6)),
             mishears=float(rng.uniform(0.0, 0.05)),
-            careful=float(rng.uniform(0.8, 1.0)),
+            careful=float(rng.uniform(0.9, 1.0)),
             eases=bool(rng.random() < 0.3),
-            rambles=float(rng.uniform(0.1, 0.45)),
+            gentle=bool(rng.random() < 0.25),
+            rambles=float(rng.uniform(0.05, 0.4)),
             offers=float(rng.uniform(0.3, 1.0)),
             reassures=float(rng.uniform(0.0, 0.3)),
-            pace=int(rng.choice((35, 40, 40))),
+            pace=int(rng.choice((30, 35, 40))),
             chats=float(rng.uniform(0.1, 0.6)),
         )
 

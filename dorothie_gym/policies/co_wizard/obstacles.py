@@ -51,12 +51,7 @@ def watch_road(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None
     )
     if mind.journey is not None:
         mind.detour_at = view.time
-        street = first_new_street(
-            view.raw, mind.town, view.lane, mind.journey.replanned(mind.town, view.here, mind.blocked)
-        )
-        values: tuple[SlotValue, ...] = (street,) if street is not None and rng.random() < NAMES_STREET else ()
-        if not values and rng.random() < 0.5:
-            values = (ActionValue.U_TURN,) if _turns_round(mind, view) else ()
+        values = _way_round(mind, view, rng)
         question = remark(DialogueMove.QUERY_YN, *values, wording=Wording(topic="detour"), joined=True)
         mind.voice = mind.voice.plan(question)
     else:
@@ -65,11 +60,14 @@ def watch_road(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None
     mind.halted = True
 
 
-def _turns_round(mind: CoWizardMind, view: View) -> bool:
-    """Whether the way round begins with turning round."""
+def _way_round(mind: CoWizardMind, view: View, rng: np.random.Generator) -> tuple[SlotValue, ...]:
+    """What it proposes: a street, turning round, or just some other way."""
     assert mind.journey is not None
     way = mind.journey.replanned(mind.town, view.here, mind.blocked)
-    return way.changes_before(way.next_crossing(mind.town, view.station))
+    street = first_new_street(view.raw, mind.town, view.lane, way)
+    if street is not None and rng.random() < NAMES_STREET:
+        return (street,)
+    return (ActionValue.U_TURN,) if way.turns_round_first(mind.town, view.station) and rng.random() < 0.5 else ()
 
 
 def _on_path(view: View) -> SeenObject | None:
@@ -103,5 +101,5 @@ def detour(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
     street = first_new_street(view.raw, mind.town, view.lane, mind.journey)
     if street is not None:
         mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, street, wording=Wording(topic="detour")))
-    if mind.journey.changes_before(mind.journey.next_crossing(mind.town, view.station)) and rng.random() < 0.6:
+    if mind.journey.turns_round_first(mind.town, view.station) and rng.random() < 0.6:
         mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, ActionValue.U_TURN, joined=street is not None))

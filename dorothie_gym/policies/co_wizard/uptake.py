@@ -11,7 +11,7 @@ from dorothie_gym.ontology import ActionValue, DialogueMove
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind
 from dorothie_gym.policies.speech import Remark, remark
 
-CONFIRMS = 0.35
+CONFIRMS = 0.45
 """Chance that a command that is not repeated is confirmed, not only acknowledged."""
 
 _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START})
@@ -41,8 +41,8 @@ def take_up(mind: CoWizardMind, action: ActionValue, words: Heard, rng: np.rando
         mind.voice = mind.voice.plan(*_repeated(action, wording, rng))
     else:
         move = DialogueMove.CONFIRM if rng.random() < CONFIRMS else DialogueMove.ACKNOWLEDGE
-        words = remark(move, wording=Wording(topic="taken"))
-        mind.voice = mind.voice.plan(words, *musing(mind, rng, joined=True))
+        taken = remark(move, wording=Wording(topic="taken"))
+        mind.voice = mind.voice.plan(taken, *musing(mind, rng, joined=True))
 
 
 def _repeated(action: ActionValue, wording: Wording, rng: np.random.Generator) -> tuple[Remark, ...]:

@@ -54,6 +54,9 @@ TAKES_OVER = 130.0
 NEAR = 95.0
 """A place is announced when it is this near [m]."""
 
+CORNER, RIGHT_BEHIND = 50.0, 55.0
+"""At a junction nearer than the first, a place no further behind it than the second is easily missed [m]."""
+
 CAREFUL = 15.0
 """Speed that the car is told to go at when it has missed a place before [km/h]."""
 
@@ -62,6 +65,12 @@ SLOW_WITHIN = 20.0
 
 SLOW_SPEED = 5.0
 """A car that is this slow need not be told to come up slowly [m/s]."""
+
+SOON_AT = 8.0
+"""A car that has just set off or turned will soon be this fast [m/s]."""
+
+TOO_SHORT = 4.0
+"""Who has missed a place before rather stops the car up to this much before it [m]."""
 
 SETS_OFF, PULL = 0.6, 3.0
 """A car that gains more speed than the first has just set off, and goes on gaining as much as the second [m/s^2]."""
@@ -123,9 +132,7 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     """Says what is to be done next, if it is time to."""
     if mind.journey is None or not mind.told or view.turning or mind.journey.astray:
         return
-    if not mind.voice.idle and mind.guiding and about_to_arrive(mind, view):
-        mind.voice = mind.voice.cleared()  # there is no time for anything else
-    if not mind.voice.idle or view.speaking > 0.0:
+    if not _may_speak(mind, view):
         return
     if _approach(mind, view, rng) or not mind.guiding:
         return
@@ -155,6 +162,13 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
             words = replace(words, act=DialogueAct(DialogueMove.EXPLAIN, words.act.slots))
         note_told(mind, view, key)
         mind.voice = mind.voice.plan(*_rounded_off(mind, words, again, rng))
+
+
+def _may_speak(mind: ParticipantMind, view: View) -> bool:
+    """Whether it is free to say a step: close to the place there is no time for anything else."""
+    if mind.guiding and about_to_arrive(mind, view):
+        mind.voice = mind.voice.cleared()
+    return mind.voice.idle and view.speaking <= 0.0
 
 
 def _rounded_off(mind: ParticipantMind, words: Remark, again: bool, rng: np.random.Generator) -> tuple[Remark, ...]:
@@ -191,20 +205,28 @@ def _left_to_ask(
 
 
 def _ease(mind: ParticipantMind, view: View) -> bool:
-    """Has the car slow down for a place that is easily missed: one missed before, or one right behind a junction."""
+    """Has the car slow down for a place that is easily missed: one missed before, or one right behind a manoeuvre."""
     assert mind.journey is not None
-    left = mind.journey.left(view.station)
-    if mind.eased or left > NEAR or view.speed < SLOW_SPEED:
+    if mind.eased or mind.journey.left(view.station) > NEAR or view.speed < SLOW_SPEED:
         return False
-    crossing = mind.journey.next_crossing(mind.town, view.station)
-    behind_junction = crossing is not None and crossing.distance < 50.0 and left - crossing.distance < 40.0
-    told = mind.guided is not None and mind.guided[0] == "turn"
-    if not mind.misses and not (behind_junction and told):
+    if not mind.misses and not _hidden_behind(mind, view):
         return False
     mind.eased = True
     wording = Wording(faster=False, speed=CAREFUL)
     mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=wording))
     return True
+
+
+def _hidden_behind(mind: ParticipantMind, view: View) -> bool:
+    """Whether there is hardly time to stop the car between the next junction, or lane change, and the place."""
+    assert mind.journey is not None
+    left = mind.journey.left(view.station)
+    crossing = mind.journey.next_crossing(mind.town, view.station)
+    if crossing is None:
+        manoeuvre = mind.journey.next_manoeuvre(view.station)
+        return manoeuvre is not None and manoeuvre[0] is not Entry.U_TURN
+    told = mind.guided is not None and mind.guided[0] == "turn"
+    return told and crossing.distance < CORNER and left - crossing.distance < RIGHT_BEHIND
 
 
 def _turning_distance(mind: ParticipantMind, view: View) -> float:
@@ -305,11 +327,11 @@ def _approach(mind: ParticipantMind, view: View, rng: np.random.Generator) -> bo
             mind.voice = mind.voice.plan(Remark(act=_STOP, text=mind.stop_text, urgent=True))
         return True
     if not mind.announced and left < NEAR and view.speed > SLOW_SPEED and mind.goal is not None:
-        if left > 3.5 * view.speed + 20.0:
+        if left > 3.5 * max(view.speed, SOON_AT) + 20.0:
             wording = Wording(distance=max(left - view.speed * 3.0, 10.0))
             words = remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, mind.goal.name, wording=wording, urgent=True)
             mind.announced, mind.voice = True, mind.voice.plan(words)
-        elif left > 3.0 * view.speed + 12.0:
+        elif left > 3.0 * max(view.speed, SOON_AT) + 12.0:
             slower = remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=Wording(faster=False), urgent=True)
             mind.announced, mind.voice = True, mind.voice.plan(slower)
     return left < NEAR
@@ -332,11 +354,11 @@ def _time_to_stop(mind: ParticipantMind, view: View, left: float) -> bool:
     if mind.announced and left > SLOW_WITHIN:
         return False  # it is about to slow down
     room, after = _room_to_stop(mind, view, left, mind.stop_text)
-    return room <= 0.0 or room < -after
+    return room <= (TOO_SHORT if mind.misses else 0.0) or room < -after
 
 
 def _room_to_stop(mind: ParticipantMind, view: View, left: float, text: str) -> tuple[float, float]:
-    """How far before the place the car stands if it is told so now, or at the next decision [m]; negative: behind it."""
+    """How far before the place the car stands if told so now, and at the next decision [m]; negative: behind it."""
     delay = math.ceil(speech_seconds(text) / DECISION - 1e-6) * DECISION
     gain = min(max((view.speed - mind.speed_before) / DECISION, -2.0), 2.0)
     if gain > SETS_OFF:

@@ -75,13 +75,13 @@ class Style:
             names_street=float(rng.uniform(0.1, 0.7)),
             hurries=float(rng.uniform(0.4, 0.95)),
             patience=float(rng.uniform(7.0, 14.0)),
-            chat=float(rng.uniform(50.0, 150.0)),
+            chat=float(rng.uniform(40.0, 120.0)),
             waits=float(rng.uniform(0.5, 0.95)),
-            hints=float(rng.uniform(0.2, 0.65)),
-            reasons=float(rng.uniform(0.05, 0.3)),
+            hints=float(rng.uniform(0.3, 0.75)),
+            reasons=float(rng.uniform(0.2, 0.5)),
             aligns=float(rng.uniform(0.0, 0.15)),
-            nods=float(rng.uniform(0.1, 0.45)),
-            curious=float(rng.uniform(0.05, 0.4)),
+            nods=float(rng.uniform(0.35, 0.7)),
+            curious=float(rng.uniform(0.02, 0.25)),
             puzzled=float(rng.uniform(0.0, 0.35)),
         )
 

@@ -31,7 +31,7 @@ LONG_STOP = 8.0
 WONDERS_AGAIN = 25.0
 """Nothing is wondered about again within this time [s]."""
 
-UNSEEN = 0.3
+UNSEEN = 0.4
 """Chance that a question about what the car sees is about something that is not to be seen."""
 
 SIGHT = 80.0
@@ -201,6 +201,7 @@ def _topics(mind: ParticipantMind, view: View, rng: np.random.Generator) -> list
     if not mind.guiding:
         found.append((remark(DialogueMove.QUERY_W, ActionValue.QUERIED),))
         found.append((remark(DialogueMove.CHECK, mind.goal.name),))
+        found.append((remark(DialogueMove.QUERY_W, StreetName.QUERIED),))
         found.append((remark(DialogueMove.QUERY_YN, mind.goal.name),))
         if rng.random() < 0.3 and not mind.hurried and not mind.slowed and view.speed > 5.0:
             faster = Wording(faster=True, speed=USUAL + 5.0 if rng.random() < 0.5 else None)

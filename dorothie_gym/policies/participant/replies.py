@@ -19,20 +19,17 @@ from dorothie_gym.ontology import (
     Role,
     Slot,
     SlotValue,
-    StreetName,
 )
 from dorothie_gym.policies.hearing import heard_utterance
 from dorothie_gym.policies.journey import first_new_street
+from dorothie_gym.policies.participant.describing import describe
 from dorothie_gym.policies.participant.goals import announcement, reason_topic, route_length, switch_target
 from dorothie_gym.policies.participant.guidance import NEAR, about_to_arrive, next_step, note_told
 from dorothie_gym.policies.participant.mind import ParticipantMind, View
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.repairs import misunderstood, not_caught
-from dorothie_gym.policies.scenery import SeenLandmark, SeenSubgoal
+from dorothie_gym.policies.scenery import SeenSubgoal
 from dorothie_gym.policies.speech import Remark, remark
-
-GUIDES_AT_ONCE = 0.12
-"""Chance that the way to a place that the car does not know is told from where it has been described."""
 
 ELSEWHERE = 40.0
 """A car that stands farther than this from the target has not come to it [m]."""
@@ -40,10 +37,7 @@ ELSEWHERE = 40.0
 SAYS_IT_ALL = 0.85
 """Chance that the order of two tasks is told by naming the first one as well."""
 
-TELLS_LOOKS = 0.35
-"""Chance that a place is described by what stands there, too."""
-
-NODS_FIRST = 0.6
+NODS_FIRST = 0.85
 """Chance that something that is about to be said begins with a word for what the car has said meanwhile."""
 
 JUST_TOLD = 5.0
@@ -57,21 +51,7 @@ _WAYS = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLL
 
 _AFTER_A_NOD = frozenset({DialogueMove.EXPLAIN, DialogueMove.INSTRUCT})
 
-_FEATURES = (
-    ObjectClass.BUILDING, ObjectClass.FENCE, ObjectClass.WALL, ObjectClass.POLE, ObjectClass.VEGETATION,
-    ObjectClass.TRAFFIC_SIGN, ObjectClass.SIDE_WALK, ObjectClass.TERRAIN, ObjectClass.GROUND, ObjectClass.WATER,
-    ObjectClass.BRIDGE, ObjectClass.GUARD_RAIL, ObjectClass.RAIL_TRACK, ObjectClass.OTHER, ObjectClass.ROAD_LINE,
-)  # fmt: skip
-"""What stands by houses and people."""
-
 _AHEAD = frozenset({ActionValue.LANE_FOLLOW, ActionValue.J_TURN})
-
-_FAMOUS = frozenset(LandmarkName) - {
-    LandmarkName.HOUSE,
-    LandmarkName.PERSON,
-    LandmarkName.UNKNOWN,
-    LandmarkName.QUERIED,
-}
 
 
 def listen(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
@@ -225,7 +205,7 @@ def _judge_proposal(
 
 
 def _open_question(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
-    landmarks, streets, actions = act.values(Slot.LANDMARK), act.values(Slot.STREET), act.values(Slot.ACTION)
+    landmarks, actions = act.values(Slot.LANDMARK), act.values(Slot.ACTION)
     if mind.goal is None:
         mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_U))
     elif words.order is not None and landmarks:
@@ -248,7 +228,7 @@ def _open_question(mind: ParticipantMind, view: View, act: DialogueAct, words: H
         mind.guiding = True
         _say_way(mind, view, DialogueMove.REPLY_W, rng)
     else:
-        _describe(mind, view, DialogueMove.REPLY_W, rng)
+        describe(mind, view, DialogueMove.REPLY_W, rng)
 
 
 def _say_order(mind: ParticipantMind, rng: np.random.Generator) -> None:
@@ -281,25 +261,6 @@ def _say_way(mind: ParticipantMind, view: View, move: DialogueMove, rng: np.rand
     mind.voice = mind.voice.cleared().plan(words, *more)
 
 
-def _describe(mind: ParticipantMind, view: View, move: DialogueMove, rng: np.random.Generator) -> None:
-    """Says where the target is; at once, or when the car is close to it, the way is told turn by turn."""
-    assert mind.goal is not None
-    mind.guiding = bool(mind.goal.street is StreetName.UNKNOWN or mind.described or rng.random() < GUIDES_AT_ONCE)
-    mind.described = True
-    values: list[SlotValue] = [mind.goal.street] if mind.goal.street is not StreetName.UNKNOWN else []
-    near = _near(mind.goal, view)
-    if near is not None:
-        values.append(near.name)
-    looks = (_looks(mind.goal),) if rng.random() < TELLS_LOOKS else ()
-    mind.voice = mind.voice.plan_first(remark(move, *values, wording=Wording(topic="where")), *looks)
-
-
-def _looks(goal: SeenLandmark) -> Remark:
-    """By what a place is known when one is there: the same for the same place."""
-    thing = _FEATURES[int(abs(goal.x) * 7.0 + abs(goal.y) * 3.0) % len(_FEATURES)]
-    return remark(DialogueMove.EXPLAIN, thing, wording=Wording(topic="looks"), joined=True)
-
-
 def _elsewhere(mind: ParticipantMind, view: View) -> bool:
     """Whether the car stands, and not at the target."""
     return view.standing and mind.journey is not None and mind.journey.left(view.station) > ELSEWHERE
@@ -312,22 +273,12 @@ def _not_here(mind: ParticipantMind, view: View) -> None:
     mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_N, mind.goal.name))
 
 
-def _near(goal: SeenLandmark, view: View) -> SeenLandmark | None:
-    """A well-known place close to the target."""
-    found = [
-        (abs(other.x - goal.x) + abs(other.y - goal.y), other.row, other)
-        for other in view.landmarks
-        if other.name in _FAMOUS and other.name is not goal.name
-    ]
-    return min(found)[2] if found and min(found)[0] < 90.0 else None
-
-
 def _explanation(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
     landmarks, statuses = act.values(Slot.LANDMARK), act.values(Slot.STATUS)
     if _put_right(mind, view, act, words):
         return
     if GoalStatus.UNKNOWN in statuses and mind.goal is not None and mind.goal.name in landmarks:
-        _describe(mind, view, DialogueMove.EXPLAIN, rng)
+        describe(mind, view, DialogueMove.EXPLAIN, rng)
         return
     if mind.goal is not None and mind.goal.name in landmarks and not statuses and _elsewhere(mind, view):
         _not_here(mind, view)
@@ -372,7 +323,7 @@ def _confusion(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard
 
 
 def _uptake(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
-    """A car that repeats the place knows it, and finds the way by itself; one that names another has to be put right."""
+    """A car that repeats the place knows it, and finds the way itself; one that names another has to be put right."""
     if _put_right(mind, view, act, words):
         return
     if mind.goal is not None and mind.goal.name in act.values(Slot.LANDMARK):
@@ -384,7 +335,10 @@ def _alignment(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard
 
 
 def _request(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
-    if mind.goal is not None:
+    """A car that wants to be guided is; one that names a place, or a turn, only repeats what it was told."""
+    if act.values(Slot.LANDMARK):
+        _uptake(mind, view, act, words, rng)
+    elif mind.goal is not None and not act.values(Slot.ACTION):
         mind.guiding = True
         _say_way(mind, view, DialogueMove.INSTRUCT, rng)
 

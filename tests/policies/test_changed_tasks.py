@@ -1,0 +1,122 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dorothie_gym.ontology import DialogueMove, GoalStatus
+from dorothie_gym.policies.participant.goals import announcement, choose_target, note_tasks, route_length
+from dorothie_gym.policies.participant.mind import View
+from tests.policies.test_repairs import Human
+
+M = DialogueMove
+
+
+def with_tasks(human: Human, **changes) -> View:
+    """What it sees when one of the tasks, `index`, has changed."""
+    index = changes.pop("index")
+    tasks = tuple(
+        replace(task, **changes) if task.index == index else task for task in human.mind.subgoals if task.live
+    )
+    human.mind.subgoals = tuple(task for task in human.mind.subgoals if task.live)
+    return replace(human.view, subgoals=tasks)
+
+
+def another_task(human: Human):
+    """An open task other than the one under way, at a place of another name."""
+    assert human.mind.goal is not None
+    view = human.view
+    for task in view.subgoals:
+        place = view.landmark(task.landmark)
+        if task.open and task.index != human.mind.target and place is not None:
+            if place.name is not human.mind.goal.name:
+                return task, place
+    raise AssertionError("there is no other task")
+
+
+def planned(human: Human) -> list[tuple[DialogueMove, frozenset]]:
+    return [(item.act.move, item.act.slots) for item in human.mind.voice.queue]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_car_is_told_of_a_task_that_is_dropped(seed):
+    human = Human()
+    task, place = another_task(human)
+    note_tasks(human.mind, with_tasks(human, index=task.index, live=False), np.random.default_rng(seed))
+    move, slots = planned(human)[0]
+    assert move in (M.INSTRUCT, M.EXPLAIN)
+    assert {place.name, GoalStatus.ABANDONED} <= slots
+
+
+def test_the_task_under_way_is_left_when_it_is_dropped():
+    human = Human()
+    note_tasks(human.mind, with_tasks(human, index=human.mind.target, live=False), human.rng)
+    assert human.mind.goal is None
+    assert human.mind.goes_on
+
+
+def test_what_is_done_is_said_after_a_breath():
+    human = Human()
+    view = with_tasks(human, index=human.mind.target, reached=True)
+    note_tasks(human.mind, view, human.rng)
+    assert GoalStatus.COMPLETE in planned(human)[0][1]
+    assert human.mind.voice.speak(view.time, 0.0, human.rng)[0] is None
+    assert human.mind.voice.speak(view.time + 20.0, 0.0, human.rng)[0] is not None
+
+
+def interrupted(seed: int) -> tuple[Human, object]:
+    """A human to whom a task comes up that is nearer than the one under way."""
+    human = Human()
+    task, place = another_task(human)
+    human.mind.journey = replace(human.mind.journey, goal=(human.mind.journey.goal[0], 1e5))
+    human.mind.subgoals = tuple(
+        replace(item, live=False) if item.index == task.index else item for item in human.mind.subgoals
+    )
+    left = human.mind.journey.left(human.view.station)
+    assert route_length(human.mind, human.view, place) < max(left, 1e4)
+    human.mind.journey = Far(human.mind.journey)
+    note_tasks(human.mind, human.view, np.random.default_rng(seed))
+    return human, place
+
+
+class Far:
+    """A journey that is longer than any."""
+
+    def __init__(self, journey) -> None:
+        self._journey = journey
+
+    def left(self, station: float) -> float:
+        return 1e5
+
+    def __getattr__(self, name: str):
+        return getattr(self._journey, name)
+
+
+def test_a_new_task_on_the_way_is_done_first_and_the_other_is_resumed():
+    human, place = next(found for seed in range(20) if (found := interrupted(seed))[0].mind.put_off)
+    told = planned(human)
+    assert human.mind.goal == place
+    assert GoalStatus.ONGOING in told[0][1] and place.name in told[0][1]
+    assert GoalStatus.PENDING in told[1][1]
+    former = next(iter(human.mind.put_off))
+    view = human.view
+    done = tuple(replace(task, reached=task.index == human.mind.target) for task in view.subgoals)
+    human.mind.target = human.mind.goal = None
+    choose_target(human.mind, replace(view, subgoals=tuple(t for t in done if t.index == former)), human.rng)
+    again = announcement(human.mind, view, human.rng)
+    assert again.wording.topic == "resume" and GoalStatus.ONGOING in again.act.slots
+
+
+def test_a_later_task_that_changes_is_told_by_both_names():
+    human = Human()
+    task, place = another_task(human)
+    names = {place.name, human.mind.goal.name}
+    other = next(mark for mark in human.view.landmarks if mark.name not in names)
+    view = with_tasks(human, index=task.index, landmark=other.row)
+    told = []
+    for seed in range(10):
+        human.mind.voice, human.mind.subgoals = human.mind.voice.cleared(), human.view.subgoals
+        human.mind.subgoals = tuple(t for t in human.mind.subgoals if t.live)
+        note_tasks(human.mind, view, np.random.default_rng(seed))
+        told += planned(human)
+    assert told
+    assert all({place.name, other.name, GoalStatus.ABANDONED, GoalStatus.PENDING} == slots for _, slots in told)
