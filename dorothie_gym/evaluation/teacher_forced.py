@@ -17,7 +17,7 @@ from dorothie_gym.evaluation.metrics import (
     SlotF1,
     SlotScorePaper,
 )
-from dorothie_gym.evaluation.predictions import ActionPredictions, ActPredictions
+from dorothie_gym.evaluation.predictions import ActionPredictions, ActPredictions, act_labels, action_labels
 from dorothie_gym.sessions import (
     Corpus,
     CorpusEntry,
@@ -274,10 +274,11 @@ def _act_metrics(actions: Sequence[Mapping[str, Any]], points: Sequence[Inferenc
         moves=np.array([action["move"] for action in actions], dtype=np.int64),
         slots=np.array([action["slots"] for action in actions], dtype=np.bool_),
     )
+    labels = act_labels(points)
     return {
-        "move_accuracy": MoveAccuracy().compute(predicted, points),
-        "slot_f1": SlotF1().compute(predicted, points),
-        "slot_score_paper": SlotScorePaper().compute(predicted, points),
+        "move_accuracy": MoveAccuracy().compute(predicted, labels),
+        "slot_f1": SlotF1().compute(predicted, labels),
+        "slot_score_paper": SlotScorePaper().compute(predicted, labels),
     }
 
 
@@ -286,8 +287,9 @@ def _decision_metrics(actions: Sequence[Mapping[str, Any]], points: Sequence[Dec
         actions=np.array([action["action"] for action in actions], dtype=np.int64),
         angles=np.array([action["angle"] for action in actions], dtype=np.float64),
     )
+    labels = action_labels(points)
     return {
-        "action_accuracy": ActionAccuracy().compute(predicted, points),
-        "argument_accuracy": ArgumentAccuracy().compute(predicted, points),
-        "joint_accuracy": JointAccuracy().compute(predicted, points),
+        "action_accuracy": ActionAccuracy().compute(predicted, labels),
+        "argument_accuracy": ArgumentAccuracy().compute(predicted, labels),
+        "joint_accuracy": JointAccuracy().compute(predicted, labels),
     }

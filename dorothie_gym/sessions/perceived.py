@@ -11,6 +11,7 @@ from __future__ import annotations
 import enum
 import functools
 from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -153,6 +154,7 @@ def _lights(
     return owner[shown], ObjectKind.LIGHT_GREEN + rows["state"][shown].astype(np.int64), values[shown]
 
 
+@functools.lru_cache(maxsize=16)
 def stop_lines(town: Town) -> Mapping[int, tuple[float, float, float]]:
     """Returns where each light's first lane ends, by the light's id: x, y [m], heading [degrees, clockwise]."""
     lit = {signal for programme in town.programmes for signal in programme.signals}
@@ -161,7 +163,7 @@ def stop_lines(town: Town) -> Mapping[int, tuple[float, float, float]]:
         if signal.id in lit and signal.lanes:
             lane = town.lanes[signal.lanes[0]]
             lines[signal.id] = (*lane.points[-1, :2].tolist(), float(np.degrees(lane.headings[-1])))
-    return lines
+    return MappingProxyType(lines)
 
 
 def _relative(places: Array, at: Array) -> Array:

@@ -16,7 +16,7 @@ IDS = sorted(name for name in gym.registry if name.startswith("dorothie_gym/"))
 def make(name: str, **arguments: Any) -> gym.Env[Any, Any]:
     """Makes an environment; those that need sessions get a short one."""
     if name.split("/")[1] in ("UfN-v0", "RfN-v0", "NfD-v0"):
-        arguments["sessions"] = [session(talk()), session(talk(), name="two")]
+        arguments["corpus"] = [session(talk()), session(talk(), name="two")]
     return gym.make(name, **arguments)
 
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import sys
 import types
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from dorothie_gym.sessions import Corpus, SessionError
 from dorothie_gym.spaces import NO_MOVE, LandmarkColumn, SpaceLimits
 from tests.sessions.builders import physical, session, utterance, write
 from tests.sessions.dialogues import DONE, OKAY, STREET, TO_KFC, talk
+from tests.sessions.sdn.builders import hub, release, sample
 
 ENVS = [UfNEnv, RfNEnv, NfDEnv]
 
@@ -183,6 +185,17 @@ def test_sessions_are_chosen_by_number_and_name(folder: Path) -> None:
     for wrong in ("c", 2, -1, 0.5):
         with pytest.raises(ValueError, match="option 'session' is "):
             env.reset(options={"session": wrong})
+
+
+@pytest.mark.parametrize("env_class", ENVS)
+@pytest.mark.parametrize("layout", [release, sample, hub])
+def test_sessions_of_the_paper_s_corpus_can_be_played(
+    env_class: type[TeacherForcedEnv], layout: Callable[[Path], Path], tmp_path: Path
+) -> None:
+    layout(tmp_path / "val" / "seen" / "log_1")
+    env = env_class(tmp_path, split="val_seen")
+    for observation in play(env, right=False)[0]:
+        assert env.observation_space.contains(observation)
 
 
 def test_several_environments_step_together(folder: Path) -> None:

@@ -73,15 +73,22 @@ def keep(columns: Columns) -> None:
         part = Path(tempfile.mkdtemp(prefix=f"{columns.key[:16]}.", suffix=PART, dir=folder))
         try:
             write_columns(columns, part)
-            target = folder / columns.key
-            if target.exists():  # damaged, else it would have been found
-                shutil.rmtree(target)
-            part.rename(target)
+            _publish(part, folder / columns.key)
         finally:
             shutil.rmtree(part, ignore_errors=True)
         _prune(folder)
     except OSError as error:
         _log.debug("features cannot be kept in %s: %s", folder, error)
+
+
+def _publish(part: Path, target: Path) -> None:
+    """Gives a finished folder its name, unless another process was faster."""
+    try:
+        part.rename(target)
+    except OSError:
+        if recall(target.name) is None:  # what stands there is damaged
+            shutil.rmtree(target)
+            part.rename(target)
 
 
 def write_columns(columns: Columns, folder: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dorothie_gym.evaluation import NfDEnv, RfNEnv, TeacherForcedEnv, UfNEnv
 from dorothie_gym.evaluation.features import BatchSpec, columns_of, gather, points
 from dorothie_gym.rollout import default_corpus
 from dorothie_gym.sessions import Corpus, Session, Task
@@ -43,6 +44,25 @@ def test_points_of_a_played_session_see_no_future(played: Session) -> None:
 def test_the_check_finds_the_leak_of_the_published_features() -> None:
     with pytest.raises(AssertionError):
         check(session(talk()), Task.UFN, spec=BatchSpec(paper_leak=True))
+
+
+@pytest.mark.parametrize("env_class", [UfNEnv, RfNEnv, NfDEnv])
+def test_no_observation_of_the_environments_shows_its_future(
+    env_class: type[TeacherForcedEnv], played: Session
+) -> None:
+    env = env_class([played])
+    observation, _ = env.reset()
+    for number in range(3):
+        assert env._point is not None
+        words = env.task is Task.UFN
+        other = env_class([with_another_future(played, env._point.index, words=words)])
+        again, _ = other.reset()
+        for _ in range(number):
+            again, *_ = other.step(other.action_space.sample())
+        np.testing.assert_equal(again, observation)
+        observation, _, done, _, _ = env.step(env.action_space.sample())
+        if done:
+            break
 
 
 @pytest.mark.slow

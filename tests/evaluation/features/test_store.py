@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.evaluation.features import build, building
-from dorothie_gym.evaluation.features.store import INDEX_FILE, StoreError, features_folder, read_columns
+from dorothie_gym.evaluation.features.store import INDEX_FILE, StoreError, features_folder, keep, read_columns
 from dorothie_gym.sessions import SessionError
 from tests.evaluation.features.test_layouts import assert_same
 from tests.sessions.builders import write
@@ -77,6 +77,14 @@ def test_damaged_files_are_built_anew(corpus: Path, name: str, damage: str) -> N
             read_columns(entry())
     assert_same(first, build(corpus))
     assert_same(first, read_columns(entry()))
+
+
+def test_the_faster_of_two_processes_wins(corpus: Path) -> None:
+    first = build(corpus)
+    before = (entry() / INDEX_FILE).stat().st_ino
+    keep(build(corpus, cache=False))
+    assert (entry() / INDEX_FILE).stat().st_ino == before
+    assert_same(first, build(corpus))
 
 
 def test_nothing_in_the_cache_can_run_code(corpus: Path) -> None:
