@@ -69,7 +69,8 @@ class Masks:
             self._note_car()
         elif role is Role.AD_WIZARD:
             self._note_town()
-        fields: dict[str, Any] = {**self._sheets[role].copy(), **self._unmasked[role]}
+        fields = self._sheets[role].copy()
+        fields.update(self._unmasked[role])
         if role is Role.CO_WIZARD:
             fields["plan"] = tuple(fields["plan"])
         return fields

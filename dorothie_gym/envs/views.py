@@ -183,9 +183,10 @@ class Views:
     def _write_true_place(self, participant: Observation, ad_wizard: Observation) -> None:
         """Where the car is; both know it."""
         car, planner = self._world.car, self._world.planner
-        pose, lane, station = (*car.position.tolist(), car.heading), self._numbers[planner.lane], planner.station
-        for view in (participant, ad_wizard):
-            view["pose"][:], view["lane"], view["station"][0] = pose, lane, station
+        participant["pose"][:2], participant["pose"][2] = car.position, car.heading
+        ad_wizard["pose"][:] = participant["pose"]
+        participant["lane"] = ad_wizard["lane"] = self._numbers[planner.lane]
+        participant["station"][0] = ad_wizard["station"][0] = planner.station
 
     def _write_believed_place(self, view: Observation, pose: Table) -> None:
         """Where the Co-Wizard takes the car to be."""

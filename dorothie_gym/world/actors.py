@@ -80,7 +80,7 @@ class Actors:
         """Whether there is any prop."""
         if self._present_of is not self.arrays:
             self._present_of, self._present = self.arrays, self.arrays.props.view(np.ndarray)["present"]
-        return bool(self._present.any())
+        return len(self._present) > 0 and bool(self._present.any())
 
     # --- coming and going -------------------------------------------------------------------------------------------
 

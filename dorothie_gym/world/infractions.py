@@ -103,8 +103,9 @@ class InfractionWatch:
 
     def wait(self, first: int, last: int) -> None:
         """Lets the car stand between two frames: what it has been doing wrong until then it goes on doing."""
-        marks = self._arrays.last
-        marks[marks == first] = last
+        for k, frame in enumerate(self._arrays.last.tolist()):
+            if frame == first:
+                self._arrays.last[k] = last
 
     def _at_line(self, line: int, frame: int, pose: Array) -> list[Breach]:
         """The breach of passing a line, if it is one: at a stop sign without a stand, or at a red light."""

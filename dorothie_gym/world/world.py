@@ -138,7 +138,7 @@ class World:
         if self.faults:
             self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
         self.planner.props = self._props_seen()
-        stood = self.car.speed == 0.0 and bool((poses[0, :HEIGHT] == poses[-1, :HEIGHT]).all())
+        stood = self.car.speed == 0.0 and poses[0, :HEIGHT].tolist() == poses[-1, :HEIGHT].tolist()
         return self.reports.close(poses, self.frame, stood=stood)
 
     def _run(self, frames: int) -> tuple[Array, Array]:

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.world.compiling import compiled, inlined
-from dorothie_gym.world.kernel.footways import ASIDE, find_segment
+from dorothie_gym.world.kernel.footways import ASIDE, find_segment, place_beside
 from dorothie_gym.world.kernel.gait import (
     PATIENCE,
 )
@@ -76,15 +76,19 @@ def comes_to_crosswalk(town: TownArrays, walker: Records, way: Records, time: fl
 
 @inlined
 def wait(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
-    """Stands at the kerb until one may step onto the crosswalk, or goes on when that takes too long."""
+    """Stands at the kerb until one may step onto the crosswalk, or goes on when that takes too long.
+
+    That is on the pavement, though it may end beside the paint: further on cars that turn cut the corner.
+    """
     walker = world.pedestrians[p]
     crossing = town.crossings[walker.crossing]
     walker.waited += time
     cos, sin = walker.direction * crossing.cos, walker.direction * crossing.sin
     inward = max(town.walks[walker.walk].half_width - FROM_KERB, 0.0)
     beside = (p % PLACES - (PLACES - 1) // 2) * PLACES_APART
-    x = crossing.x[walker.mouth] + inward * cos - beside * sin
-    y = crossing.y[walker.mouth] + inward * sin + beside * cos
+    x, y, _, _ = place_beside(town, walker, crossing.station[walker.mouth], 0.0)
+    x += inward * cos - beside * sin
+    y += inward * sin + beside * cos
     walk_towards(world, p, x, y, cos, sin, 0.0, math.inf, time)
     if abs(walker.x - x) > READY or abs(walker.y - y) > READY:
         ready = False
