@@ -12,7 +12,6 @@ from dorothie_gym.sessions.manifest import manifest_row, write_manifest
 from dorothie_gym.sessions.perceived import OBJECT_VALUES, ObjectKind, last_perceived
 from dorothie_gym.sessions.points import (
     ANGLE_TOLERANCE,
-    NO_SPEAKER,
     WAY_LENGTH,
     CarState,
     DecisionPoint,
@@ -83,7 +82,6 @@ __all__ = [
     "LandmarkRow",
     "MoveRecord",
     "NO_LANE",
-    "NO_SPEAKER",
     "OBJECT_VALUES",
     "ObjectKind",
     "Point",

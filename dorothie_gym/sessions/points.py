@@ -31,9 +31,6 @@ WAY_LENGTH: Final = 25
 WAY_STEP: Final = 12
 """States of the car in a view, and frames (30 Hz) from one to the next: 100 frames of 10 Hz, every fourth."""
 
-NO_SPEAKER: Final = "a dialogue move of neither the participant nor the Co-Wizard"
-"""Why a flagged dialogue move is no point."""
-
 
 class Task(enum.StrEnum):
     """What is to be predicted (paper, section 5)."""
@@ -189,7 +186,11 @@ def _why_no_point(event: Event, act: ActionRecord | None) -> str:
         return "" if is_decision(act) else f"{act.action.label} of {act.source.value}, not of the Co-Wizard"
     if event.type is not EventType.DIALOGUE_MOVE:
         return f"an event of type {event.type_name}: neither a dialogue move nor a physical action"
-    return "" if event.source in (Role.PARTICIPANT, Role.CO_WIZARD) else f"{NO_SPEAKER} ({event.source.value})"
+    return (
+        ""
+        if event.source in (Role.PARTICIPANT, Role.CO_WIZARD)
+        else f"a move of {event.source.value}, neither the participant nor the Co-Wizard"
+    )
 
 
 def final_view(session: Session, task: Task) -> View:

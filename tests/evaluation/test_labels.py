@@ -45,7 +45,7 @@ def test_flagged_events_that_are_no_points_are_named_with_the_reason(tmp_path: P
     count = labels.counts[""]
     assert (count.flagged, count.skipped, count.points[Task.NFD]) == (4, 3, 1)
     reasons = {skipped.event: (skipped.task, skipped.reason) for skipped in labels.skipped}
-    assert reasons[0] == (None, "a dialogue move of neither the participant nor the Co-Wizard (ad_wizard)")
+    assert reasons[0] == (None, "a move of ad_wizard, neither the participant nor the Co-Wizard")
     assert reasons[1] == (None, "Stop of agent, not of the Co-Wizard")
     assert reasons[2] == (None, "SpeedChange is no navigation action")
     assert reasons[3][0] is Task.NFD and "does not know its angle" in reasons[3][1]

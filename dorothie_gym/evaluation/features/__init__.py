@@ -20,7 +20,7 @@ from dorothie_gym.evaluation.features.columns import (
     TownGraph,
     Utterances,
 )
-from dorothie_gym.evaluation.features.table import PointCount, PointTable, Skipped, point_counts, points
+from dorothie_gym.evaluation.features.table import PointTable, points
 from dorothie_gym.sessions.perceived import OBJECT_VALUES, ObjectKind
 
 __all__ = [
@@ -39,10 +39,8 @@ __all__ = [
     "ObjectKind",
     "Objects",
     "PARTICIPANT",
-    "PointCount",
     "PointTable",
     "Sessions",
-    "Skipped",
     "Streets",
     "TENTHS",
     "TownGraph",
@@ -50,6 +48,5 @@ __all__ = [
     "build",
     "columns_of",
     "gather",
-    "point_counts",
     "points",
 ]

@@ -10,25 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.evaluation.features.columns import CO_WIZARD, PARTICIPANT, Columns, Flags, Ints, Reals
-from dorothie_gym.evaluation.labels import NO_ANGLE
+from dorothie_gym.evaluation.labels import NO_ANGLE, Unscored
 from dorothie_gym.ontology import LABELS
-from dorothie_gym.sessions import FOLDS, NO_SPEAKER, Fold, Task
+from dorothie_gym.sessions import Fold, Task
 from dorothie_gym.sessions.folds import check_fold
-
-
-@dataclass(frozen=True, kw_only=True)
-class Skipped:
-    """A flagged event that is no point, or a point of which a part cannot be scored.
-
-    Attributes:
-        session: name of the session.
-        event: number of the event; -1 for a whole session that cannot be read.
-        reason: why.
-    """
-
-    session: str
-    event: int
-    reason: str
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -56,7 +41,8 @@ class PointTable:
         label_angle: (n,) its angle [degrees, positive left]; NaN where unknown, and in UfN and RfN.
         label_belief: (n, 5) way to the next frame dx, dy [m], its heading [degrees], way to the goal dx, dy [m], in the
             town's axes; NaN where unknown.
-        skipped: what is no point, or is not scored in whole, and why.
+        skipped: flagged events that are a point of no task (`task` None), and points of this one that are not scored in
+            whole, and why. Sessions that cannot be read are in `Columns.unreadable`.
     """
 
     task: Task
@@ -81,32 +67,11 @@ class PointTable:
     label_action: Ints
     label_angle: Reals
     label_belief: Reals
-    skipped: tuple[Skipped, ...] = ()
+    skipped: tuple[Unscored, ...] = ()
 
     def __len__(self) -> int:
         """Number of points."""
         return len(self.session)
-
-
-@dataclass(frozen=True, kw_only=True)
-class PointCount:
-    """How many points of a task a fold has.
-
-    Attributes:
-        fold: as `Fold`'s value; empty for sessions outside of folds.
-        task: the task.
-        flagged: flagged events that are the task's: `points` + `skipped`.
-        points: points, all of which are scored (in NfD those of `without_angle` for the action only).
-        without_angle: points of NfD whose angle the recording does not know.
-        skipped: flagged events that are no point.
-    """
-
-    fold: str
-    task: Task
-    flagged: int
-    points: int
-    without_angle: int
-    skipped: int
 
 
 def points(columns: Columns, task: Task, fold: Fold | str | None = None) -> PointTable:
@@ -150,33 +115,6 @@ def points(columns: Columns, task: Task, fold: Fold | str | None = None) -> Poin
         label_belief=_belief(columns, session, tenth, (seen["frames_start"], seen["frames_stop"])),
     )
     return replace(table, skipped=tuple(_skipped(columns, table, chosen)))
-
-
-def point_counts(columns: Columns) -> tuple[PointCount, ...]:
-    """Returns how many points of each task each fold has that has sessions; every flagged event is counted once.
-
-    A flagged event that is neither a dialogue move nor a physical action counts as a skipped one of NfD, as do moves of
-    neither speaker as skipped ones of RfN.
-    """
-    found = []
-    for fold in sorted(set(columns.sessions.folds), key=lambda name: (name not in tuple(FOLDS), name)):
-        inside = np.array([name == fold for name in columns.sessions.folds])
-        for task in Task:
-            table = points(columns, task)
-            mine = inside[table.session]
-            left = sum(inside[session] for session, _, reason in columns.unpointed if _task_of(reason) is task)
-            without = int(np.isnan(table.label_angle[mine]).sum()) if task is Task.NFD else 0
-            count = int(mine.sum())
-            found.append(
-                PointCount(
-                    fold=fold, task=task, flagged=count + left, points=count, without_angle=without, skipped=left
-                )
-            )
-    return tuple(found)
-
-
-def _task_of(reason: str) -> Task:
-    return Task.RFN if reason.startswith(NO_SPEAKER) else Task.NFD
 
 
 def _sessions_of(columns: Columns, fold: Fold | str | None) -> Flags:
@@ -243,13 +181,13 @@ def _belief(columns: Columns, session: Ints, tenth: Ints, seen: tuple[Ints, Ints
     return labels
 
 
-def _skipped(columns: Columns, table: PointTable, chosen: Flags) -> Iterator[Skipped]:
+def _skipped(columns: Columns, table: PointTable, chosen: Flags) -> Iterator[Unscored]:
     names = columns.sessions.names
-    for name, reason in columns.unreadable:
-        yield Skipped(session=name, event=-1, reason=reason)
     for session, event, reason in columns.unpointed:
-        if chosen[session] and _task_of(reason) is table.task:
-            yield Skipped(session=names[session], event=event, reason=reason)
+        if chosen[session]:
+            yield Unscored(session=names[session], event=event, task=None, reason=reason)
     if table.task is Task.NFD:
         for row in np.flatnonzero(np.isnan(table.label_angle)).tolist():
-            yield Skipped(session=names[table.session[row]], event=int(table.event[row]), reason=NO_ANGLE)
+            yield Unscored(
+                session=names[table.session[row]], event=int(table.event[row]), task=Task.NFD, reason=NO_ANGLE
+            )
