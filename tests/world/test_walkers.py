@@ -33,7 +33,7 @@ def test_car_gives_way_to_people_on_a_crosswalk_and_then_goes_on(which: int, end
     number, lane, connector = open_crosswalks("northgate")[which]
     roads = network("northgate")
     town, arrays = roads.town, town_arrays(roads)
-    world = world_at("northgate", lane, town.lanes[lane].length - 45.0)
+    world = world_at("northgate", lane, town.lanes[lane].length - 58.0)
     state = world.actors.arrays
     world.actors.arrays = grown(arrays, state, vehicles=len(state.vehicles), pedestrians=1, props=len(state.props))
     way = next(way for way in world.planner.exits()[0] if way.connector == connector)

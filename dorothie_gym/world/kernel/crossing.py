@@ -47,7 +47,10 @@ PLACES, PLACES_APART = 3, 0.7
 """People wait beside one another in so many places, this far apart [m] ..."""
 
 FROM_KERB = 0.9
-"""... and this far from the kerb [m]."""
+"""... this far from the kerb [m] ..."""
+
+FROM_PAINT = 2.0
+"""... and no further than this beside the middle of the paint [m]."""
 
 READY = 1.0
 """Who waits steps onto the crosswalk from this close to its place [m]."""
@@ -78,7 +81,8 @@ def comes_to_crosswalk(town: TownArrays, walker: Records, way: Records, time: fl
 def wait(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
     """Stands at the kerb until one may step onto the crosswalk, or goes on when that takes too long.
 
-    That is on the pavement, though it may end beside the paint: further on cars that turn cut the corner.
+    That is where the pavement ends, also beside the paint, if not too far from it: further on cars that turn cut the
+    corner.
     """
     walker = world.pedestrians[p]
     crossing = town.crossings[walker.crossing]
@@ -87,13 +91,15 @@ def wait(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
     inward = max(town.walks[walker.walk].half_width - FROM_KERB, 0.0)
     beside = (p % PLACES - (PLACES - 1) // 2) * PLACES_APART
     x, y, _, _ = place_beside(town, walker, crossing.station[walker.mouth], 0.0)
-    x += inward * cos - beside * sin
-    y += inward * sin + beside * cos
+    aside = (y - crossing.y[0]) * crossing.cos - (x - crossing.x[0]) * crossing.sin
+    far = aside - min(max(aside, -FROM_PAINT), FROM_PAINT)
+    x += far * crossing.sin + inward * cos - beside * sin
+    y += -far * crossing.cos + inward * sin + beside * cos
     walk_towards(world, p, x, y, cos, sin, 0.0, math.inf, time)
     if abs(walker.x - x) > READY or abs(walker.y - y) > READY:
         ready = False
     else:
-        ready = _may_step(town, world, crossing, (crossing.length + AHEAD) / walker.pace)
+        ready = _may_step(town, world, crossing, (FROM_PAINT + crossing.length + AHEAD) / walker.pace)
     if ready:
         walker.state, walker.waited, walker.speed = Walk.CROSSING, 0.0, 0.0
         _advance(crossing, walker)

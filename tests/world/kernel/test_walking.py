@@ -174,7 +174,7 @@ def test_people_cross_while_the_lights_of_those_who_drive_are_red():
     for start in range(0, 90, 15):
         world, crossing = at_a_crosswalk(arrays, lights=True)
         number = int(world.pedestrians[0].crossing)
-        world.clock[0].time = float(start)
+        world.clock[0].frame, world.clock[0].time = round(start / DT), float(start)
         lanes = arrays.neighbours[crossing.light : crossing.light + crossing.lights]
         for _ in range(300):
             step(arrays, world, 5, DT)
