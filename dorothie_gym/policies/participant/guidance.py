@@ -75,6 +75,9 @@ TOO_SHORT = 4.0
 SETS_OFF, PULL = 0.6, 3.0
 """A car that gains more speed than the first has just set off, and goes on gaining as much as the second [m/s^2]."""
 
+INCHES_ON = 7.0
+"""A car that has been told to go a bit further is left alone for this long [s]."""
+
 LATE_STOP = 1.0
 """Who would stop the car further behind the place than this says less [m]."""
 
@@ -313,8 +316,8 @@ def _approach(mind: ParticipantMind, view: View, rng: np.random.Generator) -> bo
     left = journey.left(view.station)
     if view.standing:
         return _from_standing(mind, view, left)
-    if not mind.guiding:
-        return left < NEAR
+    if not mind.guiding or view.time - mind.nudged_at < INCHES_ON:
+        return left < NEAR  # a car that is told to go on a bit stops by itself
     if not mind.stop_text:
         mind.stop_text = word_act(_STOP, Role.PARTICIPANT, rng, Wording(here=True), style=mind.voice.style)
     if _room_to_stop(mind, view, left, mind.stop_text)[0] < -LATE_STOP:
