@@ -75,7 +75,7 @@ class Style:
     def draw(cls, rng: np.random.Generator) -> Style:
         """A style by chance."""
         return cls(
-            echoes=float(rng.uniform(0.15, 0.5)),
+            echoes=float(rng.uniform(0.1, 0.4)),
             checks=float(rng.uniform(0.1, 0.4)),
             tells=float(rng.uniform(0.0, 0.18)),
             silent=float(rng.uniform(0.3, 0.6)),
@@ -85,7 +85,7 @@ class Style:
             careful=float(rng.uniform(0.9, 1.0)),
             eases=bool(rng.random() < 0.3),
             gentle=bool(rng.random() < 0.25),
-            rambles=float(rng.uniform(0.05, 0.4)),
+            rambles=float(rng.uniform(0.15, 0.5)),
             offers=float(rng.uniform(0.3, 1.0)),
             reassures=float(rng.uniform(0.0, 0.3)),
             pace=int(rng.choice((30, 35, 40))),

@@ -78,6 +78,9 @@ SETS_OFF, PULL = 0.6, 3.0
 INCHES_ON = 7.0
 """A car that has been told to go a bit further is left alone for this long [s]."""
 
+CIRCLES = 3
+"""After having the car turned round so often for a place, the participant leads it there some other way."""
+
 LATE_STOP = 1.0
 """Who would stop the car further behind the place than this says less [m]."""
 
@@ -135,6 +138,7 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     """Says what is to be done next, if it is time to."""
     if mind.journey is None or not mind.told or view.turning or mind.journey.astray:
         return
+    _stop_circling(mind, view)
     if not _may_speak(mind, view):
         return
     if _approach(mind, view, rng) or not mind.guiding:
@@ -161,10 +165,21 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
         return
     if near and (mind.guided != key or overdue):
         again = mind.guided == key
-        if key[0] in ("round", "turn", "lane") and not again and rng.random() < mind.style.hints:
+        if key[0] in ("turn", "lane") and not again and rng.random() < mind.style.hints:
             words = replace(words, act=DialogueAct(DialogueMove.EXPLAIN, words.act.slots))
         note_told(mind, view, key)
         mind.voice = mind.voice.plan(*_rounded_off(mind, words, again, rng))
+
+
+def _stop_circling(mind: ParticipantMind, view: View) -> None:
+    """Leads the car another way to a place that it was turned round for again and again."""
+    if mind.rounds < CIRCLES or mind.journey is None:
+        return
+    mind.rounds = 0
+    way_in = mind.journey.way_in()
+    if way_in is not None:
+        mind.avoided = (*mind.avoided, way_in)
+        mind.journey = mind.journey.replanned(mind.town, view.place, mind.blocked + mind.avoided)
 
 
 def _may_speak(mind: ParticipantMind, view: View) -> bool:
@@ -178,7 +193,9 @@ def _rounded_off(mind: ParticipantMind, words: Remark, again: bool, rng: np.rand
     """A step with what else is said in the same breath: a reason before it, or a question whether it was heard."""
     draw = rng.random()
     if words.act.values(Slot.ACTION) == (ActionValue.U_TURN,):
-        return (words,)  # it is not to miss the moment
+        # it is not to miss the moment: the shortest of what comes to mind
+        drawn = [word_act(words.act, Role.PARTICIPANT, rng, words.wording, style=mind.voice.style) for _ in range(3)]
+        return (replace(words, text=min(drawn, key=speech_seconds)),)
     if again and rng.random() < 0.25:
         return words, remark(DialogueMove.ALIGN, joined=True)
     if draw < mind.style.aligns:
@@ -244,6 +261,7 @@ def _turning_distance(mind: ParticipantMind, view: View) -> float:
 def note_told(mind: ParticipantMind, view: View, key: tuple[str, int, int]) -> None:
     """Remembers what the car has been told to do."""
     mind.repeats = mind.repeats + 1 if mind.guided == key else 0
+    mind.rounds += key[0] == "round"
     mind.guided, mind.guided_at = key, view.time
 
 

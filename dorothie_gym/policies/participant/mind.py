@@ -77,7 +77,7 @@ class Style:
             patience=float(rng.uniform(7.0, 14.0)),
             chat=float(rng.uniform(40.0, 120.0)),
             waits=float(rng.uniform(0.5, 0.95)),
-            hints=float(rng.uniform(0.3, 0.75)),
+            hints=float(rng.uniform(0.45, 0.9)),
             reasons=float(rng.uniform(0.2, 0.5)),
             aligns=float(rng.uniform(0.0, 0.15)),
             nods=float(rng.uniform(0.35, 0.7)),
@@ -108,6 +108,7 @@ class ParticipantMind:
         guided: what was last told to do: a word for it and the lanes concerned.
         guided_at: when [s].
         repeats: how often that has been repeated.
+        rounds: how often the car has been told to turn round.
         announced: whether the car has been told that the place is near.
         misses: how often the car has gone past the place.
         avoided: places that the car is not led by any more, for it went past the target when it was.
@@ -154,6 +155,7 @@ class ParticipantMind:
     guided: tuple[str, int, int] | None = None
     guided_at: float = -math.inf
     repeats: int = 0
+    rounds: int = 0
     announced: bool = False
     misses: int = 0
     avoided: tuple[Place, ...] = ()

@@ -109,7 +109,7 @@ def _mind_weather(mind: ParticipantMind, view: View, rng: np.random.Generator) -
         mind.voice = mind.voice.plan(weather_remark(topic, rng), slower)
     elif mind.slowed and fog < THICK_FOG / 2 and rain < HEAVY_RAIN / 2:
         mind.slowed = False
-        if rng.random() < 0.7:
+        if rng.random() < 0.5:
             wording = Wording(faster=True, speed=USUAL)
             mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=wording))
 
@@ -203,7 +203,7 @@ def _topics(mind: ParticipantMind, view: View, rng: np.random.Generator) -> list
         found.append((remark(DialogueMove.CHECK, mind.goal.name),))
         found.append((remark(DialogueMove.QUERY_W, StreetName.QUERIED),))
         found.append((remark(DialogueMove.QUERY_YN, mind.goal.name),))
-        if rng.random() < 0.3 and not mind.hurried and not mind.slowed and view.speed > 5.0:
+        if rng.random() < 0.15 and not mind.hurried and not mind.slowed and view.speed > 5.0:
             faster = Wording(faster=True, speed=USUAL + 5.0 if rng.random() < 0.5 else None)
             mind.hurried = True
             return [(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=faster),)]

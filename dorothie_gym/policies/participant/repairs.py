@@ -81,10 +81,8 @@ def _wrong_side(mind: ParticipantMind, view: View, act: DialogueAct, words: Hear
         return None
     for item in reversed(mind.voice.said):
         wanted = item.wording.direction
-        if wanted is None or wanted is words.direction:
-            continue
         same = set(item.act.values(Slot.ACTION)) & set(act.values(Slot.ACTION)) & set(_SIDEWAYS)
-        if same:
-            return remark(DialogueMove.CLARIFY, *item.act.slots, wording=item.wording)
-        return None
+        if wanted is not None and same:
+            right = wanted is words.direction
+            return None if right else remark(DialogueMove.CLARIFY, *item.act.slots, wording=item.wording)
     return None
