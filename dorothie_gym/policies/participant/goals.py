@@ -72,7 +72,8 @@ def _added(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.rand
     landmark = view.landmark(subgoal.landmark)
     if landmark is None:
         return
-    if _is_on_the_way(mind, view, subgoal, landmark) and rng.random() < GOES_FIRST:
+    on_the_way = _is_on_the_way(mind, view, subgoal, landmark) and rng.random() < GOES_FIRST
+    if on_the_way or _has_to_wait(mind, view, subgoal, landmark):
         _go_first(mind, view, subgoal, landmark)
         return
     news = remark(DialogueMove.INSTRUCT, landmark.name, GoalStatus.PENDING, wording=Wording(topic="added"))
@@ -83,6 +84,13 @@ def _added(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.rand
         mind.voice = mind.voice.plan(stop, replace(news, joined=True))
     else:
         mind.voice = mind.voice.plan(news)
+
+
+def _has_to_wait(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, landmark: SeenLandmark) -> bool:
+    """Whether the task under way, which the car knows of, now has to wait for the new one."""
+    if mind.target is None or mind.goal is None or not mind.told or mind.goal.name is landmark.name:
+        return False
+    return subgoal.allowed and not next(task.allowed for task in view.subgoals if task.index == mind.target)
 
 
 def _is_on_the_way(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, landmark: SeenLandmark) -> bool:

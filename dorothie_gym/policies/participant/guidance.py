@@ -193,8 +193,8 @@ def _rounded_off(mind: ParticipantMind, words: Remark, again: bool, rng: np.rand
     """A step with what else is said in the same breath: a reason before it, or a question whether it was heard."""
     draw = rng.random()
     if words.act.values(Slot.ACTION) == (ActionValue.U_TURN,):
-        # it is not to miss the moment: the shortest of what comes to mind
-        drawn = [word_act(words.act, Role.PARTICIPANT, rng, words.wording, style=mind.voice.style) for _ in range(3)]
+        # it is not to miss the moment: the shorter of what comes to mind
+        drawn = [word_act(words.act, Role.PARTICIPANT, rng, words.wording, style=mind.voice.style) for _ in range(2)]
         return (replace(words, text=min(drawn, key=speech_seconds)),)
     if again and rng.random() < 0.25:
         return words, remark(DialogueMove.ALIGN, joined=True)
