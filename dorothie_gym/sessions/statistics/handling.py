@@ -2,10 +2,11 @@
 
 An exchange handles an exception if it begins after it, within `WINDOW`, and one of its acts refers to it:
 
-- weather: to speed or lights, to what the weather covers (sky, ground, water), or in words to fog, rain, night, ...;
+- weather: to what it covers (sky, ground, water), or in words to fog, rain, night, ...; within `PROMPT` to speed or
+  lights too;
 - vehicles or pedestrians that appear: to such;
 - something on the road: to an obstacle, in words to a way that is blocked or free again; the time counts anew from when
-  the car comes near, and from then on to a U-turn or another lane too;
+  the car comes near, and from then on, within `PROMPT`, to a U-turn or another lane too;
 - a sensor fault: in words, to a sensor or to what it shows; or begun by the car within `FAULT` with a question what to
   do, which it cannot see for itself;
 - a task: to the landmark of the task, or to what is given up or put off.
@@ -48,6 +49,10 @@ from dorothie_gym.world.config import FRAME_RATE
 WINDOW: Final = 60.0
 """An exception is handled within this time [s]."""
 
+PROMPT: Final = 20.0
+"""An act that names nothing but what the car is to do, which may have other reasons, is about what happened within this
+time before [s]."""
+
 FAULT: Final = 30.0
 """A sensor fault ends by itself within this time [s] (spec: design)."""
 
@@ -72,13 +77,13 @@ class Handled(StrEnum):
 _AROUND: Final[frozenset[SlotValue]] = frozenset({ActionValue.U_TURN, ActionValue.LANE_SWITCH})
 """How one gets around what is on the road: means it once the car is near."""
 
+_CAUTION: Final[frozenset[SlotValue]] = frozenset({ActionValue.SPEED_CHANGE, ActionValue.LIGHT_CHANGE})
+"""What one does about the weather."""
+
 _REFERENCES: Final[Mapping[ExceptionKind, frozenset[SlotValue]]] = MappingProxyType(
     {
         ExceptionKind.WEATHER: frozenset(
-            {
-                ActionValue.SPEED_CHANGE, ActionValue.LIGHT_CHANGE, ObjectClass.SKY, ObjectClass.GROUND,
-                ObjectClass.WATER, ObjectClass.TERRAIN,
-            }
+            {ObjectClass.SKY, ObjectClass.GROUND, ObjectClass.WATER, ObjectClass.TERRAIN}
         ),
         ExceptionKind.SPAWN_VEHICLES: frozenset({ObjectClass.VEHICLES}),
         ExceptionKind.SPAWN_PEDESTRIANS: frozenset({ObjectClass.PEDESTRIAN}),
@@ -213,12 +218,18 @@ class _Happened:
         values = {value for move in exchange.moves for value in move.act.slots}
         if self.kind.is_task:
             return bool(_PUT_OFF & values) or self._place() in values
-        if values & _REFERENCES.get(self.kind, frozenset()) or (is_near and values & _AROUND):
+        if values & _REFERENCES.get(self.kind, frozenset()) or self._is_met_by(values, exchange.start):
             return True
         words = _WORDS.get(self.kind)
         if words is not None and any(words.search(move.span.casefold().replace("’", "'")) for move in exchange.moves):
             return True
         return self.kind is ExceptionKind.SENSOR_FAULT and since <= FAULT and _asks_what_to_do(exchange)
+
+    def _is_met_by(self, values: set[SlotValue], time: float) -> bool:
+        """Whether what the car is to do at a time [s] is what one does about such a thing, soon enough after it."""
+        if self.kind is ExceptionKind.WEATHER:
+            return time - self.event.time <= PROMPT and bool(values & _CAUTION)
+        return 0.0 <= time - self.met <= PROMPT and bool(values & _AROUND)
 
     def is_asked_on(self, exchange: SaidUnit) -> bool:
         """Whether an exchange, right after one that handles the exception, goes on with it by a question."""
