@@ -16,6 +16,7 @@ from dorothie_gym.cli.generate import generate
 from dorothie_gym.cli.listings import storyboards, towns
 from dorothie_gym.cli.optional import PictureCommand
 from dorothie_gym.cli.replay import replay
+from dorothie_gym.cli.rollout import rollout
 from dorothie_gym.cli.run import run
 from dorothie_gym.cli.show import show
 from dorothie_gym.cli.stats import stats
@@ -35,6 +36,7 @@ app.add_typer(bench, name="bench")
 app.command()(convert)
 app.command(cls=PictureCommand)(stats)
 app.command()(generate)
+app.command()(rollout)
 app.command()(replay)
 app.command()(show)
 

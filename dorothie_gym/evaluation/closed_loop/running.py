@@ -1,0 +1,107 @@
+"""Rollouts: sessions of given players in given towns, measured where they are played."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+from dorothie_gym.evaluation.closed_loop.plan import RolloutPlan, RolloutSettings
+from dorothie_gym.evaluation.closed_loop.record import measure
+from dorothie_gym.evaluation.closed_loop.results import RESULT_FILE, RolloutResult, Row
+from dorothie_gym.rollout.folder import making_in, write_whole
+from dorothie_gym.rollout.making import SessionMaker
+from dorothie_gym.rollout.processes import share_out
+from dorothie_gym.sessions import SessionError
+from dorothie_gym.sessions.encoding import to_page
+
+SETTINGS_FILE: Final = "settings.json"
+"""What a rollout is made from: a folder with another one of these is not gone on with."""
+
+COST_FILE: Final = "cost.json"
+"""What it took on this machine; apart from the result, which does not depend on it."""
+
+
+def roll_out(
+    settings: RolloutSettings,
+    folder: Path | str,
+    *,
+    workers: int = 1,
+    on_session: Callable[[int, int], None] | None = None,
+) -> RolloutResult:
+    """Plays the sessions of a rollout, measures them, and writes the result into the folder.
+
+    The result depends on neither `workers` nor how often the making was interrupted and begun again: a session that is
+    there is measured and not played again. Where the play is interrupted, the result of the sessions that are there
+    is written. A session whose policy fails is a row with an error; it is played anew by the next run.
+
+    Args:
+        settings: what is played.
+        folder: where sessions and result are kept, made if need be.
+        workers: processes that play; with more than one the caller's main module must be importable.
+        on_session: called with the number of sessions that are there, and of those to be, at first and after each.
+
+    Raises:
+        ValueError: there are no workers.
+        SessionError: the folder holds something else, or another process is at work in it.
+        ProcessError: a process died.
+        OSError: the folder cannot be written.
+    """
+    if workers < 1:
+        raise ValueError(f"workers is {workers}; it must be at least 1")
+    root, plans, rows = Path(folder), settings.plans(), list[Row]()
+    begun, processor = time.perf_counter(), 0.0
+    wanted = settings.to_json()
+    if on_session is not None:
+        on_session(0, len(plans))
+    with making_in(root, SETTINGS_FILE, wanted):
+        try:
+            for row, seconds in share_out(partial(_Player, root, settings), plans, workers=workers):
+                rows.append(row)
+                processor += seconds
+                if on_session is not None:
+                    on_session(len(rows), len(plans))
+        finally:
+            result = write_result(root, settings, rows)
+        cost = {"wall_seconds": time.perf_counter() - begun, "cpu_seconds": processor, "workers": workers}
+        write_whole(root / COST_FILE, to_page({name: round(value, 3) for name, value in cost.items()}))
+    return result
+
+
+def write_result(root: Path, settings: RolloutSettings, rows: Iterable[Row]) -> RolloutResult:
+    """Writes `rollout.json` from the rows of the sessions that were played; returns what it says."""
+    result = RolloutResult(settings=settings.to_json(), rows=tuple(sorted(rows, key=lambda row: row.number)))
+    write_whole(root / RESULT_FILE, to_page(result.to_json()))
+    return result
+
+
+@dataclass
+class _Player:
+    """Plays and measures sessions in one process."""
+
+    root: Path
+    settings: RolloutSettings
+
+    def __post_init__(self) -> None:
+        """Prepares the making of sessions."""
+        self._maker = SessionMaker(self.root, self.settings.config, self.settings.cast)
+
+    def __call__(self, plan: RolloutPlan) -> tuple[Row, float]:
+        """Returns the row of a session, and what it took of the processor [s]."""
+        begun = time.process_time()
+        row = Row(number=plan.number, town=plan.town, seed=plan.seed)
+        try:
+            session, _, _ = self._maker(plan)
+        except (SessionError, OSError):
+            raise  # of the folder, not of the session
+        except Exception as error:  # whatever a policy does wrong: it is counted, and told in the row
+            return _with_error(row, error), time.process_time() - begun
+        record = measure(session, self._maker.env(plan.town).town)
+        return Row(number=row.number, town=row.town, seed=row.seed, record=record), time.process_time() - begun
+
+
+def _with_error(row: Row, error: Exception) -> Row:
+    return Row(number=row.number, town=row.town, seed=row.seed, error=f"{type(error).__name__}: {error}")
