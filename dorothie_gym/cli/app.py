@@ -13,6 +13,7 @@ from dorothie_gym.cli.bench import bench
 from dorothie_gym.cli.convert import convert
 from dorothie_gym.cli.evaluate import evaluate
 from dorothie_gym.cli.generate import generate
+from dorothie_gym.cli.leaderboard import leaderboard
 from dorothie_gym.cli.listings import storyboards, towns
 from dorothie_gym.cli.optional import PictureCommand
 from dorothie_gym.cli.replay import replay
@@ -37,6 +38,7 @@ app.command()(convert)
 app.command(cls=PictureCommand)(stats)
 app.command()(generate)
 app.command()(rollout)
+app.command()(leaderboard)
 app.command()(replay)
 app.command()(show)
 

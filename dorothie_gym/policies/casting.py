@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, TypeAlias
@@ -20,6 +20,8 @@ Loader: TypeAlias = Callable[[Path, Role, SpaceLimits], Policy[Any]]
 
 DESCRIPTION: Final = "model.json"
 """A folder is taken for a policy if it holds this file."""
+
+_COSTS: Final = ("steps", "seconds")
 
 _LOADERS: Final[dict[str, Loader]] = {}
 
@@ -55,13 +57,15 @@ class Player:
         name: of the policy, or the path that was given.
         path: of the file or folder that it was learned into; None for a policy by name.
         loader: reads it.
-        sha256: of the file, or of all files of the folder; what a run was played with.
+        sha256: of the file, or of the folder's files of the model ("model.*"); what a rollout was played with.
+        training: what the learning took, as far as the JSON of the file tells: `steps` and `seconds`.
     """
 
     name: str
     path: Path | None = None
     loader: Loader | None = None
     sha256: str | None = None
+    training: Mapping[str, float] = field(default_factory=dict)
 
     def make(self, role: Role, limits: SpaceLimits) -> Policy[Any]:
         """Makes the policy.
@@ -99,33 +103,39 @@ def find_player(given: str, role: Role) -> Player:
             f"{role}: there is no policy {given!r}, nor a file of that name; "
             f"the policies are {', '.join(policy_names(role))}"
         )
-    kinds = _kinds_of(path)
+    description = _description(path)
+    kinds = _kinds_of(path, description)
     loader = next((_LOADERS[kind] for kind in kinds if kind in _LOADERS), None)
     if loader is None:
         known = ", ".join(loadable_kinds()) or "none: is dorothie-gym[baselines] installed?"
         raise CastError(f"{role}: {given} is of the kind {' or '.join(kinds)}, which cannot be played (known: {known})")
-    return Player(name=given, path=path, loader=loader, sha256=_sha256(path))
+    training = {name: value for name in _COSTS if isinstance(value := description.get(name), int | float)}
+    return Player(name=given, path=path, loader=loader, sha256=_sha256(path), training=training)
 
 
-def _kinds_of(path: Path) -> tuple[str, ...]:
+def _description(path: Path) -> Mapping[str, Any]:
+    """The JSON of a file, or of a folder's description; empty where there is none."""
+    file = path / DESCRIPTION if path.is_dir() else path
+    if file.suffix != ".json" or not file.is_file():
+        return {}
+    try:
+        page = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise CastError(f"{file}: cannot be read ({error}); give the file of a policy") from None
+    return page if isinstance(page, dict) else {}
+
+
+def _kinds_of(path: Path, description: Mapping[str, Any]) -> tuple[str, ...]:
     """What a file may be called: the kind that its JSON tells, or its ending."""
-    description = path / DESCRIPTION if path.is_dir() else path
-    if path.is_dir() and not description.is_file():
-        return ("folder without " + DESCRIPTION,)
-    told: list[str] = []
-    if description.suffix == ".json":
-        try:
-            page = json.loads(description.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise CastError(f"{description}: cannot be read ({error}); give the file of a policy") from None
-        if isinstance(page, dict) and isinstance(page.get("kind"), str):
-            told.append(page["kind"])
-    return (*told, description.suffix or "file without an ending")
+    told = (str(description["kind"]),) if "kind" in description else ()
+    if not path.is_dir():
+        return (*told, path.suffix or "file without an ending")
+    return (*told, ".json") if (path / DESCRIPTION).is_file() else ("folder without " + DESCRIPTION,)
 
 
 def _sha256(path: Path) -> str:
     digest = hashlib.sha256()
-    files = sorted(each for each in path.rglob("*") if each.is_file()) if path.is_dir() else [path]
+    files = sorted(path.glob(Path(DESCRIPTION).stem + ".*")) if path.is_dir() else [path]
     for each in files:
         digest.update(each.name.encode() + b"\0")
         with each.open("rb") as content:

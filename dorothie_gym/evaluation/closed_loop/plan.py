@@ -85,10 +85,11 @@ class RolloutSettings:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Returns what the table follows from, in JSON types; of files that were learned, their SHA-256, too."""
+        """Returns what the table follows from, in JSON types; of learned players their SHA-256 and their cost, too."""
         return {
             **{str(role): self.cast[role].name for role in AGENT_ROLES},
             "sha256": {str(role): self.cast[role].sha256 for role in AGENT_ROLES if self.cast[role].sha256},
+            "training": {str(role): dict(self.cast[role].training) for role in AGENT_ROLES if self.cast[role].training},
             "towns": list(self.towns),
             "sessions_planned": self.sessions,
             "seed": self.seed,

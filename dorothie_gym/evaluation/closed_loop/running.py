@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import logging
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -23,6 +25,8 @@ SETTINGS_FILE: Final = "settings.json"
 
 COST_FILE: Final = "cost.json"
 """What it took on this machine; apart from the result, which does not depend on it."""
+
+_LOG = logging.getLogger(__name__)
 
 
 def roll_out(
@@ -66,8 +70,7 @@ def roll_out(
                     on_session(len(rows), len(plans))
         finally:
             result = write_result(root, settings, rows)
-        cost = {"wall_seconds": time.perf_counter() - begun, "cpu_seconds": processor, "workers": workers}
-        write_whole(root / COST_FILE, to_page({name: round(value, 3) for name, value in cost.items()}))
+            _add_cost(root / COST_FILE, time.perf_counter() - begun, processor, workers)
     return result
 
 
@@ -76,6 +79,17 @@ def write_result(root: Path, settings: RolloutSettings, rows: Iterable[Row]) -> 
     result = RolloutResult(settings=settings.to_json(), rows=tuple(sorted(rows, key=lambda row: row.number)))
     write_whole(root / RESULT_FILE, to_page(result.to_json()))
     return result
+
+
+def _add_cost(file: Path, wall: float, processor: float, workers: int) -> None:
+    """Adds what was spent to what the runs before have spent; a file that cannot be read counts as none."""
+    try:
+        before = json.loads(file.read_text(encoding="utf-8"))
+        wall, processor = wall + before["wall_seconds"], processor + before["cpu_seconds"]
+    except (FileNotFoundError, ValueError, KeyError, TypeError):
+        _LOG.debug("%s: is begun anew", file)
+    cost = {"wall_seconds": round(wall, 3), "cpu_seconds": round(processor, 3), "workers": workers}
+    write_whole(file, to_page(cost))
 
 
 @dataclass
