@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dorothie_gym.cli.options import WordErrors, env_config
+from dorothie_gym.cli.options import Ray, WordErrors, env_config
 from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
 from dorothie_gym.cli.progress import processors, session_progress
 
@@ -30,6 +30,7 @@ def generate(
         float | None, typer.Option(min=1.0, max=86400.0, help="Cut sessions off after so many simulated seconds.")
     ] = None,
     word_errors: WordErrors = 0.0,
+    ray: Ray = None,
     as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
 ) -> None:
     """Make a corpus: the scripted three play many sessions, divided into train, val and test, seen and unseen towns.
@@ -48,6 +49,7 @@ def generate(
                     sessions=sessions,
                     seed=seed,
                     workers=workers or processors(),
+                    ray=ray,
                     config=config,
                     on_session=on_session,
                 )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dorothie_gym.cli.options import WordErrors, env_config
+from dorothie_gym.cli.options import Ray, WordErrors, env_config
 from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
 from dorothie_gym.cli.players import find_cast
 from dorothie_gym.cli.progress import processors, session_progress
@@ -48,6 +48,7 @@ def rollout(
         float | None, typer.Option(min=1.0, max=86400.0, help="Cut sessions off after so many simulated seconds.")
     ] = None,
     word_errors: WordErrors = 0.0,
+    ray: Ray = None,
     as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
 ) -> None:
     """Let agents drive and talk through many sessions, and print what that was worth, with intervals.
@@ -65,7 +66,7 @@ def rollout(
         settings = RolloutSettings(
             cast=cast, towns=chosen, sessions=sessions, seed=seed, config=env_config(max_seconds, word_errors)
         )
-        result = _play(settings, out, workers or processors(), quiet=as_json)
+        result = _play(settings, out, workers or processors(), ray, quiet=as_json)
     if as_json:
         print_json(result.to_json())
         return
@@ -79,14 +80,14 @@ def rollout(
         console.print(f"Kept for `dorothie-gym replay` and `leaderboard`: {out}", style="dim", soft_wrap=True)
 
 
-def _play(settings: RolloutSettings, out: Path | None, workers: int, *, quiet: bool) -> RolloutResult:
+def _play(settings: RolloutSettings, out: Path | None, workers: int, ray: str | None, *, quiet: bool) -> RolloutResult:
     from dorothie_gym.evaluation.closed_loop import roll_out
     from dorothie_gym.rollout import ProcessError
 
     folder = Path(tempfile.mkdtemp(prefix="dorothie_gym-rollout-")) if out is None else out
     try:
         with session_progress(quiet=quiet) as on_session:
-            result = roll_out(settings, folder, workers=workers, on_session=on_session)
+            result = roll_out(settings, folder, workers=workers, ray=ray, on_session=on_session)
     except KeyboardInterrupt:
         _tell_interruption(folder, settings)
     except ProcessError as error:

@@ -13,6 +13,7 @@ from dorothie_gym.policies import ALL_SCRIPTED
 from dorothie_gym.rollout.corpus_plan import SessionPlan, plan_corpus
 from dorothie_gym.rollout.folder import making_in
 from dorothie_gym.rollout.making import SessionMaker
+from dorothie_gym.rollout.on_ray import share_out_on_ray
 from dorothie_gym.rollout.processes import share_out
 from dorothie_gym.sessions import SessionState, manifest_row, session_state, write_manifest
 
@@ -44,11 +45,12 @@ def generate_corpus(
     seed: int,
     workers: int = 1,
     config: EnvConfig | None = None,
+    ray: str | None = None,
     on_session: Callable[[int, int], None] | None = None,
 ) -> Generated:
     """Plays the sessions of a corpus and writes its manifest.
 
-    What lies in the folder depends on neither `workers` nor how often the making was interrupted and begun again: a
+    What lies in the folder depends on neither who plays nor how often the making was interrupted and begun again: a
     session appears in its fold when it is finished, and one that is there is not played again.
 
     Args:
@@ -57,12 +59,13 @@ def generate_corpus(
         seed: of the corpus.
         workers: processes that play; with more than one the caller's main module must be importable.
         config: of the environment.
+        ray: address of a Ray cluster that plays, instead of `workers`; see `on_ray`.
         on_session: called with the number of sessions that are there, and of those to be, at first and after each.
 
     Raises:
         ValueError: no sessions or no workers, or a negative seed.
         SessionError: the folder holds something else, or another process is at work in it.
-        ProcessError: a session failed in another process.
+        ProcessError: a session failed in another process, or there is no such cluster.
         OSError: the folder cannot be written.
     """
     if workers < 1:
@@ -73,7 +76,12 @@ def generate_corpus(
         played = 0
         if on_session is not None:
             on_session(0, sessions)
-        for number, row, is_new in share_out(partial(_CorpusMaker, root, config), plans, workers=workers):
+        prepare = partial(_CorpusMaker, config=config)
+        for number, row, is_new in (
+            share_out(partial(prepare, root), plans, workers=workers)
+            if ray is None
+            else share_out_on_ray(prepare, plans, root, address=ray)
+        ):
             rows[number] = row
             played += is_new
             if on_session is not None:

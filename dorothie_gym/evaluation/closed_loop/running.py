@@ -16,6 +16,7 @@ from dorothie_gym.evaluation.closed_loop.record import measure
 from dorothie_gym.evaluation.closed_loop.results import RESULT_FILE, RolloutResult, Row
 from dorothie_gym.rollout.folder import making_in, write_whole
 from dorothie_gym.rollout.making import SessionMaker
+from dorothie_gym.rollout.on_ray import share_out_on_ray
 from dorothie_gym.rollout.processes import share_out
 from dorothie_gym.sessions import SessionError
 from dorothie_gym.sessions.encoding import to_page
@@ -34,11 +35,12 @@ def roll_out(
     folder: Path | str,
     *,
     workers: int = 1,
+    ray: str | None = None,
     on_session: Callable[[int, int], None] | None = None,
 ) -> RolloutResult:
     """Plays the sessions of a rollout, measures them, and writes the result into the folder.
 
-    The result depends on neither `workers` nor how often the making was interrupted and begun again: a session that is
+    The result depends on neither who plays nor how often the making was interrupted and begun again: a session that is
     there is measured and not played again. Where the play is interrupted, the result of the sessions that are there
     is written. A session whose policy fails is a row with an error; it is played anew by the next run.
 
@@ -46,12 +48,13 @@ def roll_out(
         settings: what is played.
         folder: where sessions and result are kept, made if need be.
         workers: processes that play; with more than one the caller's main module must be importable.
+        ray: address of a Ray cluster that plays, instead of `workers`; see `dorothie_gym.rollout.on_ray`.
         on_session: called with the number of sessions that are there, and of those to be, at first and after each.
 
     Raises:
         ValueError: there are no workers.
         SessionError: the folder holds something else, or another process is at work in it.
-        ProcessError: a process died.
+        ProcessError: a process died, or there is no such cluster.
         OSError: the folder cannot be written.
     """
     if workers < 1:
@@ -63,7 +66,12 @@ def roll_out(
         on_session(0, len(plans))
     with making_in(root, SETTINGS_FILE, wanted):
         try:
-            for row, seconds in share_out(partial(_Player, root, settings), plans, workers=workers):
+            prepare = partial(_Player, settings=settings)
+            for row, seconds in (
+                share_out(partial(prepare, root), plans, workers=workers)
+                if ray is None
+                else share_out_on_ray(prepare, plans, root, address=ray)
+            ):
                 rows.append(row)
                 processor += seconds
                 if on_session is not None:
