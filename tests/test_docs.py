@@ -15,9 +15,11 @@ import pytest
 from dorothie_gym.dialogue.grammar import parse_grammar
 from dorothie_gym.dialogue.talk_files import read_talk_files
 from dorothie_gym.evaluation import metrics_of, read_predictions
+from dorothie_gym.evaluation.closed_loop import METRICS, RecoverySeconds
 from dorothie_gym.evaluation.features import Batch
 from dorothie_gym.evaluation.prediction_files import file_schema
 from dorothie_gym.ontology import WeatherParameter
+from dorothie_gym.policies import casting
 from dorothie_gym.sessions import Task
 from dorothie_gym.tasks import bind, load_template
 from dorothie_gym.world.town import describe, load_town
@@ -160,3 +162,17 @@ def test_the_page_of_transcripts_shows_three_sessions_of_different_kinds() -> No
 def test_every_page_is_in_the_navigation() -> None:
     navigation = (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8")
     assert [path.name for path in DOCS.glob("*.md") if f": {path.name}" not in navigation] == []
+
+
+def test_the_examples_of_the_closed_loop_page_run(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(casting, "_LOADERS", {})
+    text = (DOCS / "closed-loop.md").read_text(encoding="utf-8")
+    names: dict[str, Any] = {}
+    for block in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL):
+        exec(compile(block, "closed-loop.md", "exec"), names)
+    printed = capsys.readouterr().out
+    assert printed.startswith("0.0 0.0 0.0 0\n[0.")
+    for metric in (*METRICS, RecoverySeconds()):
+        assert f"| {metric.title} | `{metric.key}` |" in text

@@ -13,9 +13,11 @@ from dorothie_gym.cli.bench import bench
 from dorothie_gym.cli.convert import convert
 from dorothie_gym.cli.evaluate import evaluate
 from dorothie_gym.cli.generate import generate
+from dorothie_gym.cli.leaderboard import leaderboard
 from dorothie_gym.cli.listings import storyboards, towns
 from dorothie_gym.cli.optional import PictureCommand
 from dorothie_gym.cli.replay import replay
+from dorothie_gym.cli.rollout import rollout
 from dorothie_gym.cli.run import run
 from dorothie_gym.cli.show import show
 from dorothie_gym.cli.stats import stats
@@ -35,6 +37,8 @@ app.add_typer(bench, name="bench")
 app.command()(convert)
 app.command(cls=PictureCommand)(stats)
 app.command()(generate)
+app.command()(rollout)
+app.command()(leaderboard)
 app.command()(replay)
 app.command()(show)
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dorothie_gym.cli.options import WordErrors, env_config
+from dorothie_gym.cli.options import Ray, WordErrors, env_config
 from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
+from dorothie_gym.cli.progress import processors, session_progress
 
 if TYPE_CHECKING:
     from dorothie_gym.rollout import Generated
@@ -32,6 +30,7 @@ def generate(
         float | None, typer.Option(min=1.0, max=86400.0, help="Cut sessions off after so many simulated seconds.")
     ] = None,
     word_errors: WordErrors = 0.0,
+    ray: Ray = None,
     as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
 ) -> None:
     """Make a corpus: the scripted three play many sessions, divided into train, val and test, seen and unseen towns.
@@ -44,12 +43,13 @@ def generate(
         config = env_config(max_seconds, word_errors)
         begun = time.perf_counter()
         try:
-            with _progress(quiet=as_json) as on_session:
+            with session_progress(quiet=as_json) as on_session:
                 made = generate_corpus(
                     out,
                     sessions=sessions,
                     seed=seed,
-                    workers=workers or _processors(),
+                    workers=workers or processors(),
+                    ray=ray,
                     config=config,
                     on_session=on_session,
                 )
@@ -70,10 +70,6 @@ def generate(
         )
 
 
-def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def _tell_interruption(out: Path, sessions: int, seed: int, max_seconds: float | None, word_errors: float) -> None:
     from dorothie_gym.rollout import finished_sessions
 
@@ -87,18 +83,6 @@ def _tell_interruption(out: Path, sessions: int, seed: int, max_seconds: float |
         f"Interrupted with {done} of {sessions} sessions finished; go on with: {command}", markup=False, soft_wrap=True
     )
     raise typer.Exit(INTERRUPTED)
-
-
-@contextmanager
-def _progress(*, quiet: bool) -> Iterator[Callable[[int, int], None]]:
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    console = stderr()
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    hidden = quiet or not console.is_terminal
-    with Progress(*columns, console=console, disable=hidden, transient=True) as progress:
-        bar = progress.add_task("Sessions", total=None)
-        yield lambda done, total: progress.update(bar, completed=done, total=total)
 
 
 def _facts(made: Generated, seed: int, wall: float) -> dict[str, Any]:

@@ -18,6 +18,14 @@ WordErrors = Annotated[
     ),
 ]
 
+Ray = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Let a Ray cluster play: auto, HOST:PORT, ray://HOST:PORT, or local (needs dorothie-gym[ray]).",
+    ),
+]
+
 
 def env_config(max_seconds: float | None, word_errors: float) -> EnvConfig:
     """The configuration of an environment that a command line asks for.

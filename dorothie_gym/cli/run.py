@@ -22,6 +22,7 @@ from dorothie_gym.cli.output import (
     stdout,
     told_plainly,
 )
+from dorothie_gym.cli.players import find_cast
 from dorothie_gym.cli.video import check_video
 
 if TYPE_CHECKING:
@@ -30,7 +31,8 @@ if TYPE_CHECKING:
 PICTURE = Path("dorothie.png")
 """Picture that is written where none is asked for."""
 
-_POLICY = "scripted|silent|random"
+_POLICY = "scripted|silent|random|FILE"
+_CO_WIZARD = "scripted|silent|random|lane-follow|FILE"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +70,7 @@ def run(
         Path | None, typer.Option(metavar="V.mp4", help="Film the session (needs dorothie-gym[video]).")
     ] = None,
     participant: Annotated[str, typer.Option(metavar=_POLICY, help="Who plays the participant.")] = "scripted",
-    co_wizard: Annotated[str, typer.Option(metavar=_POLICY, help="Who plays the Co-Wizard.")] = "scripted",
+    co_wizard: Annotated[str, typer.Option(metavar=_CO_WIZARD, help="Who plays the Co-Wizard.")] = "scripted",
     ad_wizard: Annotated[str, typer.Option(metavar=_POLICY, help="Who plays the Ad-Wizard.")] = "scripted",
     max_seconds: Annotated[
         float | None, typer.Option(min=1.0, max=86400.0, help="Cut the session off after so many simulated seconds.")
@@ -113,19 +115,17 @@ def _check_outputs(plan: _Plan) -> None:
 def _play(plan: _Plan, *, quiet: bool) -> dict[str, Any]:
     """Plays the session and returns what --json writes."""
     from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-    from dorothie_gym.ontology import AGENT_ROLES, Role
-    from dorothie_gym.policies import make_policy
+    from dorothie_gym.ontology import Role
     from dorothie_gym.rollout import play_session
     from dorothie_gym.spaces import noop
 
+    cast = find_cast(*plan.players)
     with compiling():
         env = DuoWizardEnv(plan.town, plan.storyboard, config=env_config(plan.max_seconds, plan.word_errors))
         env.reset(seed=plan.seed)
         env.step({agent: noop(Role(agent), env.limits) for agent in env.agents})
     try:
-        policies = {
-            role: make_policy(name, role, env.limits) for role, name in zip(AGENT_ROLES, plan.players, strict=True)
-        }
+        policies = {role: player.make(role, env.limits) for role, player in cast.items()}
     except ValueError as error:
         fail(str(error))
     begun = time.perf_counter()

@@ -179,9 +179,10 @@ class Adversary:
             change(action.item)
         except StoryboardError as error:
             return str(error)
-        landmark = task.storyboard.landmarks[task.landmark_of(action.item)]
+        row = task.landmark_of(action.item)
+        landmark = task.storyboard.landmarks[row]
         status = GoalStatus.ABANDONED if action.exception is ExceptionKind.TASK_DELETE else task.status(action.item)
-        return {"subgoal": action.item, "landmark": landmark.name.label, "status": status.label}
+        return {"subgoal": action.item, "landmark": landmark.name.label, "row": row, "status": status.label}
 
     def _message(self, action: AdWizardAction) -> Outcome:
         return {} if action.message else "the message is empty"

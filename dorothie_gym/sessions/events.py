@@ -24,7 +24,8 @@ class EventType(enum.StrEnum):
     BELIEF_UPDATE = "BeliefUpdate"
     """Mental action: action (label) and its arguments (junctions, landmarks, landmark, status, x, y)."""
     EXCEPTION = "Exception"
-    """Of the Ad-Wizard, that took effect: kind (lower-case name) and its arguments."""
+    """Of the Ad-Wizard, that took effect: kind (lower-case name) and its arguments; of a task exception the subgoal and
+    its landmark, by label and by row of the header's landmarks (row)."""
     MESSAGE = "Message"
     """From the Ad-Wizard to the participant: text."""
     REFUSAL = "Refusal"

@@ -1,0 +1,31 @@
+"""Who plays, from a command line."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dorothie_gym.cli.output import fail
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology import Role
+    from dorothie_gym.policies import Player
+
+
+def find_cast(participant: str, co_wizard: str, ad_wizard: str) -> dict[Role, Player]:
+    """Returns who plays each role; fails where a name or file is none.
+
+    Args:
+        participant: name of a policy, or file of a learned one.
+        co_wizard: likewise.
+        ad_wizard: likewise.
+    """
+    from dorothie_gym.ontology import AGENT_ROLES
+    from dorothie_gym.policies import CastError, find_player, policy_names
+
+    given = dict(zip(AGENT_ROLES, (participant, co_wizard, ad_wizard), strict=True))
+    if any(name not in policy_names(role) for role, name in given.items()):
+        import dorothie_gym.baselines  # noqa: F401  # what is learned there makes itself known
+    try:
+        return {role: find_player(name, role) for role, name in given.items()}
+    except CastError as error:
+        fail(str(error))
