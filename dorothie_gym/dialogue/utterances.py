@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from dorothie_gym.ontology import DialogueAct, Role
 
-WORDS_PER_SECOND = 2.5
+WORDS_PER_SECOND = 2.7
 """Speaking rate [words/s]: ordinary talk runs at 2 to 3 words a second (design, Time)."""
 
 SHORTEST_SPAN = 0.6

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from dorothie_gym.dialogue import WORDS_PER_SECOND
 from dorothie_gym.world.config import FRAME_RATE, WorldConfig
 
 
@@ -46,7 +47,7 @@ class EnvConfig:
 
     decision_frequency: float = 2.0
     max_seconds: float = 900.0
-    words_per_second: float = 2.5
+    words_per_second: float = WORDS_PER_SECOND
     observe_acts: bool = True
     word_error_rate: float = 0.0
     world: WorldConfig = field(default_factory=WorldConfig)

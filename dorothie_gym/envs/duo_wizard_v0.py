@@ -39,7 +39,7 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
 
     ## Observation Space
     A `Dict` of fixed-shape arrays and texts for each role: see `dorothie_gym.spaces.observation_space`. Utterances of
-    the others are observed in the decision after their last word (2.5 words a second). The Co-Wizard does not see
+    the others are observed in the decision after their last word. The Co-Wizard does not see
     hidden landmarks, the task, or arrivals; the participant does not see the Ad-Wizard's options.
 
     ## Action Space

@@ -11,7 +11,7 @@ def span(text: str, move: DialogueMove = DialogueMove.INSTRUCT) -> Span:
 
 
 def test_one_act_is_heard_when_its_words_are_over():
-    talk = Conversation()
+    talk = Conversation(words_per_second=2.5)
     assert talk.say(PARTICIPANT, span("turn left at the next"), 10.0) is None  # 5 words: 2 s
     assert talk.speaking(PARTICIPANT, 10.5) == pytest.approx(1.5)
     assert talk.deliver(11.5) == []

@@ -1,6 +1,6 @@
 import pytest
 
-from dorothie_gym.dialogue import Span, Utterance, speech_seconds
+from dorothie_gym.dialogue import WORDS_PER_SECOND, Span, Utterance, speech_seconds
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role
 
 STOP = Span("Stop.", DialogueAct.of(DialogueMove.INSTRUCT))
@@ -8,7 +8,7 @@ OKAY = Span("Okay.", DialogueAct.of(DialogueMove.ACKNOWLEDGE))
 
 
 def test_speech_takes_its_words_at_the_rate():
-    assert speech_seconds("turn left at the next") == pytest.approx(2.0)
+    assert speech_seconds("turn left at the next") == pytest.approx(5 / WORDS_PER_SECOND)
     assert speech_seconds("turn left at the next", words_per_second=5.0) == pytest.approx(1.0)
 
 

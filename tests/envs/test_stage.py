@@ -22,7 +22,7 @@ from dorothie_gym.spaces import (
 from dorothie_gym.world.config import WorldConfig
 from tests.world.forcing import blind
 
-ALONE = EnvConfig(world=WorldConfig(vehicles=0, pedestrians=0))
+ALONE = EnvConfig(words_per_second=2.5, world=WorldConfig(vehicles=0, pedestrians=0))
 
 
 @pytest.fixture
