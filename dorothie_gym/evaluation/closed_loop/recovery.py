@@ -5,11 +5,11 @@ Both are read from what happened in the world, not from what was said:
 - an exception is *met* when it takes effect; one that puts something on the road when the car first comes within 60 m
   of it (`sessions.statistics.handling.NEAR`), or of the square in which newcomers appear. What it takes away again (a
   prop, the end of a fault) is nothing to meet;
-- it is *recovered from* when the car is nearer, by `FORWARD`, to the end of its task than when it met it, and stays so
-  until the next subgoal is reached or the session ends; or when that subgoal is reached. The task is that
-  which the exception left, and the way is the router's, past what stands on the road by then. So a detour counts from
-  its beginning, a task that became longer is no step back, and who drives on to where nothing is to be done any more
-  has not recovered until it has come back.
+- it is *recovered from* if the next subgoal is reached in the end, and from the moment on from which the car stays
+  nearer, by `FORWARD`, to the end of its task than when it met the exception; at the latest when that subgoal is
+  reached. The task is that which the exception left, and the way is the router's, past what stands on the road by
+  then. So a detour counts from its beginning, a task that became longer is no step back, and who drives on to where
+  nothing is to be done any more has not recovered until it has come back.
 """
 
 from __future__ import annotations
@@ -109,9 +109,10 @@ def _seconds_to_recovery(session: Session, town: Town, index: int, met: float) -
     if task.done:
         return 0.0
     step = next((event.frame for event in session.events[known:] if is_arrival(event)), None)
-    at_step = math.inf if step is None else round((step - frame) / FRAME_RATE, 3)
-    last = step if step is not None else round(session.duration * FRAME_RATE) + 1
-    frames = range(frame, last, round(STEP * FRAME_RATE))
+    if step is None:
+        return math.inf
+    at_step = round((step - frame) / FRAME_RATE, 3)
+    frames = range(frame, step, round(STEP * FRAME_RATE))
     places = places_of(session, town, frames)
     if not places or len(places) < len(frames):
         return at_step  # the recording does not know its lanes

@@ -9,25 +9,27 @@ HOME = (goal(1),)
 
 
 def test_car_that_drives_on_has_recovered_as_soon_as_it_is_ten_metres_further() -> None:
-    (found,) = met_exceptions(drive(STRAIGHT, [unexpected(10.0, "weather")], goals=HOME), street())
+    events = [unexpected(10.0, "weather"), reached(60.0, 0)]
+    (found,) = met_exceptions(drive(STRAIGHT, events, goals=HOME), street())
     assert (found.kind, found.met, found.seconds) == (ExceptionKind.WEATHER, 10.0, 2.0)
 
 
 def test_car_that_stands_recovers_when_it_goes_on() -> None:
     path = [(0.0, 20.0), (10.0, 70.0), (40.0, 70.0), (60.0, 170.0)]
     fault = unexpected(10.0, "sensor_fault", sensor="gps", on=True)
-    (found,) = met_exceptions(drive(path, [fault], goals=HOME), street())
+    (found,) = met_exceptions(drive(path, [fault, reached(60.0, 0)], goals=HOME), street())
     assert found.met == 10.0 and found.seconds == 32.0  # 30 s of standing, and 10 m at 5 m/s
 
 
 def test_who_goes_back_again_has_not_recovered_before_it_has_come_back() -> None:
     path = [(0.0, 20.0), (20.0, 120.0), (30.0, 70.0), (80.0, 320.0)]
-    (found,) = met_exceptions(drive(path, [unexpected(10.0, "weather")], goals=HOME), street())
+    events = [unexpected(10.0, "weather"), reached(80.0, 0)]
+    (found,) = met_exceptions(drive(path, events, goals=HOME), street())
     assert found.seconds == 22.0  # at 32 s it is at 80 m again, 10 m beyond where it met the weather
 
 
-def test_who_drives_past_the_goal_has_not_recovered() -> None:
-    (found,) = met_exceptions(drive(STRAIGHT, [unexpected(10.0, "weather")]), street())  # past 120 m, and no way back
+def test_who_goes_forward_and_reaches_nothing_has_not_recovered() -> None:
+    (found,) = met_exceptions(drive(STRAIGHT, [unexpected(10.0, "weather")], goals=HOME), street())
     assert found.met == 10.0 and found.seconds is None
 
 
@@ -63,7 +65,7 @@ def test_what_is_taken_away_again_is_nothing_to_meet() -> None:
 
 
 def test_longer_task_is_no_step_back() -> None:
-    events = [unexpected(10.0, "task_trigger", subgoal=1)]
+    events = [unexpected(10.0, "task_trigger", subgoal=1), reached(60.0, 0)]
     goals = (goal(0), goal(1, trigger=True), goal(2))
     (found,) = met_exceptions(drive(STRAIGHT, events, goals=goals, stations=(350.0, 360.0, 370.0)), street())
     assert found.seconds == 2.0
