@@ -39,7 +39,7 @@ class Row:
 
     def as_json(self) -> dict[str, Any]:
         """In JSON types."""
-        return {"steps": self.steps, "seconds": round(self.seconds, 2), **asdict(self.outcome)}
+        return {"steps": self.steps, "seconds": self.seconds, **asdict(self.outcome)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,7 +97,7 @@ class Training:
             self.model = make_model(settings, self._vector, log=log)
             if begun:
                 restore(self.model, folder)
-                self.seconds = float(read_description(folder).get("seconds", self.rows[-1].seconds if self.rows else 0))
+                self.seconds = float(read_description(folder)["seconds"])
         except Exception:
             self._vector.close()
             raise
@@ -119,7 +119,7 @@ class Training:
             finished = False
         finally:
             self._vector.close()
-        save_model(model, settings, self.folder)
+        save_model(model, settings, self.folder, self.seconds)
         if self.rows:
             draw_curve([row.as_json() for row in self.rows], _title(settings), self.folder / CURVE)
         return Run(
@@ -132,12 +132,12 @@ class Training:
         settings = self.settings
         act = act_with(self.model, masked=settings.algorithm == "maskable_ppo")
         outcome = evaluate_policy(Maker(settings.env, settings.env_settings), act, settings.episodes, SEEDS_FROM)
-        row = Row(steps=int(self.model.num_timesteps), seconds=self.seconds, outcome=outcome)
+        row = Row(steps=int(self.model.num_timesteps), seconds=round(self.seconds, 2), outcome=outcome)
         best = Run(folder=self.folder, rows=tuple(self.rows), steps=0, seconds=0.0, finished=False).best
         self.rows.append(row)
-        save_model(self.model, settings, self.folder)
+        save_model(self.model, settings, self.folder, self.seconds)
         if best is None or (outcome.success, outcome.reward) > (best.outcome.success, best.outcome.reward):
-            save_model(self.model, settings, self.folder / BEST)
+            save_model(self.model, settings, self.folder / BEST, self.seconds)
         with (self.folder / PROGRESS).open("a", encoding="utf-8") as file:
             file.write(json.dumps(row.as_json()) + "\n")
         draw_curve([row.as_json() for row in self.rows], _title(settings), self.folder / CURVE)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -63,10 +65,16 @@ class Falling:
         return self._last + (self._first - self._last) * remaining
 
 
-def save_model(model: Any, settings: TrainingSettings, folder: Path) -> None:
+def save_model(model: Any, settings: TrainingSettings, folder: Path, seconds: float) -> None:
     """Writes a model with the state of its optimisers into a folder; an older one stays whole until it is replaced.
 
     What an algorithm has in its replay buffer is not kept.
+
+    Args:
+        model: of stable-baselines3.
+        settings: what it was trained with.
+        folder: where the two files go.
+        seconds: for which it was trained [s].
     """
     tensors: dict[str, torch.Tensor] = {}
     groups: dict[str, Any] = {}
@@ -83,6 +91,7 @@ def save_model(model: Any, settings: TrainingSettings, folder: Path) -> None:
         "format": FORMAT,
         "settings": settings.as_json(),
         "steps": int(model.num_timesteps),
+        "seconds": round(seconds, 2),
         "updates": int(getattr(model, "_n_updates", 0)),
         "optimisers": groups,
     }
@@ -153,9 +162,17 @@ def load_model(folder: Path) -> tuple[Any, TrainingSettings]:
     folder = folder.parent if folder.is_file() else folder
     settings = TrainingSettings(**read_description(folder)["settings"])
     env = make_env(settings.env, settings.env_settings)
-    model = make_model(settings, env)
+    model = make_model(_for_one(settings), env)
     restore(model, folder)
     return model, settings
+
+
+def _for_one(settings: TrainingSettings) -> TrainingSettings:
+    """The same for a single environment, which fills no large batches: stable-baselines3 would warn."""
+    parameters = dict(settings.parameters)
+    if {"n_steps", "batch_size"} <= set(parameters):
+        parameters["batch_size"] = math.gcd(parameters["n_steps"], parameters["batch_size"])
+    return replace(settings, parameters=parameters)
 
 
 def _variables(model: Any) -> Iterator[tuple[str, torch.Tensor]]:
