@@ -70,10 +70,14 @@ _PLAIN = {
 
 
 class Controls:
-    """Reads actions and tells which would be carried out, for the car of a session."""
+    """Reads actions and tells which would be carried out, for the car of a session.
+
+    Attributes:
+        ways: ways on at the town's junctions.
+    """
 
     def __init__(self, world: World, ways: Ways) -> None:
-        self._world, self._ways = world, ways
+        self._world, self.ways = world, ways
         self._prospect = Prospect(world)
 
     @property
@@ -96,7 +100,7 @@ class Controls:
         if sector is None:
             return _PLAIN[action]
         choice = self.choice
-        way = self._ways.after(choice[0])[sector] if choice is not None else None
+        way = self.ways.after(choice[0])[sector] if choice is not None else None
         return Physical(action=PhysicalAction.J_TURN, angle=way.angle if way is not None else SECTORS[sector])
 
     def mask(self) -> NDArray[np.int8]:
@@ -117,6 +121,6 @@ class Controls:
         choice = None if committed else self.choice
         if choice is not None:
             planned = None if planner.held else planner.turn_ahead
-            for sector, way in enumerate(self._ways.after(choice[0])):
+            for sector, way in enumerate(self.ways.after(choice[0])):
                 mask[FIRST_TURN + sector] = way is not None and way.angle != planned
         return mask

@@ -42,6 +42,7 @@ class NavigationWeights:
         success: at the end, if every live subgoal was reached and nothing was hit.
         collision: for each collision of the car's own making.
         infraction: for each red light, stop sign, stretch off the road or on the wrong side.
+        gave_up: at the end, if the participant has given up, or the car has left the road.
         time: for each second.
         refusal: for each action that is refused.
     """
@@ -51,14 +52,15 @@ class NavigationWeights:
     success: float = 5.0
     collision: float = -2.0
     infraction: float = -0.2
-    time: float = -0.01
+    gave_up: float = -1.0
+    time: float = -0.02
     refusal: float = -0.02
 
 
 REWARDS: Mapping[str, NavigationWeights] = MappingProxyType(
     {
         "dense": NavigationWeights(),
-        "sparse": NavigationWeights(progress=0.0, subgoal=1.0, infraction=0.0, time=0.0, refusal=0.0),
+        "sparse": NavigationWeights(progress=0.0, subgoal=1.0, infraction=0.0, gave_up=0.0, time=0.0, refusal=0.0),
     }
 )
 """Weights by name."""
@@ -83,7 +85,7 @@ class NavigationConfig:
     traffic: str = "light"
     exceptions: float = 0.0
     max_seconds: float = 600.0
-    patience: float = 120.0
+    patience: float = 60.0
     decision_frequency: float = 2.0
     weights: NavigationWeights = field(default_factory=NavigationWeights)
 

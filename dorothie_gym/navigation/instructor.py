@@ -141,7 +141,7 @@ class Instructor:
         if self._guidance is Guidance.GOALS and self.goal.place in known:
             said: Step | None = self._name_goal()
         else:
-            said = None if turning else self._tell_way(seen, place, waits=waits)
+            said = _go_on(waits) if turning else self._tell_way(seen, place, waits=waits)
         if said is None:
             return None
         now = scalar(seen, "time")

@@ -187,6 +187,12 @@ class World:
         """Collisions of the car's own making."""
         return int(self._record["collisions"])
 
+    def find_path(self) -> None:
+        """Lays the path anew from the lane that the car is on, where somebody else has driven it off its path."""
+        vehicle = plain(self.actors.arrays.vehicles)[0]
+        lane, station, offset = (vehicle[name].item() for name in ("lane", "own_station", "own_lateral"))
+        self.planner.restart(lane, min(max(station, 0.0), self.town.lanes[lane].length), offset)
+
     # --- perception -------------------------------------------------------------------------------------------------
 
     @property
