@@ -160,10 +160,9 @@ class Drive:
         """Lets the instructor speak, and notes what that says about the goal."""
         planner = self.stage.world.planner
         waits = planner.held and float(self.stage.world.car.speed) <= STANDING
+        turning = max(planner.manoeuvre_end - planner.s, 0.1) if planner.in_manoeuvre else 0.0
         goal = self.instructor.goal
-        said = self.instructor.instruct(
-            self.seen[Role.PARTICIPANT], self._known, waits=waits, turning=planner.in_manoeuvre
-        )
+        said = self.instructor.instruct(self.seen[Role.PARTICIPANT], self._known, waits=waits, turning=turning)
         if self.instructor.goal is not goal:
             self.heard = replace(self.heard, goal=None)
             self._notes = [Mental(action=MentalAction.GOAL_UPDATE)]
