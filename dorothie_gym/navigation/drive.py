@@ -121,7 +121,7 @@ class Drive:
         if self._notes:
             action = replace(action, mental=self._notes.pop(0))
         reached = self._count_reached()
-        self.stage.play({Role.PARTICIPANT: _SILENCE, Role.CO_WIZARD: action, Role.AD_WIZARD: self._interfere()})
+        self.stage.play({Role.PARTICIPANT: _SILENCE, Role.CO_WIZARD: action, Role.AD_WIZARD: self.interfere()})
         self.seen = self.stage.observations()
         driven = float(self.stage.world.frames[:, _SPEED].sum()) / FRAME_RATE
         self.heard = replace(self.heard, driven=self.heard.driven + driven)
@@ -150,7 +150,8 @@ class Drive:
 
     # --- the others -------------------------------------------------------------------------------------------------
 
-    def _interfere(self) -> RoleAction:
+    def interfere(self) -> RoleAction:
+        """What the Ad-Wizard does now."""
         if self._adversary is None or self._plans is None:
             return _INTACT
         action, self._plans = self._adversary.step(self.seen[Role.AD_WIZARD], self._plans)

@@ -24,7 +24,7 @@ from dorothie_gym.tasks import StoryboardTemplate
 from dorothie_gym.world.car.control import Control
 from dorothie_gym.world.town import Town
 
-LOST = 3.0
+LOST = 4.0
 """A car that is farther from its path than this is shown a path from the lane that it is on [m]."""
 
 END = 2.0

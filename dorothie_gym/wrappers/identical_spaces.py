@@ -30,16 +30,19 @@ class IdenticalSpaces(ParallelEnv[str, Vector, Flat]):
         env: the environment.
         fields: which fields of its action a role keeps, by role; the others do nothing. None, or a role that is left
             out, keeps all but texts.
+        only_masks: whether infos hold the mask and nothing else: TorchRL takes arrays only.
 
     Raises:
         ValueError: `fields` names a role or a field that does not exist.
     """
 
-    def __init__(self, env: DuoWizardEnv, fields: Mapping[str, Sequence[str]] | None = None) -> None:
+    def __init__(
+        self, env: DuoWizardEnv, fields: Mapping[str, Sequence[str]] | None = None, *, only_masks: bool = False
+    ) -> None:
         for name in fields or {}:
             if name not in env.possible_agents:
                 raise ValueError(f"fields: {name!r} is none of {', '.join(env.possible_agents)}")
-        self.env = env
+        self.env, self._only_masks = env, only_masks
         self.metadata = {**env.metadata}
         self.render_mode = env.render_mode
         self.possible_agents = list(env.possible_agents)
@@ -151,4 +154,6 @@ class IdenticalSpaces(ParallelEnv[str, Vector, Flat]):
                 mask[start : start + size] = own[begin : begin + size]
                 begin += size
             info["action_mask"] = mask
+        if self._only_masks:
+            return {agent: {"action_mask": info["action_mask"]} for agent, info in infos.items()}
         return infos

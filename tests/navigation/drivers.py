@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from dorothie_gym.navigation import PEDAL_FIELDS, NavigationAction, NavigationEnv, layout
+from dorothie_gym.navigation.pedals import AHEAD
 from dorothie_gym.ontology import ActionValue
 
 FIELD = layout()
@@ -97,7 +98,7 @@ def pursue(observation: Any) -> Any:
 
     speed = float(field("speed")[0]) * 25.0
     points = field("path").reshape(-1, 2) * 50.0
-    ahead, right = points[min(range(len(points)), key=lambda k: abs(points[k, 0] - 2.0 - 0.6 * speed))]
+    ahead, right = points[min(range(len(points)), key=lambda k: abs(AHEAD[k] - 0.8 - 0.4 * speed))]
     slip = math.atan2(right, max(ahead, 0.5))
     steer = math.atan(2.0 * math.tan(max(min(slip, 0.7), -0.7))) / FULL_LOCK
     wanted = min(11.0, *(float(value) * 25.0 + 0.15 * k for k, value in enumerate(field("allowed")[:4])))
