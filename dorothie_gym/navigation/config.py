@@ -44,23 +44,25 @@ class NavigationWeights:
         infraction: for each red light, stop sign, stretch off the road or on the wrong side.
         gave_up: at the end, if the participant has given up, or the car has left the road.
         time: for each second.
+        action: for each action that is carried out: who fiddles about is no good driver.
         refusal: for each action that is refused.
     """
 
-    progress: float = 0.01
-    subgoal: float = 2.0
-    success: float = 5.0
-    collision: float = -2.0
-    infraction: float = -0.2
+    progress: float = 0.02
+    subgoal: float = 1.0
+    success: float = 2.0
+    collision: float = -1.0
+    infraction: float = -0.1
     gave_up: float = -1.0
     time: float = -0.02
-    refusal: float = -0.02
+    action: float = -0.005
+    refusal: float = -0.01
 
 
 REWARDS: Mapping[str, NavigationWeights] = MappingProxyType(
     {
         "dense": NavigationWeights(),
-        "sparse": NavigationWeights(progress=0.0, subgoal=1.0, infraction=0.0, gave_up=0.0, time=0.0, refusal=0.0),
+        "sparse": NavigationWeights(progress=0.0, infraction=0.0, gave_up=0.0, time=0.0, action=0.0, refusal=0.0),
     }
 )
 """Weights by name."""

@@ -130,7 +130,7 @@ class Drive:
         self._left = self._way_left()
         self._note_patience()
         self._end()
-        self._reward(progress, self._count_reached() - reached)
+        self._reward(progress, self._count_reached() - reached, action.physical is not None)
 
     def observe(self, choice: int | None) -> Vector:
         """What the driver observes; `choice` is the lane at whose end it has to choose a way."""
@@ -218,7 +218,7 @@ class Drive:
             self.reason = next(reason for reason, holds in reasons.items() if holds)
             stage.end(self.reason)
 
-    def _reward(self, progress: float, reached: int) -> None:
+    def _reward(self, progress: float, reached: int, physical: bool) -> None:
         weights, stage = self._config.weights, self.stage
         rules, collisions = self._count_infractions(), stage.world.collisions
         self.terms = {
@@ -229,6 +229,7 @@ class Drive:
             "infraction": weights.infraction * (rules - self._rules_broken),
             "gave_up": weights.gave_up * (self.terminated and self.reason != "arrived"),
             "time": weights.time / self._config.decision_frequency,
+            "action": weights.action * (physical and not stage.refused[Role.CO_WIZARD]),
             "refusal": weights.refusal * len(stage.refused[Role.CO_WIZARD]),
         }
         self._rules_broken, self._collisions = rules, collisions

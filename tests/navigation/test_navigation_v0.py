@@ -123,7 +123,7 @@ def test_a_sparse_reward_comes_with_subgoals_only() -> None:
     env = NavigationEnv(reward="sparse")
     assert drive(env, follow_lane, 2)["return"] == 0.0
     reached = drive(env, obey, 2)
-    assert reached["return"] == pytest.approx(reached["subgoals"]["reached"] + 5.0)
+    assert reached["return"] == pytest.approx(reached["subgoals"]["reached"] + 2.0)
 
 
 def test_scenarios_are_those_of_all_environments(env: NavigationEnv) -> None:
