@@ -101,7 +101,7 @@ class NavigationConfig:
             raise ValueError(f"exceptions is {self.exceptions}; it must be in 0..{MOST_EXCEPTIONS:g} a session")
         if not 10.0 <= self.patience <= 86400.0:
             raise ValueError(f"patience is {self.patience}; it must be in 10..86400 s")
-        self.session  # noqa: B018  (its settings are checked where they are kept)
+        EnvConfig(decision_frequency=self.decision_frequency, max_seconds=self.max_seconds)  # which checks them
 
     @property
     def session(self) -> EnvConfig:
