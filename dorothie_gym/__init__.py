@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
     from dorothie_gym.envs.scenario import Scenario, draw_scenario
     from dorothie_gym.evaluation.teacher_forced import NfDEnv, RfNEnv, UfNEnv
-    from dorothie_gym.navigation import NavigationAction, NavigationEnv, NavigationWeights
+    from dorothie_gym.navigation import NavigationAction, NavigationContinuousEnv, NavigationEnv, NavigationWeights
     from dorothie_gym.ontology import Role
     from dorothie_gym.policies import Policy, make_policy
     from dorothie_gym.sessions import Session, load_sessions
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from dorothie_gym.world.town import Town, load_town
     from dorothie_gym.world.town_env import TownEnv
     from dorothie_gym.wrappers.flatten import FlattenAction, FlattenObservation, flatten
+    from dorothie_gym.wrappers.identical_spaces import IdenticalSpaces
     from dorothie_gym.wrappers.record_session import RecordSession
     from dorothie_gym.wrappers.single_role import SingleRole
     from dorothie_gym.wrappers.teacher_forcing import TeacherForcing
@@ -38,7 +39,9 @@ _HOME = {
     "EnvConfig": "envs.config",
     "FlattenAction": "wrappers.flatten",
     "FlattenObservation": "wrappers.flatten",
+    "IdenticalSpaces": "wrappers.identical_spaces",
     "NavigationAction": "navigation",
+    "NavigationContinuousEnv": "navigation",
     "NavigationEnv": "navigation",
     "NavigationWeights": "navigation",
     "NfDEnv": "evaluation.teacher_forced",
@@ -72,7 +75,9 @@ __all__ = [
     "EnvConfig",
     "FlattenAction",
     "FlattenObservation",
+    "IdenticalSpaces",
     "NavigationAction",
+    "NavigationContinuousEnv",
     "NavigationEnv",
     "NavigationWeights",
     "NfDEnv",
@@ -126,6 +131,10 @@ def _register() -> None:
     for task in ("UfN", "RfN", "NfD"):
         gymnasium.register(f"dorothie_gym/{task}-v0", f"dorothie_gym.evaluation.teacher_forced:{task}Env")
     gymnasium.register("dorothie_gym/Navigation-v0", "dorothie_gym.navigation.navigation_v0:NavigationEnv")
+    gymnasium.register(
+        "dorothie_gym/Navigation-continuous-v0",
+        "dorothie_gym.navigation.navigation_continuous_v0:NavigationContinuousEnv",
+    )
     gymnasium.register(
         "dorothie_gym/Town-v0",
         "dorothie_gym.world.town_env:TownEnv",

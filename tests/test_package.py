@@ -67,7 +67,7 @@ def test_type_checkers_see_the_names_that_are_found() -> None:
 
 def test_environments_are_registered() -> None:
     ids = {name for name in gym.registry if name.startswith("dorothie_gym/")}
-    names = ("Participant", "CoWizard", "AdWizard", "UfN", "RfN", "NfD", "Town")
+    names = ("Participant", "CoWizard", "AdWizard", "UfN", "RfN", "NfD", "Town", "Navigation", "Navigation-continuous")
     assert ids == {f"dorothie_gym/{name}-v0" for name in names}
     assert "dorothie_gym/DuoWizard-v0" in pettingzoo.parallel_registry
     assert "dorothie_gym/DuoWizard-v0" in pettingzoo.aec_registry

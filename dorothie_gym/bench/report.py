@@ -179,6 +179,31 @@ def import_report(figures: Mapping[str, Any]) -> Report:
     )  # fmt: skip
 
 
+def rl_report(figures: Mapping[str, Any]) -> Report:
+    """Words for `baselines.rl.measuring.measure`."""
+    names = {
+        "environment": "physics and observations", "partners": "instructor and Ad-Wizard",
+        "policy": "choosing actions", "learner": "learning",
+    }  # fmt: skip
+    shares = ", ".join(f"{names[name]} {100 * share:.0f} %" for name, share in figures["shares"].items())
+    rows = [Row(label="one process\nfor environments and learner", value=figures["one_process_steps_per_second"])]
+    if figures["workers_steps_per_second"] is not None:
+        label = f"{_count(figures['workers'], 'worker')} beside the learner\nfor the environments"
+        rows.append(Row(label=label, value=figures["workers_steps_per_second"]))
+    return Report(
+        title=f"Training {figures['algorithm']} on {figures['env']}",
+        setting=f"{_count(figures['environments'], 'environment')}, network {figures['network']}, "
+        f"{figures['steps']:,} steps each",
+        headline=f"{number(figures['steps_per_second'])} environment steps a second end to end",
+        unit="environment steps a second",
+        rows=tuple(rows),
+        mark=Mark(label="wanted on two cores", value=figures["target"]),
+        notes=(f"in one process: {shares}",),
+        machine=machine_line(figures["machine"]),
+        logarithmic=False,
+    )
+
+
 def machine_line(machine: Mapping[str, Any]) -> str:
     """What a measurement was made on, in a line."""
     return (

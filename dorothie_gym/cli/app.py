@@ -21,6 +21,7 @@ from dorothie_gym.cli.rollout import rollout
 from dorothie_gym.cli.run import run
 from dorothie_gym.cli.show import show
 from dorothie_gym.cli.stats import stats
+from dorothie_gym.cli.train_rl import train_rl
 
 app = typer.Typer(
     help="Talk between a passenger and a car that drives through a town, with an adversary in between.",
@@ -41,6 +42,7 @@ app.command()(rollout)
 app.command()(leaderboard)
 app.command()(replay)
 app.command()(show)
+app.command("train-rl")(train_rl)
 
 
 def _tell_version(wanted: bool) -> None:

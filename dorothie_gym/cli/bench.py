@@ -1,4 +1,4 @@
-"""`dorothie-gym bench world|env|vector|import`: how fast all is, each against its reference in the same run."""
+"""`dorothie-gym bench world|env|vector|rl|import`: how fast all is, each against its reference in the same run."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class BenchCommand(PictureCommand):
 
 bench = typer.Typer(
     help="Measure speeds, each against its reference in the same run: the world, the environment of three agents, many "
-    "worlds at once, and how soon all is there.",
+    "worlds at once, training, and how soon all is there.",
     no_args_is_help=True,
 )
 
@@ -118,6 +118,37 @@ def vector(
         return {**measure(town, worlds=worlds, **settings, repeats=repeats), "machine": machine()}
 
     _bench("vector", measured, picture, as_json)
+
+
+@bench.command(cls=BenchCommand)
+def rl(
+    env: Annotated[str, typer.Option(metavar="ID", help="Id of the environment.")] = "dorothie_gym/Navigation-v0",
+    algorithm: Annotated[str, typer.Option(help="ppo, maskable_ppo or a2c.")] = "ppo",
+    environments: Annotated[int, typer.Option(min=1, max=256, help="How many play at once.")] = 8,
+    workers: Annotated[
+        int | None, typer.Option(min=0, max=256, help="Processes in the second run; one per core. 0: no such run.")
+    ] = None,
+    steps: Annotated[int, typer.Option(min=256, help="Of a run.")] = 16_384,
+    seed: Seed = 0,
+    picture: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Environment steps a second of training end to end, and what the time goes into."""
+
+    def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
+        try:
+            from dorothie_gym.baselines.rl.measuring import measure
+        except ImportError:
+            fail("bench rl needs torch and stable-baselines3; pip install 'dorothie-gym[baselines]' brings them")
+        from dorothie_gym.baselines.rl.settings import SettingsError
+
+        settings: dict[str, Any] = {"algorithm": algorithm, "environments": environments, "workers": workers}
+        try:
+            return measure(env, **settings, steps=steps, seed=seed, progress=progress)
+        except SettingsError as error:
+            fail(str(error))
+
+    _bench("rl", measured, picture, as_json)
 
 
 @bench.command("import", cls=BenchCommand)

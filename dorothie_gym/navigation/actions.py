@@ -69,11 +69,23 @@ _PLAIN = {
 }
 
 
+_UNDER_WAY = {
+    NavigationAction.SWITCH_LEFT: (PhysicalAction.LANE_SWITCH, LEFT),
+    NavigationAction.SWITCH_RIGHT: (PhysicalAction.LANE_SWITCH, RIGHT),
+    NavigationAction.U_TURN: (PhysicalAction.U_TURN, 0),
+}
+"""Manoeuvres, and what `LocalPlanner.manoeuvre` is while they are prepared or driven."""
+
+
 class Controls:
-    """Reads actions and tells which would be carried out, for the car of a session."""
+    """Reads actions and tells which would be carried out, for the car of a session.
+
+    Attributes:
+        ways: ways on at the town's junctions.
+    """
 
     def __init__(self, world: World, ways: Ways) -> None:
-        self._world, self._ways = world, ways
+        self._world, self.ways = world, ways
         self._prospect = Prospect(world)
 
     @property
@@ -85,10 +97,11 @@ class Controls:
     def read(self, action: NavigationAction) -> Physical | None:
         """What the Co-Wizard does; None for nothing.
 
+        A U-turn or lane switch that is being prepared just goes on: asked for again, the car would put it off.
         A turn into a sector without a way on is a turn with the sector's angle: the car refuses it, or takes the way
         that fits best.
         """
-        if action is NavigationAction.NOTHING:
+        if action is NavigationAction.NOTHING or self._prepares(action):
             return None
         if action is NavigationAction.LIGHTS:
             return Physical(action=PhysicalAction.LIGHT_CHANGE, up=not self._world.lights)
@@ -96,8 +109,13 @@ class Controls:
         if sector is None:
             return _PLAIN[action]
         choice = self.choice
-        way = self._ways.after(choice[0])[sector] if choice is not None else None
+        way = self.ways.after(choice[0])[sector] if choice is not None else None
         return Physical(action=PhysicalAction.J_TURN, angle=way.angle if way is not None else SECTORS[sector])
+
+    def _prepares(self, action: NavigationAction) -> bool:
+        """Whether an action is what the car is about to do anyway."""
+        planner = self._world.planner
+        return not planner.held and _UNDER_WAY.get(action) == planner.manoeuvre
 
     def mask(self) -> NDArray[np.int8]:
         """Which actions make a difference now (18,): 1 for those that do."""
@@ -114,9 +132,11 @@ class Controls:
             mask[NavigationAction.U_TURN] = planner.may_turn_round(speed)
             leaves = planner.held or planner.manoeuvre[0] is not None
             mask[NavigationAction.LANE_FOLLOW] = leaves and not committed
+            for action in _UNDER_WAY:
+                mask[action] &= not self._prepares(action)
         choice = None if committed else self.choice
         if choice is not None:
             planned = None if planner.held else planner.turn_ahead
-            for sector, way in enumerate(self._ways.after(choice[0])):
+            for sector, way in enumerate(self.ways.after(choice[0])):
                 mask[FIRST_TURN + sector] = way is not None and way.angle != planned
         return mask

@@ -42,23 +42,27 @@ class NavigationWeights:
         success: at the end, if every live subgoal was reached and nothing was hit.
         collision: for each collision of the car's own making.
         infraction: for each red light, stop sign, stretch off the road or on the wrong side.
+        gave_up: at the end, if the participant has given up, or the car has left the road.
         time: for each second.
+        action: for each action that is carried out: who fiddles about is no good driver.
         refusal: for each action that is refused.
     """
 
-    progress: float = 0.01
-    subgoal: float = 2.0
-    success: float = 5.0
-    collision: float = -2.0
-    infraction: float = -0.2
-    time: float = -0.01
-    refusal: float = -0.02
+    progress: float = 0.02
+    subgoal: float = 1.0
+    success: float = 2.0
+    collision: float = -1.0
+    infraction: float = -0.1
+    gave_up: float = -1.0
+    time: float = -0.02
+    action: float = -0.005
+    refusal: float = -0.01
 
 
 REWARDS: Mapping[str, NavigationWeights] = MappingProxyType(
     {
         "dense": NavigationWeights(),
-        "sparse": NavigationWeights(progress=0.0, subgoal=1.0, infraction=0.0, time=0.0, refusal=0.0),
+        "sparse": NavigationWeights(progress=0.0, infraction=0.0, gave_up=0.0, time=0.0, action=0.0, refusal=0.0),
     }
 )
 """Weights by name."""
@@ -83,7 +87,7 @@ class NavigationConfig:
     traffic: str = "light"
     exceptions: float = 0.0
     max_seconds: float = 600.0
-    patience: float = 120.0
+    patience: float = 60.0
     decision_frequency: float = 2.0
     weights: NavigationWeights = field(default_factory=NavigationWeights)
 
@@ -97,7 +101,7 @@ class NavigationConfig:
             raise ValueError(f"exceptions is {self.exceptions}; it must be in 0..{MOST_EXCEPTIONS:g} a session")
         if not 10.0 <= self.patience <= 86400.0:
             raise ValueError(f"patience is {self.patience}; it must be in 10..86400 s")
-        self.session  # noqa: B018  (its settings are checked where they are kept)
+        EnvConfig(decision_frequency=self.decision_frequency, max_seconds=self.max_seconds)  # which checks them
 
     @property
     def session(self) -> EnvConfig:

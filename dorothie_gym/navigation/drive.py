@@ -38,6 +38,9 @@ from dorothie_gym.world.town.routing import Place
 NEARER = 1.0
 """Only a way left that is shorter by this counts as having come nearer [m]."""
 
+OFF_ROAD = 15.0
+"""A car that is farther from its path than this has left the road for good [m]."""
+
 _SPEED = FRAME_COLUMNS.index("speed")
 _RULES = tuple(kind.value for kind in INFRACTION_KINDS if kind is not WorldEventKind.COLLISION)
 _SILENCE, _INTACT = ParticipantAction(), AdWizardAction()
@@ -50,6 +53,8 @@ class Drive:
         stage: the session.
         ways: ways on at the town's junctions.
         instructor: who tells the way.
+        heard: what the Co-Wizard remembers of it.
+        seen: what all roles observe now.
         reward: of the last decision.
         terms: the same by terms.
         terminated: whether the destination was reached, or the participant gave up.
@@ -65,10 +70,10 @@ class Drive:
         self._adversary = ScriptedAdWizard(stage.limits, rate=config.exceptions) if config.exceptions > 0.0 else None
         seed = policy_seed(stage.scenario.seed, Role.AD_WIZARD)
         self._plans = self._adversary.initial_state(seed, town) if self._adversary is not None else None
-        self._heard, self._notes = Heard(), list[Mental]()
+        self.heard, self._notes = Heard(), list[Mental]()
         self._aim: tuple[Place | None, tuple[Place, ...]] = (None, ())  # what `_nearest` is measured to
-        self._seen: Mapping[str, Observation] = stage.observations()
-        marks = read_landmarks(self._seen[Role.CO_WIZARD], town)  # those on its map, for the whole session
+        self.seen: Mapping[str, Observation] = stage.observations()
+        marks = read_landmarks(self.seen[Role.CO_WIZARD], town)  # those on its map, for the whole session
         self._known = frozenset(mark.place for mark in marks)
         self._rules_broken, self._collisions = self._count_infractions(), 0
         self._nearest, self._nearest_at = math.inf, 0.0
@@ -116,20 +121,20 @@ class Drive:
         if self._notes:
             action = replace(action, mental=self._notes.pop(0))
         reached = self._count_reached()
-        self.stage.play({Role.PARTICIPANT: _SILENCE, Role.CO_WIZARD: action, Role.AD_WIZARD: self._interfere()})
-        self._seen = self.stage.observations()
+        self.stage.play({Role.PARTICIPANT: _SILENCE, Role.CO_WIZARD: action, Role.AD_WIZARD: self.interfere()})
+        self.seen = self.stage.observations()
         driven = float(self.stage.world.frames[:, _SPEED].sum()) / FRAME_RATE
-        self._heard = replace(self._heard, driven=self._heard.driven + driven)
+        self.heard = replace(self.heard, driven=self.heard.driven + driven)
         progress = self._progress()
         self._listen()
         self._left = self._way_left()
         self._note_patience()
         self._end()
-        self._reward(progress, self._count_reached() - reached)
+        self._reward(progress, self._count_reached() - reached, action.physical is not None)
 
     def observe(self, choice: int | None) -> Vector:
         """What the driver observes; `choice` is the lane at whose end it has to choose a way."""
-        return self._viewpoint.observe(self._seen[Role.CO_WIZARD], self._heard, choice, self.instructor.blocked)
+        return self._viewpoint.observe(self.seen[Role.CO_WIZARD], self.heard, choice, self.instructor.blocked)
 
     def info(self) -> dict[str, Any]:
         """What else the driver is told; everything in it is the taker's own."""
@@ -145,26 +150,26 @@ class Drive:
 
     # --- the others -------------------------------------------------------------------------------------------------
 
-    def _interfere(self) -> RoleAction:
+    def interfere(self) -> RoleAction:
+        """What the Ad-Wizard does now."""
         if self._adversary is None or self._plans is None:
             return _INTACT
-        action, self._plans = self._adversary.step(self._seen[Role.AD_WIZARD], self._plans)
+        action, self._plans = self._adversary.step(self.seen[Role.AD_WIZARD], self._plans)
         return self._decoder(action)
 
     def _listen(self) -> None:
         """Lets the instructor speak, and notes what that says about the goal."""
         planner = self.stage.world.planner
         waits = planner.held and float(self.stage.world.car.speed) <= STANDING
+        turning = max(planner.manoeuvre_end - planner.s, 0.1) if planner.in_manoeuvre else 0.0
         goal = self.instructor.goal
-        said = self.instructor.instruct(
-            self._seen[Role.PARTICIPANT], self._known, waits=waits, turning=planner.in_manoeuvre
-        )
+        said = self.instructor.instruct(self.seen[Role.PARTICIPANT], self._known, waits=waits, turning=turning)
         if self.instructor.goal is not goal:
-            self._heard = replace(self._heard, goal=None)
+            self.heard = replace(self.heard, goal=None)
             self._notes = [Mental(action=MentalAction.GOAL_UPDATE)]
         if said is None:
             return
-        self._heard = replace(self._heard, told=said, driven=0.0)
+        self.heard = replace(self.heard, told=said, driven=0.0)
         name = said.landmark
         if name is not None:
             self._note_goal(name, said.distance, by_name=said.action is None)
@@ -175,7 +180,7 @@ class Drive:
         assert goal is not None
         self._notes = [Mental(action=MentalAction.GOAL_UPDATE, goals=(name,))]
         if by_name:
-            self._heard = replace(self._heard, goal=goal.place)
+            self.heard = replace(self.heard, goal=goal.place)
         elif goal.place not in self._known:
             path, s = self.stage.world.planner.path, self.stage.world.planner.s
             k = path.index_at(min(s + distance, path.length))
@@ -204,14 +209,16 @@ class Drive:
     def _end(self) -> None:
         stage, now = self.stage, self.stage.world.time
         arrived = stage.task.done
-        gave_up = not arrived and now - self._nearest_at >= self._config.patience - 1e-9
-        self.terminated = arrived or gave_up
+        left_road = abs(stage.world.planner.offset) > OFF_ROAD
+        gave_up = now - self._nearest_at >= self._config.patience - 1e-9
+        self.terminated = arrived or left_road or gave_up
         self.truncated = not self.terminated and now >= self._config.max_seconds - 1e-9
         if self.terminated or self.truncated:
-            self.reason = "arrived" if arrived else "gave up" if gave_up else "out of time"
+            reasons = {"arrived": arrived, "left the road": left_road, "gave up": gave_up, "out of time": True}
+            self.reason = next(reason for reason, holds in reasons.items() if holds)
             stage.end(self.reason)
 
-    def _reward(self, progress: float, reached: int) -> None:
+    def _reward(self, progress: float, reached: int, physical: bool) -> None:
         weights, stage = self._config.weights, self.stage
         rules, collisions = self._count_infractions(), stage.world.collisions
         self.terms = {
@@ -220,7 +227,9 @@ class Drive:
             "success": weights.success * stage.success,
             "collision": weights.collision * (collisions - self._collisions),
             "infraction": weights.infraction * (rules - self._rules_broken),
+            "gave_up": weights.gave_up * (self.terminated and self.reason != "arrived"),
             "time": weights.time / self._config.decision_frequency,
+            "action": weights.action * (physical and not stage.refused[Role.CO_WIZARD]),
             "refusal": weights.refusal * len(stage.refused[Role.CO_WIZARD]),
         }
         self._rules_broken, self._collisions = rules, collisions

@@ -119,14 +119,16 @@ class Instructor:
         self._key: tuple[object, ...] = ()
         self._subgoals = b""
 
-    def instruct(self, seen: Observation, known: frozenset[Place], *, waits: bool, turning: bool) -> Instruction | None:
+    def instruct(
+        self, seen: Observation, known: frozenset[Place], *, waits: bool, turning: float
+    ) -> Instruction | None:
         """Says something, or nothing.
 
         Args:
             seen: what the participant observes.
             known: places of the landmarks on the Co-Wizard's map.
             waits: whether the car was told to stop, and stands.
-            turning: whether it is in the middle of a lane switch or U-turn.
+            turning: what is left of a lane switch or U-turn that it is in the middle of [m]; 0 where it is in none.
 
         Returns:
             What is said now; None if nothing is.
@@ -141,7 +143,9 @@ class Instructor:
         if self._guidance is Guidance.GOALS and self.goal.place in known:
             said: Step | None = self._name_goal()
         else:
-            said = None if turning else self._tell_way(seen, place, waits=waits)
+            said = (
+                self._tell_landing(place, turning, waits=waits) if turning else self._tell_way(seen, place, waits=waits)
+            )
         if said is None:
             return None
         now = scalar(seen, "time")
@@ -247,6 +251,15 @@ class Instructor:
             return None
         left = entry is Entry.CHANGE_LEFT
         return Step(("lane", lane, left), (ActionValue.LANE_SWITCH,), nearest_sector(90.0 if left else -90.0), distance)
+
+    def _tell_landing(self, place: Place, turning: float, *, waits: bool) -> Step | None:
+        """In the middle of a manoeuvre: that the goal is right behind it, while there is time to stop for it."""
+        assert self.goal is not None
+        lane, station = self.goal.place
+        left = station - place[1]  # a car in a manoeuvre counts as being where that ends
+        if lane == place[0] and -WITHIN <= left <= STOP_DISTANCE:
+            return self._tell_stop(left + turning, waits=waits)
+        return _go_on(waits)
 
     def _tell_stop(self, left: float, *, waits: bool) -> Step | None:
         """That the car is to stop in so many metres; one that stands elsewhere than at the place is told to go on."""

@@ -4,26 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
-import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
 from dorothie_gym.navigation.actions import ACTIONS, Controls, NavigationAction
 from dorothie_gym.navigation.config import Guidance, NavigationConfig, NavigationWeights, weights_of
-from dorothie_gym.navigation.drive import Drive
+from dorothie_gym.navigation.drive_env import DriveEnv, Info
 from dorothie_gym.navigation.observations import Vector, navigation_space
 from dorothie_gym.spaces import CoWizardAction
-from dorothie_gym.tasks import StoryboardTemplate, load_template
-from dorothie_gym.world.network.network import TownNetwork
-from dorothie_gym.world.town import Town, load_town
-
-Info = dict[str, Any]
+from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.world.town import Town
 
 
-class NavigationEnv(gym.Env[Vector, np.int64]):
+class NavigationEnv(DriveEnv[np.int64]):
     """The Co-Wizard drives; a participant tells the way, and the Ad-Wizard may interfere.
 
     ## Description
@@ -68,11 +64,6 @@ class NavigationEnv(gym.Env[Vector, np.int64]):
     - v0: first version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        "render_modes": ["human", "rgb_array"],
-        "render_fps": 2,
-    }
-
     def __init__(
         self,
         town: str | Path | Town = "brookside",
@@ -83,40 +74,18 @@ class NavigationEnv(gym.Env[Vector, np.int64]):
         exceptions: float = 0.0,
         reward: str | NavigationWeights = "dense",
         max_seconds: float = 600.0,
-        patience: float = 120.0,
+        patience: float = 60.0,
         render_mode: str | None = None,
     ) -> None:
         config = NavigationConfig(
             guidance=guidance, traffic=traffic, exceptions=exceptions, weights=weights_of(reward),
             max_seconds=max_seconds, patience=patience,
         )  # fmt: skip
-        self._begin(town, storyboard, config, render_mode)
+        super().__init__(town, storyboard, config, render_mode)
         self.action_space = spaces.Discrete(len(ACTIONS))
         self.observation_space = navigation_space()
         self._controls: Controls | None = None
         self._mask = np.zeros(len(ACTIONS), dtype=np.int8)
-
-    def _begin(
-        self, town: str | Path | Town, storyboard: str | Path | StoryboardTemplate | None, config: NavigationConfig,
-        render_mode: str | None,
-    ) -> None:  # fmt: skip
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(
-                f"render_mode is {render_mode!r}; it must be None or one of {self.metadata['render_modes']}"
-            )
-        self.config, self.render_mode = config, render_mode
-        self.town = town if isinstance(town, Town) else load_town(town)
-        self.template = load_template(storyboard) if isinstance(storyboard, str | Path) else storyboard
-        self._network = TownNetwork(self.town)
-        self._drive: Drive | None = None
-        self._painter: Any = None
-
-    @property
-    def drive(self) -> Drive:
-        """The session being played; raises `gymnasium.error.ResetNeeded` before the first reset."""
-        if self._drive is None:
-            raise gym.error.ResetNeeded("no session is being played: call reset() first")
-        return self._drive
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[Vector, Info]:
         """Begins a session.
@@ -125,13 +94,8 @@ class NavigationEnv(gym.Env[Vector, np.int64]):
             seed: of the session; without one it is drawn.
             options: `scenario` plays a given `Scenario`; other options are ignored.
         """
-        super().reset(seed=seed)
-        session = seed if seed is not None else int(self.np_random.integers(2**31))
-        scenario = (options or {}).get("scenario")
-        self._drive = Drive.begin(self.town, self._network, self.template, self.config, session, scenario)
-        self._controls = Controls(self._drive.stage.world, self._drive.ways)
-        if self.render_mode == "human":
-            self.render()
+        drive = self.begin(seed, options)
+        self._controls = Controls(drive.stage.world, drive.ways)
         return self._observe(), self._info()
 
     def step(self, action: np.int64 | int) -> tuple[Vector, float, bool, bool, Info]:
@@ -153,23 +117,6 @@ class NavigationEnv(gym.Env[Vector, np.int64]):
     def action_masks(self) -> NDArray[np.bool_]:
         """Which actions would be carried out now (18,); sb3-contrib's algorithms ask for it."""
         return self._mask.astype(np.bool_)
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """Draws the aerial view: an array (800, 1280, 3), or in a window in human mode (then returns None)."""
-        if self.render_mode is None:
-            raise RuntimeError("render() needs render_mode='rgb_array' or 'human' when the environment is made")
-        from dorothie_gym.envs.painter import Painter
-
-        if self._painter is None:
-            self._painter = Painter(human=self.render_mode == "human")
-        frame: NDArray[np.uint8] | None = self._painter.paint(self.drive.stage)
-        return frame
-
-    def close(self) -> None:
-        """Closes the window, if there is one."""
-        if self._painter is not None:
-            self._painter.close()
-            self._painter = None
 
     def _observe(self) -> Vector:
         assert self._controls is not None

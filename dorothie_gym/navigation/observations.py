@@ -92,10 +92,10 @@ FIELDS: Mapping[str, int] = MappingProxyType(
 """Fields of the observation and their sizes, in order. Shares are clipped to -1..1; what is unknown is 0."""
 
 
-def layout() -> dict[str, slice]:
-    """Where in the observation each field is."""
-    ends = np.cumsum(list(FIELDS.values())).tolist()
-    return {name: slice(end - size, end) for (name, size), end in zip(FIELDS.items(), ends, strict=True)}
+def layout(fields: Mapping[str, int] = FIELDS) -> dict[str, slice]:
+    """Where in the observation each field is: by default those of `NavigationEnv`, in order and with their sizes."""
+    ends = np.cumsum(list(fields.values())).tolist()
+    return {name: slice(end - size, end) for (name, size), end in zip(fields.items(), ends, strict=True)}
 
 
 def navigation_space() -> spaces.Space[Vector]:

@@ -17,7 +17,7 @@ from dorothie_gym.world.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
 from dorothie_gym.world.kernel import WorldArrays, empty_world, step, town_arrays
 from dorothie_gym.world.kernel.editing import add_car
 from dorothie_gym.world.kernel.parameters import FRAMES
-from dorothie_gym.world.kernel.records import EventCode, Records
+from dorothie_gym.world.kernel.records import EventCode, Records, plain
 from dorothie_gym.world.kernel.rules import HEIGHT
 from dorothie_gym.world.kernel.seeing import look_around
 from dorothie_gym.world.localizer import Localizer
@@ -198,6 +198,12 @@ class World:
         """Collisions of the car's own making."""
         _, collisions = self._record.outcome.item()
         return int(collisions)
+
+    def find_path(self) -> None:
+        """Lays the path anew from the lane that the car is on, where somebody else has driven it off its path."""
+        vehicle = plain(self.actors.arrays.vehicles)[0]
+        lane, station, offset = (vehicle[name].item() for name in ("lane", "own_station", "own_lateral"))
+        self.planner.restart(lane, min(max(station, 0.0), self.town.lanes[lane].length), offset)
 
     # --- perception -------------------------------------------------------------------------------------------------
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from dorothie_gym.navigation import NavigationAction, NavigationEnv, layout
+from dorothie_gym.navigation import PEDAL_FIELDS, NavigationAction, NavigationEnv, layout
+from dorothie_gym.navigation.pedals import AHEAD
 from dorothie_gym.ontology import ActionValue
 
 FIELD = layout()
@@ -82,3 +84,33 @@ def drive(env: NavigationEnv, driver: Driver, seed: int) -> dict[str, Any]:
         total += reward
         over = terminated or truncated
     return {**info, "return": total}
+
+
+PEDALS = layout(PEDAL_FIELDS)
+FULL_LOCK = math.pi / 3.0  # [rad]
+
+
+def pursue(observation: Any) -> Any:
+    """Throttle, steer and brake of a driver who looks at a point of the path, and keeps to what is allowed."""
+
+    def field(name: str) -> Any:
+        return observation[PEDALS[name]]
+
+    speed = float(field("speed")[0]) * 25.0
+    points = field("path").reshape(-1, 2) * 50.0
+    ahead, right = points[min(range(len(points)), key=lambda k: abs(AHEAD[k] - 0.8 - 0.4 * speed))]
+    slip = math.atan2(right, max(ahead, 0.5))
+    steer = math.atan(2.0 * math.tan(max(min(slip, 0.7), -0.7))) / FULL_LOCK
+    wanted = min(11.0, *(float(value) * 25.0 + 0.15 * k for k, value in enumerate(field("allowed")[:4])))
+    there, gap, other, line = field("obstacle")
+    if there:
+        wanted = min(wanted, math.sqrt(max(6.0 * (gap * 100.0 - (1.5 if line else 3.5)), 0.0) + (other * 25.0) ** 2))
+    stop, _, close = field("stop")
+    if stop and close < 1.0:
+        wanted = min(wanted, math.sqrt(max(3.0 * (close * 10.0 - 0.4), 0.0)))
+        if abs(close) < 0.12:
+            wanted = 0.0
+    pull = wanted - speed
+    if wanted < 0.05:
+        return np.array((-1.0, steer, 0.6), dtype=np.float32)
+    return np.array((pull, steer, -pull * 0.6), dtype=np.float32).clip(-1.0, 1.0)

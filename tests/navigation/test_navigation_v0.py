@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from dorothie_gym.envs.scenario import draw_scenario
-from dorothie_gym.navigation import FIELDS, NavigationAction, NavigationEnv, NavigationWeights, layout
+from dorothie_gym.navigation import (
+    FIELDS,
+    NavigationAction,
+    NavigationContinuousEnv,
+    NavigationEnv,
+    NavigationWeights,
+    layout,
+)
 from dorothie_gym.ontology import DialogueMove
 from tests.navigation.drivers import drive, follow_lane, obey
 
@@ -123,7 +130,7 @@ def test_a_sparse_reward_comes_with_subgoals_only() -> None:
     env = NavigationEnv(reward="sparse")
     assert drive(env, follow_lane, 2)["return"] == 0.0
     reached = drive(env, obey, 2)
-    assert reached["return"] == pytest.approx(reached["subgoals"]["reached"] + 5.0)
+    assert reached["return"] == pytest.approx(reached["subgoals"]["reached"] + 2.0)
 
 
 def test_scenarios_are_those_of_all_environments(env: NavigationEnv) -> None:
@@ -224,3 +231,20 @@ def test_steps_need_a_session() -> None:
     env.step(0)
     with pytest.raises(gym.error.ResetNeeded):
         env.step(0)
+
+
+def test_many_play_at_once() -> None:
+    vector = gym.make_vec("dorothie_gym/Navigation-v0", num_envs=3, max_seconds=5.0)
+    observations, infos = vector.reset(seed=4)
+    assert observations.shape == (3, sum(FIELDS.values())) and infos["action_mask"].shape == (3, len(NavigationAction))
+    for _ in range(12):
+        observations, *_ = vector.step(np.zeros(3, dtype=np.int64))
+    single, _ = NavigationEnv(max_seconds=5.0).reset(seed=5)
+    np.testing.assert_array_equal(vector.reset(seed=4)[0][1], single)
+    vector.close()
+
+
+def test_stable_baselines_accepts_it_as_it_is() -> None:
+    checker = pytest.importorskip("stable_baselines3.common.env_checker", reason="needs the extra 'baselines'")
+    checker.check_env(NavigationEnv())
+    checker.check_env(NavigationContinuousEnv())

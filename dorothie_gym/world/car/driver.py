@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from dorothie_gym.ontology import SPEED_STEP
+from dorothie_gym.world.car.control import Control
 from dorothie_gym.world.car.path import Path
 from dorothie_gym.world.car.planner import U_TURN_SPEED, LocalPlanner
 from dorothie_gym.world.car.record import CarRecord
@@ -118,12 +119,14 @@ class Driver:
         planner: the car's local planner.
         cruise: desired speed [km/h].
         goals: places where the car is expected to stop; it comes up to them slowly.
+        manual: what pedals and steering wheel are told by somebody else; None lets the car drive itself.
     """
 
     def __init__(self, planner: LocalPlanner, *, length: float, cruise: float = 40.0) -> None:
         self.planner = planner
         self.cruise = cruise
         self.goals: Sequence[GoalAhead] = ()
+        self.manual: Control | None = None
         self._length = length
         self._told: Path | None = None
         self._told_until = 0.0
@@ -155,12 +158,22 @@ class Driver:
         elif self._told_until < min(planner.s + AHEAD, planner.path.length):
             self._tell(arrays, anew=False)
         action, _ = planner.manoeuvre
-        number = 0 if action is None else action.value
-        record.orders[()] = number, planner.manoeuvre_end, self.cruise * KMH, planner.held
+        number, manual = 0 if action is None else action.value, self.manual
+        record.orders[()] = number, planner.manoeuvre_end, self.cruise * KMH, planner.held, manual is not None
+        if manual is not None:
+            record.pedals[()] = manual.throttle, manual.steer, manual.brake
 
     def debrief(self, record: CarRecord) -> None:
         """Takes over where the car is, after the world was stepped; see `brief`."""
         self.planner.note(*record.place.item())
+
+    def speed_at(self, s: float) -> float:
+        """Speed that curves, limits and the end of the path allow at a distance along the path [m/s].
+
+        It is that of the path as the world was last stepped.
+        """
+        path = self._told
+        return float(np.interp(s, path.s, self._speeds)) if path is not None else self.cruise * KMH
 
     def _tell(self, arrays: Any, *, anew: bool) -> None:
         """Writes the stretch of path around the car; all else that follows from the path if that was laid anew."""

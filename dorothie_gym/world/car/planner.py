@@ -66,9 +66,12 @@ class LocalPlanner:
         self._manoeuvre_angle = 0
         self._manoeuvre_end = 0.0
         self._chosen = (-1, -1)  # connector and lane of the turn that is planned
+        self._begin(lane, station, 0.0)
+
+    def _begin(self, lane: int, station: float, offset: float) -> None:
         pieces, self._open_end = self._lanes.lay([Step(lane)], station, 0.0)
-        self.path = Path(pieces or [follow(town.lanes[lane], town.lanes[lane].length - 0.5)])
-        self.s, self.offset = (0.0 if pieces else self.path.length), 0.0
+        self.path = Path(pieces or [follow(self._town.lanes[lane], self._town.lanes[lane].length - 0.5)])
+        self.s, self.offset = (0.0 if pieces else self.path.length), offset
 
     # --- where the car is -------------------------------------------------------------------------------------------
 
@@ -131,6 +134,17 @@ class LocalPlanner:
         """Lengthens the path ahead where the way is clear; to be called once a decision, with the speed [m/s]."""
         if self.room < HORIZON and not self._open_end:
             self._lay_from_here(self._lanes.steps_along(self.lanes_ahead), speed)
+
+    def restart(self, lane: int, station: float, offset: float) -> None:
+        """Lays the path anew for a car that has left it, and forgets what was planned.
+
+        Args:
+            lane: where the car is: the lane,
+            station: the distance along it [m],
+            offset: and from it, positive right [m].
+        """
+        self._clear()
+        self._begin(lane, station, offset)
 
     def beside(self, lane: int, station: float) -> list[tuple[int, float]]:
         """A place, and those beside it on the other lanes of its direction: lane and distance along it [m]."""

@@ -77,8 +77,9 @@ def guide(town: TownArrays, world: WorldArrays, dt: float) -> None:
         target = min(target, car.hold_speed)
     else:
         car.hold_speed = -1.0
-    _control(world, target, dt)
-    _brake_surely(world)
+    if not car.manual:
+        _control(world, target, dt)
+        _brake_surely(world)
     if clock.frame < car.stopped_until:
         car.throttle, car.brake = 0.0, 1.0
     _note_hazard(world, limiting)

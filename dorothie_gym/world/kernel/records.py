@@ -292,6 +292,7 @@ CAR = np.dtype(
         ("goals", "i4"), ("goal", "f8", (GOALS,)),  # places along the path to come up to slowly [m]
         ("lateral_sum", "f8"), ("lateral_last", "f8"), ("speed_sum", "f8"),  # memory of the controllers
         ("throttle", "f8"), ("steer", "f8"), ("brake", "f8"),
+        ("manual", "b1"),  # whether these three are given, and not found by the controllers
         ("before", "f8"),  # speed at the start of the substep [m/s]
         ("friction", "f8"),  # share of the dry road's grip
         ("wind", "f8"), ("wind_heading", "f8"), ("wind_phase", "f8", (3,)),  # strength in [0, 1], where to, gusts

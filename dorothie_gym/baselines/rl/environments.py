@@ -1,0 +1,102 @@
+"""Environments as learners take them: one vector in, discrete or continuous numbers out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+import dorothie_gym  # noqa: F401  (its import registers the environments)
+from dorothie_gym.baselines.rl.settings import SettingsError, TrainingSettings
+from dorothie_gym.spaces.limits import REACH
+
+_PLAIN = (spaces.Discrete, spaces.MultiDiscrete, spaces.Box)
+
+
+def make_env(name: str, settings: Mapping[str, Any] | None = None) -> gym.Env[Any, Any]:
+    """Makes an environment whose observations are vectors.
+
+    Environments with richer spaces are flattened (`dorothie_gym.flatten`), and their quantities squashed.
+
+    Args:
+        name: id of the environment.
+        settings: its arguments.
+
+    Raises:
+        SettingsError: there is no such environment, or it does not take these arguments.
+    """
+    try:
+        env: gym.Env[Any, Any] = gym.make(name, disable_env_checker=True, **(settings or {}))
+    except (gym.error.Error, TypeError, ValueError) as error:
+        raise SettingsError(f"env {name}: {error}") from error
+    observed, acted = env.observation_space, env.action_space
+    if isinstance(observed, spaces.Box) and len(observed.shape) == 1 and isinstance(acted, _PLAIN):
+        return env
+    return Squashed(dorothie_gym.flatten(env))
+
+
+class Squashed(gym.ObservationWrapper[NDArray[np.float32], Any, Any]):
+    """Keeps `observation` of a flat observation, each number x as sign(x) log(1 + |x|), scaled to -1..1.
+
+    It takes metres, ids and shares alike without having to know them or to gather statistics.
+    """
+
+    def __init__(self, env: gym.Env[Any, Any]) -> None:
+        super().__init__(env)
+        assert isinstance(env.observation_space, spaces.Dict)
+        shape = env.observation_space["observation"].shape
+        self.observation_space = spaces.Box(-1.0, 1.0, shape, dtype=np.float32)
+
+    def observation(self, observation: Any) -> NDArray[np.float32]:
+        """The squashed vector."""
+        values = np.asarray(observation["observation"], dtype=np.float64)
+        squashed = np.sign(values) * np.log1p(np.abs(values)) / math.log1p(REACH)
+        return np.clip(squashed, -1.0, 1.0).astype(np.float32)
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Of the environment inside, see `FlattenAction`."""
+        masks: NDArray[np.bool_] = self.env.get_wrapper_attr("action_masks")()
+        return masks
+
+
+def masks_of(env: gym.Env[Any, Any]) -> NDArray[np.bool_] | None:
+    """Which actions an environment would carry out now; None where it does not tell."""
+    if not env.has_wrapper_attr("action_masks"):
+        return None
+    masks: NDArray[np.bool_] = env.get_wrapper_attr("action_masks")()
+    return masks
+
+
+def make_vector(settings: TrainingSettings) -> Any:
+    """stable-baselines3's vector environment for a run: in this process, or shared out among others."""
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
+
+    from dorothie_gym.baselines.rl.workers import WorkerVecEnv
+
+    maker = Maker(settings.env, settings.env_settings)
+    if settings.workers:
+        vector: Any = WorkerVecEnv(maker, settings.environments, settings.workers)
+    else:
+        vector = DummyVecEnv([maker] * settings.environments)
+    vector.seed(settings.seed * 10_000)
+    return VecMonitor(vector)
+
+
+class Maker:
+    """Makes one environment; can be sent to another process."""
+
+    def __init__(self, name: str, settings: Mapping[str, Any]) -> None:
+        self._name, self._settings = name, dict(settings)
+
+    def __call__(self) -> gym.Env[Any, Any]:
+        """A new environment."""
+        return make_env(self._name, self._settings)
+
+
+MakeEnv = Callable[[], gym.Env[Any, Any]]
+"""Makes an environment."""

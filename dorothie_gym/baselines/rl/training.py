@@ -1,0 +1,213 @@
+"""A training run in a folder: it evaluates, saves and draws as it goes, and goes on where it was stopped."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import torch
+from stable_baselines3.common.callbacks import BaseCallback
+
+from dorothie_gym.baselines.rl.curve import draw_curve
+from dorothie_gym.baselines.rl.environments import Maker, make_vector
+from dorothie_gym.baselines.rl.evaluating import SEEDS_FROM, Outcome, act_with, evaluate_policy
+from dorothie_gym.baselines.rl.settings import SettingsError, TrainingSettings
+from dorothie_gym.baselines.rl.weights import DESCRIPTION, make_model, read_description, restore, save_model
+
+PROGRESS, CURVE, BEST = "progress.jsonl", "curve.png", "best"
+"""Files of a run beside its model: a line for each evaluation, their picture, and a folder with the best model."""
+
+LIVE = ("steps", "evaluate_every", "episodes", "workers")
+"""Settings in which a run that goes on may differ from how it began."""
+
+Watch = Callable[[int, int, "Row | None"], None]
+"""Is told the steps done, those there will be, and the last evaluation."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """An evaluation: after how many steps, and after how many seconds of training [s]."""
+
+    steps: int
+    seconds: float
+    outcome: Outcome
+
+    def as_json(self) -> dict[str, Any]:
+        """In JSON types."""
+        return {"steps": self.steps, "seconds": self.seconds, **asdict(self.outcome)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """What came of a run.
+
+    Attributes:
+        folder: where all is.
+        rows: evaluations, in order.
+        steps: done so far, with those of earlier calls.
+        seconds: of training so far, evaluations left out [s].
+        finished: whether all steps were done.
+    """
+
+    folder: Path
+    rows: tuple[Row, ...]
+    steps: int
+    seconds: float
+    finished: bool
+
+    @property
+    def best(self) -> Row | None:
+        """The evaluation with most successes; of equal ones that with the highest reward."""
+        return max(self.rows, key=lambda row: (row.outcome.success, row.outcome.reward), default=None)
+
+
+class Training:
+    """A run; `go` trains until all steps are done or Ctrl-C is pressed."""
+
+    def __init__(self, settings: TrainingSettings, folder: Path, watch: Watch | None = None) -> None:
+        """Prepares a run, or takes up one that is in the folder.
+
+        Args:
+            settings: what is trained.
+            folder: where all is written.
+            watch: is told how far it is.
+
+        Raises:
+            SettingsError: the folder has a run with other settings, or nothing can be trained with these.
+            WeightsError: the run in the folder is damaged.
+        """
+        self.settings, self.folder = settings, folder
+        self._watch = watch or (lambda done, total, row: None)
+        self.rows: list[Row] = []
+        self.seconds = 0.0
+        begun = (folder / DESCRIPTION).is_file()
+        if begun:
+            _check_same(settings, TrainingSettings(**read_description(folder)["settings"]), folder)
+            self.rows = _read_rows(folder / PROGRESS)
+        folder.mkdir(parents=True, exist_ok=True)
+        torch.set_num_threads(1)  # small networks: more threads only wait for one another
+        self._vector = make_vector(settings)
+        log = folder / "tensorboard" if find_spec("tensorboard") is not None else None
+        try:
+            self.model = make_model(settings, self._vector, log=log)
+            if begun:
+                restore(self.model, folder)
+                self.seconds = float(read_description(folder)["seconds"])
+        except Exception:
+            self._vector.close()
+            raise
+
+    def go(self) -> Run:
+        """Trains.
+
+        Returns:
+            What came of it, also where Ctrl-C came between; then everything so far is in the folder.
+        """
+        settings, model = self.settings, self.model
+        left = settings.steps - int(model.num_timesteps)
+        finished = left <= 0
+        try:
+            if left > 0:
+                model.learn(left, callback=_Evaluations(self), reset_num_timesteps=False, log_interval=None)
+                finished = True
+        except KeyboardInterrupt:
+            finished = False
+        finally:
+            self._vector.close()
+        save_model(model, settings, self.folder, self.seconds)
+        if self.rows:
+            draw_curve([row.as_json() for row in self.rows], _title(settings), self.folder / CURVE)
+        return Run(
+            folder=self.folder, rows=tuple(self.rows), steps=int(model.num_timesteps), seconds=self.seconds,
+            finished=finished,
+        )  # fmt: skip
+
+    def evaluate(self) -> None:
+        """Plays the evaluation's episodes, and saves the model with what came of them."""
+        settings = self.settings
+        act = act_with(self.model, masked=settings.algorithm == "maskable_ppo")
+        outcome = evaluate_policy(Maker(settings.env, settings.env_settings), act, settings.episodes, SEEDS_FROM)
+        row = Row(steps=int(self.model.num_timesteps), seconds=round(self.seconds, 2), outcome=outcome)
+        best = Run(folder=self.folder, rows=tuple(self.rows), steps=0, seconds=0.0, finished=False).best
+        self.rows.append(row)
+        save_model(self.model, settings, self.folder, self.seconds)
+        if best is None or (outcome.success, outcome.reward) > (best.outcome.success, best.outcome.reward):
+            save_model(self.model, settings, self.folder / BEST, self.seconds)
+        with (self.folder / PROGRESS).open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row.as_json()) + "\n")
+        draw_curve([row.as_json() for row in self.rows], _title(settings), self.folder / CURVE)
+        self._watch(row.steps, settings.steps, row)
+
+    def note(self, seconds: float, steps: int) -> None:
+        """Counts time of training [s], and tells how far it is."""
+        self.seconds += seconds
+        self._watch(steps, self.settings.steps, None)
+
+
+class _Evaluations(BaseCallback):
+    """Evaluates between rollouts, and at the end; keeps the time of training."""
+
+    def __init__(self, training: Training) -> None:
+        super().__init__()
+        self._training = training
+        self._since = time.perf_counter()
+        every = training.settings.evaluate_every
+        self._due = (training.rows[-1].steps // every + 1) * every if training.rows else every
+
+    def _on_training_start(self) -> None:
+        self._since = time.perf_counter()
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_start(self) -> None:
+        self._note()
+        if self.num_timesteps >= self._due:
+            self._evaluate()
+
+    def _on_training_end(self) -> None:
+        self._note()
+        rows = self._training.rows
+        if not rows or rows[-1].steps < self.num_timesteps:
+            self._evaluate()
+
+    def _note(self) -> None:
+        now = time.perf_counter()
+        self._training.note(now - self._since, self.num_timesteps)
+        self._since = now
+
+    def _evaluate(self) -> None:
+        every = self._training.settings.evaluate_every
+        self._due = (self.num_timesteps // every + 1) * every
+        self._training.evaluate()
+        self._since = time.perf_counter()
+
+
+def _check_same(wanted: TrainingSettings, begun: TrainingSettings, folder: Path) -> None:
+    """Fails where a run in a folder was begun with other settings."""
+    same = replace(begun, **{name: getattr(wanted, name) for name in LIVE})
+    for name, value in wanted.as_json().items():
+        if same.as_json()[name] != json.loads(json.dumps(value)):
+            raise SettingsError(
+                f"{folder}: a run with another {name} is there ({same.as_json()[name]}, not {value}); "
+                "choose another folder, or the same settings to go on"
+            )
+
+
+def _read_rows(path: Path) -> list[Row]:
+    rows = []
+    for line in path.read_text(encoding="utf-8").splitlines() if path.is_file() else ():
+        found = json.loads(line)
+        steps, seconds = found.pop("steps"), found.pop("seconds")
+        rows.append(Row(steps=steps, seconds=seconds, outcome=Outcome(**found)))
+    return rows
+
+
+def _title(settings: TrainingSettings) -> str:
+    more = ", ".join(f"{name} {value}" for name, value in settings.env_settings.items())
+    return f"{settings.algorithm} on {settings.env}" + (f" ({more})" if more else "")

@@ -1,0 +1,175 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
+pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
+
+from dorothie_gym.baselines.rl import (  # noqa: E402
+    ALGORITHMS,
+    SettingsError,
+    Training,
+    TrainingSettings,
+    WeightsError,
+    load_model,
+    tuned_settings,
+)
+from dorothie_gym.baselines.rl import training as training_module  # noqa: E402
+from dorothie_gym.baselines.rl.environments import make_vector  # noqa: E402
+
+DISCRETE = "dorothie_gym/Navigation-v0"
+SMALL: dict[str, dict[str, Any]] = {
+    "ppo": {"n_steps": 16, "batch_size": 32, "n_epochs": 1},
+    "maskable_ppo": {"n_steps": 16, "batch_size": 32, "n_epochs": 1},
+    "a2c": {"n_steps": 8},
+    "dqn": {"learning_starts": 16, "buffer_size": 200, "batch_size": 8},
+    "sac": {"learning_starts": 16, "buffer_size": 200, "batch_size": 8},
+}
+
+
+def settings_for(algorithm: str, **changes: Any) -> TrainingSettings:
+    env = "Pendulum-v1" if algorithm == "sac" else DISCRETE
+    more = {} if algorithm == "sac" else {"env_settings": {"max_seconds": 10.0, "traffic": "none"}}
+    return TrainingSettings(
+        **{
+            "algorithm": algorithm, "env": env, "steps": 64, "environments": 2, "evaluate_every": 64, "episodes": 1,
+            "network": (8,), "parameters": SMALL[algorithm], **more, **changes,
+        }
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("algorithm", sorted(ALGORITHMS))
+def test_a_run_leaves_a_model_that_acts_as_the_one_that_learned(algorithm: str, tmp_path: Path) -> None:
+    training = Training(settings_for(algorithm), tmp_path)
+    run = training.go()
+    assert run.finished and run.steps >= 64 and run.rows[-1].steps == run.steps
+    model, settings = load_model(tmp_path)
+    assert settings == training.settings and model.num_timesteps == run.steps
+    observations = np.stack([model.observation_space.sample() for _ in range(20)])
+    np.testing.assert_array_equal(
+        model.predict(observations, deterministic=True)[0], training.model.predict(observations, deterministic=True)[0]
+    )
+    assert {"model.json", "model.safetensors", "progress.jsonl", "curve.png", "best"} <= {
+        path.name for path in tmp_path.iterdir()
+    }
+    assert not list(tmp_path.rglob("*.zip")) and not list(tmp_path.rglob("*.pkl"))
+
+
+def test_a_run_that_goes_on_keeps_weights_optimiser_and_evaluations(tmp_path: Path) -> None:
+    first = Training(settings_for("ppo"), tmp_path)
+    run = first.go()
+    second = Training(settings_for("ppo", steps=128), tmp_path)
+    for name, state in first.model.get_parameters().items():
+        again = second.model.get_parameters()[name]
+        if "param_groups" in state:
+            for index, values in state["state"].items():
+                for key, value in values.items():
+                    np.testing.assert_array_equal(again["state"][index][key], value)
+        else:
+            for key, value in state.items():
+                np.testing.assert_array_equal(again[key], value)
+    more = second.go()
+    assert more.steps >= 128 and more.rows[: len(run.rows)] == run.rows and len(more.rows) > len(run.rows)
+    lines = (tmp_path / "progress.jsonl").read_text(encoding="utf-8").splitlines()
+    assert [json.loads(line)["steps"] for line in lines] == [row.steps for row in more.rows]
+
+
+def test_a_finished_run_is_not_trained_again(tmp_path: Path) -> None:
+    Training(settings_for("ppo"), tmp_path).go()
+    again = Training(settings_for("ppo"), tmp_path).go()
+    assert again.finished and again.steps == 64 and len(again.rows) == 1
+
+
+def test_ctrl_c_keeps_what_there_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(self: Any, seconds: float, steps: int) -> None:
+        if steps >= 64:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(training_module.Training, "note", interrupted)
+    run = Training(settings_for("ppo", steps=1000), tmp_path).go()
+    assert not run.finished and run.steps == 64
+    monkeypatch.undo()
+    assert Training(settings_for("ppo", steps=128), tmp_path).go().steps == 128
+
+
+def test_a_folder_with_another_run_is_left_alone(tmp_path: Path) -> None:
+    Training(settings_for("ppo"), tmp_path).go()
+    with pytest.raises(SettingsError, match="another seed"):
+        Training(settings_for("ppo", seed=1), tmp_path)
+
+
+def test_processes_change_nothing_but_the_time() -> None:
+    here, there = (make_vector(settings_for("maskable_ppo", environments=3, workers=workers)) for workers in (0, 2))
+    rng = np.random.default_rng(0)
+    try:
+        np.testing.assert_array_equal(here.reset(), there.reset())
+        for _ in range(30):  # episodes of 20 decisions: each begins anew
+            masks = np.stack(here.env_method("action_masks"))
+            np.testing.assert_array_equal(masks, np.stack(there.env_method("action_masks")))
+            actions = np.array([rng.choice(np.flatnonzero(mask)) for mask in masks])
+            one, two = here.step(actions), there.step(actions)
+            for mine, theirs in zip(one[:3], two[:3], strict=True):
+                np.testing.assert_array_equal(mine, theirs)
+            assert [info.get("is_success") for info in one[3]] == [info.get("is_success") for info in two[3]]
+        assert there.has_attr("action_masks") and not there.has_attr("no_such")
+        assert there.env_method("action_masks", indices=[2])[0].shape == (18,)
+        with pytest.raises(RuntimeError, match=r"0\.\.17"):
+            there.step(np.array([0, 0, 40]))
+    finally:
+        here.close()
+        there.close()
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"algorithm": "trpo"}, "algorithm"), ({"steps": 0}, "steps"), ({"workers": 9}, "workers"),
+        ({"seed": -1}, "seed"), ({"episodes": 0}, "episodes"),
+    ],
+)  # fmt: skip
+def test_bad_settings_are_named(changes: dict[str, Any], named: str) -> None:
+    with pytest.raises(SettingsError, match=named):
+        replace(settings_for("ppo"), **changes)
+
+
+def test_what_cannot_be_trained_is_told(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="sac on dorothie_gym/Navigation-v0"):
+        Training(replace(settings_for("sac"), env=DISCRETE), tmp_path)
+    with pytest.raises(SettingsError, match="guidance"):
+        Training(settings_for("ppo", env_settings={"guidance": "stars"}), tmp_path)
+    with pytest.raises(SettingsError, match="no_such"):
+        Training(settings_for("ppo", parameters={"no_such": 1}), tmp_path)
+
+
+@pytest.mark.parametrize("algorithm", sorted(ALGORITHMS))
+def test_tuned_settings_can_be_read(algorithm: str) -> None:
+    settings = tuned_settings(algorithm, DISCRETE, steps=7, episodes=None)
+    assert settings.steps == 7 and settings.parameters and settings.network
+    assert TrainingSettings(**json.loads(json.dumps(settings.as_json()))) == settings
+
+
+def test_damaged_models_are_told(tmp_path: Path) -> None:
+    with pytest.raises(WeightsError, match="there is no model"):
+        load_model(tmp_path)
+    Training(settings_for("ppo"), tmp_path).go()
+    (tmp_path / "model.safetensors").write_bytes(b"nothing")
+    with pytest.raises(WeightsError, match="model.safetensors"):
+        load_model(tmp_path)
+    (tmp_path / "model.json").write_text("{", encoding="utf-8")
+    with pytest.raises(WeightsError, match=r"model\.json, line 1"):
+        load_model(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["CoWizard", "Participant"])
+def test_other_roles_become_vectors(name: str, tmp_path: Path) -> None:
+    settings = settings_for(
+        "ppo", env=f"dorothie_gym/{name}-v0", env_settings={"max_cycles": 20}, environments=1, steps=16,
+        parameters={"n_steps": 16, "batch_size": 16, "n_epochs": 1},
+    )  # fmt: skip
+    assert Training(settings, tmp_path).go().finished

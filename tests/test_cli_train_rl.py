@@ -1,0 +1,53 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
+
+from dorothie_gym.cli.app import app  # noqa: E402
+
+SHORT = ["--set", "max_seconds=5", "--set", "traffic=none", "--episodes", "1", "--environments", "1", "--workers", "0"]
+
+
+def test_training_tells_what_came_of_it_in_json(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    result = CliRunner().invoke(app, ["train-rl", "a2c", "--out", str(out), "--steps", "32", *SHORT, "--json"])
+    assert result.exit_code == 0, result.output
+    facts = json.loads(result.stdout)
+    assert facts["finished"] and facts["steps"] >= 32 and facts["settings"]["algorithm"] == "a2c"
+    assert facts["settings"]["env_settings"] == {"max_seconds": 5, "traffic": "none"}
+    assert facts["best"]["steps"] == facts["evaluations"][-1]["steps"]
+    assert (out / "best" / "model.json").is_file()
+    again = CliRunner().invoke(app, ["train-rl", "a2c", "--out", str(out), "--steps", "32", *SHORT])
+    assert again.exit_code == 0 and "curve.png" in again.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["trpo"], "algorithm is 'trpo'"),
+        (["ppo", "--set", "guidance"], "NAME=VALUE"),
+        (["ppo", "--set", "guidance=stars"], "guidance is 'stars'"),
+        (["ppo", "--env", "dorothie_gym/NoSuch-v0"], "dorothie_gym/NoSuch-v0"),
+        (["sac"], "sac on dorothie_gym/Navigation-v0"),
+        (["ppo", "--environments", "1", "--workers", "2"], "workers is 2"),
+    ],
+)
+def test_mistakes_are_told_in_one_line(arguments: list[str], told: str, tmp_path: Path) -> None:
+    result = CliRunner().invoke(
+        app,
+        [
+            "train-rl",
+            *arguments,
+            *(["--workers", "0"] if "--workers" not in arguments else []),
+            "--out",
+            str(tmp_path / "run"),
+        ],
+    )
+    assert result.exit_code == 2
+    assert told in " ".join(result.stderr.split())
+    assert "Traceback" not in result.output
