@@ -123,7 +123,7 @@ def nfd_points(session: Session) -> Iterator[DecisionPoint]:
                 index=record.index,
                 view=history.view(record.frame),
                 action=record.action,
-                angle=_label_angle(record),
+                angle=label_angle(record),
             )
 
 
@@ -149,6 +149,13 @@ def history_angle(record: ActionRecord) -> float:
     if record.action is PhysicalAction.U_TURN:
         return U_TURN_ANGLE
     return _wrap(record.angle or 0.0)
+
+
+def label_angle(record: ActionRecord) -> float:
+    """Returns NfD's label of an action's argument [degrees]: 0 where it takes none, NaN where it is not known."""
+    if record.action.argument not in (ArgumentKind.ANGLE, ArgumentKind.SIDE):
+        return 0.0
+    return math.nan if record.angle is None else _wrap(record.angle)
 
 
 class _History:
@@ -209,12 +216,6 @@ def _inference_points(session: Session, task: Task, speaker: Role) -> Iterator[I
 
 def _same_utterance(one: MoveRecord, other: MoveRecord) -> bool:
     return one.utterance == other.utterance and one.speaker is other.speaker
-
-
-def _label_angle(record: ActionRecord) -> float:
-    if record.action.argument not in (ArgumentKind.ANGLE, ArgumentKind.SIDE):
-        return 0.0
-    return math.nan if record.angle is None else _wrap(record.angle)
 
 
 def _wrap(degrees: float) -> float:

@@ -1,7 +1,7 @@
 """What a model is given: a corpus as columns, its points, and batches of what may be seen at them."""
 
 from dorothie_gym.evaluation.features.batch import Batch, BatchSpec, gather
-from dorothie_gym.evaluation.features.building import build
+from dorothie_gym.evaluation.features.building import build, columns_of
 from dorothie_gym.evaluation.features.columns import (
     CO_WIZARD,
     NO_TEXT,
@@ -15,16 +15,42 @@ from dorothie_gym.evaluation.features.columns import (
     Landmarks,
     Looks,
     Moves,
+    ObjectKind,
     Objects,
     Sessions,
     Streets,
     TownGraph,
     Utterances,
 )
-from dorothie_gym.evaluation.features.table import PointTable, Skipped, points
+from dorothie_gym.evaluation.features.table import PointCount, PointTable, Skipped, point_counts, points
 
 __all__ = [
-    "Actions", "Batch", "BatchSpec", "CO_WIZARD", "Columns", "Frames", "Goals", "Landmarks", "Looks", "Moves",
-    "NO_TEXT", "OBJECT_VALUES", "Objects", "PARTICIPANT", "PointTable", "Sessions", "Skipped", "Streets", "TENTHS",
-    "TownGraph", "Utterances", "build", "gather", "points",
-]  # fmt: skip
+    "Actions",
+    "Batch",
+    "BatchSpec",
+    "CO_WIZARD",
+    "Columns",
+    "Frames",
+    "Goals",
+    "Landmarks",
+    "Looks",
+    "Moves",
+    "NO_TEXT",
+    "OBJECT_VALUES",
+    "ObjectKind",
+    "Objects",
+    "PARTICIPANT",
+    "PointCount",
+    "PointTable",
+    "Sessions",
+    "Skipped",
+    "Streets",
+    "TENTHS",
+    "TownGraph",
+    "Utterances",
+    "build",
+    "columns_of",
+    "gather",
+    "point_counts",
+    "points",
+]

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from dorothie_gym.evaluation.features.columns import Columns, Flags, Ints, Reals
+from dorothie_gym.evaluation.features.columns import NO_TEXT, TENTHS, Columns, Flags, Ints, Reals
 from dorothie_gym.evaluation.features.table import PointTable
+from dorothie_gym.sessions import Task
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +44,13 @@ class BatchSpec:
     landmarks: int = 10
     streets: int = 14
     paper_leak: bool = False
+
+    def __post_init__(self) -> None:
+        """Checks the sizes."""
+        for name, value in vars(self).items():
+            least = 1 if name == "window_step" else 0
+            if name != "paper_leak" and value < least:
+                raise ValueError(f"BatchSpec.{name} is {value}; it must be at least {least}")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -138,4 +148,166 @@ def gather(columns: Columns, table: PointTable, rows: ArrayLike, spec: BatchSpec
         rows: (B,) which of them, in any order.
         spec: sizes; the default's where None.
     """
-    raise NotImplementedError
+    spec = spec or BatchSpec()
+    chosen = np.asarray(rows, dtype=np.int64).reshape(-1)
+    session = table.session[chosen]
+    return Batch(
+        session=session,
+        town=columns.sessions.town[session],
+        time=_as_seconds(table.tenth[chosen]),
+        **_moves(columns, table, chosen, spec),
+        **_utterances(columns, table, chosen, spec.utterances),
+        **_actions(columns, table, chosen, spec.actions),
+        **_window(columns, table, chosen, spec),
+        **_now(columns, table, chosen, spec.objects),
+        has_objects=columns.sessions.has_objects[session],
+        **_places(columns, session, spec),
+        **_current(columns, table, chosen),
+    )
+
+
+def _newest(start: Ints, stop: Ints, size: int) -> tuple[NDArray[np.int64], Flags]:
+    """Rows (B, size) of the last `size` of `start:stop`, oldest first, and which places hold one; the others are 0."""
+    first = np.maximum(stop - size, start).astype(np.int64)
+    rows = first[:, None] + np.arange(size)
+    mask = rows < stop[:, None]
+    return np.where(mask, rows, 0), mask
+
+
+def _take(column: NDArray[Any], rows: NDArray[np.int64], mask: Flags, filler: int = 0) -> NDArray[Any]:
+    """Values at rows, `filler` where the mask is False."""
+    if not len(column):
+        return np.full((*rows.shape, *column.shape[1:]), filler, dtype=column.dtype)
+    values: NDArray[Any] = column[rows]
+    values[~mask] = filler
+    return values
+
+
+def _moves(columns: Columns, table: PointTable, chosen: NDArray[np.int64], spec: BatchSpec) -> dict[str, Any]:
+    """The history, then the earlier acts of the current utterance."""
+    start, stop = table.moves_start[chosen], table.moves_stop[chosen]
+    spans, spans_stop = table.spans_start[chosen], table.spans_stop[chosen]
+    if spec.paper_leak and table.task is Task.UFN:
+        spans_stop = spans_stop + 1  # the point's own row follows
+    past = (stop - start).astype(np.int64)
+    total = past + spans_stop - spans
+    place = np.maximum(total - spec.moves, 0)[:, None] + np.arange(spec.moves)
+    mask = place < total[:, None]
+    behind = place - past[:, None]
+    rows = np.where(mask, np.where(behind < 0, place + start[:, None], behind + spans[:, None]), 0)
+    moves = columns.moves
+    return {
+        "move": _take(moves.move, rows, mask),
+        "move_speaker": _take(moves.speaker, rows, mask),
+        "move_slots": _take(moves.slots, rows, mask),
+        "move_time": _seconds(moves.tenth, rows, mask),
+        "move_text": _take(moves.span_text, rows, mask, NO_TEXT),
+        "move_mask": mask,
+    }
+
+
+def _utterances(columns: Columns, table: PointTable, chosen: NDArray[np.int64], size: int) -> dict[str, Any]:
+    rows, mask = _newest(table.utterances_start[chosen], table.utterances_stop[chosen], size)
+    said = columns.utterances
+    return {
+        "utterance_text": _take(said.text, rows, mask, NO_TEXT),
+        "utterance_recognised": _take(said.recognised_text, rows, mask, NO_TEXT),
+        "utterance_speaker": _take(said.speaker, rows, mask),
+        "utterance_time": _seconds(said.tenth, rows, mask),
+        "utterance_mask": mask,
+    }
+
+
+def _actions(columns: Columns, table: PointTable, chosen: NDArray[np.int64], size: int) -> dict[str, Any]:
+    rows, mask = _newest(table.actions_start[chosen], table.actions_stop[chosen], size)
+    acts = columns.actions
+    return {
+        "action": _take(acts.action, rows, mask),
+        "action_angle": _take(acts.angle, rows, mask),
+        "action_up": _take(acts.up, rows, mask),
+        "action_time": _seconds(acts.tenth, rows, mask),
+        "action_mask": mask,
+    }
+
+
+def _window(columns: Columns, table: PointTable, chosen: NDArray[np.int64], spec: BatchSpec) -> dict[str, Any]:
+    """Every `window_step`-th of the last frames, the last among them."""
+    start, stop = table.frames_start[chosen].astype(np.int64), table.frames_stop[chosen].astype(np.int64)
+    step, size = spec.window_step, spec.window
+    count = np.minimum((stop - start + step - 1) // step, size)  # tokens that there are
+    rows = (stop - 1)[:, None] - step * (count[:, None] - 1 - np.arange(size))
+    mask = np.arange(size) < count[:, None]
+    rows = np.where(mask, rows, 0)
+    frames = columns.frames
+    kind, values, present = _objects(columns, _take(frames.look, rows, mask, -1), spec.window_objects)
+    return {
+        "window_pose": _take(frames.pose, rows, mask),
+        "window_speed": _take(frames.speed, rows, mask),
+        "window_lane": _take(frames.lane, rows, mask, -1),
+        "window_time": _seconds(frames.tenth, rows, mask),
+        "window_mask": mask,
+        "window_kind": kind,
+        "window_values": values,
+        "window_objects_mask": present,
+    }
+
+
+def _now(columns: Columns, table: PointTable, chosen: NDArray[np.int64], size: int) -> dict[str, Any]:
+    """The objects of the last look."""
+    last = table.frames_stop[chosen].astype(np.int64) - 1
+    seen = last >= table.frames_start[chosen]
+    kind, values, mask = _objects(columns, _take(columns.frames.look, np.where(seen, last, 0), seen, -1), size)
+    return {"kind": kind, "values": values, "objects_mask": mask}
+
+
+def _objects(columns: Columns, look: Ints, size: int) -> tuple[Ints, Reals, Flags]:
+    """Kind, values and mask of the nearest objects of looks of any shape; -1 is no look."""
+    starts = columns.looks.start
+    none = look < 0
+    safe = np.where(none, 0, look)
+    start = np.where(none, 0, starts[safe])
+    stop = np.where(none, 0, starts[np.minimum(safe + 1, len(starts) - 1)])
+    rows = start[..., None] + np.arange(size)
+    mask = rows < stop[..., None]
+    rows = np.where(mask, rows, 0)
+    return _take(columns.objects.kind, rows, mask), _take(columns.objects.values, rows, mask), mask
+
+
+def _places(columns: Columns, session: Ints, spec: BatchSpec) -> dict[str, Any]:
+    marks, streets = columns.landmarks, columns.streets
+    rows, mask = _first(marks.start, session, spec.landmarks)
+    street_rows, street_mask = _first(streets.start, session, spec.streets)
+    return {
+        "landmark_place": _take(marks.place, rows, mask),
+        "landmark_lane": _take(marks.lane, rows, mask, -1),
+        "landmark_street": _take(marks.street, rows, mask, -1),
+        "landmark_text": _take(marks.text, rows, mask, NO_TEXT),
+        "landmark_mask": mask,
+        "street_text": _take(streets.text, street_rows, street_mask, NO_TEXT),
+        "street_mask": street_mask,
+    }
+
+
+def _first(starts: NDArray[np.int64], session: Ints, size: int) -> tuple[NDArray[np.int64], Flags]:
+    rows = starts[session][:, None] + np.arange(size)
+    mask = rows < starts[session + 1][:, None]
+    return np.where(mask, rows, 0), mask
+
+
+def _current(columns: Columns, table: PointTable, chosen: NDArray[np.int64]) -> dict[str, Any]:
+    rows = table.current[chosen].astype(np.int64)
+    mask = rows >= 0
+    rows = np.where(mask, rows, 0)
+    return {
+        "current_text": _take(columns.utterances.text, rows, mask, NO_TEXT),
+        "current_recognised": _take(columns.utterances.recognised_text, rows, mask, NO_TEXT),
+    }
+
+
+def _seconds(tenths: Ints, rows: NDArray[np.int64], mask: Flags) -> Reals:
+    return _as_seconds(_take(tenths, rows, mask))
+
+
+def _as_seconds(tenths: NDArray[Any]) -> Reals:
+    seconds: Reals = tenths.astype(np.float32) / np.float32(TENTHS)
+    return seconds

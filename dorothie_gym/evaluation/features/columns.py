@@ -7,6 +7,7 @@ indices, -1 where there is none. Rows of a session follow one another, in the or
 
 from __future__ import annotations
 
+import enum
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
@@ -29,7 +30,7 @@ PARTICIPANT, CO_WIZARD = 0, 1
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Sessions:
-    """The sessions (S,).
+    """The sessions (S,), by fold, town and seed, and by content where that is equal: their names do not count.
 
     Attributes:
         names: name of each.
@@ -50,7 +51,8 @@ class Moves:
 
     Attributes:
         session: index of its session.
-        tenth: when its utterance was over.
+        tenth: when its utterance was over: it is visible later than that.
+        point_tenth: when it is a point: at its own event, which in recordings of people may come before `tenth`.
         event: number of its event in the session.
         speaker: 0 participant, 1 Co-Wizard.
         utterance: row of `Columns.utterances`.
@@ -63,6 +65,7 @@ class Moves:
 
     session: Ints
     tenth: Ints
+    point_tenth: Ints
     event: Ints
     speaker: Ints
     utterance: Ints
@@ -105,7 +108,7 @@ class Actions:
             it is not known (`history_angle`).
         up: 1 faster or on, -1 slower or off, 0 for other actions.
         label_angle: argument as NfD's label [degrees]: 0 for an action that takes none, NaN where it is not known.
-        flagged: whether it is a point of the benchmark.
+        flagged: whether it is a point of NfD.
         handling: as of `Moves`, of the exchange that began last before it.
     """
 
@@ -205,10 +208,12 @@ class Streets:
 class Goals:
     """Where the car was to go: a label of the belief head, never an input (hidden landmarks are among them).
 
+    The goal at a point is the first of the session that is reached after it.
+
     Attributes:
-        session: index of its session.
-        tenth: since when (n,).
-        place: (n, 2) x, y [m] of the subgoal's landmark; NaN when there is none.
+        session: index of its session (n,).
+        tenth: when the subgoal was completed.
+        place: (n, 2) x, y [m] of its landmark.
     """
 
     session: Ints
@@ -243,6 +248,19 @@ class TownGraph:
     members: Ints
 
 
+class ObjectKind(enum.IntEnum):
+    """What an object is: the first five as `ActorKind`, the others a traffic light by what it shows."""
+
+    OTHER = 0
+    VEHICLE = 1
+    CYCLIST = 2
+    PEDESTRIAN = 3
+    PROP = 4
+    LIGHT_GREEN = 5
+    LIGHT_YELLOW = 6
+    LIGHT_RED = 7
+
+
 OBJECT_VALUES: Final = ("distance", "bearing", "ahead", "aside", "heading", "speed", "length", "width")
 """Columns of `Objects.values`: distance [m], bearing [degrees, positive left of where the car looks], the same place in
 metres ahead and to the left, heading relative to the car's [degrees, positive left], speed [m/s], length and width
@@ -256,7 +274,7 @@ class Columns:
     Attributes:
         key: hash of all that decided the content.
         texts: every distinct text: what was said, what was recognised, names of streets and landmarks.
-        towns: towns of the sessions.
+        towns: towns of the sessions, by name.
         unreadable: sessions that could not be read, (name, reason) each.
         unpointed: flagged events that are no point, (session, event, reason) each.
     """

@@ -21,6 +21,8 @@ AD_WIZARD_FILE: Final = "ad_wizardlog.csv"
 GAMELOG_FILE: Final = "gamelog.json"
 TASK_FILE: Final = "task.json"
 DIALOG_FILE: Final = "dialog_log.json"
+SCENE_FILE: Final = "dorothie_gym_scene.parquet"
+"""What was around the car, which the layout has no place for: a file of ours, laid out as `frames.parquet`."""
 
 OURS: Final = "dorothie_gym"
 """Field of `config.json`, and of rows of the log, that holds what only our sessions have."""
@@ -41,7 +43,7 @@ class SdnLayout(enum.StrEnum):
 _LOGS: Final = {SdnLayout.RELEASE: LOG_FILE, SdnLayout.SAMPLE: GAMELOG_FILE, SdnLayout.HUB: DIALOG_FILE}
 
 _FILES: Final = {
-    SdnLayout.RELEASE: (CONFIG_FILE, LOG_FILE, PLAN_FILE, DETAILED_PLAN_FILE, PLACES_FILE, AD_WIZARD_FILE),
+    SdnLayout.RELEASE: (CONFIG_FILE, LOG_FILE, PLAN_FILE, DETAILED_PLAN_FILE, PLACES_FILE, AD_WIZARD_FILE, SCENE_FILE),
     SdnLayout.SAMPLE: (CONFIG_FILE, GAMELOG_FILE, TASK_FILE, PLACES_FILE),
     SdnLayout.HUB: (DIALOG_FILE,),
 }

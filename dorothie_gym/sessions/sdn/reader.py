@@ -18,6 +18,7 @@ from dorothie_gym.sessions.sdn.layouts import (
     CONFIG_FILE,
     OURS,
     PLACES_FILE,
+    SCENE_FILE,
     TASK_FILE,
     SdnLayout,
     detect_layout,
@@ -28,6 +29,7 @@ from dorothie_gym.sessions.sdn.log import LogReader, sorted_rows
 from dorothie_gym.sessions.sdn.maps import SdnMap, find_town
 from dorothie_gym.sessions.sdn.places import Places, read_places, trajectory_of_places
 from dorothie_gym.sessions.sdn.rows import Row, frame_of, objects, read_json, whole_of
+from dorothie_gym.sessions.sdn.scenes import read_scene
 from dorothie_gym.sessions.sdn.views import ViewReader
 from dorothie_gym.sessions.session import Session
 
@@ -81,6 +83,8 @@ def read_sdn(path: Path | str, *, maps: Path | str | None = None, sign: SignVote
     else:
         report.facts["turn_angles"] = settled.to_json()
     trajectory, scene = trajectory_of_places(raw.places, raw.first_frame, raw.place)
+    if raw.is_ours:
+        scene = read_scene(folder / SCENE_FILE, scene, trajectory, report)
     header = raw.header
     if header.departure[0] < 0 and len(trajectory) and raw.place.town is not None:
         found = raw.place.locate(float(trajectory["x"][0]), float(trajectory["y"][0]))

@@ -23,10 +23,12 @@ from dorothie_gym.sessions.sdn.layouts import (
     OURS,
     PLACES_FILE,
     PLAN_FILE,
+    SCENE_FILE,
     SDN_RATE,
 )
 from dorothie_gym.sessions.sdn.maps import find_town
 from dorothie_gym.sessions.sdn.places import COLUMNS
+from dorothie_gym.sessions.sdn.scenes import write_scene
 from dorothie_gym.sessions.sdn.written import ad_wizard_lines, detailed_plan_rows, log_rows, plan_rows
 from dorothie_gym.sessions.session import Session
 from dorothie_gym.world.town import Town
@@ -38,7 +40,8 @@ def write_sdn(session: Session, path: Path | str, *, maps: Path | str | None = N
     """Writes a session into a new folder in the release layout, whole or not at all.
 
     What the layout has no place for (`docs/session-format.md`) is lost: frames between those of 10 Hz, the controls,
-    actors, lights and the weather at each frame, pictures. Events keep a tenth of a second as their time.
+    pictures. Events keep a tenth of a second as their time. Actors, lights and the weather of the frames that are left
+    are kept in a file of ours beside the layout's.
 
     Args:
         session: the session.
@@ -61,6 +64,7 @@ def write_sdn(session: Session, path: Path | str, *, maps: Path | str | None = N
         _write(folder / DETAILED_PLAN_FILE, _lines(detailed_plan_rows(session, first)))
         _write(folder / PLACES_FILE, "\n".join(_place_lines(session, town, first)))
         _write(folder / AD_WIZARD_FILE, "\n".join(ad_wizard_lines(session, first)))
+        write_scene(folder / SCENE_FILE, session)
     return Path(path)
 
 
