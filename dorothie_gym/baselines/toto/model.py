@@ -19,6 +19,7 @@ from dorothie_gym.baselines.toto.layers import Block, GraphAttention, segment_so
 from dorothie_gym.baselines.toto.losses import point_losses
 from dorothie_gym.baselines.toto.texts import Texts
 from dorothie_gym.baselines.toto.towns import DEGREES, METRES, Towns
+from dorothie_gym.baselines.training.trainer import Model
 from dorothie_gym.evaluation.features import PARTICIPANT
 from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, VECTOR_SLOTS, DialogueMove, PhysicalAction
 from dorothie_gym.ontology.labels import SLOT_SPANS
@@ -45,7 +46,7 @@ _OBJECT_UNITS: Final = (30.0, DEGREES, 30.0, 30.0, DEGREES, 10.0, 5.0, 5.0)
 """What the columns of `OBJECT_VALUES` are divided by, each to be about 1."""
 
 
-class TOTO(nn.Module):
+class TOTO(Model):
     """One encoder over everything that may be seen at a point, and a head for each thing that is to be told.
 
     Args:
@@ -56,7 +57,7 @@ class TOTO(nn.Module):
 
     def __init__(self, config: TOTOConfig, towns: Towns, texts: Texts):
         super().__init__()
-        self.config = config
+        self.config: TOTOConfig = config
         self.towns = towns
         self.texts = texts
         given, width, words = set(config.channels), config.width, texts.width
