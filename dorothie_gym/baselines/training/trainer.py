@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from dorothie_gym.baselines.inputs import Examples, Inputs, Labels
 from dorothie_gym.baselines.outputs import Predicted
 from dorothie_gym.baselines.training import checkpoints
+from dorothie_gym.evaluation.features import BatchSpec
 
 BEST_FILE: Final = "best.safetensors"
 """The weights of the epoch with the lowest validation loss."""
@@ -44,6 +45,8 @@ class Schedule(Protocol):
     def max_epochs(self) -> int: ...  # noqa: D102
     @property
     def patience(self) -> int: ...  # noqa: D102
+    @property
+    def spec(self) -> BatchSpec: ...  # noqa: D102
     def to_json(self) -> dict[str, Any]: ...  # noqa: D102
 
 
@@ -51,6 +54,11 @@ class Model(nn.Module):
     """What can be trained and asked."""
 
     config: Schedule
+
+    @property
+    def spec(self) -> BatchSpec:
+        """How much of each thing the model is given."""
+        return self.config.spec
 
     def loss(self, inputs: Inputs, labels: Labels) -> Tensor:
         """Returns the mean loss of B points."""
@@ -153,7 +161,7 @@ def predict(model: Model, examples: Examples) -> Predicted:
     model.eval()
     parts = []
     with torch.inference_mode():
-        for rows in torch.arange(len(examples)).split(_EVALUATED):
+        for rows in torch.split(torch.arange(len(examples)), _EVALUATED):
             inputs, labels = examples.take(rows, where)
             parts.append(model.predict(inputs, labels.task))
     fields = (torch.cat([getattr(part, name) for part in parts]).cpu() for name in ("move", "slots", "action", "angle"))
@@ -168,8 +176,8 @@ def batches(examples: Examples, size: int, seed: int) -> Iterator[Tensor]:
         (examples.inputs[name].sum(1) for name in ("move_mask", "utterance_mask", "action_mask", "objects_mask")),
         start=torch.zeros(len(examples), dtype=torch.int64),
     )
-    parts = [part[length[part].argsort(stable=True)] for part in order.split(_BUCKET * size)]
-    rows = [batch for part in parts for batch in part.split(size)]
+    parts = [part[length[part].argsort(stable=True)] for part in torch.split(order, _BUCKET * size)]
+    rows = [batch for part in parts for batch in torch.split(part, size)]
     for place in torch.randperm(len(rows), generator=generator).tolist():
         yield rows[place]
 
@@ -228,7 +236,7 @@ class _Run:
         self.model.eval()
         total = 0.0
         with torch.inference_mode(), self.autocast:
-            for rows in torch.arange(len(examples)).split(_EVALUATED):
+            for rows in torch.split(torch.arange(len(examples)), _EVALUATED):
                 inputs, labels = examples.take(rows, self.device)
                 total += float(self.model.loss(inputs, labels)) * len(labels)
         return total / len(examples)
