@@ -20,11 +20,11 @@ class HashingEncoder:
     Words tell what is said; letters make speech recognition's near misses lie close to what was said.
 
     Attributes:
-        dim: length of a vector, even: half for words, half for letters. 768 as BERT's by default.
+        dim: length of a vector, even: half for words, half for letters. 384 as MiniLM's by default.
     """
 
     name: ClassVar[str] = "hashing"
-    dim: int = 768
+    dim: int = 384
 
     def __post_init__(self) -> None:
         if self.dim < 2 or self.dim % 2:

@@ -76,6 +76,7 @@ class TOTOConfig:
     Attributes:
         width: numbers of a token.
         layers, heads, feed_forward, dropout: of the encoder.
+        attention_dropout: share of the attention's weights that are dropped.
         channels: what the model is given.
         current_text: whether the words of the current utterance are among the transcript.
         belief: whether the model also learns to tell where the car will be, and where it is to go.
@@ -104,6 +105,7 @@ class TOTOConfig:
     heads: int
     feed_forward: int
     dropout: float = 0.1
+    attention_dropout: float = 0.1
     channels: tuple[Channel, ...] = ALL_CHANNELS
     current_text: bool = True
     belief: bool = False
@@ -168,7 +170,7 @@ class TOTOConfig:
     def small(cls) -> Self:
         """Trains in less than a minute on two cores; the default."""
         return cls(
-            width=96, layers=2, heads=4, feed_forward=192, text_width=96, text_layers=1, text_tokens=20,
+            width=96, layers=2, heads=4, feed_forward=192, text_width=96, text_layers=1, text_tokens=20, attention_dropout=0.0,
             lane_width=32, map_heads=4, id_width=8, moves=12, utterances=6, actions=10, window=8, window_step=12,
             window_objects=6, objects=10, learning_rate=1e-3, batch_size=64, max_epochs=16,
         )  # fmt: skip

@@ -62,9 +62,10 @@ class Block(nn.Module):
         heads: of the attention.
         feed_forward: numbers between its two matrices.
         dropout: share of values dropped.
+        attention_dropout: share of the attention's weights dropped.
     """
 
-    def __init__(self, width: int, heads: int, feed_forward: int, dropout: float):
+    def __init__(self, width: int, heads: int, feed_forward: int, dropout: float, attention_dropout: float = 0.0):
         super().__init__()
         self.heads = heads
         self.query = nn.Linear(width, width)
@@ -75,6 +76,7 @@ class Block(nn.Module):
         self.after_attention = nn.LayerNorm(width)
         self.after_feed_forward = nn.LayerNorm(width)
         self.dropout = Dropout(dropout)
+        self.attention_dropout = Dropout(attention_dropout)
 
     def forward(self, tokens: Tensor, mask: Tensor, queries: Tensor | None = None) -> Tensor:
         """Returns the tokens after the layer.
@@ -94,12 +96,12 @@ class Block(nn.Module):
         query = _split(self.query(queries), self.heads)  # (B, heads, Q, width/heads)
         key, value = (_split(part, self.heads) for part in self.key_value(tokens).chunk(2, dim=-1))
         seen = mask[:, None, None, :]  # (B, 1, 1, T)
-        if self.training and self.dropout.level and query.device.type == "cpu":
+        if self.training and self.attention_dropout.level and query.device.type == "cpu":
             # torch's own attention takes a slow way on a CPU when it is to drop weights
             scores = (query @ key.mT / math.sqrt(query.shape[-1])).masked_fill(~seen, -math.inf)
-            attended = self.dropout(scores.softmax(dim=-1)) @ value
+            attended = self.attention_dropout(scores.softmax(dim=-1)) @ value
         else:
-            rate = self.dropout.level / 256 if self.training else 0.0
+            rate = self.attention_dropout.level / 256 if self.training else 0.0
             attended = F.scaled_dot_product_attention(query, key, value, attn_mask=seen, dropout_p=rate)
         out: Tensor = self.out(attended.transpose(1, 2).flatten(2))
         return out

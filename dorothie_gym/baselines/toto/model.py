@@ -91,7 +91,8 @@ class TOTO(Model):
             self.queries = nn.Linear(config.detector[0] * config.detector[1], width)
         self.now = nn.Parameter(torch.zeros(width))
         self.blocks = nn.ModuleList(
-            Block(width, config.heads, config.feed_forward, config.dropout) for _ in range(config.layers)
+            Block(width, config.heads, config.feed_forward, config.dropout, config.attention_dropout)
+            for _ in range(config.layers)
         )
         self.head = nn.Linear(width, 2 * len(DialogueMove) + 2 * len(VECTOR_SLOTS) + 2 * len(LABELS))
         self.action_head = nn.Linear(width, len(NAVIGATION_ACTIONS) + 2)

@@ -23,7 +23,9 @@ class CheckpointError(RuntimeError):
     """A checkpoint is damaged, or of another model or corpus; the message names the file and what to do."""
 
 
-def save(path: Path, model: nn.Module, about: Mapping[str, Any], optimiser: torch.optim.Optimizer | None = None) -> None:
+def save(
+    path: Path, model: nn.Module, about: Mapping[str, Any], optimiser: torch.optim.Optimizer | None = None
+) -> None:
     """Writes a model, and the state of its optimiser if given; whole or not at all.
 
     Args:
