@@ -170,20 +170,32 @@ class TestEvaluate:
     def test_json_has_the_metrics_of_all_tasks(self, sessions: Path, model: str) -> None:
         table = loaded("evaluate", "--sessions", sessions, "--model", model, "--json")
         assert table["tasks"] == ["ufn", "rfn", "nfd"] and table["model"] == model
-        assert table["sessions_train"] == table["sessions_test"] == 1
+        assert table["corpus"]["sessions"] == {"s4": "all"}
         for key in ("ufn_move_accuracy", "rfn_slot_f1", "nfd_joint_accuracy", "nfd_joint_accuracy_paper"):
-            assert key in table
+            assert table[key] == table["models"][model]["all"][key]["mean"]
+
+    def test_a_floor_is_written_and_scored_like_any_model(self, sessions: Path, tmp_path: Path) -> None:
+        file = tmp_path / "random.parquet"
+        drawn = loaded("evaluate", "--corpus", sessions, "--model", "random", "--seed", 5, "--save", file, "--json")
+        read = loaded("evaluate", file, "--corpus", sessions, "--json")
+        assert read["models"] == drawn["models"] and read["seed"] == 5
+        assert read["about"][str(file)]["model"] == "random"
 
     def test_the_table_names_sessions_and_counts_points(self, sessions: Path) -> None:
         result = call("evaluate", "--sessions", sessions, "--tasks", "ufn,nfd")
         assert result.exit_code == 0
-        assert "UfN" in result.stdout and "NfD" in result.stdout and "RfN" not in result.stdout
-        assert "points skipped" in result.stdout
-        assert "Trained on s3; tested on s4." in result.stdout
+        assert "UfN" in result.stdout and "NfD" in result.stdout and "RfN, right of" not in result.stdout
+        assert "points scored" in result.stdout and "flagged events" in result.stdout
+        assert "split test, 1 sessions; divided: the first half of the sessions by name trains" in result.stdout
+
+    def test_a_report_is_written(self, sessions: Path, tmp_path: Path) -> None:
+        assert call("evaluate", "--corpus", sessions, "--out", tmp_path / "r").exit_code == 0
+        assert (tmp_path / "r/table.md").read_text().startswith("# Results")
+        assert (tmp_path / "r/confusion-majority.png").is_file()
 
     def test_without_sessions_a_few_are_played(self, monkeypatch: pytest.MonkeyPatch, sessions: Path) -> None:
         monkeypatch.setattr("dorothie_gym.rollout.default_corpus", lambda: sessions)
-        assert loaded("evaluate", "--json")["sessions"] == str(sessions)
+        assert loaded("evaluate", "--json")["corpus"]["folder"] == str(sessions)
 
     def test_a_cache_that_cannot_be_written_is_told(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (tmp_path / "file").touch()

@@ -121,9 +121,15 @@ def test_files_that_cannot_be_written(arguments: list[str], words: str) -> None:
         (["--model", "oracle"], "majority, random"),
         (["--sessions", "none"], "none: there is no such folder"),
         (["--sessions", "."], "holds no session"),
+        (["--split", "dev"], "'dev'"),
+        (["none.parquet"], "none.parquet: No such file or directory"),
+        (["text.parquet", "--corpus", "."], "text.parquet: is no parquet file"),
+        (["text.parquet", "--save", "x.parquet"], "give --model majority or --model random with it"),
+        (["--save", "none/x.parquet"], "the folder none does not exist"),
     ],
 )
 def test_what_cannot_be_evaluated(arguments: list[str], words: str) -> None:
+    Path("text.parquet").write_text("session,event")
     assert words in refused("evaluate", *arguments)
 
 

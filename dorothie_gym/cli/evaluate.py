@@ -1,54 +1,139 @@
-"""`dorothie-gym evaluate`: the table of the three tasks."""
+"""`dorothie-gym evaluate`: predictions, or the floors, scored on the three tasks."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.table import Table
 
-from dorothie_gym.cli.output import fail, print_json, stdout, told_plainly
+from dorothie_gym.cli.output import check_file, fail, print_json, stdout, told_plainly
 
-_ROWS = (
-    ("move accuracy", "move_accuracy"),
-    ("slot F1 (micro)", "slot_f1"),
-    ("slot F1 (macro)", "slot_f1_macro"),
-    ("slot F1 (by slot type)", "slot_f1_type"),
-    ("slot score (as the paper's code)", "slot_score_paper"),
-    ("action accuracy", "action_accuracy"),
-    ("argument accuracy", "argument_accuracy"),
-    ("joint accuracy", "joint_accuracy"),
-    ("argument accuracy (as the paper's code)", "argument_accuracy_paper"),
-    ("joint accuracy (as the paper's code)", "joint_accuracy_paper"),
-)
+if TYPE_CHECKING:
+    from dorothie_gym.evaluation import CorpusLabels, ResultsTable, Split, TaskPredictions
+    from dorothie_gym.sessions import Corpus, Task
+
+WIDTH = 130
+"""Columns of what is written into a file or a pipe, which have no width of their own."""
+
+DETAILED = 2
+"""Up to so many models are shown with everything; more of them as the table."""
 
 
 def evaluate(
-    tasks: Annotated[str, typer.Option(help="all, or some of ufn,rfn,nfd.")] = "all",
-    model: Annotated[str, typer.Option(help="majority or random.")] = "majority",
-    sessions: Annotated[
-        Path | None, typer.Option(help="Folder of sessions; without it, a few are played once and kept.")
+    predictions: Annotated[
+        list[Path] | None, typer.Argument(metavar="PREDICTIONS...", help="Files of predictions; several seeds at will.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="What the model draws from.")] = 0,
+    corpus: Annotated[
+        Path | None,
+        typer.Option(
+            "--corpus", "--sessions", help="Corpus or folder of sessions; without it, a few are played once and kept."
+        ),
+    ] = None,
+    split: Annotated[str, typer.Option(help="train, val, test or all.")] = "test",
+    tasks: Annotated[str, typer.Option(help="all, or some of ufn,rfn,nfd.")] = "all",
+    model: Annotated[
+        str | None, typer.Option(help="majority or random: a floor; without predictions, majority.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="What the floor draws from.")] = 0,
+    save: Annotated[
+        Path | None, typer.Option(metavar="FILE.parquet", help="Write the floor's predictions into a file.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write the table (md, tex, json) and its pictures into a folder.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Write JSON, and nothing else.")] = False,
 ) -> None:
-    """Score a model on the three tasks: understanding (ufn), response (rfn) and navigation (nfd)."""
+    """Score predictions on the three tasks: understanding (ufn), response (rfn) and navigation (nfd)."""
+    files = predictions or []
+    floor = model if model is not None or files else "majority"
+    if save is not None:
+        if floor is None:
+            fail("--save writes the predictions of a floor; give --model majority or --model random with it")
+        check_file(save)
     with told_plainly():
-        from dorothie_gym.evaluation import evaluate_folder, make_model, parse_tasks
+        from dorothie_gym.evaluation import PredictionError
 
         try:
-            chosen = parse_tasks(tasks)
-            make_model(model, seed)
-        except ValueError as error:
+            table, chosen = _score(files, corpus, split, tasks, floor, seed, save)
+            if out is not None:
+                from dorothie_gym.evaluation.report import write_report
+
+                write_report(table, out)
+        except PredictionError as error:
             fail(str(error))
-        folder = _default_sessions() if sessions is None else sessions
-        table = evaluate_folder(folder, chosen, model, seed)
     if as_json:
-        print_json({"tasks": [task.value for task in chosen], "sessions": str(folder), **table})
+        print_json({"tasks": [task.value for task in chosen], **_flat(table), **table.to_json()})
     else:
-        _show(table, [task.value for task in chosen], folder)
+        _show(table, out)
+
+
+def _score(
+    files: Sequence[Path],
+    folder: Path | None,
+    split: str,
+    tasks: str,
+    floor: str | None,
+    seed: int,
+    save: Path | None,
+) -> tuple[ResultsTable, tuple[Task, ...]]:
+    from dorothie_gym.evaluation import evaluate_predictions, labels_of, read_about, read_predictions, write_predictions
+    from dorothie_gym.sessions import Corpus
+
+    chosen, part = _tasks(tasks), _split(split)
+    read = list(read_predictions(*files))
+    if floor is not None:
+        _check_floor(floor)
+    where = Corpus.load(_default_sessions() if folder is None else folder)
+    labels = labels_of(where, part)
+    if floor is not None:
+        drawn = _floor(floor, where, labels, seed)
+        if save is not None:
+            write_predictions(save, drawn, about={"model": floor, "corpus": str(where.root), "split": split})
+        read += drawn
+    about = {str(path): told for path in files if (told := read_about(path))}
+    wanted = [given for given in read if given.task in chosen]
+    if not wanted:
+        fail(f"{', '.join(map(str, files))}: holds no prediction of {tasks}; its tasks are in the column 'task'")
+    return evaluate_predictions(wanted, labels, about=about), chosen
+
+
+def _floor(name: str, corpus: Corpus, labels: CorpusLabels, seed: int) -> tuple[TaskPredictions, ...]:
+    from dorothie_gym.evaluation import labels_of, predict_floor
+
+    return predict_floor(name, labels_of(corpus, "train"), labels, seed)
+
+
+def _tasks(text: str) -> tuple[Task, ...]:
+    from dorothie_gym.sessions import Task
+
+    names = [name.strip().lower() for name in text.split(",")]
+    if names == ["all"]:
+        return tuple(Task)
+    for name in names:
+        if name not in {task.value for task in Task}:
+            fail(f"task {name!r} is unknown; choose from {', '.join(task.value for task in Task)}, or all")
+    return tuple(task for task in Task if task.value in names)
+
+
+def _split(text: str) -> Split:
+    from dorothie_gym.evaluation import SPLITS
+
+    for split in SPLITS:
+        if split == text:
+            return split
+    fail(f"split {text!r} is unknown; choose from {', '.join(SPLITS)}")
+
+
+def _check_floor(name: str) -> None:
+    from dorothie_gym.evaluation import make_floor
+
+    try:
+        make_floor(name)
+    except ValueError as error:
+        fail(str(error))
 
 
 def _default_sessions() -> Path:
@@ -60,38 +145,35 @@ def _default_sessions() -> Path:
         fail(str(error))
 
 
-def _show(table: Mapping[str, Any], tasks: Sequence[str], folder: Path) -> None:
-    shown = Table(box=None, pad_edge=False)
-    shown.add_column(f"Model: {table['model']}", no_wrap=True)
-    for task in tasks:
-        shown.add_column(task[0].upper() + task[1] + task[2].upper(), justify="right")
-    for title, key in (("points", "points"), ("points skipped", "skipped")):
-        shown.add_row(title, *(str(table[f"{task}_{key}"]) for task in tasks), style="dim")
-    for title, key in _ROWS:
-        if any(f"{task}_{key}" in table for task in tasks):
-            shown.add_row(title, *(_share(table, f"{task}_{key}") for task in tasks))
+def _flat(table: ResultsTable) -> dict[str, Any]:
+    """What a single run comes to over everything that was scored; skipped points are scored in part or not at all."""
+    if len(table.runs) != 1:
+        return {}
+    from dorothie_gym.evaluation.labels import ALL
+
+    run = table.runs[0]
+    scores = run.parts[ALL]
+    skipped = [row.task for row in (*run.left_out, *table.labels.skipped)]
+    return {
+        "model": run.model,
+        "seed": run.seed,
+        **{f"{task.value}_points": count for task, count in scores.points.items()},
+        **{f"{task.value}_skipped": skipped.count(task) for task in scores.points},
+        **{key: None if math.isnan(value) else value for key, value in scores.metrics.items()},
+    }
+
+
+def _show(table: ResultsTable, out: Path | None) -> None:
+    from dorothie_gym.evaluation.terminal import print_counts, print_details, print_table
+
     console = stdout()
-    console.print(shown)
-    console.print()
-    train, test = _split(table, folder)
-    console.print(f"Sessions: {folder}", style="dim", markup=False, soft_wrap=True)
-    console.print(f"Trained on {', '.join(train)}; tested on {', '.join(test)}.", style="dim", markup=False)
-    if table["sessions_incomplete"]:
-        console.print(f"Cut off, but used: {', '.join(table['sessions_incomplete'])}.", style="yellow", markup=False)
-    for name, reason in table["sessions_unreadable"].items():
-        console.print(f"Left out {name}: {reason}", style="yellow", markup=False)
-
-
-def _share(table: Mapping[str, Any], key: str) -> str:
-    if key not in table:
-        return ""
-    value = table[key]
-    return "undefined" if value is None else f"{100 * value:.1f} %"
-
-
-def _split(table: Mapping[str, Any], folder: Path) -> tuple[list[str], list[str]]:
-    """Names of the sessions that trained and of those that tested."""
-    from dorothie_gym.sessions import session_folders
-
-    names = [path.name for path in session_folders(folder) if path.name not in table["sessions_unreadable"]]
-    return names[: table["sessions_train"]], names[table["sessions_train"] :]
+    if not console.is_terminal:
+        console.width = WIDTH
+    if len(table.models) > DETAILED:
+        print_table(table, console)
+    else:
+        for name in table.models:
+            print_details(table, name, console)
+        print_counts(table, console)
+    if out is not None:
+        console.print(f"Written: {out}", style="dim", markup=False, soft_wrap=True)

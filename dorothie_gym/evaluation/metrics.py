@@ -14,7 +14,13 @@ from typing import ClassVar, Generic, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.evaluation.predictions import ActionPredictions, ActPredictions, act_labels, action_labels
+from dorothie_gym.evaluation.predictions import (
+    ActionPredictions,
+    ActPredictions,
+    Predictions,
+    act_labels,
+    action_labels,
+)
 from dorothie_gym.ontology import SLOT_SPANS, VECTOR_SLOTS
 from dorothie_gym.sessions import DecisionPoint, InferencePoint
 
@@ -35,8 +41,12 @@ class Metric(ABC, Generic[PredictionsT, PointT]):
     name: ClassVar[str]
 
     @abstractmethod
-    def compute(self, predicted: PredictionsT, points: Sequence[PointT]) -> float:
+    def compute(self, predicted: PredictionsT, points: Sequence[PointT] | PredictionsT) -> float:
         """Returns a number in [0, 1], or NaN where it is undefined.
+
+        Args:
+            predicted: what a model says of the points.
+            points: the points, or their labels in the form of a prediction (`act_labels`, `action_labels`).
 
         Raises:
             ValueError: there are not as many predictions as points.
@@ -53,7 +63,7 @@ class MoveAccuracy(ActMetric):
 
     name: ClassVar[str] = "move accuracy"
 
-    def compute(self, predicted: ActPredictions, points: Sequence[InferencePoint]) -> float:
+    def compute(self, predicted: ActPredictions, points: Sequence[InferencePoint] | ActPredictions) -> float:
         """Returns a share in [0, 1]; NaN when `points` is empty."""
         _check_lengths(predicted, points)
         return _share(predicted.moves == act_labels(points).moves)
@@ -71,7 +81,7 @@ class SlotF1(ActMetric):
     name: ClassVar[str] = "slot F1"
     average: Literal["micro", "macro", "type"] = "micro"
 
-    def compute(self, predicted: ActPredictions, points: Sequence[InferencePoint]) -> float:
+    def compute(self, predicted: ActPredictions, points: Sequence[InferencePoint] | ActPredictions) -> float:
         """Returns F1 in [0, 1]; NaN when no slot occurs and none is predicted ("macro": when none occurs)."""
         _check_lengths(predicted, points)
         truth, guess = act_labels(points).slots, predicted.slots  # (n, 69) each
@@ -90,7 +100,7 @@ class SlotScorePaper(ActMetric):
 
     name: ClassVar[str] = "slot score, paper protocol"
 
-    def compute(self, predicted: ActPredictions, points: Sequence[InferencePoint]) -> float:
+    def compute(self, predicted: ActPredictions, points: Sequence[InferencePoint] | ActPredictions) -> float:
         """Returns a share in [0, 1]; NaN when `points` is empty."""
         _check_lengths(predicted, points)
         return _share((predicted.slots == act_labels(points).slots).all(axis=1))
@@ -102,7 +112,7 @@ class ActionAccuracy(ActionMetric):
 
     name: ClassVar[str] = "action accuracy"
 
-    def compute(self, predicted: ActionPredictions, points: Sequence[DecisionPoint]) -> float:
+    def compute(self, predicted: ActionPredictions, points: Sequence[DecisionPoint] | ActionPredictions) -> float:
         """Returns a share in [0, 1]; NaN when `points` is empty."""
         _check_lengths(predicted, points)
         return _share(predicted.actions == action_labels(points).actions)
@@ -121,11 +131,19 @@ class ArgumentAccuracy(ActionMetric):
     tolerance: float = ANGLE_TOLERANCE
     wrap: bool = True
 
-    def compute(self, predicted: ActionPredictions, points: Sequence[DecisionPoint]) -> float:
+    def compute(self, predicted: ActionPredictions, points: Sequence[DecisionPoint] | ActionPredictions) -> float:
         """Returns a share in [0, 1]; NaN when no point has a known angle."""
         _check_lengths(predicted, points)
         known, right = _angles(predicted, points, self.tolerance, self.wrap)
         return _share(right[known])
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArgumentAccuracyPaper(ArgumentAccuracy):
+    """Argument accuracy as published: the error of the angle is not taken on the circle."""
+
+    name: ClassVar[str] = "argument accuracy, paper protocol"
+    wrap: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,7 +158,7 @@ class JointAccuracy(ActionMetric):
     wrap: ClassVar[bool] = True
     tolerance: float = ANGLE_TOLERANCE
 
-    def compute(self, predicted: ActionPredictions, points: Sequence[DecisionPoint]) -> float:
+    def compute(self, predicted: ActionPredictions, points: Sequence[DecisionPoint] | ActionPredictions) -> float:
         """Returns a share in [0, 1]; NaN when no point has a known angle."""
         _check_lengths(predicted, points)
         known, right = _angles(predicted, points, self.tolerance, self.wrap)
@@ -177,7 +195,7 @@ def wrap_degrees(angles: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _angles(
-    predicted: ActionPredictions, points: Sequence[DecisionPoint], tolerance: float, wrap: bool
+    predicted: ActionPredictions, points: Sequence[DecisionPoint] | ActionPredictions, tolerance: float, wrap: bool
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Which angles are known (n,), and which of them are right (n,)."""
     error = predicted.angles - action_labels(points).angles
@@ -198,6 +216,6 @@ def _share(right: NDArray[np.bool_]) -> float:
     return float(np.mean(right)) if len(right) else math.nan
 
 
-def _check_lengths(predicted: ActPredictions | ActionPredictions, points: Sequence[object]) -> None:
+def _check_lengths(predicted: Predictions, points: Sequence[object] | Predictions) -> None:
     if len(predicted) != len(points):
         raise ValueError(f"there are {len(predicted)} predictions for {len(points)} points; give one for each")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,10 @@ class ActPredictions:
     def __len__(self) -> int:
         return len(self.moves)
 
+    def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> ActPredictions:
+        """Returns those at some rows: their numbers, or a mask (n,)."""
+        return ActPredictions(moves=self.moves[rows], slots=self.slots[rows])
+
 
 @dataclass(frozen=True, eq=False)
 class ActionPredictions:
@@ -61,20 +66,49 @@ class ActionPredictions:
     def __len__(self) -> int:
         return len(self.actions)
 
+    def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> ActionPredictions:
+        """Returns those at some rows: their numbers, or a mask (n,)."""
+        return ActionPredictions(actions=self.actions[rows], angles=self.angles[rows])
 
-def act_labels(points: Sequence[InferencePoint]) -> ActPredictions:
-    """Returns the labels of the points, in the form of a prediction."""
+
+Predictions: TypeAlias = ActPredictions | ActionPredictions
+
+
+def act_labels(points: Sequence[InferencePoint] | ActPredictions) -> ActPredictions:
+    """Returns the labels of the points, in the form of a prediction; what is in that form already stays as it is."""
+    if isinstance(points, ActPredictions):
+        return points
     return ActPredictions(
         moves=np.array([int(point.act.move) for point in points], dtype=np.int64),
         slots=np.array([point.act.vector for point in points], dtype=np.bool_).reshape(-1, len(LABELS)),
     )
 
 
-def action_labels(points: Sequence[DecisionPoint]) -> ActionPredictions:
+def action_labels(points: Sequence[DecisionPoint] | ActionPredictions) -> ActionPredictions:
     """Returns the labels of the points, in the form of a prediction; an unknown angle is NaN."""
+    if isinstance(points, ActionPredictions):
+        return points
     return ActionPredictions(
         actions=np.array([point.action.nfd_class for point in points], dtype=np.int64),
         angles=np.array([point.angle for point in points], dtype=np.float64),
+    )
+
+
+def joined_acts(pieces: Sequence[ActPredictions]) -> ActPredictions:
+    """Returns the pieces in one, in their order."""
+    none = act_labels(())
+    return ActPredictions(
+        moves=np.concatenate([none.moves, *(piece.moves for piece in pieces)]),
+        slots=np.concatenate([none.slots, *(piece.slots for piece in pieces)]),
+    )
+
+
+def joined_actions(pieces: Sequence[ActionPredictions]) -> ActionPredictions:
+    """Returns the pieces in one, in their order."""
+    none = action_labels(())
+    return ActionPredictions(
+        actions=np.concatenate([none.actions, *(piece.actions for piece in pieces)]),
+        angles=np.concatenate([none.angles, *(piece.angles for piece in pieces)]),
     )
 
 

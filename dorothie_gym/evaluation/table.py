@@ -1,177 +1,231 @@
-"""The table of the three tasks: a model, some sessions to learn from, others to be tested on."""
+"""The table of the benchmark: every model on every metric, over seeds, by part of the corpus."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dorothie_gym.evaluation.metrics import (
-    ActionAccuracy,
-    ArgumentAccuracy,
-    JointAccuracy,
-    JointAccuracyPaper,
-    MoveAccuracy,
-    SlotF1,
-    SlotScorePaper,
-    confusion_matrix,
-    per_class_accuracy,
-)
-from dorothie_gym.evaluation.models import TaskModel, make_model
-from dorothie_gym.evaluation.predictions import act_labels, action_labels
-from dorothie_gym.ontology import NAVIGATION_ACTIONS, DialogueMove
-from dorothie_gym.sessions import (
-    DecisionPoint,
-    InferencePoint,
-    Session,
-    SessionError,
-    Task,
-    load_readable,
-    nfd_points,
-    rfn_points,
-    split_by_name,
-    ufn_points,
-)
+from dorothie_gym.evaluation.catalogue import COLUMNS, keys_of
+from dorothie_gym.evaluation.findings import Finding, findings
+from dorothie_gym.evaluation.intervals import Estimate
+from dorothie_gym.evaluation.labels import ALL, CorpusLabels, Split, labels_of
+from dorothie_gym.evaluation.metrics import per_class_accuracy
+from dorothie_gym.evaluation.paper import paper_figure, paper_figures, paper_name, paper_source
+from dorothie_gym.evaluation.prediction_files import TaskPredictions
+from dorothie_gym.evaluation.prediction_reading import read_predictions
+from dorothie_gym.evaluation.scoring import RunScore, Scores, class_labels, score_runs
+from dorothie_gym.sessions import Corpus, Task
+from dorothie_gym.sessions.statistics import Handled
 
-SPLIT = "first half of the sessions by name trains, the second half tests"
+TABLE_VERSION: Final = 1
 
 
-def parse_tasks(text: str) -> tuple[Task, ...]:
-    """Returns the tasks that a comma-separated text names, "all" for every one; raises `ValueError` otherwise."""
-    names = [name.strip().lower() for name in text.split(",")]
-    if names == ["all"]:
-        return tuple(Task)
-    for name in names:
-        if name not in {task.value for task in Task}:
-            raise ValueError(f"task {name!r} is unknown; choose from {', '.join(task.value for task in Task)}, or all")
-    return tuple(task for task in Task if task.value in names)
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ResultsTable:
+    """Scores of models over seeds.
 
-
-def evaluate_folder(
-    path: Path | str, tasks: Sequence[Task] = tuple(Task), model: str = "majority", seed: int = 0
-) -> dict[str, Any]:
-    """Evaluates a model on the sessions in a folder, split as `SPLIT` says.
-
-    Returns:
-        The table of `evaluate_tasks`, and `split`, `sessions_unreadable` ({name: reason}).
-
-    Raises:
-        SessionError: there are not two readable sessions in the folder.
-        ValueError: the model is unknown.
+    Attributes:
+        labels: what they were scored against.
+        runs: the scores of each model and seed.
+        missing: why a model could not be run ("no audio"), by its name; it keeps its row.
+        about: how the predictions were made, by model (encoders, configuration, hashes), JSON types.
     """
-    sessions, unreadable = load_readable(path)
-    if len(sessions) < 2:
-        reasons = "; ".join(unreadable.values())
-        raise SessionError(
-            f"{path}: holds {len(sessions)} readable session(s); a split needs at least 2"
-            + (f" ({reasons})" if reasons else "")
+
+    labels: CorpusLabels
+    runs: tuple[RunScore, ...]
+    missing: Mapping[str, str] = field(default_factory=dict)
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """Names of the models: those of the paper in its order, then the others as they came."""
+        names = dict.fromkeys([*(run.model for run in self.runs), *self.missing])
+        order = list(paper_figures())
+        known = sorted(
+            (name for name in names if paper_name(name)), key=lambda name: order.index(paper_name(name) or "")
         )
-    train, test = split_by_name(sessions)
-    table = evaluate_tasks(train, test, tasks, model, seed)
-    return {**table, "split": SPLIT, "sessions_unreadable": unreadable}
+        return (*known, *(name for name in names if paper_name(name) is None))
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The parts of the corpus that figures are given for."""
+        return self.labels.parts
+
+    @property
+    def tasks(self) -> tuple[Task, ...]:
+        """The tasks that any model predicted."""
+        return tuple(task for task in Task if any(task in run.parts[ALL].points for run in self.runs))
+
+    def runs_of(self, model: str) -> tuple[RunScore, ...]:
+        """Returns the runs of a model, by seed."""
+        return tuple(sorted((run for run in self.runs if run.model == model), key=lambda run: run.seed))
+
+    def estimate(self, model: str, part: str, key: str, handled: Handled | None = None) -> Estimate:
+        """Returns a figure over the seeds of a model, without any seed where it was not run or is undefined.
+
+        Args:
+            model: name of the model.
+            part: part of the corpus.
+            key: a metric with the task's name, like `ufn_move_accuracy`.
+            handled: only points whose exchange handles this.
+        """
+        scores = {run.seed: _scores_of(run, part, handled) for run in self.runs_of(model)}
+        return Estimate.of({seed: score.metrics[key] for seed, score in scores.items() if key in score.metrics})
+
+    def best(self, part: str, key: str) -> frozenset[str]:
+        """Returns the models with the highest mean of a figure, as it is printed: to a tenth of a per cent."""
+        means = {model: self.estimate(model, part, key).mean for model in self.models}
+        rounded = {model: round(100 * mean, 1) for model, mean in means.items() if mean is not None}
+        return frozenset(model for model, mean in rounded.items() if mean == max(rounded.values()))
+
+    def points(self, model: str, part: str, task: Task, handled: Handled | None = None) -> int:
+        """Returns the number of points scored (of the first seed); 0 where the task was not predicted."""
+        runs = self.runs_of(model)
+        return _scores_of(runs[0], part, handled).points.get(task, 0) if runs else 0
+
+    def confusion(self, model: str, part: str, task: Task) -> NDArray[np.int64] | None:
+        """Returns the confusion matrix of a task, summed over seeds; None where it was not predicted."""
+        found = [run.parts[part].confusion[task] for run in self.runs_of(model) if task in run.parts[part].confusion]
+        return np.sum(found, axis=0, dtype=np.int64) if found else None
+
+    def per_class(self, model: str, part: str, task: Task) -> dict[str, Estimate]:
+        """Returns the accuracy of each class that occurs among the labels."""
+        runs = [run for run in self.runs_of(model) if task in run.parts[part].confusion]
+        shares = {run.seed: per_class_accuracy(run.parts[part].confusion[task]) for run in runs}
+        names = class_labels(task)
+        found = {
+            name: Estimate.of({seed: float(share[k]) for seed, share in shares.items()}) for k, name in enumerate(names)
+        }
+        return {name: estimate for name, estimate in found.items() if estimate.seeds}
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Returns how the paper's findings come out here."""
+        return tuple(finding for part in self.parts for finding in findings(self.estimate, part))
+
+    def to_json(self) -> dict[str, Any]:
+        """Returns everything as JSON types; None where a figure is undefined.
+
+        `models.<name>.<part>.<metric>` = {mean, half_width, seeds, values}; the rest is told in docs/predictions.md.
+        """
+        return {
+            "version": TABLE_VERSION,
+            "corpus": self._corpus_json(),
+            "models": {model: self._model_json(model) for model in self.models if model not in self.missing},
+            "missing": dict(self.missing),
+            "by_handling": self._each(self._handling_json),
+            "per_class": self._each(self._per_class_json),
+            "confusion": self._each(self._confusion_json),
+            "classes": {task.value: list(class_labels(task)) for task in self.tasks},
+            "left_out": {
+                f"{run.model}, seed {run.seed}": [skipped.to_json() for skipped in run.left_out]
+                for run in self.runs
+                if run.left_out
+            },
+            "findings": [finding.to_json() for finding in self.findings()],
+            "paper": {
+                "source": paper_source(),
+                "models": {m: self._paper_json(m) for m in self.models if paper_name(m)},
+            },
+            "about": dict(self.about),
+        }
+
+    def _corpus_json(self) -> dict[str, Any]:
+        labels = self.labels
+        return {
+            "folder": str(labels.root),
+            "split": labels.split,
+            "division": labels.division,
+            "sessions": dict(labels.part_of),
+            "sessions_incomplete": list(labels.incomplete),
+            "sessions_unreadable": dict(labels.unreadable),
+            "points": {fold or ALL: count.to_json() for fold, count in sorted(labels.counts.items())},
+            "skipped": [skipped.to_json() for skipped in labels.skipped],
+        }
+
+    def _each(self, of: Any) -> dict[str, Any]:
+        return {model: {part: of(model, part) for part in self.parts} for model in self.models if self.runs_of(model)}
+
+    def _keys(self, model: str) -> tuple[str, ...]:
+        tasks = {task for run in self.runs_of(model) for task in run.parts[ALL].points}
+        return tuple(key for task in Task if task in tasks for key in keys_of(task))
+
+    def _model_json(self, model: str) -> dict[str, Any]:
+        return {
+            part: {key: self.estimate(model, part, key).to_json() for key in self._keys(model)} for part in self.parts
+        }
+
+    def _handling_json(self, model: str, part: str) -> dict[str, Any]:
+        return {
+            kind.value: {
+                "points": {task.value: self.points(model, part, task, kind) for task in self.tasks},
+                **{key: self.estimate(model, part, key, kind).to_json() for key in self._keys(model)},
+            }
+            for kind in Handled
+        }
+
+    def _per_class_json(self, model: str, part: str) -> dict[str, Any]:
+        return {
+            task.value: {name: estimate.to_json() for name, estimate in self.per_class(model, part, task).items()}
+            for task in self.tasks
+        }
+
+    def _confusion_json(self, model: str, part: str) -> dict[str, Any]:
+        found = {task.value: self.confusion(model, part, task) for task in self.tasks}
+        return {task: matrix.tolist() for task, matrix in found.items() if matrix is not None}
+
+    def _paper_json(self, model: str) -> dict[str, Any]:
+        return {
+            part: {
+                key: {"mean": figure.mean, "half_width": figure.half_width}
+                for key in COLUMNS
+                if (figure := paper_figure(model, part, key)) is not None
+            }
+            for part in self.parts
+        }
 
 
-def evaluate_tasks(
-    sessions_train: Sequence[Session],
-    sessions_test: Sequence[Session],
-    tasks: Sequence[Task] = tuple(Task),
-    model: str = "majority",
-    seed: int = 0,
-) -> dict[str, Any]:
-    """Fits a model on some sessions and scores it on others.
+def evaluate_predictions(
+    predictions: Iterable[TaskPredictions],
+    corpus: CorpusLabels | Corpus | Path | str,
+    split: Split = "test",
+    *,
+    missing: Mapping[str, str] | None = None,
+    about: Mapping[str, Any] | None = None,
+) -> ResultsTable:
+    """Scores predictions and gathers them in a table.
 
-    Returns:
-        JSON types; None where a number is undefined. `model`, `seed`, `sessions_train`, `sessions_test` and
-        `sessions_incomplete` (names of tested sessions that were cut off); for each task T `T_points` (scored),
-        `T_skipped` (points that could not be scored, whole or in part: nothing to learn from, or an angle that the
-        recording does not know), `T_per_class` ({label: accuracy}), `T_confusion` (rows are labels); for UfN and RfN
-        `T_move_accuracy`, `T_slot_f1` (micro), `T_slot_f1_macro`, `T_slot_f1_type`, `T_slot_score_paper`; for NfD
-        `nfd_action_accuracy`, `nfd_argument_accuracy`, `nfd_joint_accuracy` and the last two with `_paper`.
+    Args:
+        predictions: of any number of models, seeds and tasks.
+        corpus: the labels (`labels_of`), or the corpus whose split is taken.
+        split: see `labels_of`.
+        missing: why models could not be run, by name.
+        about: how the predictions were made, by model.
 
     Raises:
-        ValueError: the model is unknown.
+        SessionError: the corpus cannot be read.
+        PredictionError: the predictions do not fit the corpus; see `score_runs`.
     """
-    table: dict[str, Any] = {
-        "model": model,
-        "seed": seed,
-        "sessions_train": len(sessions_train),
-        "sessions_test": len(sessions_test),
-        "sessions_incomplete": [session.name for session in sessions_test if not session.complete],
-    }
-    for task in tasks:
-        fresh = make_model(model, seed)
-        if task is Task.NFD:
-            train_decisions = [point for session in sessions_train for point in nfd_points(session)]
-            test_decisions = [point for session in sessions_test for point in nfd_points(session)]
-            scores = _evaluate_actions(fresh, train_decisions, test_decisions)
-        else:
-            points = ufn_points if task is Task.UFN else rfn_points
-            train = [point for session in sessions_train for point in points(session)]
-            test = [point for session in sessions_test for point in points(session)]
-            scores = _evaluate_acts(fresh, train, test)
-        table.update({f"{task.value}_{key}": value for key, value in scores.items()})
-    return table
+    labels = corpus if isinstance(corpus, CorpusLabels) else labels_of(corpus, split)
+    return ResultsTable(
+        labels=labels, runs=score_runs(labels, predictions), missing=dict(missing or {}), about=dict(about or {})
+    )
 
 
-def _evaluate_acts(model: TaskModel, train: Sequence[InferencePoint], test: Sequence[InferencePoint]) -> dict[str, Any]:
-    skipped = 0 if train else len(test)
-    points = test if train else ()
-    if train:
-        model.fit_acts(train)
-        predicted = model.predict_acts([point.view for point in points])
-    else:
-        predicted = act_labels(())
-    metrics = {
-        "move_accuracy": MoveAccuracy(),
-        "slot_f1": SlotF1(),
-        "slot_f1_macro": SlotF1(average="macro"),
-        "slot_f1_type": SlotF1(average="type"),
-        "slot_score_paper": SlotScorePaper(),
-    }
-    return {
-        **{key: _defined(metric.compute(predicted, points)) for key, metric in metrics.items()},
-        **_by_class(act_labels(points).moves, predicted.moves, [move.label for move in DialogueMove]),
-        "points": len(points),
-        "skipped": skipped,
-    }
+def evaluate_files(
+    paths: Sequence[Path | str],
+    corpus: CorpusLabels | Corpus | Path | str,
+    split: Split = "test",
+    *,
+    missing: Mapping[str, str] | None = None,
+) -> ResultsTable:
+    """Scores files of predictions; see `evaluate_predictions` and `read_predictions`."""
+    return evaluate_predictions(read_predictions(*paths), corpus, split, missing=missing)
 
 
-def _evaluate_actions(
-    model: TaskModel, train: Sequence[DecisionPoint], test: Sequence[DecisionPoint]
-) -> dict[str, Any]:
-    skipped = sum(math.isnan(point.angle) for point in test) if train else len(test)
-    points = test if train else ()
-    if train:
-        model.fit_actions(train)
-        predicted = model.predict_actions([point.view for point in points])
-    else:
-        predicted = action_labels(())
-    metrics: Mapping[str, ActionAccuracy | ArgumentAccuracy | JointAccuracy] = {
-        "action_accuracy": ActionAccuracy(),
-        "argument_accuracy": ArgumentAccuracy(),
-        "joint_accuracy": JointAccuracy(),
-        "argument_accuracy_paper": ArgumentAccuracy(wrap=False),
-        "joint_accuracy_paper": JointAccuracyPaper(),
-    }
-    return {
-        **{key: _defined(metric.compute(predicted, points)) for key, metric in metrics.items()},
-        **_by_class(action_labels(points).actions, predicted.actions, [action.label for action in NAVIGATION_ACTIONS]),
-        "points": len(points),
-        "skipped": skipped,
-    }
-
-
-def _by_class(truth: np.ndarray[Any, Any], guess: np.ndarray[Any, Any], labels: Sequence[str]) -> dict[str, Any]:
-    confusion = confusion_matrix(truth, guess, len(labels))
-    shares = per_class_accuracy(confusion)
-    return {
-        "per_class": {label: float(share) for label, share in zip(labels, shares, strict=True) if not np.isnan(share)},
-        "confusion": confusion.tolist(),
-    }
-
-
-def _defined(value: float) -> float | None:
-    return None if math.isnan(value) else value
+def _scores_of(run: RunScore, part: str, handled: Handled | None) -> Scores:
+    return run.parts[part] if handled is None else run.handled[part, handled]

@@ -16,6 +16,7 @@ from dorothie_gym.evaluation import (
     ActionPredictions,
     ActPredictions,
     ArgumentAccuracy,
+    ArgumentAccuracyPaper,
     JointAccuracy,
     JointAccuracyPaper,
     Metric,
@@ -212,3 +213,69 @@ def test_confusion_has_labels_as_rows() -> None:
     assert matrix.tolist() == [[1, 1, 0], [0, 1, 0], [0, 0, 0]]
     shares = per_class_accuracy(matrix)
     assert shares[:2].tolist() == [0.5, 1.0] and math.isnan(shares[2])
+
+
+@given(pairs=st.lists(st.tuples(st.integers(0, 14), st.integers(0, 14)), min_size=1, max_size=30))
+@settings(max_examples=40, deadline=None)
+def test_accuracies_and_confusion_equal_scikit_learn(pairs: list[tuple[int, int]]) -> None:
+    metrics = pytest.importorskip("sklearn.metrics")
+    truth, guess = np.array(pairs, dtype=np.int64).T
+    none = np.zeros((len(pairs), len(LABELS)), dtype=np.bool_)
+    labels, predicted = ActPredictions(moves=truth, slots=none), ActPredictions(moves=guess, slots=none)
+    assert MoveAccuracy().compute(predicted, labels) == pytest.approx(metrics.accuracy_score(truth, guess))
+    matrix = confusion_matrix(truth, guess, 15)
+    assert np.array_equal(matrix, metrics.confusion_matrix(truth, guess, labels=range(15)))
+    occurring = np.unique(truth)
+    recall = metrics.recall_score(truth, guess, average=None, labels=occurring, zero_division=0)
+    assert per_class_accuracy(matrix)[occurring] == pytest.approx(recall)
+
+
+@given(bits=arrays(np.bool_, st.tuples(st.just(2), st.integers(1, 6), st.just(len(LABELS))), elements=st.booleans()))
+@settings(max_examples=30, deadline=None)
+def test_slot_score_of_the_paper_equals_subset_accuracy_of_scikit_learn(
+    bits: np.ndarray[Any, np.dtype[np.bool_]],
+) -> None:
+    metrics = pytest.importorskip("sklearn.metrics")
+    moves = np.zeros(bits.shape[1], dtype=np.int64)
+    labels, predicted = ActPredictions(moves=moves, slots=bits[0]), ActPredictions(moves=moves, slots=bits[1])
+    assert SlotScorePaper().compute(predicted, labels) == pytest.approx(metrics.accuracy_score(bits[0], bits[1]))
+    assert SlotScorePaper().compute(labels, labels) == 1.0
+
+
+ANGLES = st.lists(st.tuples(st.integers(0, 5), st.floats(-180, 179.9)), min_size=1, max_size=12)
+
+
+def driven(pairs: list[tuple[int, float]]) -> ActionPredictions:
+    return ActionPredictions(
+        actions=np.array([action for action, _ in pairs], dtype=np.int64),
+        angles=np.array([angle for _, angle in pairs]),
+    )
+
+
+@given(truth=ANGLES, turns=st.integers(-3, 3), error=st.floats(-14.9, 14.9))
+@settings(max_examples=60, deadline=None)
+def test_whole_turns_never_make_an_angle_wrong(truth: list[tuple[int, float]], turns: int, error: float) -> None:
+    labels = driven(truth)
+    predicted = driven([(action, angle + error + 360.0 * turns) for action, angle in truth])
+    assert ArgumentAccuracy().compute(predicted, labels) == JointAccuracy().compute(predicted, labels) == 1.0
+    assert ArgumentAccuracyPaper().compute(predicted, labels) == JointAccuracyPaper().compute(predicted, labels)
+    assert JointAccuracyPaper().compute(predicted, labels) == (1.0 if turns == 0 else 0.0)
+
+
+@given(truth=ANGLES, guess=ANGLES)
+@settings(max_examples=60, deadline=None)
+def test_joint_is_never_above_action_or_argument_nor_below_what_both_leave(
+    truth: list[tuple[int, float]], guess: list[tuple[int, float]]
+) -> None:
+    count = min(len(truth), len(guess))
+    labels, predicted = driven(truth[:count]), driven(guess[:count])
+    joint, action = JointAccuracy().compute(predicted, labels), ActionAccuracy().compute(predicted, labels)
+    argument = ArgumentAccuracy().compute(predicted, labels)
+    assert max(0.0, action + argument - 1.0) - 1e-9 <= joint <= min(action, argument)
+    assert JointAccuracyPaper().compute(predicted, labels) <= joint, "wrapping can only forgive"
+
+
+def test_points_and_their_labels_are_scored_alike() -> None:
+    points, predicted = acts(*TRUTH), guesses(*GUESS)
+    for metric in (MoveAccuracy(), SlotF1(), SlotScorePaper()):
+        assert metric.compute(predicted, points) == metric.compute(predicted, act_labels(points))

@@ -5,80 +5,114 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.evaluation import evaluate_folder, evaluate_tasks, parse_tasks
+from dorothie_gym.evaluation import (
+    COLUMNS,
+    CorpusLabels,
+    ResultsTable,
+    evaluate_files,
+    evaluate_predictions,
+    labels_of,
+    predict_floor,
+    write_predictions,
+)
 from dorothie_gym.ontology import PhysicalAction
-from dorothie_gym.sessions import SessionError, Task
-from tests.sessions.builders import physical, session, write
+from dorothie_gym.sessions import Task
+from tests.evaluation.corpora import corpus, oracle, wrong_moves
+from tests.sessions.builders import physical, write
 from tests.sessions.dialogues import talk
 
 
-def test_majority_table_by_hand() -> None:
-    table = evaluate_tasks([session(talk())], [session(talk())])
-    # UfN: Instruct (2 of 4); of the slots only JTurn... each occurs once in 4: none is predicted.
-    assert (table["ufn_points"], table["ufn_skipped"]) == (4, 0)
-    assert table["ufn_move_accuracy"] == 0.5
-    assert table["ufn_slot_f1"] == 0.0
-    assert table["ufn_slot_score_paper"] == 0.25
+@pytest.fixture(scope="module")
+def labels(tmp_path_factory: pytest.TempPathFactory) -> CorpusLabels:
+    return labels_of(corpus(tmp_path_factory.mktemp("corpus")))
+
+
+def tables(labels: CorpusLabels) -> ResultsTable:
+    return evaluate_predictions(
+        [
+            *oracle(labels, "ours"),
+            *(wrong_moves(labels, "E.T.", seed, share) for seed, share in enumerate((0.5, 0.75))),
+            *oracle(labels, "TOTO", shift=1),
+        ],
+        labels,
+        missing={"HuBERT Only": "no audio"},
+        about={"ours": {"encoder": "hashing"}},
+    )
+
+
+def test_models_stand_in_the_papers_order_and_others_after_them(labels: CorpusLabels) -> None:
+    assert tables(labels).models == ("TOTO", "HuBERT Only", "E.T.", "ours")
+
+
+def test_figures_are_means_over_seeds(labels: CorpusLabels) -> None:
+    # The first half (three quarters) of 8 points is right: all 4 seen ones, and 0 (2) of the 4 unseen ones.
+    table = tables(labels)
+    assert table.estimate("E.T.", "seen", "ufn_move_accuracy").values == {0: 1.0, 1: 1.0}
+    unseen = table.estimate("E.T.", "unseen", "ufn_move_accuracy")
+    assert unseen.values == {0: 0.0, 1: 0.5} and unseen.mean == 0.25
+    assert table.estimate("E.T.", "seen", "nfd_joint_accuracy").seeds == 0
+
+
+def test_json_has_models_parts_and_metrics_by_name(labels: CorpusLabels) -> None:
+    page = json.loads(json.dumps(tables(labels).to_json(), allow_nan=False))
+    ours = page["models"]["ours"]
+    assert sorted(ours) == ["seen", "unseen"]
+    for key in COLUMNS:
+        for name in (key, f"{key}_paper"):
+            assert ours["unseen"][name] == {"mean": 1.0, "half_width": None, "seeds": 1, "values": {"0": 1.0}}
+    assert "HuBERT Only" not in page["models"] and page["missing"] == {"HuBERT Only": "no audio"}
+    assert page["paper"]["models"]["TOTO"]["seen"]["ufn_move_accuracy"] == {"mean": 0.409, "half_width": 0.039}
+    assert page["about"] == {"ours": {"encoder": "hashing"}}
+    assert sum(row["flagged"] for row in page["corpus"]["points"].values()) == 5 * 12
+
+
+def test_json_has_classes_confusion_and_what_is_handled(labels: CorpusLabels) -> None:
+    page = tables(labels).to_json()
+    assert page["per_class"]["ours"]["seen"]["ufn"]["Instruct"]["mean"] == 1.0
+    assert "Align" not in page["per_class"]["ours"]["seen"]["ufn"], "it does not occur"
+    assert sum(map(sum, page["confusion"]["E.T."]["seen"]["ufn"])) == 4 * 2, "the seeds are summed"
+    assert len(page["classes"]["ufn"]) == 15 and len(page["classes"]["nfd"]) == 6
+    kinds = page["by_handling"]["ours"]["seen"]
+    assert sum(kind["points"]["nfd"] for kind in kinds.values()) == 5
+
+
+def test_the_best_is_the_highest_mean_as_printed(labels: CorpusLabels) -> None:
+    table = tables(labels)
+    assert table.best("seen", "ufn_move_accuracy") == {"ours", "E.T."}
+    assert table.best("unseen", "ufn_move_accuracy") == {"ours"}
+
+
+def test_files_of_several_seeds_make_one_row(labels: CorpusLabels, tmp_path: Path) -> None:
+    paths = [write_predictions(tmp_path / f"{s}.parquet", oracle(labels, "ours", s, shift=s)) for s in (0, 1)]
+    table = evaluate_files(paths, labels)
+    assert table.models == ("ours",)
+    assert table.estimate("ours", "seen", "nfd_action_accuracy").values == {0: 1.0, 1: 0.0}
+
+
+def test_majority_by_hand(tmp_path: Path) -> None:
+    path = corpus(tmp_path, ("train", "test/seen"))
+    train, test = labels_of(path, "train"), labels_of(path)
+    table = evaluate_predictions(predict_floor("majority", train, test), test)
+    figures = {
+        key: table.estimate("majority", "seen", key).mean for key in table.to_json()["models"]["majority"]["seen"]
+    }
+    # UfN: Instruct (2 of 4); each slot value occurs in 1 of 4: none is predicted, which is right once.
+    assert (figures["ufn_move_accuracy"], figures["ufn_slot_f1"], figures["ufn_slot_f1_paper"]) == (0.5, 0.0, 0.25)
     # RfN: Acknowledge (2 of 3), no slots; one of the three has one.
-    assert table["rfn_move_accuracy"] == pytest.approx(2 / 3)
-    assert table["rfn_slot_score_paper"] == pytest.approx(2 / 3)
+    assert figures["rfn_move_accuracy"] == figures["rfn_slot_f1_paper"] == pytest.approx(2 / 3)
     # NfD: JTurn (2 of 5) at -179 (the smaller of two equally common angles, 88 and -179).
-    assert table["nfd_points"] == 5
-    assert table["nfd_action_accuracy"] == 0.4
-    assert table["nfd_argument_accuracy"] == 0.2
-    assert table["nfd_joint_accuracy"] == 0.2
-    assert table["nfd_joint_accuracy_paper"] == 0.2
-    assert table["nfd_per_class"] == {"UTurn": 0.0, "JTurn": 1.0, "Stop": 0.0, "Start": 0.0}
-    assert sum(map(sum, table["ufn_confusion"])) == 4
+    assert (figures["nfd_action_accuracy"], figures["nfd_joint_accuracy"]) == (0.4, 0.2)
 
 
-def test_only_the_tasks_asked_for_are_in_the_table() -> None:
-    table = evaluate_tasks([session(talk())], [session(talk())], [Task.NFD])
-    assert not any(key.startswith(("ufn", "rfn")) for key in table)
-
-
-def test_points_without_anything_to_learn_from_are_counted_as_skipped() -> None:
-    table = evaluate_tasks([session()], [session(talk())])
-    for task, count in (("ufn", 4), ("rfn", 3), ("nfd", 5)):
-        assert (table[f"{task}_points"], table[f"{task}_skipped"]) == (0, count)
-    assert table["ufn_move_accuracy"] is None
-
-
-def test_unknown_angles_are_counted_as_skipped() -> None:
-    unknown = session([physical(1, PhysicalAction.J_TURN), physical(2, PhysicalAction.J_TURN, 5.0)])
-    table = evaluate_tasks([session(talk())], [unknown], [Task.NFD])
-    assert (table["nfd_points"], table["nfd_skipped"], table["nfd_action_accuracy"]) == (2, 1, 1.0)
-
-
-@pytest.mark.parametrize("model", ["majority", "random"])
-def test_folder_is_split_by_name_and_the_table_is_json(tmp_path: Path, model: str) -> None:
-    for name in "abc":
-        write(tmp_path / name, talk())
-    table = evaluate_folder(tmp_path, model=model, seed=1)
-    assert (table["sessions_train"], table["sessions_test"], table["ufn_points"]) == (1, 2, 8)
-    assert "by name" in table["split"]
-    assert json.loads(json.dumps(table, allow_nan=False)) == evaluate_folder(tmp_path, model=model, seed=1)
-
-
-def test_unreadable_and_incomplete_sessions_are_named(tmp_path: Path) -> None:
-    for name in "abc":
-        write(tmp_path / name, talk())
-    (tmp_path / "a/events.jsonl").write_text("nonsense\n")
-    page = (tmp_path / "c/session.json").read_text()
-    (tmp_path / "c/session.json").write_text(page[: page.index(' "outcome"')] + ' "outcome": null\n}\n')
-    table = evaluate_folder(tmp_path)
-    assert list(table["sessions_unreadable"]) == ["a"]
-    assert table["sessions_incomplete"] == ["c"]
-
-
-def test_one_session_cannot_be_split(tmp_path: Path) -> None:
-    write(tmp_path / "a", talk())
-    with pytest.raises(SessionError, match="at least 2"):
-        evaluate_folder(tmp_path)
-
-
-def test_tasks_are_read_from_text() -> None:
-    assert parse_tasks("all") == tuple(Task)
-    assert parse_tasks("nfd, UfN") == (Task.UFN, Task.NFD)
-    with pytest.raises(ValueError, match="'toto' is unknown; choose from ufn, rfn, nfd, or all"):
-        parse_tasks("ufn,toto")
+def test_a_task_without_anything_to_learn_from_is_left_out_with_the_reason(tmp_path: Path) -> None:
+    (tmp_path / "train").mkdir()
+    write(tmp_path / "train/silent", [physical(1, PhysicalAction.STOP)])
+    (tmp_path / "test").mkdir()
+    write(tmp_path / "test/one", talk())
+    train, test = labels_of(tmp_path, "train"), labels_of(tmp_path)
+    table = evaluate_predictions(predict_floor("random", train, test), test)
+    assert table.points("random", "all", Task.UFN) == 0 and table.points("random", "all", Task.NFD) == 5
+    assert table.estimate("random", "all", "ufn_move_accuracy").mean is None
+    assert {skipped.reason for skipped in table.runs[0].left_out} == {
+        "the sessions to learn from have no point of the task"
+    }

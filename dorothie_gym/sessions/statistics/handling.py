@@ -14,6 +14,7 @@ Where several fit, the latest counts.
 
 from __future__ import annotations
 
+import bisect
 import math
 from collections.abc import Mapping
 from enum import StrEnum
@@ -127,6 +128,26 @@ def handling(units: Units) -> dict[int, Handled]:
         else (Handled.TASK if kind.is_task else Handled.ENVIRONMENTAL)
         for unit in units.exchanges
     }
+
+
+def handling_of_events(units: Units) -> dict[int, Handled]:
+    """Returns what each dialogue move and physical action of a session handles, by the number of its event.
+
+    A move handles what its exchange does. A physical action belongs to the exchange of the last move that was over
+    before it, if that is at most `PATIENCE` ago: an exchange is open that long.
+    """
+    kinds = handling(units)
+    found = {
+        move.index: kinds.get(number, Handled.NONE) if (number := units.exchange_of(move)) is not None else Handled.NONE
+        for move in units.session.moves()
+    }
+    said = units.session.moves()
+    frames = [move.frame for move in said]
+    for action in units.session.physical_actions:
+        last = bisect.bisect_left(frames, action.frame) - 1
+        recent = last >= 0 and action.frame - frames[last] <= PATIENCE * FRAME_RATE
+        found[action.index] = found[said[last].index] if recent else Handled.NONE
+    return found
 
 
 def _handles(exchange: SaidUnit, event: Event, kind: ExceptionKind, begun: tuple[float, float]) -> bool:

@@ -1,9 +1,18 @@
 from __future__ import annotations
 
-from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, LandmarkName, ObjectClass, Role, Slot
+from dorothie_gym.ontology import (
+    ActionValue,
+    DialogueMove,
+    GoalStatus,
+    LandmarkName,
+    ObjectClass,
+    PhysicalAction,
+    Role,
+    Slot,
+)
 from dorothie_gym.sessions import Event
-from dorothie_gym.sessions.statistics import Handled, Profiles, Units, handling
-from tests.sessions.statistics.builders import M, car, drive, exception, human
+from dorothie_gym.sessions.statistics import Handled, Profiles, Units, handling, handling_of_events
+from tests.sessions.statistics.builders import M, car, did, drive, exception, human
 
 
 def kinds(*parts: list[Event]) -> list[Handled]:
@@ -62,3 +71,23 @@ def test_profiles_are_means_over_units_by_speaker() -> None:
     assert task.mean_slot(Role.PARTICIPANT, Slot.STATUS) == 1.0 and none.mean_slot(Role.PARTICIPANT, Slot.STATUS) == 0.0
     assert profiles.transactions.units == 2, "after what is given up, a command begins something else"
     assert profiles.transactions.mean_move(Role.PARTICIPANT, DialogueMove.INSTRUCT) == 1.0
+
+
+def test_an_action_belongs_to_the_exchange_that_was_heard_last_and_not_long_ago() -> None:
+    stop = PhysicalAction.STOP
+    session = drive(
+        exception(20.0, "weather", parameter="fog_density", value=80.0),
+        did(29.0, stop),
+        human(30.0, "slower", M.INSTRUCT, ActionValue.SPEED_CHANGE),  # over at 31.5 s
+        *(did(time, stop) for time in (31.5, 31.6, 41.5, 41.6)),
+        seconds=240.0,
+    )
+    found = handling_of_events(Units(session))
+    assert [found[move.index] for move in session.moves()] == [Handled.ENVIRONMENTAL]
+    assert [found[action.index] for action in session.physical_actions] == [
+        Handled.NONE,
+        Handled.NONE,  # what is over at its own frame is not known yet
+        Handled.ENVIRONMENTAL,
+        Handled.ENVIRONMENTAL,
+        Handled.NONE,
+    ]

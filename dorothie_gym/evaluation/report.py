@@ -1,0 +1,247 @@
+"""The table as Markdown, LaTeX, JSON and pictures."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Final
+
+from dorothie_gym.evaluation.catalogue import SHOWN, TASK_NAMES, has_paper_figure, shown_title, task_of, title_of
+from dorothie_gym.evaluation.findings import MARGIN, Claim, Finding
+from dorothie_gym.evaluation.intervals import Estimate
+from dorothie_gym.evaluation.labels import ALL
+from dorothie_gym.evaluation.paper import PaperFigure, paper_figure, paper_name, paper_source
+from dorothie_gym.evaluation.table import ResultsTable
+
+NONE: Final = "–"
+"""Stands where there is no figure."""
+
+_TEX: Final = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "–": "--",
+    "±": r"$\pm$",
+}
+
+
+def write_report(table: ResultsTable, folder: Path | str, *, pictures: bool = True) -> tuple[Path, ...]:
+    """Writes the table into a folder, which is made if need be.
+
+    Args:
+        table: the table.
+        folder: gets `table.md`, `table.tex` and `table.json`, and the pictures.
+        pictures: also draw `table.png`, and `confusion-<model>.png` for each model.
+
+    Returns:
+        The files written.
+
+    Raises:
+        OSError: one cannot be written.
+    """
+    place = Path(folder)
+    place.mkdir(parents=True, exist_ok=True)
+    texts = {
+        "table.md": markdown(table),
+        "table.tex": tex(table),
+        "table.json": json.dumps(table.to_json(), indent=1, allow_nan=False) + "\n",
+    }
+    written = []
+    for name, text in texts.items():
+        (place / name).write_text(text, encoding="utf-8")
+        written.append(place / name)
+    if pictures:
+        # imported here: matplotlib is slow to import, and a picture is not always wanted
+        from dorothie_gym.evaluation.pictures import draw_confusions, draw_table
+
+        written.append(draw_table(table, place / "table.png"))
+        for model in table.models:
+            if table.runs_of(model):
+                written.append(draw_confusions(table, model, place / f"confusion-{file_name(model)}.png"))
+    return tuple(written)
+
+
+def file_name(model: str) -> str:
+    """Returns a model's name as a part of a file's name: "toto-action-history" is "TOTO (- Action History)"."""
+    signs = model.replace("(+", "with ").replace("(-", "without ")
+    return re.sub(r"[^a-z0-9]+", "-", signs.casefold()).strip("-") or "model"
+
+
+def percent(estimate: Estimate | PaperFigure) -> str:
+    """Returns a figure in per cent with its half-width, as far as there is one: "40.9 ± 3.9"."""
+    if estimate.mean is None:
+        return NONE
+    mean = f"{100 * estimate.mean:.1f}"
+    return mean if estimate.half_width is None else f"{mean} ± {100 * estimate.half_width:.1f}"
+
+
+def row_title(table: ResultsTable, model: str) -> str:
+    """Returns the name of a model, and why it was not run if it was not: "HuBERT Only (not run: no audio)"."""
+    return f"{model} (not run: {table.missing[model]})" if model in table.missing else model
+
+
+def part_title(part: str) -> str:
+    """Returns the heading of a part of the corpus."""
+    return "All sessions" if part == ALL else f"{part.capitalize()} towns"
+
+
+def legend(table: ResultsTable) -> str:
+    """Returns what the cells of the table hold."""
+    seeds = sorted({len(table.runs_of(model)) for model in table.models if table.runs_of(model)})
+    over = " to ".join(str(count) for count in dict.fromkeys((seeds[0], seeds[-1]))) if seeds else "no"
+    some = f"mean and half-width of the 95 % interval over {over} seeds" if seeds and seeds[-1] > 1 else "one seed"
+    paper = " / the paper's figures" if _has_paper(table) else ""
+    protocol = "(paper): computed as the paper's code does, exact match of all slots, angles not wrapped"
+    return f"Per cent: ours ({some}){paper}; {NONE}: none. {protocol}. The best of ours is bold."
+
+
+# --- Markdown -------------------------------------------------------------------------------------------------------
+
+
+def markdown(table: ResultsTable) -> str:
+    """Returns the table as Markdown: figures by part, findings, points and what was left out."""
+    lines = ["# Results", "", legend(table), *([f"Paper: {paper_source()}."] if _has_paper(table) else [])]
+    for part in table.parts:
+        heads = ["model", *(f"{task_of(key)} {shown_title(key)}" for key in SHOWN)]
+        rows = [[row_title(table, model), *_cells(table, model, part, _bold_markdown)] for model in table.models]
+        lines += ["", f"## {part_title(part)}", "", *_markdown_table(heads, rows)]
+    tested = [finding for finding in table.findings() if any(claim.difference.seeds for claim in finding.claims)]
+    if tested:
+        lines += ["", "## The paper's findings", "", "Differences are paired over seeds, with 95 % intervals."]
+        for finding in tested:
+            lines += ["", *finding_lines(finding)]
+    lines += ["", "## Points", "", *_markdown_table(*points_rows(table)), ""]
+    lines += [f"- {line}" for line in notes(table)]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _bold_markdown(text: str) -> str:
+    return f"**{text}**"
+
+
+def _markdown_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    yield f"| {' | '.join(head or ' ' for head in heads)} |"
+    yield "|" + "---|" + "---:|" * (len(heads) - 1)
+    for row in rows:
+        yield f"| {' | '.join(cell.replace('|', '/') for cell in row)} |"
+
+
+def _cells(table: ResultsTable, model: str, part: str, bold: Callable[[str], str]) -> Iterator[str]:
+    for key in SHOWN:
+        ours = percent(table.estimate(model, part, key))
+        text = bold(ours) if model in table.best(part, key) else ours
+        paper = paper_figure(model, part, key) if has_paper_figure(key) else None
+        yield text if paper is None else f"{text} / {percent(paper)}"
+
+
+def finding_lines(finding: Finding) -> Iterator[str]:
+    """Yields a finding and its claims, a line each."""
+    yield f"**{finding.statement}** ({finding.part}): {finding.verdict}."
+    yield from (f"- {claim_line(claim)}" for claim in finding.claims)
+    if finding.note:
+        yield f"- {finding.note}"
+
+
+def claim_line(claim: Claim) -> str:
+    """Returns a claim in a line: figure, models, difference in points, verdict."""
+    mean, half = claim.difference.mean, claim.difference.half_width
+    amount = NONE if mean is None else f"{100 * mean:+.1f}" + ("" if half is None else f" ± {100 * half:.1f}")
+    wanted = "above 0" if claim.expected == "positive" else f"below {100 * MARGIN:.0f}"
+    return f"{title_of(claim.metric)}, {claim.higher} minus {claim.lower}: {amount}, expected {wanted}: {claim.verdict}"
+
+
+def points_rows(table: ResultsTable) -> tuple[list[str], list[list[str]]]:
+    """Returns headings and rows of the count of points: each fold of the corpus, and their sum."""
+    heads = ["fold", "sessions", "flagged events", *TASK_NAMES.values(), "no point of a task"]
+    rows = []
+    for fold, count in sorted(table.labels.counts.items()):
+        rows.append([fold or ALL, *(str(value) for value in count.to_json().values())])
+    totals = [sum(int(row[k]) for row in rows) for k in range(1, len(heads))]
+    return heads, [*rows, ["sum", *map(str, totals)]] if len(rows) > 1 else rows
+
+
+def notes(table: ResultsTable) -> Iterator[str]:
+    """Yields what was not scored and why, a sentence each."""
+    labels = table.labels
+    yield f"Scored: split {labels.split}, {len(labels.part_of)} sessions; divided: {labels.division}."
+    for name, reason in labels.unreadable.items():
+        yield f"Session {name} cannot be read: {reason}."
+    for name in labels.incomplete:
+        yield f"Session {name} was cut off; it counts as far as it goes."
+    for skipped in labels.skipped:
+        yield f"Session {skipped.session}, event {skipped.event}: {skipped.reason}."
+    for run in table.runs:
+        if run.ignored:
+            yield f"{run.model}, seed {run.seed}: {run.ignored} predictions are of sessions outside the split."
+        for skipped in run.left_out:
+            task = TASK_NAMES[skipped.task] if skipped.task else ""
+            yield (
+                f"{run.model}, seed {run.seed}: {task} point at session {skipped.session}, event {skipped.event} was "
+                f"left out: {skipped.reason}."
+            )
+
+
+# --- LaTeX ----------------------------------------------------------------------------------------------------------
+
+
+def tex(table: ResultsTable) -> str:
+    """Returns the table as LaTeX (booktabs, xcolor): below each model of the paper its figures, in grey."""
+    lines = [
+        r"% \usepackage{booktabs,xcolor}",
+        r"\begin{table*}",
+        r"\centering\small\setlength{\tabcolsep}{4pt}",
+        rf"\begin{{tabular}}{{l{'c' * len(SHOWN)}}}",
+        r"\toprule",
+    ]
+    for number, part in enumerate(table.parts):
+        lines += [r"\midrule"] if number else []
+        lines += _tex_heading(part)
+        for model in table.models:
+            cells = [_tex_cell(table, model, part, key) for key in SHOWN]
+            lines.append(" & ".join([escape_tex(row_title(table, model)), *cells]) + r" \\")
+            if paper_name(model) and any(paper_figure(model, part, key) for key in SHOWN):
+                lines.append(" & ".join([r"\quad\textcolor{gray}{paper}", *_tex_paper(model, part)]) + r" \\")
+    caption = escape_tex(legend(table).replace("/ the", "and in grey the"))
+    lines += [r"\bottomrule", r"\end{tabular}", rf"\caption{{{caption}}}", r"\end{table*}"]
+    return "\n".join(lines) + "\n"
+
+
+def escape_tex(text: str) -> str:
+    """Returns a text as LaTeX shows it."""
+    signs = "".join(_TEX.get(letter, f"\\{letter}" if letter in "&%$#_{}" else letter) for letter in text)
+    return signs.replace("(- ", "($-$ ").replace("(+ ", "($+$ ")
+
+
+def _tex_heading(part: str) -> Iterator[str]:
+    tasks = list(TASK_NAMES.values())
+    width = len(SHOWN) // len(tasks)
+    title = escape_tex(part_title(part))
+    yield " & ".join(["", *(rf"\multicolumn{{{width}}}{{c}}{{{task} ({title.lower()})}}" for task in tasks)]) + r" \\"
+    starts = [2 + width * k for k in range(len(tasks))]
+    yield " ".join(rf"\cmidrule(lr){{{start}-{start + width - 1}}}" for start in starts)
+    yield " & ".join(["Model", *(escape_tex(shown_title(key)) for key in SHOWN)]) + r" \\"
+    yield r"\midrule"
+
+
+def _tex_cell(table: ResultsTable, model: str, part: str, key: str) -> str:
+    figure = _tex_figure(table.estimate(model, part, key))
+    return rf"$\mathbf{{{figure}}}$" if model in table.best(part, key) else f"${figure}$" if figure else "--"
+
+
+def _tex_paper(model: str, part: str) -> Iterator[str]:
+    for key in SHOWN:
+        figure = paper_figure(model, part, key) if has_paper_figure(key) else None
+        yield "" if figure is None else rf"\textcolor{{gray}}{{${_tex_figure(figure)}$}}"
+
+
+def _tex_figure(estimate: Estimate | PaperFigure) -> str:
+    if estimate.mean is None:
+        return ""
+    mean = f"{100 * estimate.mean:.1f}"
+    return mean if estimate.half_width is None else rf"{mean}_{{\pm {100 * estimate.half_width:.1f}}}"
+
+
+def _has_paper(table: ResultsTable) -> bool:
+    return any(paper_figure(model, part, key) for model in table.models for part in table.parts for key in SHOWN)
