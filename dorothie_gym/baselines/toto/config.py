@@ -170,9 +170,9 @@ class TOTOConfig:
     def small(cls) -> Self:
         """Trains in less than a minute on two cores; the default."""
         return cls(
-            width=96, layers=2, heads=4, feed_forward=192, text_width=96, text_layers=1, text_tokens=20, attention_dropout=0.0,
+            width=96, layers=2, heads=4, feed_forward=192, text_width=96, text_layers=1, text_tokens=20,
             lane_width=32, map_heads=4, id_width=8, moves=12, utterances=6, actions=10, window=8, window_step=12,
-            window_objects=6, objects=10, learning_rate=1e-3, batch_size=64, max_epochs=16,
+            window_objects=6, objects=10, attention_dropout=0.0, learning_rate=1e-3, batch_size=64, max_epochs=16,
         )  # fmt: skip
 
     @property

@@ -20,7 +20,6 @@ from dorothie_gym.baselines.toto.losses import point_losses
 from dorothie_gym.baselines.toto.texts import Texts
 from dorothie_gym.baselines.toto.towns import DEGREES, METRES, Towns
 from dorothie_gym.baselines.training.trainer import Model
-from dorothie_gym.evaluation.features import PARTICIPANT
 from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, VECTOR_SLOTS, DialogueMove, PhysicalAction
 from dorothie_gym.ontology.labels import SLOT_SPANS
 from dorothie_gym.world.town.graph import EDGE_TYPES, FEATURES, LANE_ID, LENGTH
@@ -60,8 +59,26 @@ class TOTO(Model):
         self.config: TOTOConfig = config
         self.towns = towns
         self.texts = texts
-        given, width, words = set(config.channels), config.width, texts.width
-        ids = 2 * config.id_width
+        self._make_knowledge(config, texts.width)
+        self._make_history(config, texts.width)
+        self._make_senses(config, texts.width)
+        self.now = nn.Parameter(torch.zeros(config.width))
+        self.norm = nn.LayerNorm(config.width)
+        self.blocks = nn.ModuleList(
+            Block(config.width, config.heads, config.feed_forward, config.dropout, config.attention_dropout)
+            for _ in range(config.layers)
+        )
+        self.head = nn.Linear(config.width, 2 * (len(DialogueMove) + len(VECTOR_SLOTS) + len(LABELS)))
+        self.action_head = nn.Linear(config.width, len(NAVIGATION_ACTIONS) + 2)
+        if config.belief:
+            self.belief_head = nn.Linear(config.width, BELIEFS)
+        self.register_buffer("object_units", torch.tensor(_OBJECT_UNITS), persistent=False)
+        self.register_buffer("slot_of_value", _slot_of_value(), persistent=False)
+        nn.init.normal_(self.now, std=0.02)
+
+    def _make_knowledge(self, config: TOTOConfig, words: int) -> None:
+        """What reads the map, landmarks and streets."""
+        given, width, ids = set(config.channels), config.width, 2 * config.id_width
         if given & {Channel.MAP, Channel.TRAJECTORY}:
             self.road = nn.Embedding(config.roads, config.id_width)
             self.junction = nn.Embedding(config.junctions, config.id_width)
@@ -72,12 +89,22 @@ class TOTO(Model):
             self.map_token = nn.Linear(lane, width)
             self.landmark = nn.Linear(2 + 5 + ids + words, width)
             self.street = nn.Linear(lane + words, width)
+
+    def _make_history(self, config: TOTOConfig, words: int) -> None:
+        """What reads actions, moves and words."""
+        given, width = set(config.channels), config.width
         if Channel.ACTIONS in given:
             self.action = nn.Embedding(len(PhysicalAction) * _UPS, width - 1)
         if Channel.MOVES in given:
             self.move = nn.Embedding(len(DialogueMove), width - ROLES - len(VECTOR_SLOTS) - len(LABELS))
         if Channel.TRANSCRIPT in given:
             self.utterance = nn.Linear(words + ROLES, width)
+            if config.current_text:
+                self.current = nn.Linear(words, width)
+
+    def _make_senses(self, config: TOTOConfig, words: int) -> None:
+        """What reads the window, the current utterance's sound, and objects."""
+        given, width, ids = set(config.channels), config.width, 2 * config.id_width
         if given & {Channel.TRAJECTORY, Channel.VISION}:
             self.window = nn.Linear(4 + ids if Channel.TRAJECTORY in given else 1, width)
         if given & {Channel.VISION, Channel.OBJECTS}:
@@ -89,18 +116,6 @@ class TOTO(Model):
             self.speech = nn.Linear(config.sound_width or words, width)
         if Channel.OBJECTS in given and config.detector is not None:
             self.queries = nn.Linear(config.detector[0] * config.detector[1], width)
-        self.now = nn.Parameter(torch.zeros(width))
-        self.blocks = nn.ModuleList(
-            Block(width, config.heads, config.feed_forward, config.dropout, config.attention_dropout)
-            for _ in range(config.layers)
-        )
-        self.head = nn.Linear(width, 2 * len(DialogueMove) + 2 * len(VECTOR_SLOTS) + 2 * len(LABELS))
-        self.action_head = nn.Linear(width, len(NAVIGATION_ACTIONS) + 2)
-        if config.belief:
-            self.belief_head = nn.Linear(width, BELIEFS)
-        self.register_buffer("object_units", torch.tensor(_OBJECT_UNITS), persistent=False)
-        self.register_buffer("slot_of_value", _slot_of_value(), persistent=False)
-        nn.init.normal_(self.now, std=0.02)
 
     object_units: Tensor
     slot_of_value: Tensor
@@ -111,7 +126,8 @@ class TOTO(Model):
 
     def read(self, inputs: Inputs) -> Tensor:
         """Returns the last token after the encoder (B, d)."""
-        tokens, mask = gather_tokens(self._channels(inputs), self.config.width)
+        tokens, times, mask = gather_tokens(self._channels(inputs))
+        tokens = self.norm(tokens) + time_encoding(times, self.config.width)
         for block in self.blocks[:-1]:
             tokens = block(tokens, mask)
         last: Tensor = self.blocks[-1](tokens, mask, tokens[:, :1])  # of the last layer one token is looked at
@@ -219,8 +235,7 @@ class TOTO(Model):
         tokens = [(self.utterance(said), inputs["utterance_mask"], inputs["utterance_time"])]  # (B, U, d)
         if self.config.current_text:
             current = inputs["current_text"][:, None]  # (B, 1)
-            words = torch.cat((self.texts(current), roles(torch.full_like(current, PARTICIPANT))), dim=-1)
-            tokens.append((self.utterance(words), current >= 0, inputs["time"][:, None]))
+            tokens.append((self.current(self.texts(current)), current >= 0, inputs["time"][:, None]))
         return tokens
 
     def _moves(self, inputs: Inputs) -> Tokens:
@@ -275,8 +290,8 @@ class TOTO(Model):
         return tokens
 
 
-def gather_tokens(channels: list[Tokens], width: int) -> tuple[Tensor, Tensor]:
-    """Returns the tokens of all channels with their time added (B, T, d), and their mask (B, T).
+def gather_tokens(channels: list[Tokens]) -> tuple[Tensor, Tensor, Tensor]:
+    """Returns the tokens of all channels (B, T, d), their times (B, T) and their mask (B, T).
 
     Tokens that are there come first, and T is the most that any point has: what is missing costs nothing, and nothing
     depends on how much room for it there was. Attention does not know places, so that their order does not matter.
@@ -288,7 +303,7 @@ def gather_tokens(channels: list[Tokens], width: int) -> tuple[Tensor, Tensor]:
     order = mask.logical_not().to(torch.uint8).argsort(dim=1, stable=True)[:, :longest]  # (B, T)
     flat = order + torch.arange(len(order), device=order.device)[:, None] * mask.shape[1]
     kept = tokens.flatten(0, 1).index_select(0, flat.flatten()).view(*order.shape, -1)
-    return kept + time_encoding(times.gather(1, order), width), mask.gather(1, order)
+    return kept, times.gather(1, order), mask.gather(1, order)
 
 
 def roles(speaker: Tensor) -> Tensor:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 import torch
 from torch import Tensor, nn
@@ -10,6 +10,8 @@ from torch.nn import functional as F
 
 from dorothie_gym.baselines.encoders import PAD
 from dorothie_gym.baselines.toto.layers import Block
+
+_TINY: Final = 1e-6
 
 
 class Texts(nn.Module):
@@ -40,7 +42,8 @@ class FrozenTexts(Texts):
     def __init__(self, table: Tensor):
         super().__init__()
         self.width = table.shape[1]
-        self.register_buffer("table", torch.cat((table, table.new_zeros(1, self.width))), persistent=False)
+        spread = table.square().mean().sqrt().clamp(min=_TINY)  # numbers of about 1, whatever the encoder's scale
+        self.register_buffer("table", torch.cat((table / spread, table.new_zeros(1, self.width))), persistent=False)
 
     def forward(self, index: Tensor) -> Tensor:
         """Returns the vectors of texts (..., width); zeros where the index (...) is -1."""

@@ -211,7 +211,7 @@ class _Run:
         for name, value in self.about.items():
             if written.get(name) != value:
                 raise checkpoints.CheckpointError(
-                    f"{path}: was trained with another {name} than is asked for now; choose another folder, or delete it"
+                    f"{path}: was trained with another {name} than is asked for now; choose another folder or delete it"
                 )
         checkpoints.restore(path, self.model, self.optimiser)
         return [Epoch(**row) for row in written["epochs"]]
