@@ -77,7 +77,7 @@ def measure(
             "published inference": lambda: timed(lambda: _answer_published(published, turns)) / (3 * _ONE_BY_ONE),
         }
         for work in works.values():
-            work()  # the first time memory is taken
+            work()  # memory is taken the first time
         timing = in_turns(works, repeats, progress)
     finally:
         torch.set_num_threads(before)
@@ -187,7 +187,7 @@ def _answer_published(model: PublishedTOTO, turns: _Turns) -> None:
 def _flops(model: TOTO, batch: Batch) -> float:
     """Multiplications and additions of the matrix products of one step, forward and backward."""
     model.train()
-    counter = FlopCounterMode(display=False)
+    counter: Any = FlopCounterMode(display=False)
     with counter:
         model.loss(*batch).backward()  # type: ignore[no-untyped-call]
     return float(counter.get_total_flops())

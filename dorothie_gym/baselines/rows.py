@@ -11,6 +11,7 @@ import torch
 
 from dorothie_gym.baselines.encoders.pretrained import find_transformers, has_minilm, load_pretrained, minilm_folder
 from dorothie_gym.baselines.material import Material
+from dorothie_gym.baselines.reader import JunctionReader, reader_config
 from dorothie_gym.baselines.toto import (
     ABLATIONS,
     TOTO,
@@ -44,12 +45,14 @@ class Row:
         command: as it is written on a command line and in paths.
         change: what makes its config from that of TOTO; None where `missing` says why it cannot be run.
         missing: why it cannot be run, or empty.
+        ours: whether it is the Junction Reader.
     """
 
     name: str
     command: str
     change: Change | None = None
     missing: str = ""
+    ours: bool = False
 
 
 def _bert(config: TOTOConfig) -> TOTOConfig:
@@ -86,8 +89,9 @@ ROWS: Final[tuple[Row, ...]] = (
     Row(name="Map Encoder Only", command="map", change=_only(Channel.MAP)),
     Row(name="E.T.", command="et", change=_only(*_EPISODIC)),
     Row(name="E.T. (+ Fine-tuned BERT)", command="et-bert", change=lambda config: _bert(config.only(_EPISODIC))),
+    Row(name="Junction Reader (ours)", command="reader", change=reader_config, ours=True),
 )
-"""The rows of the paper's table, in its order."""
+"""The rows of the paper's table, in its order, and our own model."""
 
 
 class EpisodicTransformer(TOTO):
@@ -114,8 +118,17 @@ def make_model(row: Row, size: str, material: Material, seed: int) -> Model:
         raise ValueError(f"{row.name} cannot be run: {row.missing}")
     torch.manual_seed(seed)
     config = row.change(SIZES[size]())
+    if row.ours:
+        return _reader(config, material)
     kind = EpisodicTransformer if set(config.channels) == set(_EPISODIC) else TOTO
     return kind(config, Towns(material.columns.towns), make_texts(config, material))
+
+
+def _reader(config: TOTOConfig, material: Material) -> Model:
+    pairs = material.byte_pairs(config.vocabulary)
+    pieces = material.tokens(None, pairs, config.text_tokens)
+    towns, texts = Towns(material.columns.towns), FrozenTexts(material.vectors)
+    return JunctionReader(config, towns, texts, material.columns, pieces, config.vocabulary)
 
 
 def make_texts(config: TOTOConfig, material: Material) -> Texts:

@@ -31,6 +31,7 @@ class Towns(nn.Module):
     Attributes:
         lanes: (L, 14) columns as in `FEATURES`, each about 1.
         road, junction: (L,) numbers within the town.
+        street: (L,) street within the town, -1 for none.
         town: (L,) town of each lane.
         edges: (2, E) from and to.
         edge_types: (E,).
@@ -41,6 +42,7 @@ class Towns(nn.Module):
     lanes: Tensor
     road: Tensor
     junction: Tensor
+    street: Tensor
     town: Tensor
     edges: Tensor
     edge_types: Tensor
@@ -60,6 +62,7 @@ class Towns(nn.Module):
             "lanes": [graph.lanes / _scale() for graph in graphs],
             "road": [graph.road for graph in graphs],
             "junction": [graph.junction for graph in graphs],
+            "street": [graph.street for graph in graphs],
             "town": [np.full(count, town) for town, count in enumerate(lanes)],
             "edges": [(graph.edges + first).T for graph, first in zip(graphs, first_lane, strict=False)],
             "edge_types": [graph.edge_types for graph in graphs],
