@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from dorothie_gym.wrappers.flatten import FlattenAction, FlattenObservation, flatten
     from dorothie_gym.wrappers.record_session import RecordSession
     from dorothie_gym.wrappers.single_role import SingleRole
+    from dorothie_gym.wrappers.teacher_forcing import TeacherForcing
 
 __version__ = "0.1.0"
 
@@ -46,6 +47,7 @@ _HOME = {
     "Session": "sessions",
     "SingleRole": "wrappers.single_role",
     "SpaceLimits": "spaces",
+    "TeacherForcing": "wrappers.teacher_forcing",
     "Town": "world.town",
     "TownEnv": "world.town_env",
     "UfNEnv": "evaluation.teacher_forced",
@@ -76,6 +78,7 @@ __all__ = [
     "Session",
     "SingleRole",
     "SpaceLimits",
+    "TeacherForcing",
     "Town",
     "TownEnv",
     "UfNEnv",

@@ -1,18 +1,26 @@
 """The examples in docs/ are accepted by the package."""
 
+import dataclasses
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from dorothie_gym.dialogue.grammar import parse_grammar
 from dorothie_gym.dialogue.talk_files import read_talk_files
+from dorothie_gym.evaluation import metrics_of, read_predictions
+from dorothie_gym.evaluation.features import Batch
+from dorothie_gym.evaluation.prediction_files import file_schema
 from dorothie_gym.ontology import WeatherParameter
+from dorothie_gym.sessions import Task
 from dorothie_gym.tasks import bind, load_template
 from dorothie_gym.world.town import describe, load_town
 from dorothie_gym.world.weather import Weather
+from tests.sessions.builders import write
+from tests.sessions.dialogues import talk
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -73,3 +81,38 @@ def test_the_talk_of_its_page_is_worded_misheard_and_read() -> None:
 def test_the_phrases_of_the_talk_page_are_grammar() -> None:
     text = example("talk.md", "text").replace("<soon>", "<soon_enough>")
     assert parse_grammar({**read_talk_files(), "page.talk": text})
+
+
+def test_the_predictions_of_their_page_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    exec(compile(example("predictions.md", "python"), "predictions.md", "exec"), {})
+    read = read_predictions("predictions.parquet")
+    assert [(given.model, given.task.value, len(given.events)) for given in read] == [
+        ("mine", "ufn", 1),
+        ("mine", "nfd", 1),
+    ]
+
+
+def test_the_predictions_page_has_every_column_and_metric() -> None:
+    text = (DOCS / "predictions.md").read_text(encoding="utf-8")
+    for name in (*file_schema().names, *metrics_of(Task.UFN), *metrics_of(Task.NFD)):
+        assert f"`{name}`" in text, name
+
+
+def test_the_examples_of_the_tasks_page_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(tmp_path / "corpus" / "train" / "one", talk())
+    monkeypatch.chdir(tmp_path)
+    page = (DOCS / "tasks.md").read_text(encoding="utf-8")
+    names: dict[str, Any] = {}
+    examples = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    for number, code in enumerate(examples):
+        exec(compile(code, f"tasks.md, example {number}", "exec"), names)  # noqa: S102 (our own page)
+    assert len(examples) == 3
+    assert names["batch"].move.shape == (4, 8)
+    assert set(names["info"]["reward_terms"]) <= {"action", "joint"}
+
+
+def test_the_tasks_page_names_every_field_of_a_batch() -> None:
+    text = (DOCS / "tasks.md").read_text(encoding="utf-8")
+    missing = [field.name for field in dataclasses.fields(Batch) if f"`{field.name}`" not in text]
+    assert missing == []

@@ -5,8 +5,16 @@ from pathlib import Path
 
 import pytest
 
+from dorothie_gym import EnvConfig
+
 README = Path(__file__).parents[1] / "README.md"
 SNIPPETS = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), flags=re.DOTALL)
+
+
+@pytest.fixture(autouse=True)
+def a_default_corpus_that_is_played_fast(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dorothie_gym.rollout.corpus.SESSIONS", 2)
+    monkeypatch.setattr("dorothie_gym.rollout.corpus.CONFIG", EnvConfig(max_seconds=30.0))
 
 
 @pytest.mark.parametrize("snippet", SNIPPETS, ids=[f"snippet_{k}" for k in range(len(SNIPPETS))])

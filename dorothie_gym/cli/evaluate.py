@@ -38,11 +38,15 @@ def evaluate(
         str | None, typer.Option(help="majority or random: a floor; without predictions, majority.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="What the floor draws from.")] = 0,
+    seeds: Annotated[int, typer.Option(min=1, help="So many seeds of the floor, from --seed on.")] = 1,
     save: Annotated[
         Path | None, typer.Option(metavar="FILE.parquet", help="Write the floor's predictions into a file.")
     ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write the table (md, tex, json) and its pictures into a folder.")
+    ] = None,
+    maps: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder with maps of towns that are not shipped (Town01.xodr).")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Write JSON, and nothing else.")] = False,
 ) -> None:
@@ -54,10 +58,20 @@ def evaluate(
             fail("--save writes the predictions of a floor; give --model majority or --model random with it")
         check_file(save)
     with told_plainly():
-        from dorothie_gym.evaluation import PredictionError
+        from dorothie_gym.evaluation import PredictionError, evaluate_predictions, labels_of, read_about
+        from dorothie_gym.sessions import Corpus
 
+        chosen, part = _tasks(tasks), _split(split)
+        if floor is not None:
+            _check_floor(floor)
         try:
-            table, chosen = _score(files, corpus, split, tasks, floor, seed, save)
+            read = _read(files, chosen)
+            where = Corpus.load(_default_sessions() if corpus is None else corpus, maps=maps)
+            labels = labels_of(where, part)
+            if floor is not None:
+                read += _floor(floor, where, labels, range(seed, seed + seeds), chosen, save)
+            about = {str(path): told for path in files if (told := read_about(path))}
+            table = evaluate_predictions(read, labels, about=about)
             if out is not None:
                 from dorothie_gym.evaluation.report import write_report
 
@@ -70,40 +84,27 @@ def evaluate(
         _show(table, out)
 
 
-def _score(
-    files: Sequence[Path],
-    folder: Path | None,
-    split: str,
-    tasks: str,
-    floor: str | None,
-    seed: int,
-    save: Path | None,
-) -> tuple[ResultsTable, tuple[Task, ...]]:
-    from dorothie_gym.evaluation import evaluate_predictions, labels_of, read_about, read_predictions, write_predictions
-    from dorothie_gym.sessions import Corpus
+def _read(files: Sequence[Path], tasks: Sequence[Task]) -> list[TaskPredictions]:
+    from dorothie_gym.evaluation import read_predictions
 
-    chosen, part = _tasks(tasks), _split(split)
-    read = list(read_predictions(*files))
-    if floor is not None:
-        _check_floor(floor)
-    where = Corpus.load(_default_sessions() if folder is None else folder)
-    labels = labels_of(where, part)
-    if floor is not None:
-        drawn = _floor(floor, where, labels, seed)
-        if save is not None:
-            write_predictions(save, drawn, about={"model": floor, "corpus": str(where.root), "split": split})
-        read += drawn
-    about = {str(path): told for path in files if (told := read_about(path))}
-    wanted = [given for given in read if given.task in chosen]
-    if not wanted:
-        fail(f"{', '.join(map(str, files))}: holds no prediction of {tasks}; its tasks are in the column 'task'")
-    return evaluate_predictions(wanted, labels, about=about), chosen
+    read = [given for given in read_predictions(*files) if given.task in tasks]
+    if files and not read:
+        names = ", ".join(task.value for task in tasks)
+        fail(f"{', '.join(map(str, files))}: no row is of the task {names}; rows tell theirs in the column 'task'")
+    return read
 
 
-def _floor(name: str, corpus: Corpus, labels: CorpusLabels, seed: int) -> tuple[TaskPredictions, ...]:
-    from dorothie_gym.evaluation import labels_of, predict_floor
+def _floor(
+    name: str, corpus: Corpus, labels: CorpusLabels, seeds: range, tasks: Sequence[Task], save: Path | None
+) -> list[TaskPredictions]:
+    from dorothie_gym.evaluation import labels_of, predict_floor, write_predictions
 
-    return predict_floor(name, labels_of(corpus, "train"), labels, seed)
+    train = labels_of(corpus, "train")
+    drawn = [given for seed in seeds for given in predict_floor(name, train, labels, seed)]
+    wanted = [given for given in drawn if given.task in tasks]
+    if save is not None:
+        write_predictions(save, wanted, about={"model": name, "corpus": str(corpus.root), "split": labels.split})
+    return wanted
 
 
 def _tasks(text: str) -> tuple[Task, ...]:

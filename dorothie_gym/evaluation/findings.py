@@ -1,4 +1,4 @@
-"""Which of the paper's findings appear in a table: each a claim about paired differences over seeds."""
+"""Which of the paper's findings appear in a table, and what beats what: claims about paired differences over seeds."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class Claim:
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """A finding of the paper on one part of the corpus.
+    """A finding on one part of the corpus: the paper's, or that one model is above another.
 
     Attributes:
         statement: the finding.
@@ -130,9 +130,7 @@ def findings(estimate: Estimates, part: str) -> tuple[Finding, ...]:
     """
 
     def claim(metric: str, higher: str, lower: str, *, positive: bool = True) -> Claim:
-        difference = estimate(higher, part, metric).minus(estimate(lower, part, metric))
-        expected: Literal["positive", "hardly any"] = "positive" if positive else "hardly any"
-        return Claim(metric=metric, higher=higher, lower=lower, difference=difference, expected=expected)
+        return _claim(estimate, part, metric, (higher, lower), "positive" if positive else "hardly any")
 
     def most(metric: str) -> tuple[Claim, ...]:
         rival = _lowest(estimate, part, metric, OTHER_ABLATIONS)
@@ -163,6 +161,28 @@ def findings(estimate: Estimates, part: str) -> tuple[Finding, ...]:
             claims=tuple(claim(metric, FULL, NO_MAP, positive=False) for metric in COLUMNS),
         ),
     )
+
+
+def above(estimate: Estimates, part: str, higher: str, lower: str, metrics: Sequence[str] = COLUMNS) -> Finding:
+    """Returns whether one model is above another in every one of some figures.
+
+    Args:
+        estimate: as in `findings`.
+        part: part of the corpus.
+        higher: the one.
+        lower: the other; to be paired they need the same seeds, also where a seed changes nothing.
+        metrics: keys of the figures.
+    """
+    claims = tuple(_claim(estimate, part, metric, (higher, lower), "positive") for metric in metrics)
+    return Finding(statement=f"{higher} is above {lower}", part=part, claims=claims)
+
+
+def _claim(
+    estimate: Estimates, part: str, metric: str, models: tuple[str, str], expected: Literal["positive", "hardly any"]
+) -> Claim:
+    higher, lower = models
+    difference = estimate(higher, part, metric).minus(estimate(lower, part, metric))
+    return Claim(metric=metric, higher=higher, lower=lower, difference=difference, expected=expected)
 
 
 def _lowest(estimate: Estimates, part: str, metric: str, models: Sequence[str]) -> str | None:

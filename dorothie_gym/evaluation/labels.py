@@ -22,11 +22,9 @@ from dorothie_gym.evaluation.predictions import (
     joined_actions,
     joined_acts,
 )
-from dorothie_gym.ontology import NAVIGATION_ACTIONS
 from dorothie_gym.sessions import (
     Corpus,
     CorpusEntry,
-    EventType,
     Fold,
     Session,
     SessionError,
@@ -34,8 +32,10 @@ from dorothie_gym.sessions import (
     nfd_points,
     rfn_points,
     ufn_points,
+    unpointed_events,
 )
 from dorothie_gym.sessions.statistics import Handled, Units, handling_of_events
+from dorothie_gym.sessions.tenths import at_tenths
 
 Split: TypeAlias = Literal["train", "val", "test", "all"]
 SPLITS: Final[tuple[Split, ...]] = ("train", "val", "test", "all")
@@ -46,16 +46,15 @@ ALL: Final = "all"
 PARTS: Final = (SEEN, UNSEEN, ALL)
 """In the order in which they are shown."""
 
+NO_ANGLE: Final = "the recording does not know its angle: only the action is scored"
+"""Why a point of NfD is not scored wholly."""
+
 HALVES: Final = "the first half of the sessions by name trains, the second half tests"
 """How sessions are divided that lie in no folds."""
 
-NO_ANGLE: Final = "the recording does not know its angle: only the action is scored"
-
-_FLAGGED: Final = (EventType.DIALOGUE_MOVE, EventType.PHYSICAL_ACTION)
-
 
 @dataclass(frozen=True, kw_only=True)
-class Skipped:
+class Unscored:
     """A flagged event that is not scored, or not wholly.
 
     Attributes:
@@ -111,7 +110,7 @@ class FoldCount:
 
     Attributes:
         sessions: sessions that could be read.
-        flagged: flagged dialogue moves and physical actions.
+        flagged: flagged events.
         points: points of each task.
         skipped: flagged events that are a point of no task.
     """
@@ -152,7 +151,7 @@ class CorpusLabels:
     others: frozenset[str]
     incomplete: tuple[str, ...]
     counts: Mapping[str, FoldCount]
-    skipped: tuple[Skipped, ...]
+    skipped: tuple[Unscored, ...]
     unreadable: Mapping[str, str]
 
     @property
@@ -207,7 +206,7 @@ class _Reader:
         self._acts: dict[Task, list[ActPredictions]] = {task: [] for task in Task}
         self._actions: list[ActionPredictions] = []
         self.counts: dict[str, FoldCount] = {}
-        self.skipped: list[Skipped] = []
+        self.skipped: list[Unscored] = []
         self.unreadable: dict[str, str] = {}
         self.incomplete: list[str] = []
         self.read_sessions: set[str] = set()
@@ -232,13 +231,13 @@ class _Reader:
         self._acts[Task.UFN].append(act_labels(ufn))
         self._acts[Task.RFN].append(act_labels(rfn))
         self._actions.append(action_labels(nfd))
-        handled = handling_of_events(Units(session))
+        handled = handling_of_events(Units(at_tenths(session)))
         for task, numbers in events.items():
             part = self._part_of[entry.name]
             self._keys[task] += [(entry.name, event, part, handled.get(event, Handled.NONE)) for event in numbers]
         unknown = np.isnan(self._actions[-1].angles).tolist()
         self.skipped += [
-            Skipped(session=entry.name, event=event, task=Task.NFD, reason=NO_ANGLE)
+            Unscored(session=entry.name, event=event, task=Task.NFD, reason=NO_ANGLE)
             for event, is_unknown in zip(events[Task.NFD], unknown, strict=True)
             if is_unknown
         ]
@@ -260,28 +259,13 @@ class _Reader:
         fold = "" if entry.fold is None else entry.fold.value
         count = self.counts.setdefault(fold, FoldCount())
         count.sessions += 1
-        flagged = {k for k, event in enumerate(session.events) if event.flagged and event.type in _FLAGGED}
-        count.flagged += len(flagged)
+        count.flagged += sum(event.flagged for event in session.events)
         for task, numbers in events.items():
             count.points[task] += len(numbers)
-            flagged -= set(numbers)
-        count.skipped += len(flagged)
+        none = unpointed_events(session)
+        count.skipped += len(none)
         if chosen:
-            self.skipped += [
-                Skipped(session=entry.name, event=event, task=None, reason=_why_none(session, event))
-                for event in sorted(flagged)
-            ]
-
-
-def _why_none(session: Session, number: int) -> str:
-    """Why a flagged event is a point of no task."""
-    event = session.events[number]
-    if event.type is EventType.DIALOGUE_MOVE:
-        return f"said by {event.source.value}, neither the participant nor the Co-Wizard"
-    action = next(record.action for record in session.physical_actions if record.index == number)
-    if action not in NAVIGATION_ACTIONS:
-        return f"{action.label} is no navigation action"
-    return f"done by {event.source.value}, not by the Co-Wizard"
+            self.skipped += [Unscored(session=entry.name, event=event, task=None, reason=why) for event, why in none]
 
 
 def _check_names(corpus: Corpus) -> None:

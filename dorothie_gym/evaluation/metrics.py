@@ -22,10 +22,7 @@ from dorothie_gym.evaluation.predictions import (
     action_labels,
 )
 from dorothie_gym.ontology import SLOT_SPANS, VECTOR_SLOTS
-from dorothie_gym.sessions import DecisionPoint, InferencePoint
-
-ANGLE_TOLERANCE = 15.0
-"""An angle is right below this error [degrees] (paper, section 5, Evaluation)."""
+from dorothie_gym.sessions import ANGLE_TOLERANCE, DecisionPoint, InferencePoint
 
 PointT = TypeVar("PointT", InferencePoint, DecisionPoint)
 PredictionsT = TypeVar("PredictionsT", ActPredictions, ActionPredictions)

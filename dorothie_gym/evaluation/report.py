@@ -109,7 +109,12 @@ def markdown(table: ResultsTable) -> str:
         lines += ["", f"## {part_title(part)}", "", *_markdown_table(heads, rows)]
     tested = [finding for finding in table.findings() if any(claim.difference.seeds for claim in finding.claims)]
     if tested:
-        lines += ["", "## The paper's findings", "", "Differences are paired over seeds, with 95 % intervals."]
+        lines += [
+            "",
+            "## Findings",
+            "",
+            "The paper's, and what is above what. Differences are paired over seeds, with 95 % intervals.",
+        ]
         for finding in tested:
             lines += ["", *finding_lines(finding)]
     lines += ["", "## Points", "", *_markdown_table(*points_rows(table)), ""]
@@ -187,11 +192,11 @@ def notes(table: ResultsTable) -> Iterator[str]:
 
 
 def tex(table: ResultsTable) -> str:
-    """Returns the table as LaTeX (booktabs, xcolor): below each model of the paper its figures, in grey."""
+    """Returns the table as LaTeX (booktabs, graphicx, xcolor): below each model of the paper its figures, in grey."""
     lines = [
-        r"% \usepackage{booktabs,xcolor}",
+        r"% \usepackage{booktabs,graphicx,xcolor}",
         r"\begin{table*}",
-        r"\centering\small\setlength{\tabcolsep}{4pt}",
+        r"\centering\resizebox{\textwidth}{!}{%",
         rf"\begin{{tabular}}{{l{'c' * len(SHOWN)}}}",
         r"\toprule",
     ]
@@ -204,7 +209,7 @@ def tex(table: ResultsTable) -> str:
             if paper_name(model) and any(paper_figure(model, part, key) for key in SHOWN):
                 lines.append(" & ".join([r"\quad\textcolor{gray}{paper}", *_tex_paper(model, part)]) + r" \\")
     caption = escape_tex(legend(table).replace("/ the", "and in grey the"))
-    lines += [r"\bottomrule", r"\end{tabular}", rf"\caption{{{caption}}}", r"\end{table*}"]
+    lines += [r"\bottomrule", r"\end{tabular}}", rf"\caption{{{caption}}}", r"\end{table*}"]
     return "\n".join(lines) + "\n"
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.evaluation.catalogue import metrics_of
-from dorothie_gym.evaluation.labels import ALL, CorpusLabels, Skipped, TaskLabels
+from dorothie_gym.evaluation.labels import ALL, CorpusLabels, TaskLabels, Unscored
 from dorothie_gym.evaluation.metrics import confusion_matrix
 from dorothie_gym.evaluation.prediction_files import PredictionError, TaskPredictions
 from dorothie_gym.evaluation.predictions import ActPredictions, Predictions
@@ -54,7 +54,7 @@ class RunScore:
     seed: int
     parts: Mapping[str, Scores]
     handled: Mapping[tuple[str, Handled], Scores]
-    left_out: tuple[Skipped, ...]
+    left_out: tuple[Unscored, ...]
     ignored: int
 
 
@@ -67,12 +67,15 @@ def score_runs(labels: CorpusLabels, predictions: Iterable[TaskPredictions]) -> 
     """Scores predictions, each model and seed apart.
 
     Raises:
-        PredictionError: a session is unknown, an event is no point of the task, or a point of the split has no row;
-            the message names it and says what to do.
+        PredictionError: a session is unknown, an event is no point of the task, a point of the split has no row or
+            two, or a model, seed and task is given twice; the message names it and says what to do.
     """
     runs: dict[tuple[str, int], list[_Aligned]] = {}
     for given in predictions:
-        runs.setdefault((given.model, given.seed), []).append(_align(labels, given))
+        pieces = runs.setdefault((given.model, given.seed), [])
+        if any(piece.task is given.task for piece in pieces):
+            raise PredictionError(f"{_where(given)}: is given twice; leave one out, or give them other seeds")
+        pieces.append(_align(labels, given))
     return tuple(_score_run(labels, model, seed, pieces) for (model, seed), pieces in runs.items())
 
 
@@ -91,7 +94,7 @@ class _Aligned:
     predicted: Predictions
     parts: NDArray[np.str_]
     handled: NDArray[np.str_]
-    left_out: tuple[Skipped, ...]
+    left_out: tuple[Unscored, ...]
     ignored: int
 
 
@@ -109,7 +112,7 @@ def _align(labels: CorpusLabels, given: TaskPredictions) -> _Aligned:
         else:
             _check_other(labels, truth, given, key)
     left_out = tuple(
-        Skipped(session=key[0], event=key[1], task=given.task, reason=reason)
+        Unscored(session=key[0], event=key[1], task=given.task, reason=reason)
         for key, reason in given.left_out.items()
         if key in rows
     )

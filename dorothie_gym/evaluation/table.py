@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.evaluation.catalogue import COLUMNS, keys_of
-from dorothie_gym.evaluation.findings import Finding, findings
+from dorothie_gym.evaluation.findings import ACTIONS, FULL, MOVES, Finding, above, findings
+from dorothie_gym.evaluation.floors import FLOORS
 from dorothie_gym.evaluation.intervals import Estimate
 from dorothie_gym.evaluation.labels import ALL, CorpusLabels, Split, labels_of
 from dorothie_gym.evaluation.metrics import per_class_accuracy
@@ -33,7 +34,7 @@ class ResultsTable:
         labels: what they were scored against.
         runs: the scores of each model and seed.
         missing: why a model could not be run ("no audio"), by its name; it keeps its row.
-        about: how the predictions were made, by model (encoders, configuration, hashes), JSON types.
+        about: how the predictions were made (encoders, configuration, hashes), by model or file, JSON types.
     """
 
     labels: CorpusLabels
@@ -104,8 +105,24 @@ class ResultsTable:
         return {name: estimate for name, estimate in found.items() if estimate.seeds}
 
     def findings(self) -> tuple[Finding, ...]:
-        """Returns how the paper's findings come out here."""
-        return tuple(finding for part in self.parts for finding in findings(self.estimate, part))
+        """Returns how the paper's findings come out here, and whether TOTO is above the floors and below others.
+
+        Others are the models that are neither the paper's nor floors.
+        """
+        names = {paper_name(model): model for model in self.models}
+
+        def estimate(model: str, part: str, key: str) -> Estimate:
+            return self.estimate(names.get(model, model), part, key)
+
+        found: list[Finding] = []
+        for part in self.parts:
+            found += findings(estimate, part)
+            found += [
+                above(estimate, part, FULL, floor, (*MOVES, *ACTIONS)) for floor in FLOORS if floor in self.models
+            ]
+            own = [model for model in self.models if paper_name(model) is None and model not in FLOORS]
+            found += [above(estimate, part, model, FULL) for model in own]
+        return tuple(found)
 
     def to_json(self) -> dict[str, Any]:
         """Returns everything as JSON types; None where a figure is undefined.
@@ -204,7 +221,7 @@ def evaluate_predictions(
         corpus: the labels (`labels_of`), or the corpus whose split is taken.
         split: see `labels_of`.
         missing: why models could not be run, by name.
-        about: how the predictions were made, by model.
+        about: how the predictions were made, by model or file.
 
     Raises:
         SessionError: the corpus cannot be read.

@@ -1,17 +1,14 @@
-"""The three tasks as Gymnasium environments: history in, prediction out, the record goes on whatever is predicted."""
+"""The three tasks as Gymnasium environments over a corpus: history in, prediction out, the record goes on."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Literal, TypeVar
+from typing import Any, ClassVar, Final
 
-import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
 
-from dorothie_gym.evaluation.history_space import act_space, check_action, decision_space, encode_view, history_space
 from dorothie_gym.evaluation.metrics import (
     ActionAccuracy,
     ArgumentAccuracy,
@@ -20,28 +17,37 @@ from dorothie_gym.evaluation.metrics import (
     SlotF1,
     SlotScorePaper,
 )
-from dorothie_gym.evaluation.predictions import ActionPredictions, ActPredictions
+from dorothie_gym.evaluation.predictions import ActionPredictions, ActPredictions, act_labels, action_labels
 from dorothie_gym.sessions import (
+    Corpus,
+    CorpusEntry,
     DecisionPoint,
+    Fold,
     InferencePoint,
+    Point,
     Session,
     SessionError,
     Task,
-    View,
-    final_view,
-    load_sessions,
-    nfd_points,
-    rfn_points,
-    split_by_name,
-    ufn_points,
+    task_points,
 )
-from dorothie_gym.spaces import Observation, SpaceLimits
+from dorothie_gym.sessions.sdn.maps import find_town
+from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.world.town import Town
+from dorothie_gym.wrappers.point_env import PointEnv
 
-PointT = TypeVar("PointT", InferencePoint, DecisionPoint)
-Split = Literal["all", "train", "test"]
+DEFAULT: Final = "default"
+"""The corpus that is played once and kept in the user's cache folder."""
+
+ALL: Final = "all"
+
+SPLITS: Final[Mapping[str, str]] = {fold.value.replace("/", "_"): fold.value for fold in Fold}
+"""Names of splits, and the folds that they are: `val` and `test` are those of seen and unseen towns together."""
+
+KEPT: Final = 16
+"""Sessions that an environment keeps in memory, those used last."""
 
 
-class TeacherForcedEnv(gym.Env[Observation, dict[str, Any]], Generic[PointT]):
+class TeacherForcedEnv(PointEnv):
     """What the three tasks have in common.
 
     ## Description
@@ -61,204 +67,126 @@ class TeacherForcedEnv(gym.Env[Observation, dict[str, Any]], Generic[PointT]):
     | `actions` | (16,) | last physical actions, 0 where there is none |
     | `action_angles`, `action_times` | (16,) each | angles [degrees, positive left], when [s] |
     | `pose`, `speed` | (3,), (1,) | car's x, y [m], heading [rad, clockwise]; speed [m/s] |
+    | `way`, `way_length` | (25, 4), a number | x, y, heading, speed every 0.4 s, and how many of them there are |
+    | `object_kinds` | (objects,) | what was perceived at the last look: 0 nothing, else 1 + `ObjectKind` |
+    | `objects` | (objects, 8) | the same, the nearest first, columns as in `OBJECT_VALUES` |
     | `street_names` | (streets,) | id of each street's `StreetName` |
     | `landmarks` | (landmarks, 6) | those that are not hidden, columns as in `LandmarkColumn` |
 
+    ## Rewards
+    The mean of `info["reward_terms"]`, the per-point form of the task's two metrics.
+
     ## Episode End
-    Terminated after the session's last point; the last observation is of the whole record.
+    Terminated after the session's last point; the last observation is of the whole record. One episode is one session.
 
     ## Arguments
-    sessions: a folder of sessions, or the sessions; None takes a few that are played once and kept in a cache.
-    split: "all" sessions, or the first half by name ("train"), or the rest ("test").
+    corpus: "default" (a small corpus that is played once and kept in the user's cache folder), a folder of sessions of
+        any layout, a `Corpus`, or sessions.
+    split: "all", or the fold that sessions are taken from: "train", "val", "val_seen", "val_unseen", "test",
+        "test_seen", "test_unseen".
     limits: sizes of the observation's tables.
     render_mode: None or "ansi".
 
-    `reset(options={"session": n or name})` chooses the session, which is drawn at random otherwise. The infos hold
-    `session` (name), `points_left` and, after a step, `index` (number of the event), `label` (in the form of an
-    action), `score` (the reward) and `metrics` of the episode so far (None: not defined yet). Sessions without a point
-    of the task are left out, and named in `sessions_without_points`.
+    `reset(options={"session": n or name})` chooses the session, which is drawn at random otherwise; those without a
+    point of the task are passed over. The infos hold `session` (name) and `points_left`; after a step `index` (number
+    of the event), `label` (in the form of an action), `reward_terms`, and `metrics` of the episode so far (None: not
+    defined yet).
 
     Raises:
         SessionError: there are no sessions, one cannot be read, or none has a point of the task.
         ValueError: `split`, `render_mode` or an action is not one of those above, or a session has more landmarks or
             streets than `limits`; the message names the field.
+        CacheError: the default corpus cannot be kept.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["ansi"], "render_fps": 2}  # type: ignore[misc]
-    task: ClassVar[Task]
+    of_task: ClassVar[Task]
 
     def __init__(
         self,
-        sessions: Path | str | Sequence[Session] | None = None,
+        corpus: Corpus | Path | str | Sequence[Session] = DEFAULT,
         *,
-        split: Split = "all",
+        split: str = ALL,
         limits: SpaceLimits | None = None,
         render_mode: str | None = None,
     ) -> None:
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(f"render_mode is {render_mode!r}; it must be None or 'ansi'")
-        self.render_mode = render_mode
-        self._limits = limits or SpaceLimits()
-        chosen = _choose(_find(sessions), split)
-        for session in chosen:
-            _check_size(session, self._limits)
-        found = [(session, tuple(self._points_of(session))) for session in chosen]
-        self._sessions: list[tuple[Session, tuple[PointT, ...]]] = [
-            (session, points) for session, points in found if points
-        ]
-        self.sessions_without_points = tuple(session.name for session, points in found if not points)
-        if not self._sessions:
-            raise SessionError(f"none of the {len(found)} sessions has a point of the task {self.task.value}")
-        self.observation_space = history_space(self.task, self._limits)
-        self.action_space = self._action_space()
-        self._points: tuple[PointT, ...] = ()
-        self._actions: list[Mapping[str, Any]] = []
+        super().__init__(self.of_task, limits, render_mode)
+        self._library = _Library(corpus, split, self.of_task, self.limits)
+        self._session: Session | None = None
+        self._town: Town | None = None
+        self._done: list[tuple[Mapping[str, Any], Any]] = []
+        self._count = 0
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Begins a session and shows its first point."""
-        super().reset(seed=seed)
-        self._session, self._points = self._sessions[self._number(options or {})]
-        self._actions = []
-        return self._observe(), self._info()
-
-    def step(self, action: dict[str, Any]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Scores the prediction at the point shown, and shows the next."""
-        if len(self._actions) >= len(self._points):
-            raise ValueError("there is no point to predict: call reset first")
-        assert isinstance(self.action_space, spaces.Dict)
-        self._actions.append(check_action(action, self.action_space))
-        done = self._points[: len(self._actions)]
-        point = done[-1]
-        reward = self._score(self._actions[-1], point)
-        info = {
-            **self._info(),
-            "index": point.index,
-            "label": self._label(point),
-            "score": reward,
-            "metrics": {
-                key: None if np.isnan(value) else value for key, value in self._metrics(self._actions, done).items()
-            },
-        }
-        return self._observe(), reward, len(done) == len(self._points), False, info
-
-    def render(self) -> str | None:
-        """Returns the talk so far and the words to be inferred, one utterance a line."""
-        if self.render_mode is None:
-            return None
-        view = self._view()
-        lines: list[str] = [
-            f"{move.frame:6d} {move.speaker.value:>11}: {move.span} [{move.act}]" for move in view.moves
-        ]
-        return "\n".join([*lines, f"{view.frame:6d} {self.task.value:>11}? {view.utterance}"])
-
-    @abstractmethod
-    def _points_of(self, session: Session) -> Sequence[PointT]:
-        """The points of the task in a session that can be scored."""
-
-    @abstractmethod
-    def _action_space(self) -> spaces.Dict:
-        """The space of predictions."""
-
-    @abstractmethod
-    def _label(self, point: PointT) -> dict[str, Any]:
-        """The prediction that would be right."""
-
-    @abstractmethod
-    def _score(self, action: Mapping[str, Any], point: PointT) -> float:
-        """The reward of one prediction."""
-
-    @abstractmethod
-    def _metrics(self, actions: Sequence[Mapping[str, Any]], points: Sequence[PointT]) -> dict[str, float]:
-        """The metrics of the task over some predictions."""
-
-    def _number(self, options: Mapping[str, Any]) -> int:
+    def _begin(self, seed: int | None, options: Mapping[str, Any]) -> Iterator[Point]:
         wanted = options.get("session")
-        if wanted is None:
-            return int(self.np_random.integers(len(self._sessions)))
-        names = [session.name for session, _ in self._sessions]
+        order = self.np_random.permutation(len(self._library)).tolist() if wanted is None else [self._number(wanted)]
+        for number in order:
+            self._session, points = self._library.read(number)
+            if points:
+                self._done, self._count = [], len(points)
+                self._town = find_town(self._session.header.town, self._library.maps(number))
+                return iter(points)
+        raise SessionError(f"none of the {len(order)} sessions has a point of the task {self.task.value}")
+
+    def _number(self, wanted: object) -> int:
+        names = self._library.names
         if isinstance(wanted, str) and wanted in names:
             return names.index(wanted)
         if isinstance(wanted, int) and 0 <= wanted < len(names):
             return wanted
         raise ValueError(f"option 'session' is {wanted!r}; it must be a number below {len(names)} or a session's name")
 
-    def _view(self) -> View:
-        if len(self._actions) < len(self._points):
-            return self._points[len(self._actions)].view
-        return final_view(self._session, self.task)
-
-    def _observe(self) -> Observation:
-        return encode_view(self._view(), self._limits)
+    def _now(self) -> tuple[Session, Town | None]:
+        assert self._session is not None  # an episode has begun
+        return self._session, self._town
 
     def _info(self) -> dict[str, Any]:
-        return {"session": self._session.name, "points_left": len(self._points) - len(self._actions)}
+        assert self._session is not None  # an episode has begun
+        return {"session": self._session.name, "points_left": self._count - len(self._done)}
 
-
-class _ActEnv(TeacherForcedEnv[InferencePoint]):
-    """The reward and metrics of UfN and RfN."""
-
-    def _action_space(self) -> spaces.Dict:
-        return act_space()
-
-    def _label(self, point: InferencePoint) -> dict[str, Any]:
-        return {"move": int(point.act.move), "slots": np.array(point.act.vector, dtype=np.int8)}
-
-    def _score(self, action: Mapping[str, Any], point: InferencePoint) -> float:
-        return float(int(action["move"]) == int(point.act.move))
-
-    def _metrics(self, actions: Sequence[Mapping[str, Any]], points: Sequence[InferencePoint]) -> dict[str, float]:
-        predicted = ActPredictions(
-            moves=np.array([action["move"] for action in actions], dtype=np.int64),
-            slots=np.array([action["slots"] for action in actions], dtype=np.bool_),
-        )
+    def _judge(self, action: Mapping[str, Any], point: Point) -> dict[str, Any]:
+        self._done.append((action, point))
+        metrics = _act_metrics if self.task is not Task.NFD else _decision_metrics
+        found = metrics([action for action, _ in self._done], [point for _, point in self._done])
         return {
-            "move_accuracy": MoveAccuracy().compute(predicted, points),
-            "slot_f1": SlotF1().compute(predicted, points),
-            "slot_score_paper": SlotScorePaper().compute(predicted, points),
+            "points_left": self._count - len(self._done),
+            "metrics": {key: None if np.isnan(value) else value for key, value in found.items()},
         }
 
 
-class UfNEnv(_ActEnv):
+class UfNEnv(TeacherForcedEnv):
     """Understanding from navigation: what does the participant mean?
 
     ## Action Space
     `move` Discrete(15), `slots` MultiBinary(69).
 
     ## Rewards
-    1 if the move is right, else 0 (its mean is the move accuracy; slots are scored in `info["metrics"]`).
+    The mean of two terms: `move`, 1 if the move is right; `slots`, F1 over the point's (slot, value) pairs, 1 where
+    there is none and none is predicted.
 
     ## Version History
     v0. The rest as in `TeacherForcedEnv`.
     """
 
-    task = Task.UFN
-
-    def _points_of(self, session: Session) -> Sequence[InferencePoint]:
-        return tuple(ufn_points(session))
+    of_task = Task.UFN
 
 
-class RfNEnv(_ActEnv):
+class RfNEnv(TeacherForcedEnv):
     """Response from navigation: what does the Co-Wizard say next?
 
     ## Action Space
     `move` Discrete(15), `slots` MultiBinary(69).
 
     ## Rewards
-    1 if the move is right, else 0 (its mean is the move accuracy; slots are scored in `info["metrics"]`).
+    As of `UfNEnv`.
 
     ## Version History
     v0. The rest as in `TeacherForcedEnv`.
     """
 
-    task = Task.RFN
-
-    def _points_of(self, session: Session) -> Sequence[InferencePoint]:
-        return tuple(rfn_points(session))
+    of_task = Task.RFN
 
 
-class NfDEnv(TeacherForcedEnv[DecisionPoint]):
+class NfDEnv(TeacherForcedEnv):
     """Navigation from dialogue: where does the Co-Wizard drive next?
 
     ## Action Space
@@ -266,59 +194,72 @@ class NfDEnv(TeacherForcedEnv[DecisionPoint]):
     [degrees, positive left], 0 for actions that take none.
 
     ## Rewards
-    1 if the action is right and the angle within 15 degrees, on the circle, else 0 (its mean is the joint accuracy).
-    Points whose angle the recording does not know are left out, and counted in `points_without_angle`.
+    The mean of two terms: `action`, 1 if the action is right; `joint`, 1 if the angle is within 15 degrees on the
+    circle as well. Where the recording does not know the angle there is no `joint`, and the reward is `action`.
 
     ## Version History
     v0. The rest as in `TeacherForcedEnv`.
     """
 
-    task = Task.NFD
-    points_without_angle: int = 0
-
-    def _points_of(self, session: Session) -> Sequence[DecisionPoint]:
-        points = tuple(nfd_points(session))
-        known = tuple(point for point in points if not np.isnan(point.angle))
-        self.points_without_angle += len(points) - len(known)
-        return known
-
-    def _action_space(self) -> spaces.Dict:
-        return decision_space()
-
-    def _label(self, point: DecisionPoint) -> dict[str, Any]:
-        # 179.6 degrees is nearest to 180, which the space holds as -180.
-        return {"action": point.action.nfd_class, "angle": (round(point.angle) + 180) % 360 - 180}
-
-    def _score(self, action: Mapping[str, Any], point: DecisionPoint) -> float:
-        return JointAccuracy().compute(_decisions([action]), [point])
-
-    def _metrics(self, actions: Sequence[Mapping[str, Any]], points: Sequence[DecisionPoint]) -> dict[str, float]:
-        predicted = _decisions(actions)
-        return {
-            "action_accuracy": ActionAccuracy().compute(predicted, points),
-            "argument_accuracy": ArgumentAccuracy().compute(predicted, points),
-            "joint_accuracy": JointAccuracy().compute(predicted, points),
-        }
+    of_task = Task.NFD
 
 
-def _decisions(actions: Sequence[Mapping[str, Any]]) -> ActionPredictions:
-    return ActionPredictions(
-        actions=np.array([action["action"] for action in actions], dtype=np.int64),
-        angles=np.array([action["angle"] for action in actions], dtype=np.float64),
-    )
+class _Library:
+    """The sessions of a split, read when they are asked for.
+
+    Args:
+        corpus: as of `TeacherForcedEnv`; `split` likewise.
+        split: see there.
+        task: whose points are wanted.
+        limits: sizes that sessions must keep within.
+    """
+
+    def __init__(
+        self, corpus: Corpus | Path | str | Sequence[Session], split: str, task: Task, limits: SpaceLimits
+    ) -> None:
+        if split not in (ALL, *SPLITS):
+            raise ValueError(f"split is {split!r}; it must be one of {', '.join((ALL, *SPLITS))}")
+        self._task, self._limits = task, limits
+        found = _sessions(corpus, split)
+        self.names = [one.name for one in found]
+        self._found = found
+        self.read = lru_cache(maxsize=KEPT)(self._read)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def maps(self, number: int) -> Path | None:
+        """Returns the folder with maps that a session was given with."""
+        found = self._found[number]
+        return None if isinstance(found, Session) else found.maps
+
+    def _read(self, number: int) -> tuple[Session, tuple[Point, ...]]:
+        found = self._found[number]
+        session = found if isinstance(found, Session) else found.load()
+        _check_size(session, self._limits)
+        return session, task_points(session, self._task)
 
 
-def _find(sessions: Path | str | Sequence[Session] | None) -> tuple[Session, ...]:
-    if sessions is None:
+def _sessions(corpus: Corpus | Path | str | Sequence[Session], split: str) -> Sequence[CorpusEntry | Session]:
+    """Sessions, or entries that load them."""
+    if isinstance(corpus, str) and corpus == DEFAULT:
         # Playing sessions needs the environments, which are slow to import: only where it is asked for.
         from dorothie_gym.rollout.corpus import default_corpus
 
-        return load_sessions(default_corpus())
-    if isinstance(sessions, Path | str):
-        return load_sessions(sessions)
-    if not sessions:
-        raise SessionError("sessions is empty; give a folder of sessions, some sessions, or None")
-    return tuple(sessions)
+        corpus = default_corpus()
+    if isinstance(corpus, Path | str):
+        corpus = Corpus.load(corpus)
+    if isinstance(corpus, Corpus):
+        chosen = corpus if split == ALL else corpus.filter(fold=SPLITS[split])
+        if not len(chosen):
+            folds = ", ".join(fold.value.replace("/", "_") for fold in corpus.folds) or "no folds"
+            raise SessionError(f"{corpus.root}: split {split!r} has no session; there are {folds}")
+        return chosen.entries
+    if not corpus:
+        raise SessionError("corpus is empty; give a folder of sessions, some sessions, or 'default'")
+    if split != ALL:
+        raise ValueError(f"split is {split!r}, but sessions in memory lie in no fold: it must be {ALL!r}")
+    return tuple(corpus)
 
 
 def _check_size(session: Session, limits: SpaceLimits) -> None:
@@ -328,12 +269,27 @@ def _check_size(session: Session, limits: SpaceLimits) -> None:
             raise ValueError(f"session {session.name} has {count} {name}; SpaceLimits.{name} is {size}: raise it")
 
 
-def _choose(sessions: tuple[Session, ...], split: Split) -> tuple[Session, ...]:
-    if split == "all":
-        return sessions
-    if split not in ("train", "test"):
-        raise ValueError(f"split is {split!r}; it must be 'all', 'train' or 'test'")
-    train, test = split_by_name(sessions)
-    if not train:
-        raise SessionError(f"split {split!r} needs at least 2 sessions, there is {len(sessions)}")
-    return train if split == "train" else test
+def _act_metrics(actions: Sequence[Mapping[str, Any]], points: Sequence[InferencePoint]) -> dict[str, float]:
+    predicted = ActPredictions(
+        moves=np.array([action["move"] for action in actions], dtype=np.int64),
+        slots=np.array([action["slots"] for action in actions], dtype=np.bool_),
+    )
+    labels = act_labels(points)
+    return {
+        "move_accuracy": MoveAccuracy().compute(predicted, labels),
+        "slot_f1": SlotF1().compute(predicted, labels),
+        "slot_score_paper": SlotScorePaper().compute(predicted, labels),
+    }
+
+
+def _decision_metrics(actions: Sequence[Mapping[str, Any]], points: Sequence[DecisionPoint]) -> dict[str, float]:
+    predicted = ActionPredictions(
+        actions=np.array([action["action"] for action in actions], dtype=np.int64),
+        angles=np.array([action["angle"] for action in actions], dtype=np.float64),
+    )
+    labels = action_labels(points)
+    return {
+        "action_accuracy": ActionAccuracy().compute(predicted, labels),
+        "argument_accuracy": ArgumentAccuracy().compute(predicted, labels),
+        "joint_accuracy": JointAccuracy().compute(predicted, labels),
+    }

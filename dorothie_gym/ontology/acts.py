@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 from dorothie_gym.ontology.errors import OntologyError
@@ -43,7 +44,7 @@ class DialogueAct:
         """All values, in the order of the label vector."""
         return in_label_order(self.slots)
 
-    @property
+    @cached_property
     def vector(self) -> tuple[int, ...]:
         """The label vector (69,) of the values."""
         return encode_slots(self.slots)

@@ -1,4 +1,4 @@
-"""A few sessions that are played once and kept: what there is to read when nobody has given a folder of sessions."""
+"""A small corpus that is played once and kept: what there is to read when nobody has given a folder of sessions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import logging
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -18,19 +18,18 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from dorothie_gym import __version__
 from dorothie_gym.envs.config import EnvConfig
-from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.ontology import AGENT_ROLES
-from dorothie_gym.policies import make_policy
-from dorothie_gym.rollout.play import play_session
+from dorothie_gym.rollout.generation import generate_corpus
 from dorothie_gym.sessions import FORMAT_VERSION
 
 CACHE_VARIABLE = "DOROTHIE_GYM_CACHE"
 """The environment variable that names the folder in which sessions are kept."""
 
-TOWN = "brookside"
-SEEDS = tuple(range(8))
-CONFIG = EnvConfig(max_seconds=240.0)
-"""Shorter than a session usually is, so that nobody waits long for the first of them."""
+SESSIONS = 20
+"""Sessions of the corpus: the fewest of which each fold has one, as many as a leak test wants, some minutes to play."""
+
+SEED = 0
+
+CONFIG = EnvConfig()
 
 _LOG = logging.getLogger(__name__)
 
@@ -50,20 +49,25 @@ def cache_folder() -> Path:
     return (Path(base) if base else Path("~/.cache").expanduser()) / "dorothie_gym"
 
 
-def default_corpus(*, seeds: Sequence[int] = SEEDS, config: EnvConfig = CONFIG) -> Path:
-    """Returns a folder of sessions of the scripted roles; plays them the first time, with a progress bar on stderr.
+def default_corpus(*, sessions: int | None = None, seed: int = SEED, config: EnvConfig | None = None) -> Path:
+    """Returns a folder with a corpus of the scripted roles; plays it the first time, with a progress bar on stderr.
 
-    They are kept in the user's cache under the version of the package and what they were played with, so that another
-    version plays its own. The folder appears when all sessions are played: nobody ever reads a part of it.
+    Its folds and towns are shared out as the paper's. It is kept in the user's cache under the version of the package
+    and what it was made from, so that another version plays its own. The folder appears when all sessions are played:
+    nobody ever reads a part of it.
 
     Args:
-        seeds: a session is played for each.
-        config: of the environment.
+        sessions: how many; `SESSIONS` where None.
+        seed: of the corpus.
+        config: of the environment; `CONFIG` where None.
 
     Raises:
         CacheError: the cache cannot be written.
+        ValueError: no sessions, or a negative seed.
     """
-    key = {"format": FORMAT_VERSION, "town": TOWN, "seeds": list(seeds), "config": asdict(config)}
+    config = CONFIG if config is None else config
+    sessions = SESSIONS if sessions is None else sessions
+    key = {"format": FORMAT_VERSION, "sessions": sessions, "seed": seed, "config": asdict(config)}
     digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:12]
     folder = cache_folder() / f"corpus-{__version__}-{digest}"
     if folder.is_dir():
@@ -72,24 +76,25 @@ def default_corpus(*, seeds: Sequence[int] = SEEDS, config: EnvConfig = CONFIG) 
         folder.parent.mkdir(parents=True, exist_ok=True)
         part = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", suffix=".part", dir=folder.parent))
         try:
-            _play(part, seeds, config)
+            _play(part, sessions, seed, config)
             _publish(part, folder)
         finally:
             shutil.rmtree(part, ignore_errors=True)
     return folder
 
 
-def _play(folder: Path, seeds: Sequence[int], config: EnvConfig) -> None:
+def _play(folder: Path, sessions: int, seed: int, config: EnvConfig) -> None:
     console = Console(stderr=True)
-    _LOG.info("playing %d sessions, which are kept in %s", len(seeds), folder.parent)
-    env = DuoWizardEnv(TOWN, config=config)
-    policies = {role: make_policy("scripted", role, env.limits) for role in AGENT_ROLES}
+    _LOG.info("playing %d sessions, which are kept in %s", sessions, folder.parent)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as progress:
-        bar = progress.add_task("Playing a few sessions, once", total=len(seeds))
-        for seed in seeds:
-            play_session(env, policies, seed=seed, folder=folder / f"{TOWN}-{seed:03d}")
-            progress.advance(bar)
+        bar = progress.add_task("Playing a small corpus, once", total=sessions)
+
+        def advance(done: int, _: int) -> None:
+            progress.update(bar, completed=done)
+
+        # One process: several need a main module that can be imported, which not every caller has.
+        generate_corpus(folder, sessions=sessions, seed=seed, config=config, on_session=advance)
 
 
 def _publish(part: Path, folder: Path) -> None:

@@ -9,20 +9,28 @@ from dorothie_gym.sessions.folds import FOLDS, Fold
 from dorothie_gym.sessions.header import LandmarkRow, SessionHeader, SubgoalRow
 from dorothie_gym.sessions.layout import SessionState, safe_name
 from dorothie_gym.sessions.manifest import manifest_row, write_manifest
+from dorothie_gym.sessions.perceived import OBJECT_VALUES, ObjectKind, last_perceived
 from dorothie_gym.sessions.points import (
+    ANGLE_TOLERANCE,
+    NO_SPEAKER,
+    WAY_LENGTH,
     CarState,
     DecisionPoint,
     InferencePoint,
     Point,
     Task,
     View,
+    angle_error,
+    corpus_points,
     final_view,
     history_angle,
+    is_decision,
     label_angle,
     nfd_points,
     rfn_points,
     task_points,
     ufn_points,
+    unpointed_events,
 )
 from dorothie_gym.sessions.reading import read_session, session_folders
 from dorothie_gym.sessions.records import ActionRecord, InfractionRecord, MoveRecord, UtteranceRecord
@@ -52,6 +60,7 @@ from dorothie_gym.world.config import FRAME_RATE
 
 __all__ = [
     "ACTOR_DTYPE",
+    "ANGLE_TOLERANCE",
     "ActionRecord",
     "ActorKind",
     "CarState",
@@ -74,6 +83,9 @@ __all__ = [
     "LandmarkRow",
     "MoveRecord",
     "NO_LANE",
+    "NO_SPEAKER",
+    "OBJECT_VALUES",
+    "ObjectKind",
     "Point",
     "ReadReport",
     "Scene",
@@ -90,11 +102,16 @@ __all__ = [
     "Trajectory",
     "UtteranceRecord",
     "View",
+    "WAY_LENGTH",
     "WEATHER_DTYPE",
+    "angle_error",
+    "corpus_points",
     "final_view",
     "first_difference",
     "history_angle",
+    "is_decision",
     "label_angle",
+    "last_perceived",
     "load_readable",
     "load_sessions",
     "manifest_row",
@@ -109,5 +126,6 @@ __all__ = [
     "task_points",
     "trajectory_of",
     "ufn_points",
+    "unpointed_events",
     "write_manifest",
 ]

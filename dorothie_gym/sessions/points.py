@@ -10,17 +10,29 @@ from __future__ import annotations
 import bisect
 import enum
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, U_TURN_ANGLE, ArgumentKind, DialogueAct, PhysicalAction, Role
+from dorothie_gym.sessions.events import Event, EventType
 from dorothie_gym.sessions.header import LandmarkRow
 from dorothie_gym.sessions.records import ActionRecord, MoveRecord
 from dorothie_gym.sessions.session import Session
 from dorothie_gym.world.config import FRAME_RATE
+
+ANGLE_TOLERANCE: Final = 15.0
+"""The angle of a navigation action is right below this error [degrees] (paper, section 5, Evaluation)."""
+
+
+WAY_LENGTH: Final = 25
+WAY_STEP: Final = 12
+"""States of the car in a view, and frames (30 Hz) from one to the next: 100 frames of 10 Hz, every fourth."""
+
+NO_SPEAKER: Final = "a dialogue move of neither the participant nor the Co-Wizard"
+"""Why a flagged dialogue move is no point."""
 
 
 class Task(enum.StrEnum):
@@ -57,6 +69,8 @@ class View:
         moves: past dialogue moves of both speakers, oldest first.
         actions: past physical actions, oldest first.
         car: the last recorded state of the car; None before the first.
+        way: where it was before, every `WAY_STEP` frames of the recording back from `car`, which is the last; at most
+            `WAY_LENGTH` states (the working memory of the paper, section 6: 10 s).
         utterance: words of the current utterance at a UfN point, else empty.
         street_names: label of each street's name.
         landmarks: those that are not hidden.
@@ -69,6 +83,7 @@ class View:
     moves: tuple[MoveRecord, ...]
     actions: tuple[ActionRecord, ...]
     car: CarState | None
+    way: tuple[CarState, ...]
     utterance: str
     street_names: tuple[str, ...]
     landmarks: tuple[LandmarkRow, ...]
@@ -104,21 +119,21 @@ class DecisionPoint:
 Point: TypeAlias = InferencePoint | DecisionPoint
 
 
-def ufn_points(session: Session) -> Iterator[InferencePoint]:
-    """Yields a point for each flagged dialogue move of the participant."""
-    yield from _inference_points(session, Task.UFN, Role.PARTICIPANT)
+def ufn_points(session: Session, *, since: int = 0) -> Iterator[InferencePoint]:
+    """Yields a point for each flagged dialogue move of the participant; of events from number `since` on."""
+    yield from _inference_points(session, Task.UFN, Role.PARTICIPANT, since)
 
 
-def rfn_points(session: Session) -> Iterator[InferencePoint]:
-    """Yields a point for each flagged dialogue move of the Co-Wizard."""
-    yield from _inference_points(session, Task.RFN, Role.CO_WIZARD)
+def rfn_points(session: Session, *, since: int = 0) -> Iterator[InferencePoint]:
+    """Yields a point for each flagged dialogue move of the Co-Wizard; of events from number `since` on."""
+    yield from _inference_points(session, Task.RFN, Role.CO_WIZARD, since)
 
 
-def nfd_points(session: Session) -> Iterator[DecisionPoint]:
-    """Yields a point for each flagged navigation action of the Co-Wizard."""
+def nfd_points(session: Session, *, since: int = 0) -> Iterator[DecisionPoint]:
+    """Yields a point for each flagged navigation action of the Co-Wizard; of events from number `since` on."""
     history = _History(session, Task.NFD)
     for record in session.physical_actions:
-        if record.flagged and record.source is Role.CO_WIZARD and record.action in NAVIGATION_ACTIONS:
+        if record.index >= since and is_decision(record):
             yield DecisionPoint(
                 index=record.index,
                 view=history.view(record.frame),
@@ -127,15 +142,54 @@ def nfd_points(session: Session) -> Iterator[DecisionPoint]:
             )
 
 
-def task_points(session: Session, task: Task) -> tuple[Point, ...]:
-    """Returns the points of a task in a session."""
+def task_points(session: Session, task: Task, *, since: int = 0) -> tuple[Point, ...]:
+    """Returns the points of a task in a session; of events from number `since` on."""
     match task:
         case Task.UFN:
-            return tuple(ufn_points(session))
+            return tuple(ufn_points(session, since=since))
         case Task.RFN:
-            return tuple(rfn_points(session))
+            return tuple(rfn_points(session, since=since))
         case Task.NFD:
-            return tuple(nfd_points(session))
+            return tuple(nfd_points(session, since=since))
+
+
+def corpus_points(sessions: Iterable[Session], task: Task) -> Iterator[Point]:
+    """Yields the points of a task in sessions, such as a `Corpus`; each session is read when it is its turn.
+
+    Raises:
+        SessionError: a session cannot be read.
+    """
+    for session in sessions:
+        yield from task_points(session, task)
+
+
+def is_decision(record: ActionRecord) -> bool:
+    """Whether a physical action is a point of NfD."""
+    return record.flagged and record.source is Role.CO_WIZARD and record.action in NAVIGATION_ACTIONS
+
+
+def unpointed_events(session: Session) -> tuple[tuple[int, str], ...]:
+    """Returns the number of each flagged event that is a point of no task, and why it is none.
+
+    With the points of the three tasks they are all flagged events, each once.
+    """
+    acts = {act.index: act for act in session.physical_actions}
+    return tuple(
+        (index, reason)
+        for index, event in enumerate(session.events)
+        if event.flagged and (reason := _why_no_point(event, acts.get(index)))
+    )
+
+
+def _why_no_point(event: Event, act: ActionRecord | None) -> str:
+    """Why a flagged event is no point; empty if it is one."""
+    if act is not None:
+        if act.action not in NAVIGATION_ACTIONS:
+            return f"{act.action.label} is no navigation action"
+        return "" if is_decision(act) else f"{act.action.label} of {act.source.value}, not of the Co-Wizard"
+    if event.type is not EventType.DIALOGUE_MOVE:
+        return f"an event of type {event.type_name}: neither a dialogue move nor a physical action"
+    return "" if event.source in (Role.PARTICIPANT, Role.CO_WIZARD) else f"{NO_SPEAKER} ({event.source.value})"
 
 
 def final_view(session: Session, task: Task) -> View:
@@ -156,6 +210,11 @@ def label_angle(record: ActionRecord) -> float:
     if record.action.argument not in (ArgumentKind.ANGLE, ArgumentKind.SIDE):
         return 0.0
     return math.nan if record.angle is None else _wrap(record.angle)
+
+
+def angle_error(predicted: float, label: float) -> float:
+    """Returns how far an angle is off, on the circle [degrees], in [0, 180]: 179 and -179 differ by 2."""
+    return abs(_wrap(predicted - label))
 
 
 class _History:
@@ -179,6 +238,7 @@ class _History:
         if move is not None and self._task is Task.UFN:
             utterance = move.text
             moves += tuple(past for past in self._moves if _same_utterance(past, move) and past.index < move.index)
+        way = self._way(frame)
         return View(
             task=self._task,
             session=self._session.name,
@@ -186,31 +246,31 @@ class _History:
             time=frame / FRAME_RATE,
             moves=moves,
             actions=self._actions[: bisect.bisect_left(self._action_frames, frame)],
-            car=self._car(frame),
+            car=way[-1] if way else None,
+            way=way,
             utterance=utterance,
             street_names=tuple(self._session.header.street_names),
             landmarks=self._landmarks,
         )
 
-    def _car(self, frame: int) -> CarState | None:
+    def _way(self, frame: int) -> tuple[CarState, ...]:
         trajectory = self._session.trajectory
-        row = int(np.searchsorted(trajectory["frame"], frame, side="left")) - 1
-        if row < 0:
-            return None
-        last = trajectory[row]
-        return CarState(
-            frame=int(last["frame"]),
-            x=float(last["x"]),
-            y=float(last["y"]),
-            heading=float(last["heading"]),
-            speed=float(last["speed"]),
-        )
+        last = int(np.searchsorted(trajectory["frame"], frame, side="left")) - 1
+        if last < 0:
+            return ()
+        wanted = int(trajectory["frame"][last]) - WAY_STEP * np.arange(WAY_LENGTH)[::-1]
+        rows = np.searchsorted(trajectory["frame"], wanted[wanted >= trajectory["frame"][0]])
+        states = trajectory[list(_STATE)][rows].tolist()
+        return tuple(CarState(**dict(zip(_STATE, state, strict=True))) for state in states)
 
 
-def _inference_points(session: Session, task: Task, speaker: Role) -> Iterator[InferencePoint]:
+_STATE: Final = ("frame", "x", "y", "heading", "speed")
+
+
+def _inference_points(session: Session, task: Task, speaker: Role, since: int) -> Iterator[InferencePoint]:
     history = _History(session, task)
     for move in session.moves(speaker):
-        if move.flagged:
+        if move.flagged and move.index >= since:
             yield InferencePoint(index=move.index, view=history.view(move.frame, move), act=move.act)
 
 

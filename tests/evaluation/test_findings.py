@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from dorothie_gym.evaluation import COLUMNS, Estimate, Verdict, findings, paper_figures
+from dorothie_gym.evaluation import COLUMNS, Estimate, Verdict, above, findings, paper_figures
 from dorothie_gym.evaluation.findings import FULL, NO_HISTORY, NO_MAP, OTHER_ABLATIONS, TUNED
 
 NOISE = (-0.01, 0.0, 0.01)
@@ -75,3 +75,11 @@ def test_the_papers_figures_are_shares() -> None:
     toto = paper_figures()[FULL]["unseen"]
     assert toto["nfd_joint_accuracy"].mean == pytest.approx(0.411)
     assert len(paper_figures()) == 16
+
+
+def test_a_model_is_above_another_if_it_is_in_every_figure() -> None:
+    table = Table({("mine", ""): 0.8, ("other", ""): 0.8, ("other", "rfn_slot_f1"): 0.6})
+    assert above(table, "seen", "mine", FULL).verdict is Verdict.HOLDS
+    assert above(table, "seen", "other", FULL).verdict is Verdict.UNDECIDED
+    assert above(table, "seen", "other", FULL, ("ufn_move_accuracy",)).verdict is Verdict.HOLDS
+    assert above(table, "seen", FULL, "mine").verdict is Verdict.FAILS

@@ -2,14 +2,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from dorothie_gym.evaluation import labels_of
+from dorothie_gym.evaluation import ActPredictions, labels_of, score_task
+from dorothie_gym.evaluation.features import build, points
+from dorothie_gym.evaluation.features.extraction import HANDLINGS
 from dorothie_gym.ontology import PhysicalAction, Role
-from dorothie_gym.sessions import Event, EventType, SessionError, Task
+from dorothie_gym.sessions import Event, EventType, SessionError, Task, read_session
+from dorothie_gym.sessions.sdn import write_sdn
 from tests.evaluation.corpora import FOLDS, corpus
 from tests.sessions.builders import physical, write
 from tests.sessions.dialogues import talk
+
+JTURN = PhysicalAction.J_TURN
 
 
 def test_the_split_test_is_what_lies_in_its_folders_seen_and_unseen_apart(tmp_path: Path) -> None:
@@ -39,13 +45,10 @@ def test_flagged_events_that_are_no_points_are_named_with_the_reason(tmp_path: P
     count = labels.counts[""]
     assert (count.flagged, count.skipped, count.points[Task.NFD]) == (4, 3, 1)
     reasons = {skipped.event: (skipped.task, skipped.reason) for skipped in labels.skipped}
-    assert reasons[0] == (None, "said by ad_wizard, neither the participant nor the Co-Wizard")
-    assert reasons[1] == (None, "done by agent, not by the Co-Wizard")
+    assert reasons[0] == (None, "a dialogue move of neither the participant nor the Co-Wizard (ad_wizard)")
+    assert reasons[1] == (None, "Stop of agent, not of the Co-Wizard")
     assert reasons[2] == (None, "SpeedChange is no navigation action")
     assert reasons[3][0] is Task.NFD and "does not know its angle" in reasons[3][1]
-
-
-JTURN = PhysicalAction.J_TURN
 
 
 def test_sessions_without_folds_are_divided_by_name(tmp_path: Path) -> None:
@@ -83,3 +86,34 @@ def test_two_sessions_of_one_name_are_refused(tmp_path: Path) -> None:
         write(tmp_path / fold / "same", talk())
     with pytest.raises(SessionError, match="same name.*rename one"):
         labels_of(tmp_path)
+
+
+def test_labels_of_a_corpus_in_sdns_layout_are_the_same(tmp_path: Path) -> None:
+    native = corpus(tmp_path / "native", ("test/seen",))
+    (tmp_path / "sdn/test/seen").mkdir(parents=True)
+    session = read_session(native / "test/seen/of-test-seen")
+    write_sdn(session, tmp_path / "sdn/test/seen/log_1")
+    ours, theirs = labels_of(native), labels_of(tmp_path / "sdn")
+    assert theirs.part_of == {"log_1": "seen"}
+    for task, labels in ours.tasks.items():
+        other = theirs.tasks[task]
+        assert other.events.tolist() == labels.events.tolist() and other.handled.tolist() == labels.handled.tolist()
+        scores = score_task(task, other.labels, labels.labels)
+        assert set(scores.values()) == {1.0}
+
+
+def test_labels_are_those_of_the_features(tmp_path: Path) -> None:
+    path = corpus(tmp_path, ("test/seen", "test/unseen"))
+    labels, columns = labels_of(path), build(path, cache=False)
+    for task, of in labels.tasks.items():
+        table = points(columns, task)
+        names = [columns.sessions.names[number] for number in table.session]
+        rows = [of.rows()[key] for key in zip(names, table.event.tolist(), strict=True)]
+        assert sorted(rows) == list(range(len(of)))
+        assert [HANDLINGS[kind] for kind in table.handling] == of.handled[rows].tolist()
+        if isinstance(of.labels, ActPredictions):
+            assert table.label_move.tolist() == of.labels.moves[rows].tolist()
+            assert np.array_equal(table.label_slots, of.labels.slots[rows])
+        else:
+            assert table.label_action.tolist() == of.labels.actions[rows].tolist()
+            assert table.label_angle == pytest.approx(of.labels.angles[rows], nan_ok=True)

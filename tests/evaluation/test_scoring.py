@@ -138,3 +138,8 @@ def test_a_point_with_two_rows_is_refused(one: CorpusLabels) -> None:
     events[1] = events[0]
     with pytest.raises(PredictionError, match="a point has two rows"):
         score_runs(one, [replace(given, events=events)])
+
+
+def test_a_model_and_seed_that_come_twice_are_refused(one: CorpusLabels) -> None:
+    with pytest.raises(PredictionError, match="model oracle, seed 0, ufn: is given twice; leave one out"):
+        score_runs(one, [*oracle(one), *oracle(one)])

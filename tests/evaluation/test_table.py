@@ -9,6 +9,7 @@ from dorothie_gym.evaluation import (
     COLUMNS,
     CorpusLabels,
     ResultsTable,
+    Verdict,
     evaluate_files,
     evaluate_predictions,
     labels_of,
@@ -116,3 +117,17 @@ def test_a_task_without_anything_to_learn_from_is_left_out_with_the_reason(tmp_p
     assert {skipped.reason for skipped in table.runs[0].left_out} == {
         "the sessions to learn from have no point of the task"
     }
+
+
+def test_findings_know_models_in_any_case(labels: CorpusLabels) -> None:
+    runs = [wrong_moves(labels, name, seed, 0.5) for seed in (0, 1) for name in ("toto", "toto (- current speech)")]
+    speech = evaluate_predictions(runs, labels).findings()[1]
+    assert speech.claims[0].difference.values == {0: 0.0, 1: 0.0}
+
+
+def test_toto_is_held_against_the_floors_and_others_against_toto(labels: CorpusLabels) -> None:
+    runs = [run for seed in (0, 1) for name in ("TOTO", "mine") for run in oracle(labels, name, seed)]
+    runs += [run for seed in (0, 1) for run in predict_floor("majority", labels, labels, seed)]
+    verdicts = {(found.statement, found.part): found.verdict for found in evaluate_predictions(runs, labels).findings()}
+    assert verdicts["TOTO is above majority", "seen"] is Verdict.HOLDS
+    assert verdicts["mine is above TOTO", "unseen"] is Verdict.UNDECIDED

@@ -9,11 +9,12 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
+from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 from dorothie_gym.evaluation import NfDEnv, RfNEnv, TeacherForcedEnv, UfNEnv
 from dorothie_gym.ontology import DialogueMove, PhysicalAction, Role
-from dorothie_gym.sessions import SessionError
+from dorothie_gym.sessions import Corpus, SessionError
 from dorothie_gym.spaces import NO_MOVE, LandmarkColumn, SpaceLimits
 from tests.sessions.builders import physical, session, utterance, write
 from tests.sessions.dialogues import DONE, OKAY, STREET, TO_KFC, talk
@@ -21,29 +22,30 @@ from tests.sessions.dialogues import DONE, OKAY, STREET, TO_KFC, talk
 ENVS = [UfNEnv, RfNEnv, NfDEnv]
 
 
-def play(env: TeacherForcedEnv[Any], right: bool = True) -> tuple[list[dict[str, Any]], list[float], dict[str, Any]]:
+def play(env: TeacherForcedEnv, right: bool = True) -> tuple[list[dict[str, Any]], list[float], dict[str, Any]]:
     """Plays an episode with the labels, or with random actions."""
     observation, info = env.reset(seed=0)
-    observations, rewards, points = [observation], [], env._points
+    observations, rewards, terminated = [observation], [], False
     env.action_space.seed(0)
-    for point in points:
-        action = env._label(point) if right else env.action_space.sample()
+    while not terminated:
+        assert env._point is not None
+        action = env.rules.label(env._point) if right else env.action_space.sample()
         observation, reward, terminated, truncated, info = env.step(action)
         observations.append(observation)
         rewards.append(reward)
-    assert terminated and not truncated
+        assert not truncated
     return observations, rewards, info
 
 
 @pytest.mark.parametrize("env_class", ENVS)
-def test_gymnasium_accepts_the_environment(env_class: type[TeacherForcedEnv[Any]]) -> None:
+def test_gymnasium_accepts_the_environment(env_class: type[TeacherForcedEnv]) -> None:
     sessions = [session(talk()), session(talk(), name="two")]
-    made = gym.make(EnvSpec("test/Task-v0", entry_point=env_class, kwargs={"sessions": sessions}), render_mode="ansi")
+    made = gym.make(EnvSpec("test/Task-v0", entry_point=env_class, kwargs={"corpus": sessions}), render_mode="ansi")
     check_env(made.unwrapped)  # its warnings are errors here
 
 
 @pytest.mark.parametrize(("env_class", "count"), [(UfNEnv, 4), (RfNEnv, 3), (NfDEnv, 5)])
-def test_labels_earn_everything(env_class: type[TeacherForcedEnv[Any]], count: int) -> None:
+def test_labels_earn_everything(env_class: type[TeacherForcedEnv], count: int) -> None:
     observations, rewards, info = play(env_class([session(talk())]))
     assert rewards == [1.0] * count
     assert info["points_left"] == 0
@@ -52,14 +54,14 @@ def test_labels_earn_everything(env_class: type[TeacherForcedEnv[Any]], count: i
 
 
 @pytest.mark.parametrize("env_class", ENVS)
-def test_predictions_do_not_change_what_is_observed(env_class: type[TeacherForcedEnv[Any]]) -> None:
+def test_predictions_do_not_change_what_is_observed(env_class: type[TeacherForcedEnv]) -> None:
     one, _, _ = play(env_class([session(talk())]))
     other, _, _ = play(env_class([session(talk())]), right=False)
     np.testing.assert_equal(one, other)
 
 
 @pytest.mark.parametrize("env_class", ENVS)
-def test_every_observation_is_in_the_space(env_class: type[TeacherForcedEnv[Any]]) -> None:
+def test_every_observation_is_in_the_space(env_class: type[TeacherForcedEnv]) -> None:
     env = env_class([session(talk() + utterance(280, Role.PARTICIPANT, 8, ("caf\u00e9 \u2019" * 200, DONE)))])
     for observation in play(env)[0]:
         assert env.observation_space.contains(observation)
@@ -91,28 +93,36 @@ def test_only_ufn_sees_the_words() -> None:
         assert "utterance" not in env.observation_space.spaces  # type: ignore[attr-defined]
 
 
-def test_reward_of_ufn_is_the_move_and_the_metrics_hold_the_slots() -> None:
+def test_reward_of_ufn_is_the_mean_of_move_and_slots() -> None:
     env = UfNEnv([session(talk())])
     env.reset(seed=0)
     action = {"move": int(DialogueMove.INSTRUCT), "slots": np.zeros(69, dtype=np.int8)}
     _, reward, _, _, info = env.step(action)
-    assert reward == 1.0
+    assert (reward, info["reward_terms"]) == (0.5, {"move": 1.0, "slots": 0.0})
     assert info["metrics"] == {"move_accuracy": 1.0, "slot_f1": 0.0, "slot_score_paper": 0.0}
     assert tuple(info["label"]["slots"]) == TO_KFC.vector
     _, reward, _, _, info = env.step(action)
-    assert (reward, info["metrics"]["move_accuracy"]) == (0.0, 0.5)
+    assert (reward, info["reward_terms"]) == (0.5, {"move": 0.0, "slots": 1.0}), "a plain yes has no slots"
+    assert info["metrics"]["move_accuracy"] == 0.5
+    half = np.array(STREET.vector, dtype=np.int8)
+    half[np.flatnonzero(half)[0]] = 0
+    _, _, _, _, info = env.step({"move": int(DialogueMove.INSTRUCT), "slots": half})
+    assert info["reward_terms"]["slots"] == pytest.approx(2 / 3), "one of two, nothing wrong: F1 of 2 / 3"
 
 
-def test_reward_of_nfd_is_joint_and_on_the_circle() -> None:
+def test_reward_of_nfd_is_the_mean_of_action_and_joint_on_the_circle() -> None:
     env = NfDEnv([session([physical(1, PhysicalAction.J_TURN, -179.0), physical(2, PhysicalAction.J_TURN, 10.0)])])
     env.reset(seed=0)
     assert env.step({"action": 3, "angle": 179})[1] == 1.0
-    assert env.step({"action": 3, "angle": 25})[1] == 0.0
+    _, reward, _, _, info = env.step({"action": 3, "angle": 25})
+    assert (reward, info["reward_terms"]) == (0.5, {"action": 1.0, "joint": 0.0})
 
 
-def test_unknown_angles_are_left_out_and_counted() -> None:
+def test_where_the_angle_is_not_known_only_the_action_counts() -> None:
     env = NfDEnv([session([physical(1, PhysicalAction.J_TURN), physical(2, PhysicalAction.STOP)])])
-    assert (env.reset(seed=0)[1]["points_left"], env.points_without_angle) == (1, 1)
+    assert env.reset(seed=0)[1]["points_left"] == 2
+    _, reward, _, _, info = env.step({"action": 3, "angle": 77})
+    assert (reward, info["reward_terms"], info["metrics"]["joint_accuracy"]) == (1.0, {"action": 1.0}, None)
 
 
 @pytest.mark.parametrize(
@@ -129,7 +139,7 @@ def test_unknown_angles_are_left_out_and_counted() -> None:
         (NfDEnv, {"action": 1, "angle": 1.5}, "'angle' is 1.5"),
     ],
 )
-def test_malformed_action_is_told_by_field(env_class: type[TeacherForcedEnv[Any]], action: Any, message: str) -> None:
+def test_malformed_action_is_told_by_field(env_class: type[TeacherForcedEnv], action: Any, message: str) -> None:
     env = env_class([session(talk())])
     env.reset(seed=0)
     with pytest.raises(ValueError, match=message):
@@ -138,20 +148,49 @@ def test_malformed_action_is_told_by_field(env_class: type[TeacherForcedEnv[Any]
 
 def test_step_without_a_point_is_refused() -> None:
     env = UfNEnv([session(talk())])
-    with pytest.raises(ValueError, match="call reset first"):
+    with pytest.raises(ResetNeeded, match=r"call reset\(\) first"):
+        env.step({"move": 1, "slots": np.zeros(69, dtype=np.int8)})
+    play(env)
+    with pytest.raises(ResetNeeded, match=r"call reset\(\) first"):
         env.step({"move": 1, "slots": np.zeros(69, dtype=np.int8)})
 
 
-def test_sessions_come_from_a_folder_and_are_chosen_by_split_number_and_name(tmp_path: Path) -> None:
-    for name in "abc":
-        write(tmp_path / name, talk())
-    assert {UfNEnv(tmp_path).reset(seed=seed)[1]["session"] for seed in range(20)} == {"a", "b", "c"}
-    assert UfNEnv(tmp_path, split="train").reset(seed=0)[1]["session"] == "a"
-    env = UfNEnv(str(tmp_path), split="test")
-    assert env.reset(options={"session": 1})[1]["session"] == "c"
-    assert env.reset(options={"session": "b"})[1]["session"] == "b"
-    with pytest.raises(ValueError, match="'session' is 'a'"):
-        env.reset(options={"session": "a"})
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for fold, name in (("train", "a"), ("train", "b"), ("val/seen", "c"), ("test/seen", "d"), ("test/unseen", "e")):
+        write(tmp_path / fold / name, talk())
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("split", "names"),
+    [("all", "abcde"), ("train", "ab"), ("val", "c"), ("test", "de"), ("test_seen", "d"), ("test_unseen", "e")],
+)
+def test_a_split_is_a_fold_of_the_corpus(folder: Path, split: str, names: str) -> None:
+    env = gym.make("dorothie_gym/UfN-v0", corpus=folder, split=split)
+    assert {env.reset(seed=seed)[1]["session"] for seed in range(30)} == set(names)
+
+
+def test_a_split_that_the_corpus_lacks_is_told_with_those_it_has(folder: Path) -> None:
+    with pytest.raises(SessionError, match="split 'val_unseen' has no session; there are train, val_seen, test_seen"):
+        UfNEnv(folder, split="val_unseen")
+
+
+def test_sessions_are_chosen_by_number_and_name(folder: Path) -> None:
+    env = RfNEnv(Corpus.load(folder), split="train")
+    assert env.reset(options={"session": 1})[1]["session"] == "b"
+    assert env.reset(options={"session": "a"})[1]["session"] == "a"
+    for wrong in ("c", 2, -1, 0.5):
+        with pytest.raises(ValueError, match="option 'session' is "):
+            env.reset(options={"session": wrong})
+
+
+def test_several_environments_step_together(folder: Path) -> None:
+    envs = gym.make_vec("dorothie_gym/RfN-v0", 3, vectorization_mode="sync", corpus=folder, split="train")
+    envs.reset(seed=0)
+    _, rewards, *_ = envs.step(envs.action_space.sample())
+    assert rewards.shape == (3,)
+    envs.close()
 
 
 def test_same_seed_draws_the_same_session() -> None:
@@ -159,9 +198,9 @@ def test_same_seed_draws_the_same_session() -> None:
     assert env.reset(seed=5)[1]["session"] == env.reset(seed=5)[1]["session"]
 
 
-def test_session_without_points_is_left_out_and_named() -> None:
+def test_sessions_without_points_are_passed_over() -> None:
     env = RfNEnv([session(talk()), session(utterance(30, Role.PARTICIPANT, 0, ("Okay", OKAY)), name="silent")])
-    assert env.sessions_without_points == ("silent",)
+    assert {env.reset(seed=seed)[1]["session"] for seed in range(10)} == {"one"}
 
 
 def test_no_sessions_are_one_clear_error(tmp_path: Path) -> None:
@@ -169,29 +208,30 @@ def test_no_sessions_are_one_clear_error(tmp_path: Path) -> None:
         UfNEnv(tmp_path)
     with pytest.raises(SessionError, match="no such folder"):
         UfNEnv(tmp_path / "missing")
-    with pytest.raises(SessionError, match="sessions is empty"):
+    with pytest.raises(SessionError, match="corpus is empty"):
         UfNEnv([])
     with pytest.raises(SessionError, match="none of the 1 sessions has a point of the task nfd"):
-        NfDEnv([session(utterance(30, Role.PARTICIPANT, 0, ("Fuller", STREET)))])
-    with pytest.raises(SessionError, match="at least 2 sessions"):
-        UfNEnv([session(talk())], split="train")
+        NfDEnv([session(utterance(30, Role.PARTICIPANT, 0, ("Fuller", STREET)))]).reset()
 
 
 def test_wrong_arguments_are_named() -> None:
     with pytest.raises(ValueError, match="render_mode is 'human'"):
         UfNEnv([session(talk())], render_mode="human")
-    with pytest.raises(ValueError, match="split is 'val'"):
-        UfNEnv([session(talk())], split="val")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="split is 'dev'; it must be one of all, train, val_seen"):
+        UfNEnv([session(talk())], split="dev")
+    with pytest.raises(ValueError, match="split is 'val', but sessions in memory lie in no fold"):
+        UfNEnv([session(talk())], split="val")
     with pytest.raises(ValueError, match=r"2 landmarks; SpaceLimits.landmarks is 1"):
-        UfNEnv([session(talk())], limits=SpaceLimits(landmarks=1))
+        UfNEnv([session(talk())], limits=SpaceLimits(landmarks=1)).reset()
 
 
-def test_without_sessions_the_cached_corpus_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_default_corpus_is_the_cached_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write(tmp_path / "cached", talk())
     corpus = types.ModuleType("dorothie_gym.rollout.corpus")
     corpus.default_corpus = lambda: tmp_path  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "dorothie_gym.rollout.corpus", corpus)
     assert UfNEnv().reset(seed=0)[1]["session"] == "cached"
+    assert gym.make("dorothie_gym/UfN-v0", corpus="default").reset(seed=0)[1]["session"] == "cached"
 
 
 def test_render_shows_the_talk_and_the_words_in_question() -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from dorothie_gym.envs.config import EnvConfig
 from dorothie_gym.rollout import CacheError, corpus, default_corpus
-from dorothie_gym.sessions import load_sessions
+from dorothie_gym.sessions import Corpus, load_sessions
 
 SHORT = EnvConfig(max_seconds=3.0)
 
@@ -19,19 +19,20 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_sessions_are_played_once_and_kept(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = default_corpus(seeds=(3, 4), config=SHORT)
-    assert [session.header.seed for session in load_sessions(folder)] == [3, 4]
+    folder = default_corpus(sessions=2, seed=3, config=SHORT)
+    assert len(load_sessions(folder)) == 2
     assert all(session.complete for session in load_sessions(folder))
+    assert Corpus.load(folder).verify() == ()
     left = {path.name for path in cache.iterdir()} - {"towns"}  # towns are kept there too, by whoever loads one first
     assert left == {folder.name}, "nothing else is left behind"
-    monkeypatch.setattr(corpus, "play_session", lambda *args, **kwargs: pytest.fail("played again"))
-    assert default_corpus(seeds=(3, 4), config=SHORT) == folder
+    monkeypatch.setattr(corpus, "generate_corpus", lambda *args, **kwargs: pytest.fail("played again"))
+    assert default_corpus(sessions=2, seed=3, config=SHORT) == folder
 
 
 def test_other_settings_are_kept_apart(cache: Path) -> None:
-    first = default_corpus(seeds=(3,), config=SHORT)
-    second = default_corpus(seeds=(4,), config=SHORT)
-    third = default_corpus(seeds=(3,), config=EnvConfig(max_seconds=2.0))
+    first = default_corpus(sessions=1, seed=3, config=SHORT)
+    second = default_corpus(sessions=1, seed=4, config=SHORT)
+    third = default_corpus(sessions=1, seed=3, config=EnvConfig(max_seconds=2.0))
     assert len({first, second, third}) == 3
 
 
@@ -39,18 +40,18 @@ def test_an_interrupted_corpus_leaves_nothing(cache: Path, monkeypatch: pytest.M
     def interrupt(*args: object, **kwargs: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(corpus, "play_session", interrupt)
+    monkeypatch.setattr(corpus, "generate_corpus", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        default_corpus(seeds=(3,), config=SHORT)
+        default_corpus(sessions=1, seed=3, config=SHORT)
     assert list(cache.iterdir()) == []
 
 
 def test_a_faster_process_wins(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    done = default_corpus(seeds=(3,), config=SHORT)
+    done = default_corpus(sessions=1, seed=3, config=SHORT)
     part = cache / "other.part"
     part.mkdir()
     corpus._publish(part, done)
-    assert [session.header.seed for session in load_sessions(done)] == [3]
+    assert len(load_sessions(done)) == 1
 
 
 def test_a_cache_that_cannot_be_written_is_told_with_what_to_set(
@@ -59,7 +60,7 @@ def test_a_cache_that_cannot_be_written_is_told_with_what_to_set(
     (tmp_path / "file").touch()
     monkeypatch.setenv("DOROTHIE_GYM_CACHE", str(tmp_path / "file" / "below"))
     with pytest.raises(CacheError, match=r"below: sessions cannot be kept here \(.*set DOROTHIE_GYM_CACHE to a folder"):
-        default_corpus(seeds=(3,), config=SHORT)
+        default_corpus(sessions=1, seed=3, config=SHORT)
 
 
 def test_the_cache_follows_the_desktop_standard(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,12 +8,14 @@ import pytest
 from dorothie_gym.ontology import PhysicalAction, Role
 from dorothie_gym.sessions import (
     Task,
+    corpus_points,
     final_view,
     history_angle,
     nfd_points,
     rfn_points,
     task_points,
     ufn_points,
+    unpointed_events,
 )
 from tests.sessions.builders import physical, session, utterance
 from tests.sessions.dialogues import DONE, OKAY, STREET, TO_KFC, TURNING, YES, talk
@@ -24,6 +26,11 @@ def test_every_flagged_event_is_a_point_once() -> None:
     assert [point.act for point in ufn_points(talked)] == [TO_KFC, YES, STREET, DONE]
     assert [point.act for point in rfn_points(talked)] == [OKAY, TURNING, OKAY]
     assert [point.action.label for point in nfd_points(talked)] == ["Start", "JTurn", "UTurn", "JTurn", "Stop"]
+
+
+def test_points_of_a_corpus_come_session_by_session() -> None:
+    names = [point.view.session for point in corpus_points([session(talk()), session(talk(), name="two")], Task.RFN)]
+    assert names == ["one"] * 3 + ["two"] * 3
 
 
 def test_unflagged_events_are_history_and_no_points() -> None:
@@ -100,3 +107,28 @@ def test_final_view_holds_the_whole_record() -> None:
 
 def test_before_the_first_frame_there_is_no_car() -> None:
     assert next(nfd_points(session([physical(0, PhysicalAction.START)]))).view.car is None
+
+
+def test_the_way_goes_back_from_the_last_state_of_the_car() -> None:
+    view = next(nfd_points(session([physical(100, PhysicalAction.STOP)]))).view
+    assert [state.frame for state in view.way] == [3, 15, 27, 39, 51, 63, 75, 87, 99]
+    assert view.way[-1] == view.car
+    later = next(nfd_points(session([physical(900, PhysicalAction.STOP)], 1000))).view
+    assert (len(later.way), later.way[0].frame, later.way[-1].frame) == (25, 899 - 24 * 12, 899)
+    assert next(nfd_points(session([physical(0, PhysicalAction.STOP)]))).view.way == ()
+
+
+def test_flagged_events_that_are_no_point_are_told_with_the_reason() -> None:
+    odd = [
+        physical(10, PhysicalAction.SPEED_CHANGE, up=True),
+        replace(physical(20, PhysicalAction.STOP), source=Role.AGENT),
+        *utterance(30, Role.AD_WIZARD, 9, ("Hello", OKAY)),
+        physical(40, PhysicalAction.SPEED_CHANGE, up=True, flagged=False),
+        physical(50, PhysicalAction.STOP),
+    ]
+    reasons = dict(unpointed_events(session(odd)))
+    assert sorted(reasons) == [0, 1, 2]
+    assert reasons[0] == "SpeedChange is no navigation action"
+    assert reasons[1] == "Stop of agent, not of the Co-Wizard"
+    assert reasons[2].endswith("(ad_wizard)")
+    assert unpointed_events(session(talk())) == ()

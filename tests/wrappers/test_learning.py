@@ -9,6 +9,8 @@ import gymnasium as gym
 import pytest
 
 import dorothie_gym
+from tests.sessions.builders import session
+from tests.sessions.dialogues import talk
 
 QUIET = {"participant": "silent", "ad_wizard": "silent"}
 
@@ -48,3 +50,42 @@ def test_a_masked_learner_does_only_what_is_possible() -> None:
         action, _ = model.predict(observation, action_masks=env.get_wrapper_attr("action_masks")())
         assert env.get_wrapper_attr("action_masks")()[int(action[0])]
         observation, *_ = env.step(action)
+
+
+def points_of(task: str, fields: tuple[str, ...] | None = None) -> Any:
+    return dorothie_gym.flatten(gym.make(f"dorothie_gym/{task}-v0", corpus=[session(talk())]), fields)
+
+
+def test_a_learner_learns_on_recorded_points() -> None:
+    """One session, again and again: what it earns there rises."""
+    learner = pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'").PPO
+    env = points_of("NfD", ("action",))
+    settings = {"n_steps": 64, "batch_size": 64, "n_epochs": 8, "gamma": 0.0, "learning_rate": 3e-3}
+    model = learner("MultiInputPolicy", env, device="cpu", seed=0, **settings)
+    before = earned(model, env)
+    model.learn(512)
+    assert earned(model, env) > before
+
+
+def test_a_learner_takes_moves_and_slots() -> None:
+    learner = pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'").PPO
+    model = learner("MultiInputPolicy", points_of("UfN"), n_steps=8, batch_size=8, n_epochs=1, device="cpu", seed=0)
+    model.learn(16)
+    assert model.num_timesteps == 16
+    assert model.predict(model.env.reset())[0].shape == (1, 70)
+
+
+def earned(model: Any, env: Any) -> float:
+    """Mean reward of an episode."""
+    observation, _ = env.reset(seed=0)
+    rewards, done = [], False
+    while not done:
+        observation, reward, done, _, _ = env.step(model.predict(observation, deterministic=True)[0])
+        rewards.append(reward)
+    return sum(rewards) / len(rewards)
+
+
+@pytest.mark.parametrize("task", ["UfN", "RfN", "NfD"])
+def test_stable_baselines_accepts_the_tasks(task: str) -> None:
+    checker = pytest.importorskip("stable_baselines3.common.env_checker", reason="needs the extra 'baselines'")
+    checker.check_env(points_of(task))

@@ -5,7 +5,6 @@ from dorothie_gym.evaluation.features.building import build, columns_of
 from dorothie_gym.evaluation.features.columns import (
     CO_WIZARD,
     NO_TEXT,
-    OBJECT_VALUES,
     PARTICIPANT,
     TENTHS,
     Actions,
@@ -15,7 +14,6 @@ from dorothie_gym.evaluation.features.columns import (
     Landmarks,
     Looks,
     Moves,
-    ObjectKind,
     Objects,
     Sessions,
     Streets,
@@ -23,6 +21,7 @@ from dorothie_gym.evaluation.features.columns import (
     Utterances,
 )
 from dorothie_gym.evaluation.features.table import PointCount, PointTable, Skipped, point_counts, points
+from dorothie_gym.sessions.perceived import OBJECT_VALUES, ObjectKind
 
 __all__ = [
     "Actions",

@@ -7,7 +7,6 @@ indices, -1 where there is none. Rows of a session follow one another, in the or
 
 from __future__ import annotations
 
-import enum
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
@@ -109,7 +108,7 @@ class Actions:
         up: 1 faster or on, -1 slower or off, 0 for other actions.
         label_angle: argument as NfD's label [degrees]: 0 for an action that takes none, NaN where it is not known.
         flagged: whether it is a point of NfD.
-        handling: as of `Moves`, of the exchange that began last before it.
+        handling: as of `Moves`, by the rule of `handling_of_events`.
     """
 
     session: Ints
@@ -164,8 +163,8 @@ class Objects:
     """What was perceived around the car (n,), the nearest of each look first.
 
     Attributes:
-        kind: see `ObjectKind`.
-        values: (n, 8) columns as in `OBJECT_VALUES`, relative to the car as it was at the look.
+        kind: see `dorothie_gym.sessions.ObjectKind`.
+        values: (n, 8) columns as in `dorothie_gym.sessions.OBJECT_VALUES`, relative to the car as it was at the look.
     """
 
     kind: Ints
@@ -246,25 +245,6 @@ class TownGraph:
     edge_types: Ints
     member_start: Ints
     members: Ints
-
-
-class ObjectKind(enum.IntEnum):
-    """What an object is: the first five as `ActorKind`, the others a traffic light by what it shows."""
-
-    OTHER = 0
-    VEHICLE = 1
-    CYCLIST = 2
-    PEDESTRIAN = 3
-    PROP = 4
-    LIGHT_GREEN = 5
-    LIGHT_YELLOW = 6
-    LIGHT_RED = 7
-
-
-OBJECT_VALUES: Final = ("distance", "bearing", "ahead", "aside", "heading", "speed", "length", "width")
-"""Columns of `Objects.values`: distance [m], bearing [degrees, positive left of where the car looks], the same place in
-metres ahead and to the left, heading relative to the car's [degrees, positive left], speed [m/s], length and width
-[m]; of a light distance, bearing and place are those of its stop line, and the rest is 0."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

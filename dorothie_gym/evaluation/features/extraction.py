@@ -3,34 +3,29 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.evaluation.features.columns import CO_WIZARD, NO_TEXT, OBJECT_VALUES, PARTICIPANT, TENTHS
-from dorothie_gym.evaluation.features.perceived import perceived
-from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, GoalStatus, PhysicalAction, Role
+from dorothie_gym.evaluation.features.columns import CO_WIZARD, NO_TEXT, PARTICIPANT, TENTHS
+from dorothie_gym.ontology import LABELS, GoalStatus, Role
 from dorothie_gym.sessions import (
-    FRAME_RATE,
     NO_LANE,
-    ActionRecord,
     EventType,
-    MoveRecord,
-    Scene,
     Session,
     history_angle,
+    is_decision,
     label_angle,
+    unpointed_events,
 )
-from dorothie_gym.sessions.sdn.scenes import scene_at
-from dorothie_gym.sessions.statistics.handling import Handled, handling
+from dorothie_gym.sessions.perceived import OBJECT_VALUES, light_switches, perceived
+from dorothie_gym.sessions.statistics.handling import Handled, handling_of_events
 from dorothie_gym.sessions.statistics.units import Units
+from dorothie_gym.sessions.tenths import EACH, at_tenths
 from dorothie_gym.world.town import Town
-
-EACH: Final = FRAME_RATE // TENTHS
-"""Frames of a recording in a tenth of a second."""
 
 HEADING_STEP: Final = 1e-3
 """Headings are rounded to this [degrees], so that the last digits do not tell in which unit a file had them."""
@@ -38,8 +33,6 @@ HEADING_STEP: Final = 1e-3
 SPEAKERS: Final = {Role.PARTICIPANT: PARTICIPANT, Role.CO_WIZARD: CO_WIZARD}
 HANDLINGS: Final = (Handled.NONE, Handled.TASK, Handled.ENVIRONMENTAL)
 """What the numbers in columns `handling` mean."""
-
-NO_SPEAKER: Final = "a dialogue move of neither participant nor Co-Wizard"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -63,22 +56,11 @@ class SessionColumns:
     signature: str
 
 
-def at_tenths(session: Session) -> Session:
-    """Returns a session as a recording at 10 Hz has it: events of a tenth stand at its beginning, frames between go."""
-    trajectory = session.trajectory[session.trajectory["frame"] % EACH == 0]
-    return replace(
-        session,
-        events=tuple(replace(event, frame=event.frame - event.frame % EACH) for event in session.events),
-        trajectory=trajectory,
-        scene=scene_at(session.scene, trajectory) if len(trajectory) else Scene(),
-    )
-
-
 def extract(session: Session, town: Town | None) -> SessionColumns:
     """Returns the columns of a session; `town` is None where it is not known."""
     session = at_tenths(session)
     pool = _Pool()
-    handled = _Handled(session)
+    handled = {event: HANDLINGS.index(kind) for event, kind in handling_of_events(Units(session)).items()}
     arrays = {
         **_places(session, pool),  # first: numbers of texts then do not depend on what is said later
         **_said(session, pool, handled),
@@ -87,7 +69,7 @@ def extract(session: Session, town: Town | None) -> SessionColumns:
         **_goals(session),
     }
     arrays["sessions.has_objects"] = np.array([len(session.scene.actors) > 0])
-    unpointed = tuple(_unpointed(session))
+    unpointed = unpointed_events(session)
     content = hashlib.sha256(repr((session.header.town, list(pool.texts), unpointed)).encode())
     for name in sorted(arrays):
         content.update(f"{name} {arrays[name].dtype} {arrays[name].shape}".encode() + arrays[name].tobytes())
@@ -112,26 +94,7 @@ class _Pool:
         return NO_TEXT if text is None else self.texts.setdefault(text, len(self.texts))
 
 
-class _Handled:
-    """What the exchanges of a session handle."""
-
-    def __init__(self, session: Session) -> None:
-        self._units = Units(session)
-        self._kinds = {number: HANDLINGS.index(kind) for number, kind in handling(self._units).items()}
-        begun = sorted((unit.start, unit.id) for unit in self._units.exchanges)
-        self._starts = [start for start, _ in begun]
-        self._ids = [number for _, number in begun]
-
-    def of_move(self, move: MoveRecord) -> int:
-        number = self._units.exchange_of(move)
-        return 0 if number is None else self._kinds[number]
-
-    def of_action(self, action: ActionRecord) -> int:
-        last = int(np.searchsorted(self._starts, action.frame / FRAME_RATE, side="left")) - 1
-        return 0 if last < 0 else self._kinds[self._ids[last]]
-
-
-def _said(session: Session, pool: _Pool, handled: _Handled) -> dict[str, NDArray[Any]]:
+def _said(session: Session, pool: _Pool, handled: Mapping[int, int]) -> dict[str, NDArray[Any]]:
     """Moves and utterances, by when the whole utterance was over."""
     spoken = [utterance for utterance in session.utterances() if utterance.speaker in SPEAKERS]
     spoken.sort(key=lambda utterance: (max(move.frame for move in utterance.moves), utterance.moves[0].index))
@@ -154,11 +117,11 @@ def _said(session: Session, pool: _Pool, handled: _Handled) -> dict[str, NDArray
         "moves.slots": np.array([move.act.vector for _, move in moves], dtype=np.bool_).reshape(-1, len(LABELS)),
         "moves.span_text": _ints([pool.number(move.span) for _, move in moves]),
         "moves.flagged": np.array([move.flagged for _, move in moves], dtype=np.bool_),
-        "moves.handling": _ints([handled.of_move(move) for _, move in moves]),
+        "moves.handling": _ints([handled[move.index] for _, move in moves]),
     }
 
 
-def _done(session: Session, handled: _Handled) -> dict[str, NDArray[Any]]:
+def _done(session: Session, handled: Mapping[int, int]) -> dict[str, NDArray[Any]]:
     done = session.physical_actions
     return {
         "actions.tenth": _ints([act.frame // EACH for act in done]),
@@ -167,36 +130,9 @@ def _done(session: Session, handled: _Handled) -> dict[str, NDArray[Any]]:
         "actions.angle": np.array([history_angle(act) for act in done], dtype=np.float32),
         "actions.up": _ints([0 if act.up is None else (1 if act.up else -1) for act in done]),
         "actions.label_angle": np.array([label_angle(act) for act in done], dtype=np.float32),
-        "actions.flagged": np.array([_is_point(act) for act in done], dtype=np.bool_),
-        "actions.handling": _ints([handled.of_action(act) for act in done]),
+        "actions.flagged": np.array([is_decision(act) for act in done], dtype=np.bool_),
+        "actions.handling": _ints([handled[act.index] for act in done]),
     }
-
-
-def _is_point(act: ActionRecord) -> bool:
-    return act.flagged and act.source is Role.CO_WIZARD and act.action in NAVIGATION_ACTIONS
-
-
-def _unpointed(session: Session) -> list[tuple[int, str]]:
-    """Flagged events that are no point of any task, and why."""
-    acts = {act.index: act for act in session.physical_actions}
-    found = []
-    for index, event in enumerate(session.events):
-        if not event.flagged:
-            continue
-        if event.type is EventType.DIALOGUE_MOVE:
-            if event.source not in SPEAKERS:
-                found.append((index, f"{NO_SPEAKER} ({event.source.value})"))
-        elif event.type is not EventType.PHYSICAL_ACTION:
-            found.append((index, f"an event of type {event.type_name}: neither a dialogue move nor a physical action"))
-        elif not _is_point(acts[index]):
-            found.append((index, _why_no_point(acts[index].action, event.source)))
-    return found
-
-
-def _why_no_point(action: PhysicalAction, source: Role) -> str:
-    if action not in NAVIGATION_ACTIONS:
-        return f"{action.label} is no navigation action"
-    return f"{action.label} of {source.value}, not of the Co-Wizard"
 
 
 def _frames(session: Session, town: Town | None) -> dict[str, NDArray[Any]]:
@@ -209,7 +145,7 @@ def _frames(session: Session, town: Town | None) -> dict[str, NDArray[Any]]:
     if len(rows) > 1:
         way = np.hypot(np.diff(rows["x"]), np.diff(rows["y"]))
         speed[1:] = way / (np.diff(tenths) / TENTHS)
-    looks = list(perceived(session, pose, rows["frame"], town))
+    looks = list(perceived(session.scene, pose, rows["frame"], light_switches(session), town))
     look_tenths = np.array([frame // EACH for frame, _, _ in looks], dtype=np.int64)
     kinds = [kind for _, kind, _ in looks]
     values = [value for _, _, value in looks]
@@ -221,7 +157,7 @@ def _frames(session: Session, town: Town | None) -> dict[str, NDArray[Any]]:
         "frames.look": (np.searchsorted(look_tenths, tenths, side="right") - 1).astype(np.int32),
         "looks.tenth": look_tenths.astype(np.int32),
         "looks.start": np.concatenate(([0], np.cumsum([len(kind) for kind in kinds]))).astype(np.int64)[:-1],
-        "objects.kind": np.concatenate(kinds or [np.empty(0)]).astype(np.int32),
+        "objects.kind": np.concatenate([*kinds, np.empty(0, dtype=np.int64)]).astype(np.int32),
         "objects.values": np.concatenate(values or [np.empty((0, len(OBJECT_VALUES)))]).astype(np.float32),
     }
 

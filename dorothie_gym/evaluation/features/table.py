@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.evaluation.features.columns import CO_WIZARD, PARTICIPANT, Columns, Flags, Ints, Reals
-from dorothie_gym.evaluation.features.extraction import NO_SPEAKER
+from dorothie_gym.evaluation.labels import NO_ANGLE
 from dorothie_gym.ontology import LABELS
-from dorothie_gym.sessions import FOLDS, Fold, Task
+from dorothie_gym.sessions import FOLDS, NO_SPEAKER, Fold, Task
 from dorothie_gym.sessions.folds import check_fold
-
-NO_ANGLE: Final = "the recording does not know its angle: only the action is scored"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -151,8 +151,9 @@ def trajectory_of_places(places: Places, first_frame: int, place: SdnMap) -> tup
     for name in ("throttle", "steer", "brake"):
         trajectory[name] = np.nan
     if count > 1:
-        times = places.frames / SDN_RATE
-        trajectory["speed"] = np.hypot(np.gradient(places.x, times), np.gradient(places.y, times))
+        # Over the time before, never after: a state must not tell where the car goes next.
+        way = np.hypot(np.diff(places.x), np.diff(places.y))
+        trajectory["speed"][1:] = way / (np.diff(places.frames) / SDN_RATE)
     roads, lanes = places.ids["road_id"].tolist(), places.ids["lane_id"].tolist()
     if place.town is None:
         trajectory["lane"] = NO_LANE

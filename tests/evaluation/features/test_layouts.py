@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from dorothie_gym.evaluation.features import Columns, build, points
+from dorothie_gym.evaluation.features import Columns, build, columns_of, gather, points
 from dorothie_gym.evaluation.features.columns import GROUPS
-from dorothie_gym.sessions import Corpus, Task
+from dorothie_gym.sessions import Corpus, Task, read_session
 from dorothie_gym.sessions.sdn import write_sdn
 from tests.evaluation.features.played import play
 from tests.sessions.builders import write
 from tests.sessions.dialogues import talk
+from tests.sessions.sdn.builders import hub, release, sample
 
 
 def assert_same(one: Columns, other: Columns) -> None:
@@ -56,3 +59,14 @@ def test_columns_do_not_depend_on_names_within_a_fold(tmp_path: Path) -> None:
     shutil.copytree(one / "train" / "a", other / "train" / "z")
     shutil.copytree(one / "train" / "b", other / "train" / "y")
     assert_same(build(one, cache=False), build(other, cache=False))
+
+
+@pytest.mark.parametrize("layout", [release, sample, hub])
+def test_sessions_of_the_paper_s_corpus_give_points_and_batches(tmp_path: Path, layout: Callable[[Path], Path]) -> None:
+    columns = columns_of(read_session(layout(tmp_path / "log_1")))
+    for task in Task:
+        table = points(columns, task)
+        batch = gather(columns, table, np.arange(len(table)))
+        assert len(table) > 0 and len(batch) == len(table)
+        assert batch.window_mask.any() == (layout is not hub), "the hub has no trajectory"
+        assert not batch.has_objects.any()

@@ -9,6 +9,9 @@ import pytest
 from dorothie_gym.evaluation.features import BatchSpec, columns_of, gather, point_counts, points
 from dorothie_gym.ontology import LABELS, PhysicalAction, Role
 from dorothie_gym.sessions import Event, EventType, Session, SessionError, Task, task_points
+from dorothie_gym.sessions.perceived import last_perceived
+from dorothie_gym.sessions.tenths import at_tenths
+from dorothie_gym.world.town import load_town
 from tests.sessions.builders import physical, session, utterance
 from tests.sessions.dialogues import DONE, OKAY, STREET, TO_KFC, TURNING, YES, talk
 
@@ -61,6 +64,43 @@ def test_ufn_sees_earlier_acts_of_the_utterance_and_the_paper_s_leak_its_own() -
     assert tuple(leaked.move_slots[0][4].tolist()) == tuple(map(bool, STREET.vector))
     assert honest.utterance_mask.sum() == 2, "the current utterance is no history"
     assert columns.texts[int(honest.current_text[0])] == "Yes, left on Fuller."
+
+
+@pytest.mark.parametrize("task", list(Task))
+def test_a_played_session_has_the_histories_of_its_views(played: Session, task: Task) -> None:
+    """Two ways to the same: views of the session at 10 Hz, and rows of columns."""
+    tenths = at_tenths(played)
+    columns, expected = columns_of(played), task_points(tenths, task)
+    table = points(columns, task)
+    batch = gather(columns, table, np.arange(len(table)), BatchSpec(moves=99, actions=99))
+    assert table.event.tolist() == [point.index for point in expected] != []
+    for row, view in enumerate(point.view for point in expected):
+        assert batch.move[row][batch.move_mask[row]].tolist() == [int(move.act.move) for move in view.moves]
+        assert batch.action[row][batch.action_mask[row]].tolist() == [act.action.value - 1 for act in view.actions]
+        window = batch.window_pose[row][batch.window_mask[row]]
+        np.testing.assert_allclose(window[:, :2], [(state.x, state.y) for state in view.way], rtol=1e-5)
+
+
+def test_objects_of_a_batch_are_those_that_environments_show(played: Session) -> None:
+    columns, tenths = columns_of(played), at_tenths(played)
+    table = points(columns, Task.NFD)
+    batch = gather(columns, table, np.arange(len(table)))
+    for row, tenth in enumerate(table.tenth.tolist()):
+        kinds, values = last_perceived(tenths, 3 * tenth, load_town("brookside"))
+        mask = batch.objects_mask[row]
+        assert batch.kind[row][mask].tolist() == kinds.tolist()
+        np.testing.assert_allclose(batch.values[row][mask], values, atol=2e-3)  # headings are rounded in columns
+    assert batch.objects_mask.any()
+
+
+def test_the_paper_s_leak_gives_every_label_away(played: Session) -> None:
+    columns = columns_of(played)
+    table = points(columns, Task.UFN)
+    rows = np.arange(len(table))
+    leaked = gather(columns, table, rows, BatchSpec(moves=99, paper_leak=True))
+    newest = leaked.move_mask.sum(axis=1) - 1
+    assert leaked.move[rows, newest].tolist() == table.label_move.tolist()
+    assert np.array_equal(leaked.move_slots[rows, newest], table.label_slots)
 
 
 @pytest.mark.parametrize("task", [Task.RFN, Task.NFD])
@@ -147,7 +187,7 @@ def test_every_flagged_event_is_a_point_or_listed_with_its_reason() -> None:
     assert len(reasons) == 5
     assert any("SpeedChange is no navigation action" in reason for reason in reasons)
     assert any("Stop of agent" in reason for reason in reasons)
-    assert any("neither participant nor Co-Wizard (ad_wizard)" in reason for reason in reasons)
+    assert any("neither the participant nor the Co-Wizard (ad_wizard)" in reason for reason in reasons)
     assert any("type Message" in reason for reason in reasons)
     assert any("angle" in reason for reason in reasons)
 

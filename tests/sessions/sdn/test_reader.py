@@ -129,6 +129,16 @@ def test_header_has_the_town_its_streets_and_landmarks(tmp_path: Path) -> None:
     assert header.config["sdn"]["first_frame"] == FIRST
 
 
+def test_the_speed_of_a_frame_does_not_tell_where_the_car_goes_next(tmp_path: Path) -> None:
+    rows = drive()
+    stops = [*rows[:100], *((FIRST + k, *rows[99][1:]) for k in range(100, 300))]
+    one, other = (
+        read_sdn(release(tmp_path / name, **{"trajectory.csv": csv(way)})) for name, way in (("a", rows), ("b", stops))
+    )
+    np.testing.assert_array_equal(one.trajectory["speed"][:100], other.trajectory["speed"][:100])
+    assert one.trajectory["speed"][99] == pytest.approx(6.0, rel=1e-3)
+
+
 def test_the_car_goes_where_the_file_says(tmp_path: Path) -> None:
     session = read_sdn(release(tmp_path / "log_1"))
     assert session.trajectory["frame"].tolist() == list(range(0, 900, 3))

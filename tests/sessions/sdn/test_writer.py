@@ -11,11 +11,14 @@ import numpy as np
 import pytest
 
 from dorothie_gym.ontology import PhysicalAction, Role
-from dorothie_gym.sessions import Event, EventType, Session, SessionError
+from dorothie_gym.sessions import Event, EventType, Scene, SceneTable, Session, SessionError
+from dorothie_gym.sessions.scene import light_rows
 from dorothie_gym.sessions.sdn import SignVote, read_sdn, settle_sign, write_sdn
+from dorothie_gym.sessions.sdn.layouts import SCENE_FILE
 from dorothie_gym.world.town import load_town
 from tests.sessions.builders import physical, session, utterance
 from tests.sessions.dialogues import TO_KFC, talk
+from tests.sessions.scenes import actors, lights
 from tests.sessions.sdn.builders import csv as csv_of
 from tests.sessions.sdn.builders import drive, release, sample
 
@@ -210,3 +213,37 @@ def test_nothing_is_replaced_and_nothing_is_left_behind(original: Session, tmp_p
     with pytest.raises(SessionError, match="reason is inf"):
         write_sdn(bad, tmp_path / "log_2")
     assert [path.name for path in tmp_path.iterdir()] == ["log_1"]
+
+
+def test_what_was_around_the_car_comes_back(tmp_path: Path) -> None:
+    frames = np.arange(0, 300, 15)
+    around = np.concatenate([actors(k % 3, seed=k) for k in range(len(frames))])
+    offsets = np.concatenate(([0], np.cumsum([k % 3 for k in range(len(frames))])))
+    shown = [light_rows(lights(int(frame))) for frame in frames]
+    scene = Scene(
+        actors=SceneTable(frames, offsets, around),
+        lights=SceneTable(frames, np.arange(len(frames) + 1) * 2, np.concatenate(shown)),
+    )
+    played = replace(session(talk()), scene=scene)
+    again = read_sdn(write_sdn(played, tmp_path / "log_1"))
+    assert again.scene.actors.equals(scene.actors)
+    assert again.scene.lights.equals(scene.lights)
+    assert not again.report.unknown and "files_not_read" not in again.report.facts
+    write_sdn(session(talk()), tmp_path / "log_2")
+    assert not (tmp_path / "log_2" / SCENE_FILE).exists(), "nothing was recorded, nothing is written"
+
+
+def test_surroundings_between_the_frames_that_are_left_go_with_them(tmp_path: Path) -> None:
+    frames = np.array([3, 4, 6])
+    scene = Scene(actors=SceneTable(frames, np.array([0, 1, 2, 3]), actors(3)))
+    again = read_sdn(write_sdn(replace(session(talk()), scene=scene), tmp_path / "log_1"))
+    assert again.scene.actors.frames.tolist() == [3, 6]
+    assert again.scene.actors.rows["key"].tolist() == [100, 102]
+
+
+def test_a_damaged_file_of_surroundings_is_named(tmp_path: Path) -> None:
+    scene = Scene(actors=SceneTable(np.array([3]), np.array([0, 1]), actors(1)))
+    folder = write_sdn(replace(session(talk()), scene=scene), tmp_path / "log_1")
+    (folder / SCENE_FILE).write_bytes(b"PAR1 no")
+    with pytest.raises(SessionError, match=SCENE_FILE):
+        read_sdn(folder)

@@ -6,20 +6,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dorothie_gym.evaluation.features import ObjectKind, columns_of, gather, points
-from dorothie_gym.evaluation.features.perceived import stop_lines
+from dorothie_gym.evaluation.features import columns_of, gather, points
 from dorothie_gym.ontology import PhysicalAction, WeatherParameter
 from dorothie_gym.sessions import (
     ACTOR_DTYPE,
     LIGHT_DTYPE,
     WEATHER_DTYPE,
     ActorKind,
+    ObjectKind,
     Scene,
     SceneTable,
     Session,
     Task,
     trajectory_of,
 )
+from dorothie_gym.sessions.perceived import stop_lines
 from dorothie_gym.world.town import load_town
 from dorothie_gym.world.visibility import CLEAR_SIGHT
 from dorothie_gym.world.weather import Weather

@@ -8,21 +8,44 @@ read within sight by whoever comes towards it. Relative to the car as it was whe
 
 from __future__ import annotations
 
+import enum
 import functools
-from collections.abc import Iterator, Mapping
-from typing import Any, Final
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.evaluation.features.columns import OBJECT_VALUES, ObjectKind
 from dorothie_gym.ontology import OntologyError, PhysicalAction, WeatherParameter
-from dorothie_gym.sessions import Scene, SceneTable, Session
+from dorothie_gym.sessions.scene import Scene, SceneTable
+from dorothie_gym.sessions.session import Session
 from dorothie_gym.world.town import Town
 from dorothie_gym.world.visibility import CLEAR_SIGHT
 from dorothie_gym.world.weather import Weather
 
-Array = NDArray[np.float64]
+Array: TypeAlias = NDArray[np.float64]
+Switches: TypeAlias = Sequence[tuple[int, bool]]
+"""Frames at which the head lights were switched, and whether on."""
+
+
+class ObjectKind(enum.IntEnum):
+    """What an object is: the first five as `ActorKind`, the others a traffic light by what it shows."""
+
+    OTHER = 0
+    VEHICLE = 1
+    CYCLIST = 2
+    PEDESTRIAN = 3
+    PROP = 4
+    LIGHT_GREEN = 5
+    LIGHT_YELLOW = 6
+    LIGHT_RED = 7
+
+
+OBJECT_VALUES: Final = ("distance", "bearing", "ahead", "aside", "heading", "speed", "length", "width")
+"""Columns of `Objects.values`: distance [m], bearing [degrees, positive left of where the car looks], the same place in
+metres ahead and to the left, heading relative to the car's [degrees, positive left], speed [m/s], length and width
+[m]; of a light distance, bearing and place are those of its stop line, and the rest is 0."""
 
 MOST_OBJECTS: Final = 64
 """Objects of a look that are kept, the nearest: more than any batch takes."""
@@ -31,20 +54,21 @@ FACING: Final = 90.0
 """A light is seen by whoever drives in the direction of the lane that it rules, up to this much aslant [degrees]."""
 
 
-def perceived(session: Session, pose: Array, frames: NDArray[np.int64], town: Town | None) -> Iterator[Any]:
+def perceived(
+    scene: Scene, pose: Array, frames: NDArray[np.int64], switches: Switches, town: Town | None
+) -> Iterator[tuple[int, NDArray[np.int64], Array]]:
     """Yields for each look the frame (int), kinds (k,) and values (k, 8) of what was perceived, the nearest first.
 
     Args:
-        session: at 10 Hz.
+        scene: what was recorded around the car.
         pose: (n, 3) x, y [m], heading [degrees, clockwise] of the car.
-        frames: (n,) frames of the poses, rising.
+        frames: (n,) frames of the poses, rising; those of the scene are among them.
+        switches: of the head lights, which are off at first.
         town: the town, if it is known: it tells where the lights are.
     """
-    scene = session.scene
     looks = scene.actors.frames
-    rows = np.searchsorted(frames, looks)  # a scene has no frame that the trajectory lacks
-    at = pose[rows].reshape(-1, 3)
-    sight = _sights(session, looks)
+    at = pose[np.searchsorted(frames, looks)].reshape(-1, 3)
+    sight = _sights(scene.weather, switches, looks)
     actors, lights = _actors(scene.actors, at), _lights(scene, looks, at, town)
     owner = np.concatenate([actors[0], lights[0]])
     kind = np.concatenate([actors[1], lights[1]])
@@ -58,6 +82,42 @@ def perceived(session: Session, pose: Array, frames: NDArray[np.int64], town: To
         start = int(ends[look - 1]) if look else 0
         chosen = slice(start, min(stop, start + MOST_OBJECTS))
         yield frame, kind[chosen], values[chosen]
+
+
+def last_perceived(session: Session, frame: int, town: Town | None) -> tuple[NDArray[np.int64], Array]:
+    """Returns kinds (k,) and values (k, 8) of the last look before a frame; nothing (k = 0) where there was none.
+
+    Args:
+        session: the session, as far as it has come.
+        frame: looks of this frame and later ones do not count.
+        town: as of `perceived`.
+    """
+    scene, trajectory = session.scene, session.trajectory
+    look = _last(scene.actors, frame - 1)
+    row = int(np.searchsorted(trajectory["frame"], look.frames[0])) if len(look) else len(trajectory)
+    if row == len(trajectory):
+        return np.empty(0, dtype=np.int64), np.empty((0, len(OBJECT_VALUES)))
+    there = trajectory[row : row + 1]
+    pose = np.stack([there["x"], there["y"], np.degrees(there["heading"])], axis=1)
+    now = int(look.frames[0])
+    scene = Scene(actors=look, lights=_last(scene.lights, now), weather=_last(scene.weather, now))
+    (_, kinds, values), *_ = perceived(scene, pose, look.frames, light_switches(session), town)
+    return kinds, values
+
+
+def light_switches(session: Session) -> Switches:
+    """Returns the frames at which the head lights were switched, and whether on."""
+    switched = [act for act in session.physical_actions if act.action is PhysicalAction.LIGHT_CHANGE]
+    return [(act.frame, bool(act.up)) for act in switched]
+
+
+def _last(table: SceneTable, frame: int) -> SceneTable:
+    """The last record at a frame or before, alone."""
+    k = int(np.searchsorted(table.frames, frame, side="right")) - 1
+    if k < 0:
+        return SceneTable(table.frames[:0], table.offsets[:1], table.rows[:0])
+    start, stop = int(table.offsets[k]), int(table.offsets[k + 1])
+    return SceneTable(table.frames[k : k + 1], np.array([0, stop - start]), table.rows[start:stop])
 
 
 def _actors(table: SceneTable, at: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
@@ -94,6 +154,7 @@ def _lights(
     return owner[shown], ObjectKind.LIGHT_GREEN + rows["state"][shown].astype(np.int64), values[shown]
 
 
+@functools.lru_cache(maxsize=16)
 def stop_lines(town: Town) -> Mapping[int, tuple[float, float, float]]:
     """Returns where each light's first lane ends, by the light's id: x, y [m], heading [degrees, clockwise]."""
     lit = {signal for programme in town.programmes for signal in programme.signals}
@@ -102,7 +163,7 @@ def stop_lines(town: Town) -> Mapping[int, tuple[float, float, float]]:
         if signal.id in lit and signal.lanes:
             lane = town.lanes[signal.lanes[0]]
             lines[signal.id] = (*lane.points[-1, :2].tolist(), float(np.degrees(lane.headings[-1])))
-    return lines
+    return MappingProxyType(lines)
 
 
 def _relative(places: Array, at: Array) -> Array:
@@ -118,14 +179,12 @@ def _wrap(degrees: Array) -> Array:
     return (degrees + 180.0) % 360.0 - 180.0
 
 
-def _sights(session: Session, looks: NDArray[np.int64]) -> Array:
+def _sights(weather: SceneTable, switches: Switches, looks: NDArray[np.int64]) -> Array:
     """How far things were seen at each look [m]."""
-    weather = session.scene.weather
     record = np.searchsorted(weather.frames, looks, side="right") - 1
-    switched = [act for act in session.physical_actions if act.action is PhysicalAction.LIGHT_CHANGE]
     lamps = np.zeros(len(looks), dtype=np.bool_)
-    for act in switched:
-        lamps[looks >= act.frame] = bool(act.up)
+    for frame, on in switches:
+        lamps[looks >= frame] = on
     found = np.full(len(looks), CLEAR_SIGHT)
     if len(weather):
         distinct, which = np.unique(weather.rows, return_inverse=True)

@@ -20,10 +20,22 @@ from dorothie_gym.ontology import (
     parse_landmark,
     parse_street,
 )
-from dorothie_gym.sessions import FRAME_RATE, MoveRecord, Task, View, history_angle
+from dorothie_gym.sessions import (
+    FRAME_RATE,
+    OBJECT_VALUES,
+    WAY_LENGTH,
+    MoveRecord,
+    ObjectKind,
+    Session,
+    Task,
+    View,
+    history_angle,
+    last_perceived,
+)
 from dorothie_gym.spaces import NO_MOVE, LandmarkColumn, Observation, SpaceLimits
 from dorothie_gym.spaces.limits import TEXT_CHARACTERS
 from dorothie_gym.spaces.observations import MAX_UTTERANCE
+from dorothie_gym.world.town import Town
 
 HISTORY: Final = 16
 """Moves and physical actions of the history that are in an observation; the oldest are left out."""
@@ -53,6 +65,10 @@ def history_space(task: Task, limits: SpaceLimits) -> spaces.Dict:
             "action_times": _box(HISTORY, low=0.0),
             "pose": _box(3),
             "speed": _box(1),
+            "way": _box(WAY_LENGTH, 4),
+            "way_length": spaces.Discrete(WAY_LENGTH + 1),
+            "object_kinds": spaces.MultiDiscrete([len(ObjectKind) + 1] * limits.objects),
+            "objects": _box(limits.objects, len(OBJECT_VALUES)),
             "street_names": spaces.MultiDiscrete([len(StreetName)] * limits.streets),
             "landmarks": _box(limits.landmarks, len(LandmarkColumn)),
         }
@@ -60,7 +76,7 @@ def history_space(task: Task, limits: SpaceLimits) -> spaces.Dict:
 
 
 def encode_view(view: View, limits: SpaceLimits) -> Observation:
-    """Returns the observation of a view, in `history_space` of its task."""
+    """Returns the observation of a view, in `history_space` of its task but for what `encode_objects` adds."""
     moves, actions = view.moves[: -HISTORY - 1 : -1], view.actions[: -HISTORY - 1 : -1]  # newest first
     car = view.car
     observation: Observation = {
@@ -75,13 +91,31 @@ def encode_view(view: View, limits: SpaceLimits) -> Observation:
         "action_angles": _padded([history_angle(action) for action in actions], 0.0),
         "action_times": _padded([action.frame / FRAME_RATE for action in actions], 0.0),
         "pose": np.array([car.x, car.y, car.heading] if car else [0.0, 0.0, 0.0]),
-        "speed": np.array([car.speed if car else 0.0]),
+        "speed": np.nan_to_num([car.speed if car else 0.0]),  # NaN: the recording does not know it
+        "way": _way(view),
+        "way_length": np.int64(len(view.way)),
         "street_names": _streets(view, limits),
         "landmarks": _landmarks(view, limits),
     }
     if view.task is Task.UFN:
         observation["utterance"] = clean_text(view.utterance)
     return observation
+
+
+def encode_objects(session: Session, frame: int, town: Town | None, limits: SpaceLimits) -> Observation:
+    """Returns the part of an observation that tells what was perceived around the car at the last look before a frame.
+
+    Args:
+        session: the session, as far as it has come.
+        frame: of the point.
+        town: the session's, where it is known: it tells where traffic lights are.
+        limits: how many objects there are room for, the nearest.
+    """
+    kinds, values = last_perceived(session, frame, town)
+    numbers, table = np.zeros(limits.objects, dtype=np.int64), np.zeros((limits.objects, len(OBJECT_VALUES)))
+    count = min(len(kinds), limits.objects)
+    numbers[:count], table[:count] = 1 + kinds[:count], values[:count]
+    return {"object_kinds": numbers, "objects": table}
 
 
 def act_space() -> spaces.Dict:
@@ -114,6 +148,13 @@ def check_action(action: object, space: spaces.Dict) -> Mapping[str, Any]:
 def clean_text(text: str) -> str:
     """Returns the text as a `Text` space takes it: unknown characters become "?", and its end is cut off if long."""
     return "".join(character if character in TEXT_CHARACTERS else "?" for character in text)[:MAX_UTTERANCE]
+
+
+def _way(view: View) -> NDArray[np.float64]:
+    table = np.zeros((WAY_LENGTH, 4))
+    states = [(state.x, state.y, state.heading, state.speed) for state in reversed(view.way)]
+    table[: len(states)] = np.nan_to_num(np.array(states).reshape(-1, 4))
+    return table
 
 
 def _padded(values: Sequence[float], filler: float) -> NDArray[Any]:
