@@ -181,6 +181,12 @@ class TestEvaluate:
         assert read["models"] == drawn["models"] and read["seed"] == 5
         assert read["about"][str(file)]["model"] == "random"
 
+    def test_several_seeds_of_a_floor_give_an_interval(self, sessions: Path) -> None:
+        table = loaded("evaluate", "--corpus", sessions, "--model", "random", "--seed", 3, "--seeds", 2, "--json")
+        figure = table["models"]["random"]["all"]["ufn_move_accuracy"]
+        assert sorted(figure["values"]) == ["3", "4"] and figure["seeds"] == 2 and figure["half_width"] is not None
+        assert "ufn_move_accuracy" not in table, "a single run only"
+
     def test_the_table_names_sessions_and_counts_points(self, sessions: Path) -> None:
         result = call("evaluate", "--sessions", sessions, "--tasks", "ufn,nfd")
         assert result.exit_code == 0

@@ -33,6 +33,9 @@ _REQUIRED: Final = {"version": "int", "model": "str", "seed": "int", "task": "st
 _ANSWERS: Final = {"move": "str", "action": "str", "angle": "float", "skipped": "str"}
 _WANTED: Final = {"int": "whole numbers", "str": "texts", "float": "numbers"}
 
+_LAST_EVENT: Final = 2**31
+"""No session has more events."""
+
 _MOVES: Final = {move.label: int(move) for move in DialogueMove}
 _ACTIONS: Final = {action.label: action.nfd_class for action in NAVIGATION_ACTIONS}
 _TASKS: Final = tuple(Task)
@@ -76,11 +79,14 @@ def read_about(path: Path | str) -> dict[str, Any]:
     """Returns what a file tells of how its predictions were made; empty where it tells nothing.
 
     Raises:
-        PredictionError: it is no parquet file.
+        PredictionError: it is no parquet file, or what it tells is no JSON.
         OSError: it cannot be read.
     """
     told = (_open(Path(path)).schema.metadata or {}).get(ABOUT)
-    value = {} if told is None else json.loads(told)
+    try:
+        value = {} if told is None else json.loads(told)
+    except ValueError as error:
+        raise PredictionError(f"{path}: {ABOUT.decode()} in its metadata is no JSON ({error}); {_PAGE}") from None
     return value if isinstance(value, dict) else {"about": value}
 
 
@@ -90,9 +96,11 @@ def _open(path: Path) -> pa.Table:
 
     content = path.read_bytes()
     try:
-        return pq.ParquetFile(pa.BufferReader(content)).read()
+        table = pq.ParquetFile(pa.BufferReader(content)).read()
+        table.validate(full=True)
     except (pa.ArrowException, OSError) as error:  # damaged pages raise OSError
-        raise PredictionError(f"{path}: is no parquet file ({error}); {_PAGE}") from None
+        raise PredictionError(f"{path}: is no parquet file, or damaged ({error}); {_PAGE}") from None
+    return table
 
 
 def _read_file(path: Path) -> Iterator[TaskPredictions]:
@@ -162,6 +170,8 @@ def _check_required(rows: _Rows) -> None:
             wrong.append(f"{rows.name(row)}: {missing} is null; it must be given in every row")
         elif (version := rows.columns["version"][row]) != VERSION:
             wrong.append(f"{rows.name(row)}: version is {version}; this release reads version {VERSION}")
+        elif not 0 <= rows.columns["event"][row] <= _LAST_EVENT:
+            wrong.append(f"{rows.name(row)}: events are counted from 0 within their session")
         elif (task := rows.columns["task"][row]) not in tasks:
             wrong.append(f"{rows.name(row)}: task is {task!r}; it must be one of {', '.join(sorted(tasks))}")
     _refuse(rows.source, wrong)

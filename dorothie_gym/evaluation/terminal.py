@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from rich.console import Console
@@ -22,8 +22,9 @@ from dorothie_gym.evaluation.catalogue import (
     title_of,
 )
 from dorothie_gym.evaluation.findings import Finding, Verdict
+from dorothie_gym.evaluation.intervals import Estimate
 from dorothie_gym.evaluation.labels import ALL
-from dorothie_gym.evaluation.paper import paper_figure
+from dorothie_gym.evaluation.paper import PaperFigure, paper_figure
 from dorothie_gym.evaluation.report import (
     NONE,
     claim_line,
@@ -39,6 +40,9 @@ from dorothie_gym.evaluation.table import ResultsTable
 from dorothie_gym.sessions import Task
 from dorothie_gym.sessions.statistics import Handled
 
+WIDE: Final = 110
+"""From this width on the tasks stand side by side."""
+
 NOTES: Final = 8
 """So many notes are shown; the JSON has all."""
 
@@ -51,8 +55,9 @@ def print_table(table: ResultsTable, console: Console) -> None:
     """Prints all models: figures by part of the corpus, ours above the paper's, the findings, and what was counted."""
     for part in table.parts:
         console.print(f"[bold]{part_title(part)}[/]")
-        console.print(_figures(table, part))
-        console.print()
+        for tasks in _side_by_side(table, console):
+            console.print(_figures(table, part, tasks))
+            console.print()
     console.print(legend(table).replace(" / the paper's", ", below them in grey the paper's"), style="dim")
     console.print()
     for finding in table.findings():
@@ -64,7 +69,11 @@ def print_table(table: ResultsTable, console: Console) -> None:
 def print_details(table: ResultsTable, model: str, console: Console) -> None:
     """Prints one model: every metric by part, by what is handled, and the accuracy of each class."""
     console.print(f"[bold]{escape(model)}[/]")
-    for shown in (_metrics(table, model), _by_handling(table, model), *_classes(table, model)):
+    for make in (_metrics, _by_handling):
+        for tasks in _side_by_side(table, console):
+            console.print(make(table, model, tasks))
+            console.print()
+    for shown in _classes(table, model):
         console.print(shown)
         console.print()
 
@@ -84,21 +93,32 @@ def print_counts(table: ResultsTable, console: Console) -> None:
         console.print(f"... and {len(told) - NOTES - 1} more; --json has all", style="dim")
 
 
-def _figures(table: ResultsTable, part: str) -> Table:
+def _side_by_side(table: ResultsTable, console: Console) -> Sequence[Sequence[Task]]:
+    """The tasks that have a table together: all of them where the terminal is wide enough, else each its own."""
+    return [table.tasks] if console.width >= WIDE else [(task,) for task in table.tasks]
+
+
+def _figures(table: ResultsTable, part: str, tasks: Sequence[Task]) -> Table:
+    names = {TASK_NAMES[task] for task in tasks}
+    keys = [key for key in SHOWN if task_of(key) in names]
     shown = Table(box=None, pad_edge=False)
     shown.add_column("model", vertical="top")
-    for key in SHOWN:
+    for key in keys:
         shown.add_column(f"{task_of(key)}\n{shown_title(key)}", justify="right")
     for model in table.models:
-        shown.add_row(escape(row_title(table, model)), *(_cell(table, model, part, key) for key in SHOWN))
+        shown.add_row(escape(row_title(table, model)), *(_cell(table, model, part, key) for key in keys))
     return shown
 
 
 def _cell(table: ResultsTable, model: str, part: str, key: str) -> str:
-    ours = percent(table.estimate(model, part, key)).replace(" ± ", " ±")
+    ours = _percent(table.estimate(model, part, key))
     text = f"[bold]{ours}[/]" if model in table.best(part, key) else ours
     paper = paper_figure(model, part, key) if has_paper_figure(key) else None
-    return text if paper is None else f"{text}\n[dim]{percent(paper).replace(' ± ', ' ±')}[/]"
+    return text if paper is None else f"{text}\n[dim]{_percent(paper)}[/]"
+
+
+def _percent(figure: Estimate | PaperFigure) -> str:
+    return percent(figure).replace(" ± ", " ±")
 
 
 def _print_finding(finding: Finding, console: Console) -> None:
@@ -111,15 +131,15 @@ def _print_finding(finding: Finding, console: Console) -> None:
     console.print()
 
 
-def _metrics(table: ResultsTable, model: str) -> Table:
-    columns = [(task, part) for task in table.tasks for part in table.parts]
+def _metrics(table: ResultsTable, model: str, tasks: Sequence[Task]) -> Table:
+    columns = [(task, part) for task in tasks for part in table.parts]
     shown = _grid("", *(_heading(task, part) for task, part in columns))
     points = [str(table.points(model, part, task)) for task, part in columns]
     shown.add_row("points scored", *points, style="dim")
-    names = dict.fromkeys(name for task in table.tasks for name in metrics_of(task) if _is_own(name))
+    names = dict.fromkeys(name for task in tasks for name in metrics_of(task) if _is_own(name))
     for name in names:
         cells = [
-            percent(table.estimate(model, part, f"{task}_{name}")) if name in metrics_of(task) else ""
+            _percent(table.estimate(model, part, f"{task}_{name}")) if name in metrics_of(task) else ""
             for task, part in columns
         ]
         shown.add_row(metric_title(name), *cells)
@@ -135,8 +155,8 @@ def _heading(task: Task, part: str) -> str:
     return TASK_NAMES[task] if part == ALL else f"{TASK_NAMES[task]}\n{part}"
 
 
-def _by_handling(table: ResultsTable, model: str) -> Table:
-    keys = [key for key in COLUMNS if task_of(key) in {TASK_NAMES[task] for task in table.tasks}]
+def _by_handling(table: ResultsTable, model: str, tasks: Sequence[Task]) -> Table:
+    keys = [key for key in COLUMNS if task_of(key) in {TASK_NAMES[task] for task in tasks}]
     shown = _grid(
         "exchanges that handle", *(title_of(key).replace(" accuracy", "").replace(" ", "\n", 1) for key in keys)
     )
@@ -145,7 +165,7 @@ def _by_handling(table: ResultsTable, model: str) -> Table:
             cells = []
             for key in keys:
                 count = table.points(model, part, Task(key.partition("_")[0]), kind)
-                figure = percent(table.estimate(model, part, key, kind))
+                figure = _percent(table.estimate(model, part, key, kind))
                 cells.append(f"{figure} [dim]({count})[/]" if count else NONE)
             what = "nothing" if kind is Handled.NONE else f"{kind} exceptions"
             shown.add_row(what if part == ALL else f"{what}, {part}", *cells)
@@ -166,7 +186,7 @@ def _classes(table: ResultsTable, model: str) -> Iterator[Table]:
                 estimate = estimates[part].get(name)
                 seeds = max(len(table.runs_of(model)), 1)
                 count = 0 if matrix is None else int(matrix[order.index(name)].sum()) // seeds
-                cells.append(NONE if estimate is None else f"{percent(estimate)} [dim]({count})[/]")
+                cells.append(NONE if estimate is None else f"{_percent(estimate)} [dim]({count})[/]")
             shown.add_row(name, *cells)
         yield shown
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +100,7 @@ def test_several_files_are_put_together_by_model_seed_and_task(tmp_path: Path) -
         ({**DRIVE, "angle": float("nan")}, "angle is nan"),
         ({**ROW, "task": "toto"}, "task is 'toto'; it must be one of nfd, rfn, ufn"),
         ({**ROW, "version": 2}, "version is 2; this release reads version 1"),
+        ({**ROW, "event": -1}, "events are counted from 0 within their session"),
         ({**ROW, "event": None}, "event is null; it must be given in every row"),
         ({**ROW, "event": 1}, "row 0 is of the same point, model mine and seed 3; leave one of them out"),
     ],
@@ -133,6 +135,29 @@ def test_what_is_no_parquet_file_is_told(tmp_path: Path) -> None:
     (tmp_path / "p.parquet").write_text("session,event\n")
     with pytest.raises(PredictionError, match=r"p\.parquet: is no parquet file"):
         read_predictions(tmp_path / "p.parquet")
+
+
+@pytest.mark.parametrize("offset", range(4, 400, 41))
+def test_damage_is_refused_or_does_no_harm(tmp_path: Path, offset: int) -> None:
+    whole = file(tmp_path, ROW, DRIVE).read_bytes()
+    (tmp_path / "d.parquet").write_bytes(whole[:offset] + bytes([whole[offset] ^ 0xA7]) + whole[offset + 1 :])
+    with contextlib.suppress(PredictionError):
+        read_predictions(tmp_path / "d.parquet")
+    (tmp_path / "d.parquet").write_bytes(whole[:offset])
+    with pytest.raises(PredictionError, match="is no parquet file, or damaged"):
+        read_predictions(tmp_path / "d.parquet")
+
+
+def test_what_a_file_tells_must_be_json(tmp_path: Path) -> None:
+    table = pa.Table.from_pylist([ROW]).replace_schema_metadata({"dorothie_gym.about": "hashing"})
+    pq.write_table(table, tmp_path / "p.parquet")
+    with pytest.raises(PredictionError, match="about in its metadata is no JSON"):
+        read_about(tmp_path / "p.parquet")
+
+
+def test_rows_that_name_no_slot_at_all_are_read(tmp_path: Path) -> None:
+    (acts,) = read_predictions(file(tmp_path, {**ROW, "slots": []}))
+    assert isinstance(acts.predicted, ActPredictions) and not acts.predicted.slots.any()
 
 
 def test_how_predictions_were_made_is_kept(tmp_path: Path) -> None:

@@ -58,6 +58,7 @@ def test_latex_has_as_many_cells_in_each_row_and_escapes_names(table: ResultsTab
     assert r"a|b\_c" in text and r"TOTO ($-$ Action History)" in text
     assert r"$\mathbf{100.0_{\pm 0.0}}$" in text and r"\textcolor{gray}{$40.9_{\pm 3.9}$}" in text
     assert text.count(r"\begin{") == text.count(r"\end{") and r"\toprule" in text
+    assert text.replace(r"\_", "").count("{") == text.count("}")
 
 
 def test_letters_that_latex_reads_otherwise_are_escaped() -> None:
@@ -81,8 +82,8 @@ def test_report_is_written_with_its_pictures(table: ResultsTable, tmp_path: Path
     assert page["models"]["TOTO"]["seen"]["ufn_move_accuracy"]["seeds"] == 2
 
 
-def shown(table: ResultsTable, model: str | None = None) -> str:
-    console = Console(width=150, record=True, file=io.StringIO())
+def shown(table: ResultsTable, model: str | None = None, width: int = 150) -> str:
+    console = Console(width=width, record=True, file=io.StringIO())
     if model is None:
         print_table(table, console)
     else:
@@ -100,3 +101,8 @@ def test_terminal_shows_the_table_and_the_papers_figures_below(table: ResultsTab
 def test_terminal_shows_classes_and_exceptions_of_a_model(table: ResultsTable) -> None:
     text = shown(table, "TOTO")
     assert "environmental exceptions, seen" in text and "UfN, right of" in text
+
+
+def test_narrow_terminals_lose_nothing(table: ResultsTable) -> None:
+    for model in (None, "TOTO"):
+        assert "…" not in shown(table, model, width=80)
