@@ -67,7 +67,7 @@ def measure(
         ours_optimiser = torch.optim.AdamW(ours.parameters(), lr=1e-5, weight_decay=1e-4, fused=True)
         published_optimiser = torch.optim.AdamW(published.parameters(), lr=1e-5, weight_decay=1e-4)
         left, right = torch.randn(_SIDE, _SIDE), torch.randn(_SIDE, _SIDE)
-        works = {
+        works: dict[str, Callable[[], float]] = {
             "matrix rate": lambda: timed(lambda: [left @ right for _ in range(4)]) / 4,
             "training": lambda: timed(lambda: _train(ours, ours_optimiser, batch)) / batch_size,
             "published training": lambda: (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 import torch
 
@@ -26,6 +26,8 @@ from dorothie_gym.baselines.toto import (
 )
 from dorothie_gym.baselines.training import Model
 
+Kind = Literal["toto", "reader", "ppo", "cloning"]
+
 Change: TypeAlias = Callable[[TOTOConfig], TOTOConfig]
 
 SIZES: Final[Mapping[str, Callable[[], TOTOConfig]]] = MappingProxyType(
@@ -43,16 +45,16 @@ class Row:
     Attributes:
         name: as the paper's table has it.
         command: as it is written on a command line and in paths.
-        change: what makes its config from that of TOTO; None where `missing` says why it cannot be run.
+        change: what makes its config from that of TOTO; None for a policy, and where it cannot be run.
         missing: why it cannot be run, or empty.
-        ours: whether it is the Junction Reader.
+        kind: what is trained: "toto" (with its ablations and rivals), our "reader", or a policy by "ppo" or "cloning".
     """
 
     name: str
     command: str
     change: Change | None = None
     missing: str = ""
-    ours: bool = False
+    kind: Kind = "toto"
 
 
 def _bert(config: TOTOConfig) -> TOTOConfig:
@@ -89,9 +91,11 @@ ROWS: Final[tuple[Row, ...]] = (
     Row(name="Map Encoder Only", command="map", change=_only(Channel.MAP)),
     Row(name="E.T.", command="et", change=_only(*_EPISODIC)),
     Row(name="E.T. (+ Fine-tuned BERT)", command="et-bert", change=lambda config: _bert(config.only(_EPISODIC))),
-    Row(name="Junction Reader (ours)", command="reader", change=reader_config, ours=True),
+    Row(name="Behaviour Cloning", command="cloning", kind="cloning"),
+    Row(name="PPO", command="ppo", kind="ppo"),
+    Row(name="Junction Reader (ours)", command="reader", change=reader_config, kind="reader"),
 )
-"""The rows of the paper's table, in its order, and our own model."""
+"""The rows of the paper's table, in its order; then policies, and our own model."""
 
 
 class EpisodicTransformer(TOTO):
@@ -115,10 +119,10 @@ def make_model(row: Row, size: str, material: Material, seed: int) -> Model:
     if size not in SIZES:
         raise ValueError(f"there is no config {size!r}; choose from {', '.join(SIZES)}")
     if row.change is None:
-        raise ValueError(f"{row.name} cannot be run: {row.missing}")
+        raise ValueError(f"{row.name} is no model of its own: {row.missing or 'it is a policy'}")
     torch.manual_seed(seed)
     config = row.change(SIZES[size]())
-    if row.ours:
+    if row.kind == "reader":
         return _reader(config, material)
     kind = EpisodicTransformer if set(config.channels) == set(_EPISODIC) else TOTO
     return kind(config, Towns(material.columns.towns), make_texts(config, material))

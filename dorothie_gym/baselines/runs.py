@@ -16,7 +16,7 @@ from dorothie_gym.baselines.inputs import TASKS
 from dorothie_gym.baselines.material import TEST, TRAIN, VALIDATION, Material
 from dorothie_gym.baselines.outputs import Predicted
 from dorothie_gym.baselines.rows import Row, find_row, make_model
-from dorothie_gym.baselines.training import Trained, predict, train
+from dorothie_gym.baselines.training import CheckpointError, Trained, predict, train
 from dorothie_gym.baselines.training.curves import draw_curves
 from dorothie_gym.baselines.training.trainer import OnEpoch
 from dorothie_gym.evaluation import ActionPredictions, ActPredictions, TaskPredictions, write_predictions
@@ -69,6 +69,8 @@ def run(job: Job, material: Material, on_epoch: OnEpoch = lambda epoch: None) ->
         OSError: the folder cannot be written.
     """
     about = {"model": job.row.name, "version": __version__, **material.about()}
+    if job.row.kind in ("ppo", "cloning"):
+        return _run_policy(job, about)
     model = make_model(job.row, job.size, material, job.seed)
     spec = model.spec
     started = time.perf_counter(), time.process_time()
@@ -90,6 +92,28 @@ def run(job: Job, material: Material, on_epoch: OnEpoch = lambda epoch: None) ->
     write_predictions(job.folder / PREDICTIONS_FILE, rows, about={**about, "config": model.config.to_json()})
     draw_curves(trained.epochs, job.row.name, job.folder / CURVES_FILE)
     result = {**about, **_told(job, model, trained), "seconds": round(wall, 3), "cpu_seconds": round(cpu, 3)}
+    write_atomically(kept, json.dumps(result, indent=1) + "\n")
+    return result
+
+
+def _run_policy(job: Job, about: dict[str, Any]) -> dict[str, Any]:
+    """Trains and tests policies, unless that was done before."""
+    # imported here: stable-baselines3 is slow to import
+    from dorothie_gym.baselines.reinforcement import run_policy
+
+    kept = job.folder / RESULT_FILE
+    if (job.folder / PREDICTIONS_FILE).is_file() and kept.is_file():
+        done = dict(json.loads(kept.read_text(encoding="utf-8")))
+        if done.get("corpus") != about["corpus"]:
+            message = f"{kept}: was trained on another corpus than is asked for now; choose another folder or delete it"
+            raise CheckpointError(message)
+        return done
+    started = time.perf_counter()
+    predicted, told = run_policy(job.corpus, job.row.kind, job.seed, job.folder, job.row.name)
+    write_predictions(job.folder / PREDICTIONS_FILE, predicted, about=about)
+    seconds = round(time.perf_counter() - started, 3)
+    of = {"command": job.model, "size": job.size, "seed": job.seed, "folder": str(job.folder)}
+    result = {**about, **of, "tasks": told, "seconds": seconds}
     write_atomically(kept, json.dumps(result, indent=1) + "\n")
     return result
 

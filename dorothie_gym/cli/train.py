@@ -68,6 +68,8 @@ def train(
         return
     _show(table)
     for result in results:
+        if "epochs" not in result:
+            continue
         stdout().print(
             f"Seed {result['seed']}: {result['epochs']} epochs, best {result['best_epoch']}, validation loss "
             f"{result['validation_loss']:.4f}, {result['seconds']:.0f} s; {result['folder']}",

@@ -143,7 +143,7 @@ class GraphAttention(nn.Module):
         itself = torch.arange(count, device=nodes.device)
         source, target = torch.cat((edges, itself.expand(2, -1)), dim=1)  # (E + L,) each
         own = torch.full_like(itself, self.of_edge.num_embeddings - 1)
-        hidden = self.project(nodes).view(count, self.heads, -1)  # (L, heads, outputs/heads)
+        hidden = self.project(nodes).view(count, *self.to_source.shape)  # (L, heads, outputs/heads)
         score = (hidden * self.to_source).sum(-1).index_select(0, source)
         score = score + (hidden * self.to_target).sum(-1).index_select(0, target)
         score = F.leaky_relu(score + self.of_edge(torch.cat((edge_types, own))), 0.2)  # (E + L, heads)
