@@ -16,7 +16,9 @@ EXITS: Final = 5
 
 _HOPS: Final = 24
 _START_YAW, _END_YAW = FEATURES.index("start_yaw"), FEATURES.index("end_yaw")
-_START, _END = slice(0, 2), slice(6, 8)
+
+END: Final = slice(FEATURES.index("end_x"), FEATURES.index("end_y") + 1)
+"""Columns of the place where a lane ends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +51,7 @@ def exit_table(graph: TownGraph) -> ExitTable:
         ways = sorted(ways)[:EXITS]
         for column, (turn, target) in enumerate(ways):
             angle[row, column], lane[row, column] = turn, target
-    place = graph.lanes[np.maximum(lane, 0)][..., _END] if count else np.zeros((0, EXITS, 2))
+    place = graph.lanes[np.maximum(lane, 0)][..., END] if count else np.zeros((0, EXITS, 2))
     return ExitTable(angle, lane, place.astype(np.float32), lane >= 0, distance)
 
 

@@ -15,7 +15,7 @@ from torch.nn import functional as F
 from dorothie_gym.baselines.encoders import PAD
 from dorothie_gym.baselines.inputs import NFD, TASKS, UFN, Inputs, Labels
 from dorothie_gym.baselines.outputs import TAKES_ANGLE, TAKES_SIDE, Predicted, allowed_angle
-from dorothie_gym.baselines.reader.exits import EXITS, exit_table
+from dorothie_gym.baselines.reader.exits import END, EXITS, exit_table
 from dorothie_gym.baselines.reader.mentions import mentions
 from dorothie_gym.baselines.toto.config import Channel, TOTOConfig
 from dorothie_gym.baselines.toto.layers import time_encoding
@@ -104,12 +104,19 @@ class JunctionReader(TOTO):
     exit_place: Tensor
     exit_there: Tensor
     exit_distance: Tensor
+    lane_end: Tensor
+    lane_street: Tensor
 
     def _keep_exits(self, columns: Columns, towns: Towns) -> None:
         tables = [exit_table(graph) for graph in columns.towns]
         for name in ("angle", "lane", "place", "there", "distance"):
             values = torch.cat([torch.from_numpy(getattr(table, name)) for table in tables])
-            self.register_buffer(f"exit_{name}", values, persistent=False)
+            nowhere = torch.zeros(1, *values.shape[1:], dtype=values.dtype)  # the last row, of a lane not known: -1
+            self.register_buffer(f"exit_{name}", torch.cat((values, nowhere)), persistent=False)
+        ends = torch.cat((towns.lanes[:, END], towns.lanes.new_zeros(1, 2))) * METRES
+        self.register_buffer("lane_end", ends, persistent=False)
+        streets = torch.cat((towns.street, towns.street.new_full((1,), -1)))
+        self.register_buffer("lane_street", streets, persistent=False)
 
     # --- reading ------------------------------------------------------------------------------------------------------
 
@@ -215,17 +222,15 @@ class JunctionReader(TOTO):
         """Tokens of the exits of the next junction (B, X, d), mask and angles (B, X), how far it is (B,) [m]."""
         lane, pose = _newest(inputs["window_lane"], inputs["window_mask"]), _newest_pose(inputs)
         row = self.towns.lane_rows(inputs["town"], lane)  # (B,)
-        safe = row.clamp(min=0)
-        there = self.exit_there[safe] & (row >= 0)[:, None]
-        angles, places = self.exit_angle[safe], self.exit_place[safe]
-        end = self.towns.lanes[safe, 6:8] * METRES
-        distance = self.exit_distance[safe] + (end - pose[:, :2]).norm(dim=-1)
+        there, angles, places = self.exit_there[row], self.exit_angle[row], self.exit_place[row]
+        end = self.lane_end[row]
+        distance = self.exit_distance[row] + (end - pose[:, :2]).norm(dim=-1)
         mark, known = self._wanted_place(inputs)
         turn, way, far = torch.deg2rad(angles), places - end[:, None], mark[:, None] - places
         nearer = (mark - end).norm(dim=-1)[:, None] - far.norm(dim=-1)
         along = F.cosine_similarity(way, (mark - end)[:, None], dim=-1)
         seen = known[:, None].expand(along.shape)
-        street = self._street_names(inputs, self.exit_lane[safe])
+        street = self._street_names(inputs, torch.where(there, self.exit_lane[row], -1))
         numbers = torch.stack(
             (turn.cos(), turn.sin(), (angles.abs() < 30).float(), (angles >= 30).float(), (angles <= -30).float(),
              seen.float(), along * seen, (nearer / METRES) * seen), dim=-1,
@@ -236,7 +241,7 @@ class JunctionReader(TOTO):
     def _street_names(self, inputs: Inputs, lane: Tensor) -> Tensor:
         """Vectors of the names of the streets of lanes (B, X, E); zeros where a lane has none."""
         row = self.towns.lane_rows(inputs["town"], lane)
-        street = torch.where(row >= 0, self.towns.street[row.clamp(min=0)], -1)  # (B, X)
+        street = torch.where(row >= 0, self.lane_street[row], -1)  # (B, X)
         names = inputs["street_text"]  # (B, R)
         known = (street >= 0) & (street < names.shape[1])
         text = names.gather(1, torch.where(known, street, 0))

@@ -201,9 +201,11 @@ class TOTO(Model):
         sums = sums.index_add(0, towns.member_street, lanes.index_select(0, towns.members))
         counts = lanes.new_zeros(towns.streets).index_add(0, towns.member_street, lanes.new_ones(len(towns.members)))
         means = sums / counts.clamp(min=1.0).unsqueeze(-1)  # (s, lane)
+        means = torch.cat((means, means.new_zeros(1, means.shape[1])))  # of a street whose lanes are not known
         mask = inputs["street_mask"]
-        street = towns.street_start[town][:, None] + torch.arange(mask.shape[1], device=town.device)
-        mean = nn.functional.embedding(torch.where(mask, street, 0), means)  # (B, R, lane)
+        number = torch.arange(mask.shape[1], device=town.device)
+        street = torch.where(number < towns.street_count[town][:, None], towns.street_start[town][:, None] + number, -1)
+        mean = nn.functional.embedding(street % len(means), means)  # (B, R, lane)
         streets = self.street(torch.cat((mean, self.texts(inputs["street_text"])), dim=-1))  # (B, R, d)
 
         known_landmarks = inputs["landmark_mask"]

@@ -35,7 +35,7 @@ class Towns(nn.Module):
         town: (L,) town of each lane.
         edges: (2, E) from and to.
         edge_types: (E,).
-        lane_start, street_start: (towns,) first lane and first street of each town.
+        lane_start, street_start, street_count: (towns,) first lane, first street and number of streets of each town.
         members, member_street: (m,) a lane of a street, and the street.
     """
 
@@ -48,6 +48,7 @@ class Towns(nn.Module):
     edge_types: Tensor
     lane_start: Tensor
     street_start: Tensor
+    street_count: Tensor
     members: Tensor
     member_street: Tensor
 
@@ -76,6 +77,7 @@ class Towns(nn.Module):
         values["lanes"] = values["lanes"].float()
         values["edges"] = values["edges"].T.contiguous()
         values["lane_start"], values["street_start"] = tensor(first_lane[:-1]), tensor(first_street[:-1])
+        values["street_count"] = tensor(np.array(streets))
         for name, value in values.items():
             self.register_buffer(name, value, persistent=False)
 
