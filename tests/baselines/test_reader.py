@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 import torch
 
+from dorothie_gym.baselines.inputs import NFD
 from dorothie_gym.baselines.reader import JunctionReader, exit_table, mentions, reader_config
 from dorothie_gym.baselines.reader.mentions import label_words
 from dorothie_gym.baselines.toto import FrozenTexts, Towns
 from dorothie_gym.evaluation.features import build
-from dorothie_gym.ontology import LABELS, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.ontology import LABELS, LandmarkName, ObjectClass, PhysicalAction, StreetName
 from dorothie_gym.ontology.labels import LABEL_INDEX
 from dorothie_gym.world.town.graph import EDGE_TYPES, FEATURES, EdgeType
 from tests.baselines import samples
@@ -99,7 +100,12 @@ def test_the_order_of_a_batch_does_not_matter():
 def test_every_weight_learns():
     model = make((crossing(),))
     model.train()
-    model.loss(samples.inputs(60), samples.labels(60)).backward()
+    given, truth = samples.inputs(60), samples.labels(60)
+    given["window_lane"] = torch.zeros_like(given["window_lane"])
+    decides, turn = truth.task == NFD, PhysicalAction.J_TURN.nfd_class
+    angle = torch.where(decides, 90.0 - 180.0 * (torch.arange(60) % 2), truth.angle)
+    action = torch.where(decides & (torch.arange(60) < 40), turn, truth.action)
+    model.loss(given, replace(truth, action=action, angle=angle)).backward()
     idle = [
         name
         for name, weights in model.named_parameters()
@@ -142,7 +148,6 @@ def test_what_was_understood_already_is_marked():
 @pytest.mark.slow
 def test_exits_of_a_played_corpus_hold_nearly_all_turns(tmp_path):
     from dorothie_gym.evaluation.features import points
-    from dorothie_gym.ontology import PhysicalAction
     from dorothie_gym.rollout import generate_corpus
     from dorothie_gym.sessions import Task
 

@@ -85,7 +85,7 @@ class TOTO(Model):
         if Channel.MAP in given:
             lane = config.lane_width
             self.lanes = GraphAttention(len(FEATURES) + ids, lane, config.map_heads, len(EDGE_TYPES))
-            self.map_score = nn.Linear(lane, 1)
+            self.map_score = nn.Linear(lane, 1, bias=False)
             self.map_token = nn.Linear(lane, width)
             self.landmark = nn.Linear(2 + 5 + ids + words, width)
             self.street = nn.Linear(lane + words, width)
