@@ -16,6 +16,7 @@ from stable_baselines3 import PPO
 from torch import nn
 
 from dorothie_gym.baselines.material import TEST, TRAIN, VALIDATION
+from dorothie_gym.baselines.outputs import allowed_angle
 from dorothie_gym.baselines.training import checkpoints
 from dorothie_gym.evaluation import ActionPredictions, ActPredictions, TaskPredictions
 from dorothie_gym.evaluation.teacher_forced import NfDEnv, RfNEnv, TeacherForcedEnv, UfNEnv
@@ -172,7 +173,8 @@ def _predictions(policy: Any, env: FlatTask, test: Demonstrations, task: Task, s
     predicted: ActPredictions | ActionPredictions
     if task is Task.NFD:
         chosen = np.array([answer["action"] for answer in answers], dtype=np.int64)
-        angles = np.array([float(answer["angle"]) for answer in answers])
+        angles = torch.tensor([float(answer["angle"]) for answer in answers])
+        angles = allowed_angle(torch.from_numpy(chosen), angles).double().numpy()
         predicted = ActionPredictions(actions=chosen, angles=angles)
     else:
         moves = np.array([answer["move"] for answer in answers], dtype=np.int64)

@@ -207,8 +207,8 @@ def train_report(figures: Mapping[str, Any]) -> Report:
         ),
         notes=(
             f"answering: {number(figures['inference_ratio'])} times the published loop",
-            f"{number(figures['flops_per_point'] / 1e9)} billion operations a point in training: {number(giga)} billion "
-            f"a second, of {number(figures['matrix_flops_per_second'] / 1e9)} in products of large matrices",
+            f"{number(figures['flops_per_point'] / 1e9)} billion operations a point in training: {number(giga)} "
+            f"billion a second, of {number(figures['matrix_flops_per_second'] / 1e9)} in products of large matrices",
             f"the published model has {figures['published_parameters'] / 1e6:.0f} million numbers",
         ),
         machine=f"{machine_line(figures['machine'])}, torch {figures['torch']}",
