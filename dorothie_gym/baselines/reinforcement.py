@@ -173,8 +173,8 @@ def _predictions(policy: Any, env: FlatTask, test: Demonstrations, task: Task, s
     predicted: ActPredictions | ActionPredictions
     if task is Task.NFD:
         chosen = np.array([answer["action"] for answer in answers], dtype=np.int64)
-        angles = torch.tensor([float(answer["angle"]) for answer in answers])
-        angles = allowed_angle(torch.from_numpy(chosen), angles).double().numpy()
+        free = torch.tensor([float(answer["angle"]) for answer in answers])
+        angles = allowed_angle(torch.from_numpy(chosen), free).double().numpy()
         predicted = ActionPredictions(actions=chosen, angles=angles)
     else:
         moves = np.array([answer["move"] for answer in answers], dtype=np.int64)
