@@ -43,6 +43,7 @@ def corpus(tmp_path_factory):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)
 def test_a_table_is_made_once_and_read_then(corpus, tmp_path):
     command = ["table", "--models", "detector,cloning", "--seeds", "2", "--encoder", "hashing", "--json"]
     places = ["--corpus", str(corpus), "--out", str(tmp_path)]
@@ -56,6 +57,7 @@ def test_a_table_is_made_once_and_read_then(corpus, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)
 def test_a_training_killed_with_9_goes_on_to_the_same_bytes(corpus, tmp_path):
     def command(out):
         options = ["--corpus", str(corpus), "--seeds", "1", "--encoder", "hashing", "--json"]
@@ -79,6 +81,7 @@ def test_a_training_killed_with_9_goes_on_to_the_same_bytes(corpus, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)
 def test_training_is_measured_against_the_published_loop(corpus):
     arguments = [
         "bench",
