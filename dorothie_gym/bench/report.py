@@ -204,6 +204,42 @@ def rl_report(figures: Mapping[str, Any]) -> Report:
     )
 
 
+def train_report(figures: Mapping[str, Any]) -> Report:
+    """Words for the measurement of training (`baselines.bench.measure`)."""
+    threads = _count(figures["threads"], "thread")
+    giga = figures["flops_per_second"] / 1e9
+    return Report(
+        title="TOTO at the published size",
+        setting=f"{figures['parameters'] / 1e6:.0f} million numbers, batches of {figures['batch_size']} points, up to "
+        f"{figures['tokens']} tokens each; {threads}, float32",
+        headline=f"training: {number(figures['ratio'])} times the published loop, "
+        f"{figures['matrix_share']:.0%} of the machine's matrix rate",
+        unit="points a second",
+        rows=(
+            Row(
+                label="published loop, training\none point at a time", value=figures["published_points_per_second"],
+                spread=figures["published_spread"], best=figures["published_best"], reference=True,
+            ),
+            Row(
+                label="TOTO, training", value=figures["points_per_second"], spread=figures["spread"],
+                best=figures["best"],
+            ),
+            Row(
+                label="published loop, answering", value=figures["published_inference_points_per_second"],
+                reference=True,
+            ),
+            Row(label="TOTO, answering", value=figures["inference_points_per_second"]),
+        ),
+        notes=(
+            f"answering: {number(figures['inference_ratio'])} times the published loop",
+            f"{number(figures['flops_per_point'] / 1e9)} billion operations a point in training: {number(giga)} "
+            f"billion a second, of {number(figures['matrix_flops_per_second'] / 1e9)} in products of large matrices",
+            f"the published model has {figures['published_parameters'] / 1e6:.0f} million numbers",
+        ),
+        machine=f"{machine_line(figures['machine'])}, torch {figures['torch']}",
+    )  # fmt: skip
+
+
 def machine_line(machine: Mapping[str, Any]) -> str:
     """What a measurement was made on, in a line."""
     return (

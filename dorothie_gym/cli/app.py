@@ -21,6 +21,7 @@ from dorothie_gym.cli.rollout import rollout
 from dorothie_gym.cli.run import run
 from dorothie_gym.cli.show import show
 from dorothie_gym.cli.stats import stats
+from dorothie_gym.cli.train import table, train
 from dorothie_gym.cli.train_rl import train_rl
 
 app = typer.Typer(
@@ -43,6 +44,8 @@ app.command()(leaderboard)
 app.command()(replay)
 app.command()(show)
 app.command("train-rl")(train_rl)
+app.command()(train)
+app.command()(table)
 
 
 def _tell_version(wanted: bool) -> None:

@@ -1,4 +1,4 @@
-"""`dorothie-gym bench world|env|vector|rl|import`: how fast all is, each against its reference in the same run."""
+"""`dorothie-gym bench world|env|vector|rl|train|import`: speeds, each against its reference in the same run."""
 
 from __future__ import annotations
 
@@ -161,6 +161,37 @@ def importing(repeats: Repeats = 7, picture: Picture = None, as_json: AsJson = F
         return measure(repeats=repeats, progress=progress)
 
     _bench("import", measured, picture, as_json)
+
+
+@bench.command(cls=BenchCommand)
+def train(
+    corpus: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Sessions; without it a few are played once and kept.")
+    ] = None,
+    threads: Annotated[
+        int | None, typer.Option(min=1, max=256, help="Of torch; all cores without it. With 1, CPU time is measured.")
+    ] = None,
+    batch: Annotated[int, typer.Option(min=1, max=1024, help="Points of one of our steps.")] = 64,
+    repeats: Repeats = 5,
+    picture: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Points a second in training at the published size, against the published loop and the machine's matrix rate."""
+
+    def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
+        try:
+            from dorothie_gym.baselines.bench import measure
+        except ImportError as error:
+            fail(f"{error.name} is not installed; run: pip install 'dorothie-gym[baselines]'")
+        from dorothie_gym.rollout import CacheError, default_corpus
+
+        try:
+            folder = corpus or default_corpus()
+        except CacheError as error:
+            fail(str(error))
+        return measure(folder, threads=threads, batch_size=batch, repeats=repeats, progress=progress)
+
+    _bench("train", measured, picture, as_json)
 
 
 def _bench(name: str, measure: Measure, picture: Path | None, as_json: bool) -> None:

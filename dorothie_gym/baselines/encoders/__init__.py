@@ -1,0 +1,67 @@
+"""Encoders: what turns texts, speech and pictures into vectors, with frozen weights or with none."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from dorothie_gym.baselines.encoders.byte_pairs import PAD, BytePairs
+from dorothie_gym.baselines.encoders.encoder import (
+    Encoder,
+    EncoderError,
+    ImageEncoder,
+    SpeechEncoder,
+    TextEncoder,
+    Vectors,
+    table_key,
+    text_table,
+)
+from dorothie_gym.baselines.encoders.hashing import HashingEncoder
+from dorothie_gym.baselines.encoders.pretrained import (
+    BertEncoder,
+    HubertEncoder,
+    MiniLMEncoder,
+    ResNetEncoder,
+    has_minilm,
+)
+
+TEXT_ENCODERS: Mapping[str, Callable[[], TextEncoder]] = MappingProxyType(
+    {"hashing": HashingEncoder, "minilm": MiniLMEncoder, "bert": BertEncoder}
+)
+"""What makes each encoder of texts, by name."""
+
+
+def text_encoder(name: str = "auto") -> TextEncoder:
+    """Returns an encoder of texts.
+
+    Args:
+        name: one of `TEXT_ENCODERS`; "auto" is MiniLM where its weights are installed, else hashing.
+
+    Raises:
+        EncoderError: there is none of that name, or what it needs is not here.
+    """
+    if name == "auto":
+        name = "minilm" if has_minilm() else "hashing"
+    if name not in TEXT_ENCODERS:
+        raise EncoderError(f"there is no text encoder {name!r}; choose auto, {', '.join(TEXT_ENCODERS)}")
+    return TEXT_ENCODERS[name]()
+
+
+__all__ = [
+    "PAD",
+    "TEXT_ENCODERS",
+    "BertEncoder",
+    "BytePairs",
+    "Encoder",
+    "EncoderError",
+    "HashingEncoder",
+    "HubertEncoder",
+    "ImageEncoder",
+    "ResNetEncoder",
+    "SpeechEncoder",
+    "TextEncoder",
+    "Vectors",
+    "has_minilm",
+    "MiniLMEncoder",
+    "table_key",
+    "text_encoder",
+    "text_table",
+]

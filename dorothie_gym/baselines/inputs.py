@@ -1,0 +1,127 @@
+"""Points as tensors: the fields of a batch of features, and their labels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Final, Self, TypeAlias
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from dorothie_gym.evaluation.features import Batch, BatchSpec, Columns, PointTable, gather
+from dorothie_gym.sessions import Task
+
+Inputs: TypeAlias = Mapping[str, Tensor]
+"""The fields of `Batch` by name, as tensors of B points; whole numbers as int64."""
+
+TASKS: Final = (Task.UFN, Task.RFN, Task.NFD)
+"""The tasks in the order of their numbers in `Labels.task`."""
+
+UFN, RFN, NFD = range(len(TASKS))
+"""Numbers of the tasks."""
+
+_GATHERED: Final = 512
+"""Points that are gathered at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Labels:
+    """What is to be predicted at B points; a field that its task does not have is filled as in `PointTable`.
+
+    Attributes:
+        task: (B,) number of the task, int64.
+        move: (B,) int64, -1 at NfD points.
+        slots: (B, 69) float32, 0 or 1.
+        action: (B,) int64, -1 at UfN and RfN points.
+        angle: (B,) float32 [degrees], NaN where unknown.
+        belief: (B, 5) float32, NaN where unknown.
+    """
+
+    task: Tensor
+    move: Tensor
+    slots: Tensor
+    action: Tensor
+    angle: Tensor
+    belief: Tensor
+
+    def __len__(self) -> int:
+        return len(self.task)
+
+    def take(self, rows: Tensor) -> Labels:
+        """Returns the labels of some points."""
+        return Labels(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+    def to(self, device: torch.device) -> Labels:
+        """Returns the labels on a device."""
+        return Labels(*(getattr(self, field.name).to(device, non_blocking=True) for field in fields(self)))
+
+    @classmethod
+    def of(cls, table: PointTable) -> Labels:
+        """Returns the labels of a task's points."""
+        task = torch.full((len(table),), TASKS.index(table.task), dtype=torch.int64)
+        return cls(
+            task,
+            tensor(table.label_move),
+            tensor(table.label_slots).float(),
+            tensor(table.label_action),
+            tensor(table.label_angle),
+            tensor(table.label_belief),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Examples:
+    """Points of all three tasks, gathered once: a training loop only picks rows.
+
+    Attributes:
+        inputs: fields (N, ...).
+        labels: of the N points.
+    """
+
+    inputs: Inputs
+    labels: Labels
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+    def take(self, rows: Tensor, device: torch.device | None = None) -> tuple[dict[str, Tensor], Labels]:
+        """Returns inputs and labels of some points."""
+        inputs = {name: values[rows] for name, values in self.inputs.items()}
+        labels = self.labels.take(rows)
+        if device is None or device.type == "cpu":
+            return inputs, labels
+        return {name: values.to(device, non_blocking=True) for name, values in inputs.items()}, labels.to(device)
+
+    @classmethod
+    def gather(cls, columns: Columns, tables: Sequence[PointTable], spec: BatchSpec) -> Self:
+        """Gathers all points of some tables, in their order.
+
+        Raises:
+            ValueError: there is no point.
+        """
+        batches = [
+            gather(columns, table, np.arange(start, min(start + _GATHERED, len(table))), spec)
+            for table in tables
+            for start in range(0, len(table), _GATHERED)
+        ]
+        if not batches:
+            raise ValueError("there is no point to gather: the tables are empty")
+        names = [field.name for field in fields(Batch)]
+        inputs = {name: torch.cat([tensor(getattr(batch, name)) for batch in batches]) for name in names}
+        return cls(inputs, join(Labels.of(table) for table in tables))
+
+
+def join(parts: Iterable[Labels]) -> Labels:
+    """Returns labels one after another."""
+    every = tuple(parts)
+    return Labels(*(torch.cat([getattr(part, field.name) for part in every]) for field in fields(Labels)))
+
+
+def tensor(values: np.ndarray) -> Tensor:
+    """Returns an array as a tensor of its own; whole numbers as int64, which look-ups take."""
+    array = np.ascontiguousarray(values)
+    if array.dtype.kind in "iu" and array.dtype != np.int64:
+        array = array.astype(np.int64)
+    return torch.from_numpy(array.copy() if array is values or not array.flags.writeable else array)

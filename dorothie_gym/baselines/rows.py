@@ -1,0 +1,159 @@
+"""The rows of the table: every model by its name in the paper, and how it is made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any, Final, Literal, TypeAlias
+
+import torch
+
+from dorothie_gym.baselines.encoders.pretrained import find_transformers, has_minilm, load_pretrained, minilm_folder
+from dorothie_gym.baselines.material import Material
+from dorothie_gym.baselines.reader import JunctionReader, reader_config
+from dorothie_gym.baselines.toto import (
+    ABLATIONS,
+    TOTO,
+    Channel,
+    FrozenTexts,
+    PretrainedBert,
+    SmallBert,
+    Texts,
+    TOTOConfig,
+    Towns,
+    TrainedTexts,
+)
+from dorothie_gym.baselines.training import Model
+
+Kind = Literal["toto", "reader", "ppo", "cloning"]
+
+Change: TypeAlias = Callable[[TOTOConfig], TOTOConfig]
+
+SIZES: Final[Mapping[str, Callable[[], TOTOConfig]]] = MappingProxyType(
+    {"small": TOTOConfig.small, "paper": TOTOConfig.paper}
+)
+"""The configurations that a user may choose."""
+
+NO_AUDIO: Final = "no audio: the sessions carry no sound"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """A row of the table.
+
+    Attributes:
+        name: as the paper's table has it.
+        command: as it is written on a command line and in paths.
+        change: what makes its config from that of TOTO; None for a policy, and where it cannot be run.
+        missing: why it cannot be run, or empty.
+        kind: what is trained: "toto" (with its ablations and rivals), our "reader", or a policy by "ppo" or "cloning".
+    """
+
+    name: str
+    command: str
+    change: Change | None = None
+    missing: str = ""
+    kind: Kind = "toto"
+
+
+def _bert(config: TOTOConfig) -> TOTOConfig:
+    return replace(config, text="trained")
+
+
+def _without(name: str) -> Change:
+    return lambda config: config.without(*ABLATIONS[name])
+
+
+def _only(*channels: Channel) -> Change:
+    return lambda config: config.only(channels)
+
+
+_EPISODIC: Final = (Channel.ACTIONS, Channel.MOVES, Channel.TRANSCRIPT, Channel.VISION)
+"""Inputs of the Episodic Transformer (Pashevich et al., 2021): actions, text and the images of the window."""
+
+ROWS: Final[tuple[Row, ...]] = (
+    Row(name="TOTO", command="toto", change=lambda config: config),
+    Row(name="TOTO (+ Belief Tracking)", command="toto-belief", change=lambda config: replace(config, belief=True)),
+    Row(name="TOTO (+ Fine-tuned BERT)", command="toto-bert", change=_bert),
+    *(
+        Row(name=f"TOTO (- {name})", command=f"toto-no-{name.lower().replace(' ', '-')}", change=_without(name))
+        for name in ABLATIONS
+    ),
+    Row(
+        name="Fine-tuned BERT Only",
+        command="bert-trained",
+        change=lambda config: _bert(config.only((Channel.TRANSCRIPT,))),
+    ),
+    Row(name="BERT Only", command="bert", change=_only(Channel.TRANSCRIPT)),
+    Row(name="HuBERT Only", command="hubert", missing=NO_AUDIO),
+    Row(name="Deformable-DETR Only", command="detector", change=_only(Channel.OBJECTS)),
+    Row(name="Map Encoder Only", command="map", change=_only(Channel.MAP)),
+    Row(name="E.T.", command="et", change=_only(*_EPISODIC)),
+    Row(name="E.T. (+ Fine-tuned BERT)", command="et-bert", change=lambda config: _bert(config.only(_EPISODIC))),
+    Row(name="Behaviour Cloning", command="cloning", kind="cloning"),
+    Row(name="PPO", command="ppo", kind="ppo"),
+    Row(name="Junction Reader (ours)", command="reader", change=reader_config, kind="reader"),
+)
+"""The rows of the paper's table, in its order; then policies, and our own model."""
+
+
+class EpisodicTransformer(TOTO):
+    """E.T. (Pashevich et al., 2021): TOTO's encoder over actions, text and images alone."""
+
+
+def find_row(name: str) -> Row:
+    """Returns a row by its command or its name; raises `ValueError` naming all where there is none."""
+    for row in ROWS:
+        if name.casefold() in (row.command, row.name.casefold()):
+            return row
+    raise ValueError(f"there is no model {name!r}; choose from {', '.join(row.command for row in ROWS)}")
+
+
+def make_model(row: Row, size: str, material: Material, seed: int) -> Model:
+    """Returns a model with weights drawn from a seed.
+
+    Raises:
+        ValueError: the size is unknown, or the row cannot be run.
+    """
+    if size not in SIZES:
+        raise ValueError(f"there is no config {size!r}; choose from {', '.join(SIZES)}")
+    if row.change is None:
+        raise ValueError(f"{row.name} is no model of its own: {row.missing or 'it is a policy'}")
+    torch.manual_seed(seed)
+    config = row.change(SIZES[size]())
+    if row.kind == "reader":
+        return _reader(config, material)
+    kind = EpisodicTransformer if set(config.channels) == set(_EPISODIC) else TOTO
+    return kind(config, Towns(material.columns.towns), make_texts(config, material))
+
+
+def _reader(config: TOTOConfig, material: Material) -> Model:
+    pairs = material.byte_pairs(config.vocabulary)
+    pieces = material.tokens(None, pairs, config.text_tokens)
+    towns, texts = Towns(material.columns.towns), FrozenTexts(material.vectors)
+    return JunctionReader(config, towns, texts, material.columns, pieces, config.vocabulary)
+
+
+def make_texts(config: TOTOConfig, material: Material) -> Texts:
+    """Returns how a model reads the texts of a corpus: vectors that stay, or an encoder that learns."""
+    if config.text == "frozen":
+        return FrozenTexts(material.vectors)
+    if config.pretrained_text and has_minilm():
+        return _minilm(config, material)
+    pairs = material.byte_pairs(config.vocabulary)
+    length, width = config.text_tokens, config.text_width
+    reader = SmallBert(config.vocabulary, length, width, config.text_layers, config.dropout)
+    return TrainedTexts(material.tokens(None, pairs, length), reader, width)
+
+
+def _minilm(config: TOTOConfig, material: Material) -> Texts:
+    transformers = find_transformers("minilm")
+    folder = minilm_folder()
+    model: Any = load_pretrained(transformers.BertModel, folder, "minilm")
+    tokenizer: Any = load_pretrained(transformers.AutoTokenizer, folder, "minilm")
+    pieces = tokenizer(
+        list(material.columns.texts), padding="max_length", truncation=True, max_length=config.text_tokens,
+        return_tensors="pt",
+    )  # fmt: skip
+    return TrainedTexts(pieces["input_ids"], PretrainedBert(model), int(model.config.hidden_size))

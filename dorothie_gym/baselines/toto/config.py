@@ -1,0 +1,221 @@
+"""Sizes, inputs and learning of TOTO: as published, and small."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from types import MappingProxyType
+from typing import Any, Final, Literal, Self
+
+from dorothie_gym.evaluation.features import BatchSpec
+
+
+class Channel(enum.StrEnum):
+    """A kind of input. A model without one is not given it at all."""
+
+    MAP = "map"
+    """The lane graph, known landmarks and streets."""
+    TRAJECTORY = "trajectory"
+    """Where the car was in the last ten seconds."""
+    ACTIONS = "actions"
+    """Physical actions so far."""
+    MOVES = "moves"
+    """Dialogue moves so far, with their slots."""
+    TRANSCRIPT = "transcript"
+    """The words that were spoken, those of the current utterance among them."""
+    VISION = "vision"
+    """What was around the car in the last ten seconds."""
+    SPEECH = "speech"
+    """The current utterance as it is heard: its sound, or what a recogniser made of it where there is no sound."""
+    OBJECTS = "objects"
+    """What is around the car now."""
+
+
+ALL_CHANNELS: Final = tuple(Channel)
+
+ABLATIONS: Final[Mapping[str, tuple[Channel, ...]]] = MappingProxyType(
+    {
+        "Action History": (Channel.ACTIONS, Channel.MOVES),
+        "GT Transcript": (Channel.TRANSCRIPT,),
+        "Object Detection": (Channel.OBJECTS,),
+        "Vision History": (Channel.VISION, Channel.OBJECTS),
+        "Current Speech": (Channel.SPEECH,),
+        "Map Knowledge": (Channel.MAP, Channel.TRAJECTORY),
+    }
+)
+"""What the paper's table takes away from TOTO, by the name it has there. Without Current Speech the words of the
+current utterance go too where there is no sound (`TOTOConfig.current_text`)."""
+
+TextTraining = Literal["frozen", "trained"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LossWeights:
+    """What each part of the loss counts (paper, appendix C, Loss coefficients).
+
+    Attributes:
+        move, slot_types, slot_values: of UfN and of RfN; cross entropy, and binary cross entropies.
+        action: of NfD; cross entropy.
+        angle: of NfD; error of the angle [1/degree].
+        belief: error of the belief [1/unit].
+    """
+
+    move: float = 1.0
+    slot_types: float = 1e-2
+    slot_values: float = 2e-3
+    action: float = 1.0
+    angle: float = 1e-2
+    belief: float = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class TOTOConfig:
+    """Everything that makes one TOTO differ from another. Each ablation of the table is one value of `channels`.
+
+    Attributes:
+        width: numbers of a token.
+        layers, heads, feed_forward, dropout: of the encoder.
+        attention_dropout: share of the attention's weights that are dropped.
+        channels: what the model is given.
+        current_text: whether the words of the current utterance are among the transcript.
+        belief: whether the model also learns to tell where the car will be, and where it is to go.
+        text: "frozen" vectors of a text encoder, or a "trained" one, which learns with the rest.
+        text_width, text_layers, text_tokens, vocabulary: of the trained text encoder, where it is not a BERT's.
+        pretrained_text: whether the trained text encoder is MiniLM, where its weights are installed.
+        lane_width: numbers of a lane's vector, a multiple of `map_heads`.
+        map_heads: of the graph attention.
+        id_width: numbers of the vector looked up for a road, and for a junction.
+        roads, junctions: sizes of those tables; ids beyond them share rows.
+        image_width: numbers of a picture's vector at each token of the window; 0 where there is no camera.
+        sound_width: numbers of the vector of the current utterance's sound; 0 where there is no sound.
+        detector: (queries, numbers each) of an object detector; None: objects come from the world's list.
+        moves, utterances, actions, window, window_step, window_objects, objects: see `BatchSpec`.
+        learning_rate, weight_decay, clip: of AdamW, and the largest norm of the gradient.
+        batch_size: points of a step.
+        min_epochs, max_epochs, patience: epochs at least, at most, and without a better validation loss.
+        loss: weights of its parts.
+
+    Raises:
+        ValueError: a field is out of its range; the message names it.
+    """
+
+    width: int
+    layers: int
+    heads: int
+    feed_forward: int
+    dropout: float = 0.1
+    attention_dropout: float = 0.1
+    channels: tuple[Channel, ...] = ALL_CHANNELS
+    current_text: bool = True
+    belief: bool = False
+    text: TextTraining = "frozen"
+    text_width: int = 128
+    text_layers: int = 2
+    text_tokens: int = 24
+    vocabulary: int = 1024
+    pretrained_text: bool = False
+    lane_width: int = 64
+    map_heads: int = 8
+    id_width: int = 25
+    roads: int = 259
+    junctions: int = 34
+    image_width: int = 0
+    sound_width: int = 0
+    detector: tuple[int, int] | None = None
+    moves: int = 32
+    utterances: int = 16
+    actions: int = 16
+    window: int = 25
+    window_step: int = 4
+    window_objects: int = 8
+    objects: int = 32
+    learning_rate: float = 1e-5
+    weight_decay: float = 1e-4
+    clip: float = 1.0
+    batch_size: int = 64
+    min_epochs: int = 10
+    max_epochs: int = 60
+    patience: int = 5
+    loss: LossWeights = LossWeights()
+
+    def __post_init__(self) -> None:
+        if self.width % self.heads:
+            raise ValueError(f"TOTOConfig.width is {self.width}; it must be a multiple of heads, {self.heads}")
+        if self.width % 2:
+            raise ValueError(f"TOTOConfig.width is {self.width}; it must be even: half of the time is sines")
+        if self.lane_width % self.map_heads:
+            raise ValueError(f"TOTOConfig.lane_width is {self.lane_width}; it must be a multiple of {self.map_heads}")
+        if not 0.0 <= self.dropout < 1.0:
+            raise ValueError(f"TOTOConfig.dropout is {self.dropout}; it must be in [0, 1)")
+        if not self.channels:
+            raise ValueError("TOTOConfig.channels is empty; a model needs an input")
+        if self.min_epochs > self.max_epochs:
+            raise ValueError(f"TOTOConfig.min_epochs is {self.min_epochs}, above max_epochs, {self.max_epochs}")
+        for name in ("layers", "heads", "batch_size", "patience", "roads", "junctions", "max_epochs"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"TOTOConfig.{name} is {getattr(self, name)}; it must be at least 1")
+
+    @classmethod
+    def paper(cls) -> Self:
+        """The published sizes (paper, appendix C); 770 numbers are BERT's 768 and two for the role."""
+        return cls(width=770, layers=2, heads=11, feed_forward=770, text_width=384, pretrained_text=True)
+
+    @classmethod
+    def published(cls) -> Self:
+        """The published sizes with the published pictures, sounds and detector queries as well: for measuring speed."""
+        return replace(cls.paper(), image_width=1000, sound_width=1024, detector=(300, 256))
+
+    @classmethod
+    def small(cls) -> Self:
+        """Trains in less than a minute on two cores; the default."""
+        return cls(
+            width=96, layers=2, heads=4, feed_forward=192, text_width=96, text_layers=1, text_tokens=20,
+            lane_width=32, map_heads=4, id_width=8, moves=12, utterances=6, actions=10, window=8, window_step=12,
+            window_objects=6, objects=10, attention_dropout=0.0, learning_rate=1e-3, batch_size=64, max_epochs=16,
+        )  # fmt: skip
+
+    @property
+    def spec(self) -> BatchSpec:
+        """How much of each thing the model is given."""
+        return BatchSpec(
+            moves=self.moves, utterances=self.utterances, actions=self.actions, window=self.window,
+            window_step=self.window_step, window_objects=self.window_objects, objects=self.objects,
+        )  # fmt: skip
+
+    def without(self, *channels: Channel) -> Self:
+        """Returns the config of an ablation: without some inputs.
+
+        Speech takes the current utterance's words along where there is no sound: they are the same utterance.
+        """
+        kept = tuple(channel for channel in self.channels if channel not in channels)
+        current = self.current_text and (Channel.SPEECH not in channels or self.sound_width > 0)
+        return replace(self, channels=kept, current_text=current)
+
+    def only(self, channels: Iterable[Channel]) -> Self:
+        """Returns the config with these inputs and no others."""
+        wanted = set(channels)
+        return replace(self, channels=tuple(channel for channel in ALL_CHANNELS if channel in wanted))
+
+    def to_json(self) -> dict[str, Any]:
+        """Returns the fields in JSON types."""
+        fields = asdict(self)
+        fields["channels"] = [channel.value for channel in self.channels]
+        fields["detector"] = None if self.detector is None else list(self.detector)
+        return fields
+
+    @classmethod
+    def from_json(cls, fields: Mapping[str, Any]) -> Self:
+        """Reads what `to_json` returned.
+
+        Raises:
+            ValueError: a field is unknown or out of its range.
+        """
+        known = dict(fields)
+        try:
+            known["channels"] = tuple(Channel(name) for name in known["channels"])
+            known["detector"] = None if known["detector"] is None else tuple(known["detector"])
+            known["loss"] = LossWeights(**known["loss"])
+            return cls(**known)
+        except (KeyError, TypeError) as error:
+            raise ValueError(f"TOTOConfig: the fields do not fit this version: {error}") from None

@@ -1,0 +1,134 @@
+"""How a model reads texts: as vectors that stay as they are, or with an encoder that learns with the rest."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from dorothie_gym.baselines.encoders import PAD
+from dorothie_gym.baselines.toto.layers import Block
+
+_TINY: Final = 1e-6
+
+
+class Texts(nn.Module):
+    """Turns indices of texts into vectors.
+
+    The texts themselves are no part of a model's weights: a model may be used on another corpus.
+
+    Attributes:
+        width: numbers of a vector.
+    """
+
+    width: int
+
+    def forward(self, index: Tensor) -> Tensor:
+        """Returns the vectors of texts (..., width); zeros where the index (...) is -1."""
+        raise NotImplementedError
+
+
+class FrozenTexts(Texts):
+    """Vectors of a text encoder.
+
+    Args:
+        table: (n, width) float32, a row for each text of the corpus.
+    """
+
+    table: Tensor
+
+    def __init__(self, table: Tensor):
+        super().__init__()
+        self.width = table.shape[1]
+        spread = table.square().mean().sqrt().clamp(min=_TINY)  # numbers of about 1, whatever the encoder's scale
+        self.register_buffer("table", torch.cat((table / spread, table.new_zeros(1, self.width))), persistent=False)
+
+    def forward(self, index: Tensor) -> Tensor:
+        """Returns the vectors of texts (..., width); zeros where the index (...) is -1."""
+        return self.table[index]  # -1 is the last row, which is zeros
+
+
+class TrainedTexts(Texts):
+    """A text encoder that learns. Each text of a batch is encoded once, however often it occurs.
+
+    Args:
+        tokens: (n, length) int64 pieces of each text of the corpus, padding at the end.
+        reader: what turns (u, length) pieces into (u, width) vectors.
+        width: of the reader's vectors.
+    """
+
+    tokens: Tensor
+
+    def __init__(self, tokens: Tensor, reader: nn.Module, width: int):
+        super().__init__()
+        self.width = width
+        self.reader = reader
+        padding = tokens.new_full((1, tokens.shape[1]), PAD)
+        self.register_buffer("tokens", torch.cat((tokens, padding)), persistent=False)
+
+    def forward(self, index: Tensor) -> Tensor:
+        """Returns the vectors of texts (..., width); zeros where the index (...) is -1."""
+        distinct, place = torch.unique(index, return_inverse=True)
+        pieces = self.tokens[distinct]
+        longest = max(1, int((pieces != PAD).sum(1).max()))
+        vectors = self.reader(pieces[:, :longest]) * (distinct >= 0).unsqueeze(-1)
+        return F.embedding(place, vectors)  # its gradient is summed in a fixed order
+
+
+class SmallBert(nn.Module):
+    """A BERT of few layers over byte pairs, without weights from elsewhere.
+
+    Args:
+        vocabulary: how many pieces there are.
+        length: pieces of a text at most.
+        width, layers: of the encoder; its heads are 32 numbers wide, or all of a narrower one.
+        dropout: share of values dropped.
+    """
+
+    def __init__(self, vocabulary: int, length: int, width: int, layers: int, dropout: float):
+        super().__init__()
+        self.piece = nn.Embedding(vocabulary, width)
+        self.place = nn.Embedding(length, width)
+        self.norm = nn.LayerNorm(width)
+        heads = max(1, width // 32)
+        self.blocks = nn.ModuleList(Block(width, heads, 2 * width, dropout) for _ in range(layers))
+        nn.init.normal_(self.piece.weight, std=0.02)
+        nn.init.normal_(self.place.weight, std=0.02)
+
+    def forward(self, pieces: Tensor) -> Tensor:
+        """Returns vectors of texts (u, width): the mean over their pieces.
+
+        Args:
+            pieces: (u, length) padding at the end; a text without any is read as one piece of padding.
+        """
+        mask = pieces != PAD
+        mask = torch.cat((mask.any(1, keepdim=True).logical_not() | mask[:, :1], mask[:, 1:]), dim=1)
+        tokens = self.norm(self.piece(pieces) + self.place.weight[: pieces.shape[1]])  # (u, length, width)
+        for block in self.blocks:
+            tokens = block(tokens, mask)
+        kept = mask.unsqueeze(-1)
+        pooled: Tensor = (tokens * kept).sum(1) / kept.sum(1)
+        return pooled
+
+
+class PretrainedBert(nn.Module):
+    """A BERT of transformers whose weights go on learning.
+
+    Args:
+        model: a `BertModel`; its padding is id 0, as in every published BERT.
+    """
+
+    def __init__(self, model: Any):
+        super().__init__()
+        self.model = model
+
+    def forward(self, pieces: Tensor) -> Tensor:
+        """Returns vectors of texts (u, width): the mean over their pieces (u, length)."""
+        mask = pieces != PAD
+        mask = torch.cat((mask.any(1, keepdim=True).logical_not() | mask[:, :1], mask[:, 1:]), dim=1)
+        tokens = self.model(input_ids=pieces, attention_mask=mask.long()).last_hidden_state
+        kept = mask.unsqueeze(-1)
+        pooled: Tensor = (tokens * kept).sum(1) / kept.sum(1)
+        return pooled

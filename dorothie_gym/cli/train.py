@@ -1,0 +1,199 @@
+"""`dorothie-gym train` and `dorothie-gym table`: models trained on a corpus, and the table of all of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.runs import Job
+    from dorothie_gym.baselines.training import Epoch
+    from dorothie_gym.evaluation import ResultsTable
+
+RUNS = Path("runs")
+"""Folder of trainings where none is named: one for each corpus within."""
+
+WIDTH = 130
+"""Columns of what is written into a file or a pipe, which have no width of their own."""
+
+_FAILED = 1
+
+CorpusOption = Annotated[
+    Path | None,
+    typer.Option("--corpus", metavar="DIR", help="Folder of the corpus; without it a small one is made once and kept."),
+]
+Size = Annotated[str, typer.Option("--config", help="small (two cores) or paper (the published sizes).")]
+Seeds = Annotated[int, typer.Option(min=1, max=99, help="How many: 0, 1, ...")]
+Encoder = Annotated[
+    str, typer.Option(help="Of texts: auto (minilm where installed, else hashing), hashing, minilm, bert.")
+]
+Out = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Folder of the trainings; one that was begun is gone on with.")
+]
+Workers = Annotated[int | None, typer.Option(min=1, max=256, help="Processes; all cores without it.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")]
+
+
+def train(
+    model: Annotated[str, typer.Argument(metavar="MODEL", help="toto, toto-belief, bert, ...; see `table`.")],
+    corpus: CorpusOption = None,
+    size: Size = "small",
+    seeds: Seeds = 5,
+    encoder: Encoder = "auto",
+    out: Out = None,
+    workers: Workers = None,
+    as_json: AsJson = False,
+) -> None:
+    """Train a model with some seeds, test it, and tell its figures. When it is stopped, the same command goes on."""
+    with _told_plainly():
+        from dorothie_gym.baselines.rows import find_row
+        from dorothie_gym.baselines.table import gather_table, table_jobs
+
+        row = find_row(model)
+        if row.missing:
+            fail(f"{row.name} cannot be trained: {row.missing}")
+        folder, where = _places(corpus, out)
+        jobs = table_jobs(folder, where, encoder=encoder, size=size, seeds=seeds, rows=[row])
+        results = _run(jobs, workers, quiet=as_json)
+        table, _ = gather_table(jobs, floors=False)
+    if as_json:
+        print_json({"model": row.name, "corpus": str(folder), "runs": results, "table": table.to_json()})
+        return
+    _show(table)
+    for result in results:
+        if "epochs" not in result:
+            continue
+        stdout().print(
+            f"Seed {result['seed']}: {result['epochs']} epochs, best {result['best_epoch']}, validation loss "
+            f"{result['validation_loss']:.4f}, {result['seconds']:.0f} s; {result['folder']}",
+            style="dim", markup=False, soft_wrap=True,
+        )  # fmt: skip
+
+
+def table(
+    corpus: CorpusOption = None,
+    size: Size = "small",
+    seeds: Seeds = 5,
+    models: Annotated[str, typer.Option(help="all, or some by their commands: toto,bert,...")] = "all",
+    encoder: Encoder = "auto",
+    out: Out = None,
+    workers: Workers = None,
+    as_json: AsJson = False,
+) -> None:
+    """Train every model that is not trained yet, and make the paper's complete table, with its figures beside ours.
+
+    The table is written as Markdown, LaTeX, JSON and pictures, with all predictions behind it. When it is stopped,
+    the same command goes on.
+    """
+    begun = time.perf_counter()
+    with _told_plainly():
+        from dorothie_gym.baselines.rows import ROWS, find_row
+        from dorothie_gym.baselines.table import PREDICTIONS, gather_table, table_jobs
+        from dorothie_gym.evaluation import write_predictions
+        from dorothie_gym.evaluation.report import write_report
+
+        rows = ROWS if models == "all" else [find_row(name.strip()) for name in models.split(",")]
+        folder, where = _places(corpus, out)
+        jobs = table_jobs(folder, where, encoder=encoder, size=size, seeds=seeds, rows=rows)
+        results = _run(jobs, workers, quiet=as_json)
+        made, predictions = gather_table(jobs)
+        write_predictions(where / PREDICTIONS, predictions)
+        write_report(made, where)
+    seconds = time.perf_counter() - begun
+    if as_json:
+        print_json({**made.to_json(), "out": str(where), "runs": results, "wall_seconds": round(seconds, 3)})
+        return
+    _show(made)
+    stdout().print(
+        f"{len(jobs)} trainings in {seconds:.0f} s. Written: {where}", style="dim", markup=False, soft_wrap=True
+    )
+
+
+def _run(jobs: Sequence[Job], workers: int | None, *, quiet: bool) -> list[dict[str, Any]]:
+    """Runs the jobs, and returns what came of them in their order."""
+    from dorothie_gym.baselines.workers import run_jobs
+    from dorothie_gym.bench.timing import cores
+
+    found: dict[Path, dict[str, Any]] = {}
+    try:
+        with _progress(len(jobs), quiet=quiet) as (on_epoch, on_job):
+            for job, result in run_jobs(jobs, workers or cores(), on_epoch):
+                found[job.folder] = result
+                on_job(job)
+    except KeyboardInterrupt:
+        told = f"Interrupted with {len(found)} of {len(jobs)} trainings finished; the same command goes on."
+        stderr().print(told, markup=False, soft_wrap=True)
+        raise typer.Exit(INTERRUPTED) from None
+    return [found[job.folder] for job in jobs]
+
+
+@contextmanager
+def _progress(jobs: int, *, quiet: bool) -> Iterator[tuple[Callable[[Job, Epoch], None], Callable[[Job], None]]]:
+    """A bar on standard error while that is a terminal."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = stderr()
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, disable=quiet or not console.is_terminal, transient=True) as progress:
+        bar = progress.add_task("Trainings", total=jobs)
+
+        def on_epoch(job: Job, epoch: Epoch) -> None:
+            loss = f"{epoch.training:.3f} / {epoch.validation:.3f}"
+            progress.update(bar, description=f"{job.model}, seed {job.seed}, epoch {epoch.number}: loss {loss}")
+
+        def on_job(job: Job) -> None:
+            progress.update(bar, advance=1, description=f"{job.model}, seed {job.seed}: done")
+
+        yield on_epoch, on_job
+
+
+def _places(corpus: Path | None, out: Path | None) -> tuple[Path, Path]:
+    """The corpus, and the folder of its trainings, which is made."""
+    folder = corpus
+    if folder is None:
+        from dorothie_gym.rollout import CacheError, default_corpus
+
+        try:
+            folder = default_corpus()
+        except CacheError as error:
+            fail(str(error))
+    where = out or RUNS / folder.absolute().name
+    where.mkdir(parents=True, exist_ok=True)
+    return folder, where
+
+
+def _show(table: ResultsTable) -> None:
+    from dorothie_gym.evaluation.terminal import print_table
+
+    console = stdout()
+    if not console.is_terminal:
+        console.width = WIDTH
+    print_table(table, console)
+
+
+@contextmanager
+def _told_plainly() -> Iterator[None]:
+    """Turns a user's mistakes into one message, those of training among them."""
+    try:
+        import torch  # noqa: F401
+    except ImportError:
+        fail("training needs torch; run: pip install 'dorothie-gym[baselines]'")
+    from dorothie_gym.baselines.encoders import EncoderError
+    from dorothie_gym.baselines.training import CheckpointError
+    from dorothie_gym.evaluation import PredictionError
+    from dorothie_gym.rollout import ProcessError
+
+    with told_plainly():
+        try:
+            yield
+        except (EncoderError, CheckpointError, PredictionError, ValueError) as error:
+            fail(str(error))
+        except ProcessError as error:
+            fail(str(error), _FAILED)

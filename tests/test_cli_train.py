@@ -1,0 +1,102 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from typer.testing import CliRunner
+
+from dorothie_gym.cli import app
+
+runner = CliRunner()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["train", "gpt"], "there is no model 'gpt'; choose from toto, toto-belief"),
+        (["train", "hubert"], "no audio"),
+        (["table", "--models", "toto,gpt"], "there is no model 'gpt'"),
+    ],
+)
+def test_what_cannot_be_trained_is_told(arguments, message, tmp_path):
+    result = runner.invoke(app, [*arguments, "--corpus", str(tmp_path), "--out", str(tmp_path / "runs")])
+    assert result.exit_code == 2
+    assert message in " ".join(result.stderr.split())
+
+
+def test_a_folder_without_sessions_is_told(tmp_path):
+    result = runner.invoke(app, ["train", "bert", "--corpus", str(tmp_path), "--out", str(tmp_path / "runs")])
+    assert result.exit_code == 2
+    assert str(tmp_path) in result.stderr.replace("\n", "")
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory):
+    from dorothie_gym.rollout import generate_corpus
+
+    folder = tmp_path_factory.mktemp("corpus")
+    generate_corpus(folder, sessions=12, seed=2, workers=1)
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_a_table_is_made_once_and_read_then(corpus, tmp_path):
+    command = ["table", "--models", "detector,cloning", "--seeds", "2", "--encoder", "hashing", "--json"]
+    places = ["--corpus", str(corpus), "--out", str(tmp_path)]
+    first = json.loads(runner.invoke(app, [*command, *places], catch_exceptions=False).stdout)
+    again = json.loads(runner.invoke(app, [*command, *places], catch_exceptions=False).stdout)
+    assert {"Deformable-DETR Only", "Behaviour Cloning", "majority", "random"} <= set(first["models"])
+    figure = first["models"]["Deformable-DETR Only"]["seen"]["nfd_joint_accuracy"]
+    assert figure["seeds"] == 2 and 0 <= figure["mean"] <= 1
+    assert again["models"] == first["models"] and again["wall_seconds"] < first["wall_seconds"]
+    assert {"table.md", "table.tex", "table.json", "predictions.parquet"} <= {path.name for path in tmp_path.iterdir()}
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_a_training_killed_with_9_goes_on_to_the_same_bytes(corpus, tmp_path):
+    def command(out):
+        options = ["--corpus", str(corpus), "--seeds", "1", "--encoder", "hashing", "--json"]
+        return [sys.executable, "-m", "dorothie_gym.cli", "train", "map", *options, "--out", str(tmp_path / out)]
+
+    folder = "map/small/seed-0"
+    subprocess.run(command("whole"), check=True, capture_output=True)
+    process = subprocess.Popen(command("killed"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    last = tmp_path / "killed" / folder / "last.safetensors"
+    while not last.exists():
+        assert process.poll() is None
+        time.sleep(0.01)
+    time.sleep(0.3)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    assert not (tmp_path / "killed" / folder / "result.json").exists(), "it was killed too late to test anything"
+    subprocess.run(command("killed"), check=True, capture_output=True)
+    for name in ("best.safetensors", "last.safetensors"):
+        whole, killed = (tmp_path / out / folder / name for out in ("whole", "killed"))
+        assert whole.read_bytes() == killed.read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_training_is_measured_against_the_published_loop(corpus):
+    arguments = [
+        "bench",
+        "train",
+        "--corpus",
+        str(corpus),
+        "--threads",
+        "1",
+        "--repeats",
+        "1",
+        "--batch",
+        "8",
+        "--json",
+    ]
+    figures = json.loads(runner.invoke(app, arguments, catch_exceptions=False).stdout)
+    assert 92e6 < figures["published_parameters"] < 95e6
+    assert figures["points_per_second"] > 0 and 0 < figures["matrix_share"] < 1.5
+    assert figures["flops_per_point"] > 2e9
