@@ -16,7 +16,7 @@ from dorothie_gym.navigation.instructor import Instructor  # noqa: E402
 
 def test_shares_of_the_time_add_up() -> None:
     instruct = Instructor.instruct
-    figures = measure(environments=1, workers=0, steps=256)
+    figures = measure(environments=2, workers=0, steps=512)
     assert Instructor.instruct is instruct  # measuring leaves no trace
     assert set(figures["shares"]) == set(SHARES)
     assert sum(figures["shares"].values()) == pytest.approx(1.0, abs=0.01)
