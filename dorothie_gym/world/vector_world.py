@@ -11,14 +11,15 @@ import numpy as np
 
 from dorothie_gym.world.kernel import TownArrays, WorldArrays
 from dorothie_gym.world.kernel.batch import put, stacked, step_share, world_of
+from dorothie_gym.world.kernel.turns import turns_of
 from dorothie_gym.world.town.model import Array
 
 
 class VectorWorld:
     """Worlds of one town in one set of arrays; every thread steps a share of them in one compiled call.
 
-    A thread that is done with a world takes the next one that nobody has: who wakes up late, or gets worlds with much
-    traffic, does fewer.
+    A thread has a block of worlds of its own, which stay in its processor's cache; when it is done with them it takes
+    those that others have not come to: who wakes up late, or gets worlds with much traffic, does fewer.
     What happens in a world depends on its own arrays only: not on the other worlds, its place among them, or the
     threads. Threads share nothing that is written to, and hold the interpreter's lock between calls only.
 
@@ -82,19 +83,19 @@ class VectorWorld:
         return np.array(np.broadcast_to(values, len(self)))
 
     def share(self, work: Callable[..., None], *arguments: Any) -> None:
-        """Calls `work(turns, *arguments)` in every thread, and waits for all of them.
+        """Calls `work(turns, home, *arguments)` in every thread, and waits for all of them.
 
         Args:
             work: works on the worlds whose numbers it takes (`kernel.turns`) until there is none left.
             arguments: for it.
         """
-        turns = np.zeros(1, dtype=np.int64)
+        turns = turns_of(len(self), self.threads)
         if self._others is None:
-            work(turns, *arguments)
+            work(turns, 0, *arguments)
             return
-        futures = [self._others.submit(work, turns, *arguments) for _ in range(self.threads - 1)]
+        futures = [self._others.submit(work, turns, home, *arguments) for home in range(1, self.threads)]
         try:
-            work(turns, *arguments)
+            work(turns, 0, *arguments)
         finally:
             errors = [future.exception() for future in futures]  # waits: nobody works on when this returns
         for error in errors:

@@ -76,6 +76,7 @@ def _compiled_rows(arrays: Any, number: int) -> Any:
 @concurrent
 def step_share(
     turns: NDArray[Any],
+    home: int,
     town: TownArrays,
     batch: WorldArrays,
     substeps: int,
@@ -87,6 +88,7 @@ def step_share(
 
     Args:
         turns: numbers of the worlds, see `turns.take`; shared by all threads that work on the batch.
+        home: number of the block that is this thread's own.
         town: arrays of the town.
         batch: arrays of all worlds.
         substeps: how many.
@@ -94,7 +96,7 @@ def step_share(
         acceleration: (worlds,) of each world's vehicles of the kind `Kind.EGO` [m/s^2].
         steering: (worlds,) angle of their front wheels, positive to the right [rad].
     """
-    number = take(turns)
-    while number < len(acceleration):
+    number = take(turns, home)
+    while number >= 0:
         step(town, world_of(batch, number), substeps, dt, acceleration[number], steering[number])
-        number = take(turns)
+        number = take(turns, home)

@@ -71,13 +71,14 @@ def begin_one(number: int, town: TownArrays, batch: WorldArrays, view: View, ego
 
 @concurrent
 def play_share(
-    turns: NDArray[np.int64], town: TownArrays, batch: WorldArrays, view: View, egos: Egos, actions: NDArray[np.int32],
-    playing: NDArray[np.bool_], substeps: int, dt: float,
+    turns: NDArray[np.int64], home: int, town: TownArrays, batch: WorldArrays, view: View, egos: Egos,
+    actions: NDArray[np.int32], playing: NDArray[np.bool_], substeps: int, dt: float,
 ) -> None:  # fmt: skip
     """Plays a decision in worlds, as long as there are any whose turn has not come.
 
     Args:
         turns: numbers of the worlds, see `turns.take`; shared by all threads that work on them.
+        home: number of the block that is this thread's own.
         town: arrays of the town.
         batch: arrays of all worlds.
         view: what is observed.
@@ -87,11 +88,11 @@ def play_share(
         substeps: how many.
         dt: time of each [s].
     """
-    number = take(turns)
-    while number < len(playing):
+    number = take(turns, home)
+    while number >= 0:
         if playing[number]:
             _play(number, town, batch, view, egos, actions[number], substeps, dt)
-        number = take(turns)
+        number = take(turns, home)
 
 
 @inlined

@@ -5,25 +5,48 @@ from __future__ import annotations
 import threading
 from typing import Any
 
+import numpy as np
 from numba import types
 from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
 from dorothie_gym.world.compiling import WITHOUT_COUNTS
 
+LINE = 8
+"""Numbers in a line of a processor's cache: counters that lie closer are written to by turns, not at once."""
+
 _lock = threading.Lock()
 
 
-def take(turns: NDArray[Any]) -> int:
-    """The next number: 0, 1, 2, and so on.
+def turns_of(count: int, threads: int) -> NDArray[np.int64]:
+    """The numbers 0 to `count` - 1 in as many blocks as there are threads, none of them taken.
+
+    Returns:
+        (threads, LINE): of each block the next number and the one behind its last.
+    """
+    turns = np.zeros((threads, LINE), dtype=np.int64)
+    borders = np.arange(threads + 1) * count // threads
+    turns[:, 0], turns[:, 1] = borders[:-1], borders[1:]
+    return turns
+
+
+def take(turns: NDArray[Any], home: int) -> int:
+    """The next number of one's own block, so that a thread gets again what is in its cache; then those of others.
 
     Args:
-        turns: (1,) int64, the next number; 0 at first.
+        turns: see `turns_of`.
+        home: number of one's own block.
+
+    Returns:
+        A number that nobody else gets, or -1 when there is none left.
     """
-    with _lock:
-        number = int(turns[0])
-        turns[0] += 1
-    return number
+    for k in range(len(turns)):
+        block = turns[(home + k) % len(turns)]
+        with _lock:
+            if block[0] < block[1]:
+                block[0] += 1
+                return int(block[0]) - 1
+    return -1
 
 
 @intrinsic
@@ -38,8 +61,14 @@ def _fetch_and_add(typing_context: Any, turns: Any) -> Any:
 
 
 @overload(take, jit_options=WITHOUT_COUNTS)
-def _compiled_take(turns: Any) -> Any:
-    def one(turns: Any) -> Any:
-        return _fetch_and_add(turns)
+def _compiled_take(turns: Any, home: Any) -> Any:
+    def one(turns: Any, home: Any) -> Any:
+        for k in range(len(turns)):
+            block = (home + k) % len(turns)
+            if turns[block, 0] < turns[block, 1]:
+                number = _fetch_and_add(turns[block])
+                if number < turns[block, 1]:
+                    return number
+        return -1
 
     return one
