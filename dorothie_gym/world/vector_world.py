@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 
+from dorothie_gym.world.crew import Crew
 from dorothie_gym.world.kernel import TownArrays, WorldArrays
 from dorothie_gym.world.kernel.batch import put, stacked, step_share, world_of
 from dorothie_gym.world.kernel.turns import turns_of
@@ -48,7 +48,7 @@ class VectorWorld:
         self.town = town
         self.arrays = stacked(world, worlds)
         self.threads = min(threads or available_processors(), worlds)
-        self._others = ThreadPoolExecutor(self.threads - 1, "worlds") if self.threads > 1 else None
+        self._crew = Crew(self.threads - 1)
 
     def __len__(self) -> int:
         return len(self.arrays.clock)
@@ -90,22 +90,11 @@ class VectorWorld:
             arguments: for it.
         """
         turns = turns_of(len(self), self.threads)
-        if self._others is None:
-            work(turns, 0, *arguments)
-            return
-        futures = [self._others.submit(work, turns, home, *arguments) for home in range(1, self.threads)]
-        try:
-            work(turns, 0, *arguments)
-        finally:
-            errors = [future.exception() for future in futures]  # waits: nobody works on when this returns
-        for error in errors:
-            if error is not None:
-                raise error
+        self._crew.do(work, lambda home: (turns, home, *arguments))
 
     def close(self) -> None:
         """Lets the threads go; the worlds cannot be stepped any more."""
-        if self._others is not None:
-            self._others.shutdown()
+        self._crew.close()
 
 
 def available_processors() -> int:
