@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.world.car.clearance import BRAKING
 from dorothie_gym.world.car.control import LATERAL, LONGITUDINAL, MAX_ACCELERATION, MAX_BRAKING, MAX_SLIP, MAX_STEERING
-from dorothie_gym.world.car.driver import (
+from dorothie_gym.world.car.pace import (
     APPROACH_DISTANCE,
     APPROACH_SPEED,
     PROFILE_BRAKING,
