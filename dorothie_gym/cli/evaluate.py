@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dorothie_gym.cli.options import Maps
 from dorothie_gym.cli.output import check_file, fail, print_json, stdout, told_plainly
 
 if TYPE_CHECKING:
@@ -45,9 +46,7 @@ def evaluate(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write the table (md, tex, json) and its pictures into a folder.")
     ] = None,
-    maps: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder with maps of towns that are not shipped (Town01.xodr).")
-    ] = None,
+    maps: Maps = None,
     as_json: Annotated[bool, typer.Option("--json", help="Write JSON, and nothing else.")] = False,
 ) -> None:
     """Score predictions on the three tasks: understanding (ufn), response (rfn) and navigation (nfd)."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dorothie_gym.cli.options import Ray, WordErrors, env_config
+from dorothie_gym.cli.options import AsJson, MaxSeconds, Players, Ray, WordErrors, env_config
 from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
 from dorothie_gym.cli.players import find_cast
 from dorothie_gym.cli.progress import processors, session_progress
@@ -36,20 +36,16 @@ def rollout(
     ad_wizard: Annotated[str, typer.Option(metavar=_POLICY, help="Who plays the Ad-Wizard.")] = "scripted",
     sessions: Annotated[int, typer.Option(min=1, help="How many, in all towns together.")] = 20,
     towns: Annotated[str, typer.Option(metavar="seen|unseen|all|NAME,...", help="Where; towns take turns.")] = "unseen",
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes that play; as many as there are processors.")
-    ] = None,
+    workers: Players = None,
     seed: Annotated[int, typer.Option(min=0, help="Equal seeds give equal sessions, whoever plays.")] = 0,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Keep sessions and results here; a rollout that was begun is gone on with."),
     ] = None,
-    max_seconds: Annotated[
-        float | None, typer.Option(min=1.0, max=86400.0, help="Cut sessions off after so many simulated seconds.")
-    ] = None,
+    max_seconds: MaxSeconds = None,
     word_errors: WordErrors = 0.0,
     ray: Ray = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Let agents drive and talk through many sessions, and print what that was worth, with intervals.
 

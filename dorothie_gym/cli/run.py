@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dorothie_gym.cli.options import WordErrors, env_config
+from dorothie_gym.cli.options import AsJson, WordErrors, env_config
 from dorothie_gym.cli.output import (
     INTERRUPTED,
     check_picture,
@@ -76,7 +76,7 @@ def run(
         float | None, typer.Option(min=1.0, max=86400.0, help="Cut the session off after so many simulated seconds.")
     ] = None,
     word_errors: WordErrors = 0.0,
-    as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Play one session: three roles talk while the car drives. The seed is 0 unless you give another."""
     if no_picture and picture is not None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dorothie_gym.cli.options import AsJson
 from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
 
 if TYPE_CHECKING:
@@ -38,7 +39,6 @@ Out = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Folder of the trainings; one that was begun is gone on with.")
 ]
 Workers = Annotated[int | None, typer.Option(min=1, max=256, help="Processes; all cores without it.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")]
 
 
 def train(
