@@ -9,14 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dorothie_gym.cli.options import AsJson, MaxSeconds, Players, Ray, WordErrors, env_config
-from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
+from dorothie_gym.cli.output import FAILED, INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
 from dorothie_gym.cli.progress import processors, session_progress
 
 if TYPE_CHECKING:
     from dorothie_gym.rollout import Generated
-
-_FAILED = 1
-"""Exit code where a session could not be played."""
 
 
 def generate(
@@ -52,7 +49,7 @@ def generate(
         except KeyboardInterrupt:
             _tell_interruption(out, sessions, seed, max_seconds, word_errors)
         except ProcessError as error:
-            fail(str(error), _FAILED)
+            fail(str(error), FAILED)
     facts = _facts(made, seed, time.perf_counter() - begun)
     if as_json:
         print_json(facts)

@@ -18,6 +18,18 @@ Maps = Annotated[
 
 Players = Annotated[int | None, typer.Option(min=1, help="Processes that play; as many as there are processors.")]
 
+Participant = Annotated[str, typer.Option(metavar="scripted|silent|random|FILE", help="Who plays the participant.")]
+
+CoWizard = Annotated[
+    str,
+    typer.Option(
+        metavar="scripted|silent|random|lane-follow|FILE",
+        help="Who plays the Co-Wizard; a file holds a learned policy.",
+    ),
+]
+
+AdWizard = Annotated[str, typer.Option(metavar="scripted|silent|random|FILE", help="Who plays the Ad-Wizard.")]
+
 MaxSeconds = Annotated[
     float | None, typer.Option(min=1.0, max=86400.0, help="Cut sessions off after so many simulated seconds.")
 ]
