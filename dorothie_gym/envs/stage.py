@@ -19,6 +19,7 @@ from dorothie_gym.envs.scenario import Scenario
 from dorothie_gym.envs.talk import Talk
 from dorothie_gym.envs.views import Moment, Views
 from dorothie_gym.ontology import (
+    AGENT_ROLES,
     ARRIVAL_DISTANCE,
     NAVIGATION_ACTIONS,
     ExceptionKind,
@@ -44,9 +45,6 @@ from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.reports import INFRACTION_KINDS, WorldEventKind
 from dorothie_gym.world.town import Town
 from dorothie_gym.world.world import World
-
-ROLES = (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD)
-"""The agents, in the order in which they are listed."""
 
 _SIGNS = ((Role.PARTICIPANT, 1.0), (Role.CO_WIZARD, 1.0), (Role.AD_WIZARD, -1.0))
 """The Ad-Wizard gets the opposite of what the others share."""
@@ -98,7 +96,7 @@ class Stage:
         self._moment = self._new_moment("")
         self._statuses = [self.task.status(i) for i in range(len(scenario.storyboard.subgoals))]
         self.events: list[Event] = []
-        self.refused: dict[Role, list[str]] = {role: [] for role in ROLES}
+        self.refused: dict[Role, list[str]] = {role: [] for role in AGENT_ROLES}
         self.messages: list[tuple[float, str]] = []
         self.trail: list[tuple[float, float]] = [self._car_place()]
         self.counts = {"utterances": 0, "acts": 0, "physical_actions": 0, "exceptions": 0, "refusals": 0}
@@ -112,7 +110,7 @@ class Stage:
     def play(self, actions: Mapping[Role, RoleAction]) -> dict[Role, dict[str, float]]:
         """Carries out a decision of all roles and runs the physics until the next; returns each role's reward terms."""
         self.events = []
-        self.refused = {role: [] for role in ROLES}
+        self.refused = {role: [] for role in AGENT_ROLES}
         collisions, reached = self.world.collisions, self._reached()
         message = self._play_ad_wizard(actions[Role.AD_WIZARD])
         spoken = {role: self._speak(role, actions[role]) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
