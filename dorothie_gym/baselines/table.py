@@ -37,11 +37,6 @@ def table_jobs(
     ]
 
 
-def is_done(job: Job) -> bool:
-    """Returns whether a training was finished and tested before; whether it was this one is checked when it is run."""
-    return (job.folder / PREDICTIONS_FILE).is_file() and (job.folder / RESULT_FILE).is_file()
-
-
 def gather_table(jobs: Sequence[Job], *, floors: bool = True) -> tuple[ResultsTable, tuple[TaskPredictions, ...]]:
     """Scores what finished trainings predicted, and the floors beside them.
 

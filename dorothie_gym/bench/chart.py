@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from dorothie_gym.bench.report import Report, number
-from dorothie_gym.world.graphics.palette import CAR, INK, INK_SOFT, LIGHT_RED, ROAD, SHEET, Colour
+from dorothie_gym.world.graphics.charts import INK, SHEET, SOFT, hexadecimal
+from dorothie_gym.world.graphics.palette import CAR, LIGHT_RED, ROAD
 
 SIZE = 9.0
 """Width of the picture [inches]."""
@@ -36,7 +37,7 @@ def draw(report: Report, path: Path) -> None:
     with rc_context({"font.family": _FONT}):
         rows, notes = _ROW * len(report.rows), 0.2 * len(report.notes)
         height = rows + _AROUND + notes
-        figure = Figure(figsize=(SIZE, height), dpi=DOTS, facecolor=_hex(SHEET))
+        figure = Figure(figsize=(SIZE, height), dpi=DOTS, facecolor=SHEET)
         FigureCanvasAgg(figure)
         _words(figure, report, height)
         axes = figure.add_axes(
@@ -52,11 +53,11 @@ def _words(figure: Any, report: Report, height: float) -> None:
     def say(inches: float, text: str, **style: Any) -> None:
         figure.text(0.03, inches / height, text, va="baseline", **style)
 
-    say(height - 0.42, report.headline[0].upper() + report.headline[1:], fontsize=13.5, weight="bold", color=_hex(INK))
-    say(height - 0.72, f"{report.title} · {report.setting}", fontsize=9, color=_hex(INK_SOFT))
+    say(height - 0.42, report.headline[0].upper() + report.headline[1:], fontsize=13.5, weight="bold", color=INK)
+    say(height - 0.72, f"{report.title} · {report.setting}", fontsize=9, color=SOFT)
     for k, note in enumerate(reversed(report.notes)):
-        say(0.36 + 0.2 * k, note, fontsize=8.5, color=_hex(INK))
-    say(0.14, report.machine, fontsize=7, color=_hex(INK_SOFT))
+        say(0.36 + 0.2 * k, note, fontsize=8.5, color=INK)
+    say(0.14, report.machine, fontsize=7, color=SOFT)
 
 
 def _bars(axes: Any, report: Report) -> None:
@@ -70,7 +71,7 @@ def _bars(axes: Any, report: Report) -> None:
         left, right = 0.0, max(known) * 1.25
     axes.set_xlim(left, right)
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:,.10g}")
-    colours = [_hex(ROAD if row.reference else CAR) for row in report.rows]
+    colours = [hexadecimal(ROAD if row.reference else CAR) for row in report.rows]
     axes.barh(places, [value - left for value in values], left=left, height=0.56, color=colours, zorder=2)
     for k, row in enumerate(report.rows):
         axes.annotate(
@@ -78,21 +79,17 @@ def _bars(axes: Any, report: Report) -> None:
             weight="bold", color=colours[k], zorder=4,
         )  # fmt: skip
     if report.mark is not None:
-        axes.axvline(report.mark.value, color=_hex(LIGHT_RED), linewidth=1.4, linestyle=(0, (4, 3)), zorder=3)
+        axes.axvline(report.mark.value, color=hexadecimal(LIGHT_RED), linewidth=1.4, linestyle=(0, (4, 3)), zorder=3)
         axes.annotate(
             report.mark.label, (report.mark.value, 1.0), xycoords=("data", "axes fraction"), xytext=(4, 3),
-            textcoords="offset points", fontsize=8.5, color=_hex(LIGHT_RED),
+            textcoords="offset points", fontsize=8.5, color=hexadecimal(LIGHT_RED),
         )  # fmt: skip
-    axes.set_yticks(list(places), [row.label for row in report.rows], fontsize=9, color=_hex(INK))
+    axes.set_yticks(list(places), [row.label for row in report.rows], fontsize=9, color=INK)
     axes.set_ylim(len(values) - 0.5, -0.5)
-    axes.set_xlabel(report.unit + (" (logarithmic)" if report.logarithmic else ""), fontsize=8.5, color=_hex(INK_SOFT))
-    axes.tick_params(axis="x", labelsize=8, colors=_hex(INK_SOFT), which="both", length=0)
+    axes.set_xlabel(report.unit + (" (logarithmic)" if report.logarithmic else ""), fontsize=8.5, color=SOFT)
+    axes.tick_params(axis="x", labelsize=8, colors=SOFT, which="both", length=0)
     axes.tick_params(axis="y", length=0)
     axes.grid(axis="x", color="white", linewidth=1.0, zorder=0)
-    axes.set_facecolor(_hex(SHEET))
+    axes.set_facecolor(SHEET)
     for side in axes.spines.values():
         side.set_visible(False)
-
-
-def _hex(colour: Colour) -> str:
-    return "#{:02x}{:02x}{:02x}".format(*colour)

@@ -14,7 +14,7 @@ from dorothie_gym.bench.timing import Progress, cores, in_turns, machine, quiet,
 from dorothie_gym.bench.workers import Worker
 from dorothie_gym.envs.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.envs.stage import ROLES
+from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.spaces import noop
 from dorothie_gym.world.config import FRAME_RATE, WorldConfig
 
@@ -45,7 +45,7 @@ class Session:
     def __init__(self, town: str, vehicles: int, pedestrians: int, seed: int) -> None:
         world = WorldConfig(vehicles=vehicles, pedestrians=pedestrians)
         self.env = DuoWizardEnv(town, config=EnvConfig(world=world, max_seconds=DAY))
-        self._actions = {str(role): noop(role, self.env.limits) for role in ROLES}
+        self._actions = {str(role): noop(role, self.env.limits) for role in AGENT_ROLES}
         self.env.reset(seed=seed)
         self.seconds(WARM_UP, time.process_time)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import typer
 
 from dorothie_gym.cli.optional import OWN_NAME, PictureCommand
+from dorothie_gym.cli.options import AsJson
 from dorothie_gym.cli.output import INTERRUPTED, check_picture, fail, print_json, stderr, stdout, told_plainly
 
 if TYPE_CHECKING:
@@ -50,7 +51,6 @@ Repeats = Annotated[int, typer.Option(min=1, max=99, help="How often each is mea
 Picture = Annotated[
     Path | None, typer.Option(help="Draw a chart into this PNG file; without a file, into one named after the command.")
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")]
 
 
 @bench.command(cls=BenchCommand)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dorothie_gym.cli.options import AsJson, Maps
 from dorothie_gym.cli.output import fail, print_json, stderr, stdout, told_plainly
 
 if TYPE_CHECKING:
@@ -30,10 +31,8 @@ def convert(
     source: Annotated[Path, typer.Argument(metavar="IN", help="A session, or a folder of sessions or of folds.")],
     out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder to write, which must hold no such session yet.")],
     to: Annotated[Layout, typer.Option("--to", help="Write the SDN release layout, our own, or two Parquet tables.")],
-    maps: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder with maps of towns that are not shipped (Town01.xodr).")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
+    maps: Maps = None,
+    as_json: AsJson = False,
 ) -> None:
     """Convert sessions: SDN (release, sample or hub layout) and our own, either way; reports what was not understood.
 

@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dorothie_gym.cli.output import check_file, fail, print_json, stdout, told_plainly
+from dorothie_gym.cli.options import Maps
+from dorothie_gym.cli.output import check_file, fail, print_json, told_plainly, wide_stdout
 
 if TYPE_CHECKING:
     from dorothie_gym.evaluation import CorpusLabels, ResultsTable, Split, TaskPredictions
     from dorothie_gym.sessions import Corpus, Task
-
-WIDTH = 130
-"""Columns of what is written into a file or a pipe, which have no width of their own."""
 
 DETAILED = 2
 """Up to so many models are shown with everything; more of them as the table."""
@@ -45,9 +43,7 @@ def evaluate(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write the table (md, tex, json) and its pictures into a folder.")
     ] = None,
-    maps: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder with maps of towns that are not shipped (Town01.xodr).")
-    ] = None,
+    maps: Maps = None,
     as_json: Annotated[bool, typer.Option("--json", help="Write JSON, and nothing else.")] = False,
 ) -> None:
     """Score predictions on the three tasks: understanding (ufn), response (rfn) and navigation (nfd)."""
@@ -167,9 +163,7 @@ def _flat(table: ResultsTable) -> dict[str, Any]:
 def _show(table: ResultsTable, out: Path | None) -> None:
     from dorothie_gym.evaluation.terminal import print_counts, print_details, print_table
 
-    console = stdout()
-    if not console.is_terminal:
-        console.width = WIDTH
+    console = wide_stdout()
     if len(table.models) > DETAILED:
         print_table(table, console)
     else:

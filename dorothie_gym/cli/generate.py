@@ -8,30 +8,23 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dorothie_gym.cli.options import Ray, WordErrors, env_config
-from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
+from dorothie_gym.cli.options import AsJson, MaxSeconds, Players, Ray, WordErrors, env_config
+from dorothie_gym.cli.output import FAILED, INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
 from dorothie_gym.cli.progress import processors, session_progress
 
 if TYPE_CHECKING:
     from dorothie_gym.rollout import Generated
-
-_FAILED = 1
-"""Exit code where a session could not be played."""
 
 
 def generate(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the corpus; one that was begun is gone on with.")],
     sessions: Annotated[int, typer.Option(min=1, help="How many, in folds as the paper's 183.")] = 183,
     seed: Annotated[int, typer.Option(min=0, help="Equal seeds make equal corpora.")] = 0,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes that play; as many as there are processors.")
-    ] = None,
-    max_seconds: Annotated[
-        float | None, typer.Option(min=1.0, max=86400.0, help="Cut sessions off after so many simulated seconds.")
-    ] = None,
+    workers: Players = None,
+    max_seconds: MaxSeconds = None,
     word_errors: WordErrors = 0.0,
     ray: Ray = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Make a corpus: the scripted three play many sessions, divided into train, val and test, seen and unseen towns.
 
@@ -56,7 +49,7 @@ def generate(
         except KeyboardInterrupt:
             _tell_interruption(out, sessions, seed, max_seconds, word_errors)
         except ProcessError as error:
-            fail(str(error), _FAILED)
+            fail(str(error), FAILED)
     facts = _facts(made, seed, time.perf_counter() - begun)
     if as_json:
         print_json(facts)

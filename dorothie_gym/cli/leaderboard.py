@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from dorothie_gym.cli.options import AsJson
 from dorothie_gym.cli.output import check_file, fail, print_json, stdout, told_plainly
 
 PAGE = Path("docs/leaderboard.md")
@@ -19,7 +20,7 @@ def leaderboard(
     out: Annotated[
         Path, typer.Option(metavar="FILE.md", help="Page to write; its picture lies beside it, with the ending .png.")
     ] = PAGE,
-    as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Rank policies by the results of their rollouts: a page with intervals, cost and commands, and a picture."""
     with told_plainly():

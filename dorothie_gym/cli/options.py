@@ -2,12 +2,37 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
     from dorothie_gym.envs.config import EnvConfig
+
+AsJson = Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")]
+
+Maps = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Folder with maps of towns that are not shipped (Town01.xodr).")
+]
+
+Players = Annotated[int | None, typer.Option(min=1, help="Processes that play; as many as there are processors.")]
+
+Participant = Annotated[str, typer.Option(metavar="scripted|silent|random|FILE", help="Who plays the participant.")]
+
+CoWizard = Annotated[
+    str,
+    typer.Option(
+        metavar="scripted|silent|random|lane-follow|FILE",
+        help="Who plays the Co-Wizard; a file holds a learned policy.",
+    ),
+]
+
+AdWizard = Annotated[str, typer.Option(metavar="scripted|silent|random|FILE", help="Who plays the Ad-Wizard.")]
+
+MaxSeconds = Annotated[
+    float | None, typer.Option(min=1.0, max=86400.0, help="Cut sessions off after so many simulated seconds.")
+]
 
 WordErrors = Annotated[
     float,

@@ -12,16 +12,30 @@ from typing import Any, NoReturn
 import typer
 from rich.console import Console
 
+FAILED = 1
+"""Exit code where what was asked for could not be done."""
+
 BAD_INPUT = 2
 """Exit code for a user's mistake."""
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it (128 + SIGINT)."""
 
+WIDTH = 130
+"""Columns of what is written into a file or a pipe, which have no width of their own."""
+
 
 def stdout() -> Console:
     """A console on standard output, as it is now."""
     return Console(highlight=False)
+
+
+def wide_stdout() -> Console:
+    """A console on standard output for tables: `WIDTH` columns where it is no terminal."""
+    console = stdout()
+    if not console.is_terminal:
+        console.width = WIDTH
+    return console
 
 
 def stderr() -> Console:

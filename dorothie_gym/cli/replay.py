@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dorothie_gym.cli.options import AsJson
 from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
 from dorothie_gym.cli.video import check_video, video_writer
 
@@ -39,7 +40,7 @@ def replay(
     storyboard: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Its storyboard, where that is not shipped (.json).")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Show a recorded session, with the talk beside the town; or --check that it comes out the same again.
 

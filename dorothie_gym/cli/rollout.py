@@ -10,46 +10,41 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dorothie_gym.cli.options import Ray, WordErrors, env_config
-from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
+from dorothie_gym.cli.options import (
+    AdWizard,
+    AsJson,
+    CoWizard,
+    MaxSeconds,
+    Participant,
+    Players,
+    Ray,
+    WordErrors,
+    env_config,
+)
+from dorothie_gym.cli.output import FAILED, INTERRUPTED, fail, print_json, stderr, told_plainly, wide_stdout
 from dorothie_gym.cli.players import find_cast
 from dorothie_gym.cli.progress import processors, session_progress
 
 if TYPE_CHECKING:
     from dorothie_gym.evaluation.closed_loop import RolloutResult, RolloutSettings
 
-WIDTH = 130
-"""Columns of what is written into a file or a pipe, which have no width of their own."""
-
-_FAILED = 1
-"""Exit code where a session could not be played."""
-
-_POLICY = "scripted|silent|random|FILE"
-_CO_WIZARD = "scripted|silent|random|lane-follow|FILE"
-
 
 def rollout(
-    co_wizard: Annotated[
-        str, typer.Option(metavar=_CO_WIZARD, help="Who plays the Co-Wizard; a file holds a learned policy.")
-    ] = "scripted",
-    participant: Annotated[str, typer.Option(metavar=_POLICY, help="Who plays the participant.")] = "scripted",
-    ad_wizard: Annotated[str, typer.Option(metavar=_POLICY, help="Who plays the Ad-Wizard.")] = "scripted",
+    co_wizard: CoWizard = "scripted",
+    participant: Participant = "scripted",
+    ad_wizard: AdWizard = "scripted",
     sessions: Annotated[int, typer.Option(min=1, help="How many, in all towns together.")] = 20,
     towns: Annotated[str, typer.Option(metavar="seen|unseen|all|NAME,...", help="Where; towns take turns.")] = "unseen",
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes that play; as many as there are processors.")
-    ] = None,
+    workers: Players = None,
     seed: Annotated[int, typer.Option(min=0, help="Equal seeds give equal sessions, whoever plays.")] = 0,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Keep sessions and results here; a rollout that was begun is gone on with."),
     ] = None,
-    max_seconds: Annotated[
-        float | None, typer.Option(min=1.0, max=86400.0, help="Cut sessions off after so many simulated seconds.")
-    ] = None,
+    max_seconds: MaxSeconds = None,
     word_errors: WordErrors = 0.0,
     ray: Ray = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Let agents drive and talk through many sessions, and print what that was worth, with intervals.
 
@@ -72,9 +67,7 @@ def rollout(
         return
     from dorothie_gym.evaluation.closed_loop.terminal import print_result
 
-    console = stdout()
-    if not console.is_terminal:
-        console.width = WIDTH
+    console = wide_stdout()
     print_result(result, console)
     if out is not None:
         console.print(f"Kept for `dorothie-gym replay` and `leaderboard`: {out}", style="dim", soft_wrap=True)
@@ -91,7 +84,7 @@ def _play(settings: RolloutSettings, out: Path | None, workers: int, ray: str | 
     except KeyboardInterrupt:
         _tell_interruption(folder, settings)
     except ProcessError as error:
-        fail(f"{error}; what was played until then is kept in {folder}", _FAILED)
+        fail(f"{error}; what was played until then is kept in {folder}", FAILED)
     if out is None:
         shutil.rmtree(folder)
     return result

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dorothie_gym.cli.options import WordErrors, env_config
+from dorothie_gym.cli.options import AdWizard, AsJson, CoWizard, Participant, WordErrors, env_config
 from dorothie_gym.cli.output import (
     INTERRUPTED,
     check_picture,
@@ -30,9 +30,6 @@ if TYPE_CHECKING:
 
 PICTURE = Path("dorothie.png")
 """Picture that is written where none is asked for."""
-
-_POLICY = "scripted|silent|random|FILE"
-_CO_WIZARD = "scripted|silent|random|lane-follow|FILE"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,14 +66,14 @@ def run(
     video: Annotated[
         Path | None, typer.Option(metavar="V.mp4", help="Film the session (needs dorothie-gym[video]).")
     ] = None,
-    participant: Annotated[str, typer.Option(metavar=_POLICY, help="Who plays the participant.")] = "scripted",
-    co_wizard: Annotated[str, typer.Option(metavar=_CO_WIZARD, help="Who plays the Co-Wizard.")] = "scripted",
-    ad_wizard: Annotated[str, typer.Option(metavar=_POLICY, help="Who plays the Ad-Wizard.")] = "scripted",
+    participant: Participant = "scripted",
+    co_wizard: CoWizard = "scripted",
+    ad_wizard: AdWizard = "scripted",
     max_seconds: Annotated[
         float | None, typer.Option(min=1.0, max=86400.0, help="Cut the session off after so many simulated seconds.")
     ] = None,
     word_errors: WordErrors = 0.0,
-    as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Play one session: three roles talk while the car drives. The seed is 0 unless you give another."""
     if no_picture and picture is not None:

@@ -10,6 +10,7 @@ import typer
 from rich.table import Table
 
 from dorothie_gym.cli.optional import OWN_NAME
+from dorothie_gym.cli.options import AsJson, Maps
 from dorothie_gym.cli.output import check_picture, fail, print_json, stdout, told_plainly
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ def stats(
     folder: Annotated[
         Path | None, typer.Argument(metavar="DIR", help="A corpus, a folder of sessions, or one session.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
+    as_json: AsJson = False,
     picture: Annotated[
         Path | None,
         typer.Option(metavar="[FILE.png]", help=f"Draw moves and slots by speaker and exception; else {PICTURE}."),
@@ -66,9 +67,7 @@ def stats(
         tuple[Path, Path] | None,
         typer.Option(metavar="A B", help="Cohen's kappa of two annotations of one session."),
     ] = None,
-    maps: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder with maps of towns that are not shipped (Town01.xodr).")
-    ] = None,
+    maps: Maps = None,
 ) -> None:
     """Count a corpus: table 2 of the paper and what makes its tasks easy or hard, found anew from the events."""
     _check_choice(folder, kappa, picture=picture is not None, phenomena=phenomena, behaviour=behaviour, check=check)

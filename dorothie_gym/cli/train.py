@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
+from dorothie_gym.cli.options import AsJson
+from dorothie_gym.cli.output import FAILED, INTERRUPTED, fail, print_json, stderr, stdout, told_plainly, wide_stdout
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.runs import Job
@@ -19,11 +20,6 @@ if TYPE_CHECKING:
 
 RUNS = Path("runs")
 """Folder of trainings where none is named: one for each corpus within."""
-
-WIDTH = 130
-"""Columns of what is written into a file or a pipe, which have no width of their own."""
-
-_FAILED = 1
 
 CorpusOption = Annotated[
     Path | None,
@@ -38,7 +34,6 @@ Out = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Folder of the trainings; one that was begun is gone on with.")
 ]
 Workers = Annotated[int | None, typer.Option(min=1, max=256, help="Processes; all cores without it.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")]
 
 
 def train(
@@ -172,9 +167,7 @@ def _places(corpus: Path | None, out: Path | None) -> tuple[Path, Path]:
 def _show(table: ResultsTable) -> None:
     from dorothie_gym.evaluation.terminal import print_table
 
-    console = stdout()
-    if not console.is_terminal:
-        console.width = WIDTH
+    console = wide_stdout()
     print_table(table, console)
 
 
@@ -196,4 +189,4 @@ def _told_plainly() -> Iterator[None]:
         except (EncoderError, CheckpointError, PredictionError, ValueError) as error:
             fail(str(error))
         except ProcessError as error:
-            fail(str(error), _FAILED)
+            fail(str(error), FAILED)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dorothie_gym.cli.options import AsJson
 from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def train_rl(
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Of networks and environments.")] = 0,
     evaluate_every: Annotated[int | None, typer.Option(min=1, help="Steps between evaluations; as tuned.")] = None,
     episodes: Annotated[int | None, typer.Option(min=1, help="Of an evaluation; as tuned.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Train a driver (or any role) with stable-baselines3, from defaults that were tuned.
 

@@ -13,7 +13,7 @@ from dorothie_gym.spaces import AdWizardAction
 from dorothie_gym.tasks import StoryboardError, TaskState
 from dorothie_gym.world.bodies import Prop
 from dorothie_gym.world.boxes import Box, boxes_touch
-from dorothie_gym.world.car.planner import BRAKING
+from dorothie_gym.world.car.clearance import BRAKING
 from dorothie_gym.world.roadblocks import crowds, cuts_off
 from dorothie_gym.world.town.model import Array, LinkType
 from dorothie_gym.world.world import World

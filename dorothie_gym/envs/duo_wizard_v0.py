@@ -15,15 +15,15 @@ from pettingzoo.utils.conversions import parallel_to_aec
 
 from dorothie_gym.envs.config import EnvConfig
 from dorothie_gym.envs.scenario import Scenario, draw_scenario
-from dorothie_gym.envs.stage import ROLES, Stage
-from dorothie_gym.ontology import Role
+from dorothie_gym.envs.stage import Stage
+from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.sessions import Event, SessionHeader
 from dorothie_gym.spaces import ActionDecoder, SpaceLimits, action_space, observation_space
 from dorothie_gym.tasks import StoryboardTemplate, load_template
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.town import Town, load_town
 
-_AGENTS = {str(role): role for role in ROLES}
+_AGENTS = {str(role): role for role in AGENT_ROLES}
 
 
 class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
@@ -98,13 +98,13 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
         self.limits = SpaceLimits().grown_for(
             lanes=len(self.town.lanes), junctions=len(self.town.junctions), streets=len(self.town.streets)
         )
-        self.possible_agents = [str(role) for role in ROLES]
+        self.possible_agents = [str(role) for role in AGENT_ROLES]
         self.agents: list[str] = []
         self.observation_spaces = {
-            str(role): deepcopy(observation_space(role, self.limits, self.config.observe_acts)) for role in ROLES
+            str(role): deepcopy(observation_space(role, self.limits, self.config.observe_acts)) for role in AGENT_ROLES
         }
-        self.action_spaces = {str(role): deepcopy(action_space(role, self.limits)) for role in ROLES}
-        self._decoders = {role: ActionDecoder(role, self.limits) for role in ROLES}
+        self.action_spaces = {str(role): deepcopy(action_space(role, self.limits)) for role in AGENT_ROLES}
+        self._decoders = {role: ActionDecoder(role, self.limits) for role in AGENT_ROLES}
         self._network = TownNetwork(self.town)
         self._seeds = np.random.default_rng()
         self._stage: Stage | None = None
@@ -145,7 +145,7 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
         self._cycles = 0
         self.agents = list(self.possible_agents)
         observations = self._stage.observations()
-        infos = self._infos({role: {} for role in ROLES})
+        infos = self._infos({role: {} for role in AGENT_ROLES})
         if self.render_mode == "human":
             self.render()
         return observations, infos

@@ -3,22 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from dorothie_gym.dialogue import (
-    Annotator,
-    Channel,
-    Conversation,
-    Recogniser,
-    Span,
-    Utterance,
-    draw_style,
-    guess_spans,
-    word_act,
-)
+from dorothie_gym.dialogue import Utterance
 from dorothie_gym.envs.adversary import Adversary
 from dorothie_gym.envs.beliefs import Beliefs
 from dorothie_gym.envs.config import EnvConfig
@@ -26,11 +16,12 @@ from dorothie_gym.envs.headers import header_of
 from dorothie_gym.envs.masks import Masks
 from dorothie_gym.envs.prospect import Prospect
 from dorothie_gym.envs.scenario import Scenario
+from dorothie_gym.envs.talk import Talk
 from dorothie_gym.envs.views import Moment, Views
 from dorothie_gym.ontology import (
+    AGENT_ROLES,
     ARRIVAL_DISTANCE,
     NAVIGATION_ACTIONS,
-    DialogueAct,
     ExceptionKind,
     LandmarkName,
     MentalAction,
@@ -47,18 +38,13 @@ from dorothie_gym.spaces import (
     Physical,
     RoleAction,
     SpaceLimits,
-    plain_text,
 )
-from dorothie_gym.spaces.limits import UTTERANCE_LENGTH
 from dorothie_gym.tasks import TaskState
 from dorothie_gym.world.car.driver import GoalAhead
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.reports import INFRACTION_KINDS, WorldEventKind
 from dorothie_gym.world.town import Town
 from dorothie_gym.world.world import World
-
-ROLES = (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD)
-"""The agents, in the order in which they are listed."""
 
 _SIGNS = ((Role.PARTICIPANT, 1.0), (Role.CO_WIZARD, 1.0), (Role.AD_WIZARD, -1.0))
 """The Ad-Wizard gets the opposite of what the others share."""
@@ -89,7 +75,6 @@ class Stage:
         masks: which actions would not be refused now.
         events: what happened in the last decision.
         refused: reasons for the refusals of the last decision, by role.
-        said: all utterances that were heard so far.
         trail: places of the car, one a decision.
         counts: what the summary counts.
     """
@@ -104,21 +89,14 @@ class Stage:
         self.task = TaskState(scenario.storyboard)
         self.beliefs = Beliefs(town, scenario)
         self._adversary = Adversary(self.world, self.task, limits.props)
-        self._conversation = Conversation(config.words_per_second, limits.spans)
-        self._annotator = Annotator(
-            scenario.storyboard.landmarks[subgoal.landmark].name for subgoal in scenario.storyboard.subgoals
-        )
-        self._words, styles = np.random.default_rng(word_seed), np.random.default_rng(style_seed)
-        self._styles = {role: draw_style(role, styles) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
-        self._recogniser = Recogniser(Channel(rate=config.word_error_rate), np.random.default_rng(ear_seed))
+        self._talk = Talk(scenario, config, limits.spans, words=word_seed, ears=ear_seed, styles=style_seed)
         prospect = Prospect(self.world)
         self._views = Views(self.world, scenario, self.task, self.beliefs, limits, config.observe_acts, prospect)
         self.masks = Masks(self.world, self.task, limits, prospect)
-        self._moment = self._new_moment([], "")
+        self._moment = self._new_moment("")
         self._statuses = [self.task.status(i) for i in range(len(scenario.storyboard.subgoals))]
         self.events: list[Event] = []
-        self.refused: dict[Role, list[str]] = {role: [] for role in ROLES}
-        self.said: list[Utterance] = []
+        self.refused: dict[Role, list[str]] = {role: [] for role in AGENT_ROLES}
         self.messages: list[tuple[float, str]] = []
         self.trail: list[tuple[float, float]] = [self._car_place()]
         self.counts = {"utterances": 0, "acts": 0, "physical_actions": 0, "exceptions": 0, "refusals": 0}
@@ -132,7 +110,7 @@ class Stage:
     def play(self, actions: Mapping[Role, RoleAction]) -> dict[Role, dict[str, float]]:
         """Carries out a decision of all roles and runs the physics until the next; returns each role's reward terms."""
         self.events = []
-        self.refused = {role: [] for role in ROLES}
+        self.refused = {role: [] for role in AGENT_ROLES}
         collisions, reached = self.world.collisions, self._reached()
         message = self._play_ad_wizard(actions[Role.AD_WIZARD])
         spoken = {role: self._speak(role, actions[role]) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
@@ -140,7 +118,7 @@ class Stage:
         for event in self.world.step(self.config.frames):
             self._log(_WORLD_EVENTS[event.kind], Role.AGENT, event.data, frame=event.frame)
         self._note_arrivals()
-        self._moment = self._new_moment(self._conversation.deliver(self.world.time), message)
+        self._moment = self._new_moment(message)
         self.trail.append(self._car_place())
         return self._rewards(self._reached() - reached, self.world.collisions - collisions, spoken)
 
@@ -161,6 +139,11 @@ class Stage:
     def success(self) -> bool:
         """Whether every live subgoal was reached, the destination last, without a collision of the car's own making."""
         return self.world.collisions == 0 and self.task.done and self.task.success
+
+    @property
+    def said(self) -> Sequence[Utterance]:
+        """All utterances that were heard so far."""
+        return self._talk.said
 
     @property
     def infractions(self) -> dict[str, int]:
@@ -191,18 +174,12 @@ class Stage:
 
     def _speak(self, role: Role, action: RoleAction) -> bool:
         assert isinstance(action, ParticipantAction | CoWizardAction)
-        speech = action.speech
-        if speech is None:
+        if action.speech is None:
             return False
-        text = speech.text.strip() or self._worded(speech.act, role)
-        reason = self._conversation.say(role, Span(text, speech.act), self.world.time)
+        reason = self._talk.say(role, action.speech, self.world.time)
         if reason is not None:
             self._refuse(role, "speech", reason)
         return reason is None
-
-    def _worded(self, act: DialogueAct, role: Role) -> str:
-        """Words for an act that came without, in the speaker's style."""
-        return plain_text(word_act(act, role, self._words, style=self._styles[role]), UTTERANCE_LENGTH)
 
     def _play_co_wizard(self, action: RoleAction) -> None:
         assert isinstance(action, CoWizardAction)
@@ -288,51 +265,23 @@ class Stage:
     def _log_subgoal(self, i: int, cause: str) -> None:
         landmark = self.scenario.storyboard.landmarks[self.task.landmark_of(i)]
         status = self.task.status(i)
-        self._annotator.note(landmark.name, status)
+        self._talk.note(landmark.name, status)
         data = {"subgoal": i, "landmark": landmark.name.label, "status": status.label, "cause": cause}
         self._log(EventType.SUBGOAL, Role.AGENT, data)
 
-    def _new_moment(self, utterances: list[Utterance], message: str) -> Moment:
+    def _new_moment(self, message: str) -> Moment:
         said: dict[Role, Utterance] = {}
         heard: dict[Role, Utterance] = {}
-        for utterance in utterances:
-            speaker = utterance.speaker
-            said[speaker], heard[speaker] = utterance, self._recogniser.hear(utterance)
-            self.said.append(utterance)
-            # The Co-Wizard's beliefs are of what it takes itself, and the human, to have said.
-            self.beliefs.hear(speaker, self._understood(utterance if speaker is Role.CO_WIZARD else heard[speaker]))
-            self._log_utterance(utterance, heard[speaker])
         now = self.world.time
-        self._annotator.tick(now)
-        speaking = {role: self._conversation.speaking(role, now) for role in ROLES}
-        return Moment(said=said, heard=heard, message=message, speaking=speaking)
-
-    def _understood(self, utterance: Utterance) -> tuple[DialogueAct, ...]:
-        """What the Co-Wizard may take from an utterance: its acts, or where they do not show, what words sound like."""
-        if self.config.observe_acts:
-            return utterance.acts
-        return tuple(span.act for span in guess_spans(utterance.text))
-
-    def _log_utterance(self, utterance: Utterance, heard: Utterance) -> None:
-        exchanges, transaction = self._annotator.update(utterance)
-        number = self.counts["utterances"]
-        self.counts["utterances"] += 1
-        transcript = {"recognised": heard.text} if self.config.word_error_rate else {}
-        for span, exchange in zip(utterance.spans, exchanges, strict=True):
-            self.counts["acts"] += 1
-            data = {
-                "utterance": number,
-                "text": utterance.text,
-                **transcript,
-                "span": span.text,
-                "move": span.act.move.label,
-                "slots": {label: list(values) for label, values in span.act.slot_labels().items()},
-                "exchange": exchange,
-                "transaction": transaction,
-                "start": round(utterance.start, 3),
-                "end": round(utterance.end, 3),
-            }
-            self._log(EventType.DIALOGUE_MOVE, utterance.speaker, data, flagged=True)
+        for words in self._talk.deliver(now):
+            speaker = words.said.speaker
+            said[speaker], heard[speaker] = words.said, words.heard
+            self.beliefs.hear(speaker, words.understood)
+            self.counts["utterances"] += 1
+            self.counts["acts"] += len(words.records)
+            for data in words.records:
+                self._log(EventType.DIALOGUE_MOVE, speaker, data, flagged=True)
+        return Moment(said=said, heard=heard, message=message, speaking=self._talk.speaking(now))
 
     def _rewards(self, reached: int, collisions: int, spoken: Mapping[Role, bool]) -> dict[Role, dict[str, float]]:
         weights = self.config.rewards
@@ -389,7 +338,7 @@ class Stage:
             "infractions": self.infractions,
             "seconds": round(self.world.time, 3),
             **self.counts,
-            "exchanges": len(self._annotator.exchanges),
-            "transactions": len(self._annotator.transactions),
+            "exchanges": self._talk.exchanges,
+            "transactions": self._talk.transactions,
             **(self._outcome or {}),
         }

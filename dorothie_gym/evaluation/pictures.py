@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,18 +17,14 @@ from dorothie_gym.evaluation.report import part_title, row_title
 from dorothie_gym.evaluation.scoring import class_labels
 from dorothie_gym.evaluation.table import ResultsTable
 from dorothie_gym.sessions import Task
-
-DOTS: Final = 130
-"""Dots an inch."""
+from dorothie_gym.world.graphics.charts import INK, SHEET, SOFT, dress_percent_axes, empty_figure
 
 PANELS: Final = tuple(key + PAPER_SUFFIX if key + PAPER_SUFFIX in SHOWN else key for key in COLUMNS)
 """What is drawn: the paper's six columns, by the paper's protocol, so that its figures can stand beside ours."""
 
 _ROW, _TOP, _BOTTOM = 0.46, 1.75, 0.75
-_INK, _SOFT, _GRID, _SHEET = "#2e3644", "#707783", "#e2ddd1", "#fbf8f1"
 _OURS: Final = {"seen": "#2f62c4", "unseen": "#cf7f1d", ALL: "#2f62c4"}
 _PAPER = "#9a9ea6"
-_FONT = "DejaVu Sans"
 
 
 def draw_table(table: ResultsTable, path: Path | str) -> Path:
@@ -43,17 +38,17 @@ def draw_table(table: ResultsTable, path: Path | str) -> Path:
         OSError: the file cannot be written.
     """
     height = _TOP + _BOTTOM + _ROW * max(len(table.models), 1)
-    with _figure(15.0, height) as figure:
+    with empty_figure(15.0, height) as figure:
         axes = figure.subplots(1, len(PANELS), sharey=True, squeeze=False)[0]
         figure.subplots_adjust(left=0.185, right=0.985, top=1 - _TOP / height, bottom=_BOTTOM / height, wspace=0.09)
         for key, panel in zip(PANELS, axes, strict=True):
             _panel(panel, table, key)
         names = [row_title(table, model).replace(" (not run: ", "\n(not run: ") for model in table.models]
-        axes[0].set_yticks(range(len(names)), names, fontsize=8.5, color=_INK)
+        axes[0].set_yticks(range(len(names)), names, fontsize=8.5, color=INK)
         axes[0].set_ylim(len(names) - 0.5, -0.5)
         title = "Models on the three tasks" + (", ours beside the paper's" if _has_paper(table) else "")
         figure.text(0.012, 1 - 0.42 / height, title, fontsize=14, weight="bold")
-        figure.text(0.012, 1 - 0.68 / height, _subtitle(table), fontsize=9.5, color=_SOFT)
+        figure.text(0.012, 1 - 0.68 / height, _subtitle(table), fontsize=9.5, color=SOFT)
         _legend(figure, table, height)
         figure.savefig(path, format="png")
     return Path(path)
@@ -72,7 +67,7 @@ def draw_confusions(table: ResultsTable, model: str, path: Path | str) -> Path:
     """
     tasks, parts = table.tasks, table.parts
     widths = [1.0 if task is Task.NFD else 1.45 for task in tasks]
-    with _figure(5.2 * sum(widths) + 0.8, 7.6 * len(parts) + 1.0) as figure:
+    with empty_figure(5.2 * sum(widths) + 0.8, 7.6 * len(parts) + 1.0) as figure:
         height = 7.6 * len(parts) + 1.0
         grid = figure.add_gridspec(
             len(parts), len(tasks), left=0.085, right=0.985, top=1 - 1.25 / height, bottom=1.0 / height,
@@ -83,7 +78,7 @@ def draw_confusions(table: ResultsTable, model: str, path: Path | str) -> Path:
         figure.text(0.012, 1 - 0.45 / height, model, fontsize=15, weight="bold")
         figure.text(
             0.012, 1 - 0.75 / height, f"Per cent of the points of each label (their number){over}", fontsize=10,
-            color=_SOFT,
+            color=SOFT,
         )  # fmt: skip
         for row, part in enumerate(parts):
             for column, task in enumerate(tasks):
@@ -92,19 +87,6 @@ def draw_confusions(table: ResultsTable, model: str, path: Path | str) -> Path:
                     _matrix(figure.add_subplot(grid[row, column], anchor="N"), matrix, task, part, seeds)
         figure.savefig(path, format="png")
     return Path(path)
-
-
-@contextmanager
-def _figure(width: float, height: float) -> Iterator[Any]:
-    # imported here: matplotlib is slow to import, and a picture is not always wanted
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    with rc_context({"font.family": _FONT, "text.color": _INK, "axes.labelcolor": _SOFT}):
-        figure = Figure(figsize=(width, height), dpi=DOTS, facecolor=_SHEET)
-        FigureCanvasAgg(figure)
-        yield figure
 
 
 def _panel(axes: Any, table: ResultsTable, key: str) -> None:
@@ -116,19 +98,7 @@ def _panel(axes: Any, table: ResultsTable, key: str) -> None:
             if paper is not None:
                 _dot(axes, paper, row + offset + 0.09, _PAPER, filled=part != UNSEEN, square=True)
             _dot(axes, table.estimate(model, part, key), row + offset - 0.07, _OURS[part], filled=part != UNSEEN)
-    for row in range(0, len(table.models), 2):
-        axes.axhspan(row - 0.5, row + 0.5, color="#f2ede1", zorder=0)
-    axes.set_facecolor(_SHEET)
-    axes.set_title(f"{task_of(key)}\n{shown_title(key)}", fontsize=10, color=_INK, pad=8)
-    axes.set_xlim(-2, 102)
-    axes.set_xticks((0, 25, 50, 75, 100), ("0", "", "50", "", "100"))
-    axes.tick_params(axis="both", length=0)
-    axes.tick_params(axis="x", labelsize=8, labelcolor=_SOFT)
-    axes.grid(axis="x", color=_GRID, linewidth=0.9)
-    axes.set_axisbelow(True)
-    axes.set_xlabel("per cent", fontsize=8)
-    for spine in axes.spines.values():
-        spine.set_visible(False)
+    dress_percent_axes(axes, f"{task_of(key)}\n{shown_title(key)}", len(table.models), margin=2)
 
 
 def _dot(
@@ -140,7 +110,7 @@ def _dot(
     axes.plot([mean - half, mean + half], [at, at], color=colour, linewidth=1.3, zorder=2)
     axes.plot(
         [mean], [at], "s" if square else "o", markersize=3.6 if square else 5.2, color=colour,
-        markerfacecolor=colour if filled else _SHEET, markeredgewidth=1.2, zorder=3,
+        markerfacecolor=colour if filled else SHEET, markeredgewidth=1.2, zorder=3,
     )  # fmt: skip
 
 
@@ -152,7 +122,7 @@ def _legend(figure: Any, table: ResultsTable, height: float) -> None:
         for colour, marker, whose in ((_OURS[part], "o", "ours"), (_PAPER, "s", "paper")):
             if whose == "paper" and not _has_paper(table):
                 continue
-            face = _SHEET if part == UNSEEN else colour
+            face = SHEET if part == UNSEEN else colour
             label = f"{whose}, {part_title(part).lower()}"
             handles.append(Line2D([], [], color=colour, marker=marker, markerfacecolor=face, label=label))
     figure.legend(
@@ -182,7 +152,7 @@ def _matrix(axes: Any, counts: NDArray[np.int64], task: Task, part: str, seeds: 
         share = shares[row, column]
         axes.text(
             column, row, f"{100 * share:.0f}", ha="center", va="center", fontsize=7.5,
-            color="white" if share > 0.55 else _INK,
+            color="white" if share > 0.55 else INK,
         )  # fmt: skip
     labels = [f"{names[k]} ({round(total / seeds)})" for k, total in zip(used, totals[:, 0], strict=True)]
     _dress_matrix(axes, labels, [names[k] for k in used])
@@ -192,15 +162,15 @@ def _matrix(axes: Any, counts: NDArray[np.int64], task: Task, part: str, seeds: 
 
 
 def _dress_matrix(axes: Any, rows: Sequence[str], columns: Sequence[str]) -> None:
-    axes.set_xticks(range(len(columns)), columns, fontsize=8.5, color=_INK)
-    axes.set_yticks(range(len(rows)), rows, fontsize=8.5, color=_INK)
+    axes.set_xticks(range(len(columns)), columns, fontsize=8.5, color=INK)
+    axes.set_yticks(range(len(rows)), rows, fontsize=8.5, color=INK)
     for label in axes.get_xticklabels():
         label.set(rotation=45, ha="right", rotation_mode="anchor")
     axes.set_xlabel("predicted", fontsize=9)
     axes.set_ylabel("label", fontsize=9)
     axes.set_xticks(np.arange(len(columns) + 1) - 0.5, minor=True)
     axes.set_yticks(np.arange(len(rows) + 1) - 0.5, minor=True)
-    axes.grid(which="minor", color=_SHEET, linewidth=1.5)
+    axes.grid(which="minor", color=SHEET, linewidth=1.5)
     axes.tick_params(axis="both", which="both", length=0)
     for spine in axes.spines.values():
         spine.set_visible(False)

@@ -93,10 +93,6 @@ class SessionWriter:
             self._frames.update(rows[:, 0].tolist())
             self._last_frame = int(rows[-1, 0])
 
-    def add_events(self, events: Iterable[Event]) -> None:
-        """Appends what happened; raises `SessionError` where an event cannot be written, and writes none then."""
-        self.append(events)
-
     def add_frames(self, frames: NDArray[np.float64]) -> None:
         """Appends frames of the car, (n, 9) float64 as in `TRAJECTORY_COLUMNS`; raises `SessionError` as `append`."""
         self.append((), frames)

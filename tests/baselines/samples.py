@@ -1,6 +1,6 @@
 """A made-up batch in a made-up town: no session has to be played for the tests of models."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import torch
@@ -26,6 +26,21 @@ def town_graph(lanes=12, seed=0):
         member_start=np.arange(streets + 1, dtype=np.int32) * (lanes // streets),
         members=np.arange(streets * (lanes // streets), dtype=np.int32),
     )
+
+
+def no_town():
+    """A town without lanes and streets."""
+    graph = town_graph()
+    return replace(
+        graph, lanes=graph.lanes[:0], road=graph.road[:0], junction=graph.junction[:0], street=graph.street[:0],
+        edges=graph.edges[:, :0], edge_types=graph.edge_types[:0], members=graph.members[:0],
+        member_start=graph.member_start[:1],
+    )  # fmt: skip
+
+
+def on_no_lane(given):
+    """The fields of a batch in which no place is on a lane."""
+    return {**given, **{name: given[name] * 0 - 1 for name in ("window_lane", "landmark_lane")}}
 
 
 def inputs(points=6, spec=None, seed=0, towns=1, room=0):

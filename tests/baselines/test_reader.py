@@ -123,15 +123,8 @@ def test_turns_are_exits_of_the_junction_ahead():
 
 
 def test_a_town_that_is_not_known_is_no_obstacle():
-    graph = samples.town_graph()
-    empty = replace(
-        graph, lanes=graph.lanes[:0], road=graph.road[:0], junction=graph.junction[:0], street=graph.street[:0],
-        edges=graph.edges[:, :0], edge_types=graph.edge_types[:0], members=graph.members[:0],
-        member_start=graph.member_start[:1],
-    )  # fmt: skip
-    given = samples.inputs()
-    given["window_lane"], given["landmark_lane"] = given["window_lane"] * 0 - 1, given["landmark_lane"] * 0 - 1
-    assert answers(make((empty,)), given, torch.arange(6) % 3).isfinite().all()
+    given = samples.on_no_lane(samples.inputs())
+    assert answers(make((samples.no_town(),)), given, torch.arange(6) % 3).isfinite().all()
 
 
 def test_what_was_understood_already_is_marked():

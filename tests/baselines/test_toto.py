@@ -99,15 +99,8 @@ def test_a_point_alone_is_told_what_it_is_told_among_others():
 
 
 def test_a_town_without_lanes_is_no_obstacle():
-    graph = samples.town_graph()
-    empty = replace(
-        graph, lanes=graph.lanes[:0], road=graph.road[:0], junction=graph.junction[:0], street=graph.street[:0],
-        edges=graph.edges[:, :0], edge_types=graph.edge_types[:0], members=graph.members[:0],
-        member_start=graph.member_start[:1],
-    )  # fmt: skip
-    given = samples.inputs()
-    given["window_lane"], given["landmark_lane"] = given["window_lane"] * 0 - 1, given["landmark_lane"] * 0 - 1
-    assert values(make(graphs=[empty]).eval()(given)).isfinite().all()
+    given = samples.on_no_lane(samples.inputs())
+    assert values(make(graphs=[samples.no_town()]).eval()(given)).isfinite().all()
 
 
 @pytest.mark.parametrize("row", [row for row in ROWS if row.change and row.kind == "toto"], ids=lambda row: row.command)

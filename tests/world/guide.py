@@ -7,9 +7,10 @@ import math
 import numpy as np
 
 from dorothie_gym.ontology import ARRIVAL_DISTANCE, PhysicalAction
+from dorothie_gym.world.car.clearance import BRAKING
 from dorothie_gym.world.car.driver import GoalAhead
 from dorothie_gym.world.car.lanes import LEAD, Lanes
-from dorothie_gym.world.car.planner import BRAKING, U_TURN_SPEED, LocalPlanner
+from dorothie_gym.world.car.planner import U_TURN_SPEED, LocalPlanner
 from dorothie_gym.world.config import FRAME_RATE
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.town import Site, Town

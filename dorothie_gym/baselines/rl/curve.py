@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dorothie_gym.world.graphics.palette import CAR, INK, INK_SOFT, SHEET, Colour
+from dorothie_gym.world.graphics.charts import INK, SHEET, SOFT, hexadecimal
+from dorothie_gym.world.graphics.palette import CAR
 
 SIZE = (7.0, 4.0)
 """Of the picture [inches]."""
@@ -33,22 +34,18 @@ def draw_curve(rows: Sequence[Mapping[str, Any]], title: str, path: Path) -> Non
 
     steps = [row["steps"] / 1e3 for row in rows]
     with rc_context({"font.family": "DejaVu Sans", "font.size": 9}):
-        figure = Figure(figsize=SIZE, dpi=DOTS, facecolor=_hex(SHEET), layout="constrained")
+        figure = Figure(figsize=SIZE, dpi=DOTS, facecolor=SHEET, layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.add_subplot()
-        axes.set_facecolor(_hex(SHEET))
+        axes.set_facecolor(SHEET)
         axes.fill_between(
-            steps, [row["low"] for row in rows], [row["high"] for row in rows], color=_hex(CAR), alpha=0.2, lw=0
+            steps, [row["low"] for row in rows], [row["high"] for row in rows], color=hexadecimal(CAR), alpha=0.2, lw=0
         )
-        axes.plot(steps, [row["success"] for row in rows], color=_hex(CAR), lw=2, marker="o", ms=3)
+        axes.plot(steps, [row["success"] for row in rows], color=hexadecimal(CAR), lw=2, marker="o", ms=3)
         axes.set(ylim=(-0.02, 1.02), xlabel="thousand steps", ylabel=f"success of {rows[-1]['episodes']} episodes")
-        axes.yaxis.label.set_color(_hex(CAR))
+        axes.yaxis.label.set_color(hexadecimal(CAR))
         rewards = axes.twinx()
-        rewards.plot(steps, [row["reward"] for row in rows], color=_hex(INK_SOFT), lw=1.2, ls="--")
-        rewards.set_ylabel("mean reward of an episode (dashed)", color=_hex(INK_SOFT))
-        axes.set_title(f"{title}; {rows[-1]['seconds'] / 60:.1f} min of training", color=_hex(INK), fontsize=10)
+        rewards.plot(steps, [row["reward"] for row in rows], color=SOFT, lw=1.2, ls="--")
+        rewards.set_ylabel("mean reward of an episode (dashed)", color=SOFT)
+        axes.set_title(f"{title}; {rows[-1]['seconds'] / 60:.1f} min of training", color=INK, fontsize=10)
         figure.savefig(path, format="png")
-
-
-def _hex(colour: Colour) -> str:
-    return "#{:02x}{:02x}{:02x}".format(*colour[:3])

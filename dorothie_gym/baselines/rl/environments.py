@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import gymnasium as gym
@@ -96,7 +96,3 @@ class Maker:
     def __call__(self) -> gym.Env[Any, Any]:
         """A new environment."""
         return make_env(self._name, self._settings)
-
-
-MakeEnv = Callable[[], gym.Env[Any, Any]]
-"""Makes an environment."""

@@ -42,30 +42,46 @@ class WorkerVecEnv(VecEnv):
             theirs.close()
             self._connections.append(ours)
             self._processes.append(process)
-        observed, acted = self._ask(0, "spaces")
-        self._pending: Any = None
+        observed, acted = self._ask("spaces")[0]
         self._closed = False
         super().__init__(environments, observed, acted)
 
-    def _ask(self, worker: int, command: str, *arguments: Any) -> Any:
-        self._connections[worker].send((command, arguments))
-        return self._answer(worker)
-
-    def _answer(self, worker: int) -> Any:
-        try:
-            done, answer = self._connections[worker].recv()
-        except EOFError:
-            self._processes[worker].join()
-            code = self._processes[worker].exitcode
-            raise RuntimeError(f"a process that steps environments died with code {code}") from None
-        if not done:
-            raise RuntimeError(f"an environment failed: {answer}")
-        return answer
-
-    def _ask_all(self, command: str, *arguments: Any) -> list[Any]:
+    def _ask(self, command: str, *arguments: Any) -> list[Any]:
+        """Answers of all processes."""
         for connection in self._connections:
             connection.send((command, arguments))
-        return [self._answer(worker) for worker in range(len(self._shares))]
+        return self._answers(self._connections)
+
+    def _ask_some(self, indices: Any, command: str, *arguments: Any, **named: Any) -> list[Any]:
+        """Answers of the environments with these indices, in their order; the other environments are left alone."""
+        numbers = [range(self.num_envs)[k] for k in self._get_indices(indices)]
+        parts = [[k for k in numbers if k in share] for share in self._shares]
+        asked = []
+        for share, connection, part in zip(self._shares, self._connections, parts, strict=True):
+            if part:
+                connection.send(("some", (command, [k - share.start for k in part], arguments, named)))
+                asked.append(connection)
+        answers = [answer for own in self._answers(asked) for answer in own]
+        order = [k for part in parts for k in part]
+        by_number = dict(zip(order, answers, strict=True))
+        return [by_number[k] for k in numbers]
+
+    def _answers(self, connections: Iterable[Connection]) -> list[Any]:
+        """What processes answer; all of them are heard before it is told that one failed."""
+        received = [self._receive(connection) for connection in connections]
+        for done, answer in received:
+            if not done:
+                raise RuntimeError(f"an environment failed: {answer}")
+        return [answer for _, answer in received]
+
+    def _receive(self, connection: Connection) -> tuple[bool, Any]:
+        try:
+            done, answer = connection.recv()
+        except (EOFError, ConnectionResetError):
+            process = self._processes[self._connections.index(connection)]
+            process.join()
+            raise RuntimeError(f"a process that steps environments died with code {process.exitcode}") from None
+        return done, answer
 
     # --- stable-baselines3's interface ------------------------------------------------------------------------------
 
@@ -74,7 +90,7 @@ class WorkerVecEnv(VecEnv):
         for share, connection in zip(self._shares, self._connections, strict=True):
             seeds = [self._seeds[k] for k in share]
             connection.send(("reset", (seeds, [self._options[k] for k in share])))
-        answers = [self._answer(worker) for worker in range(len(self._shares))]
+        answers = self._answers(self._connections)
         self.reset_infos = [info for _, infos in answers for info in infos]
         self._reset_seeds()
         self._reset_options()
@@ -87,7 +103,7 @@ class WorkerVecEnv(VecEnv):
 
     def step_wait(self) -> Any:
         """Waits for what came of them."""
-        answers = [self._answer(worker) for worker in range(len(self._shares))]
+        answers = self._answers(self._connections)
         observations, rewards, dones, infos = zip(*answers, strict=True)
         told = [info for part in infos for info in part]
         return np.concatenate(observations), np.concatenate(rewards), np.concatenate(dones), told
@@ -105,39 +121,27 @@ class WorkerVecEnv(VecEnv):
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """An attribute of some environments."""
-        return self._some(self._ask_all("get_attr", attr_name), indices)
+        return self._ask_some(indices, "get_attr", attr_name)
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Sets an attribute of all environments; of some it cannot be set."""
-        if indices is not None:
-            raise NotImplementedError("set_attr of some environments; leave indices out")
-        self._ask_all("set_attr", attr_name, value)
+        """Sets an attribute of some environments."""
+        self._ask_some(indices, "set_attr", attr_name, value)
 
     def env_method(self, method_name: str, *arguments: Any, indices: Any = None, **named: Any) -> list[Any]:
-        """Calls a method of all environments; returns the answers of some."""
-        return self._some(self._ask_all("env_method", method_name, arguments, named), indices)
+        """Calls a method of some environments; returns what they answer."""
+        return self._ask_some(indices, "env_method", method_name, *arguments, **named)
 
     def has_attr(self, attr_name: str) -> bool:
         """Whether the environments have an attribute."""
-        return all(self._ask_all("has_attr", attr_name))
+        return all(self._ask("has_attr", attr_name))
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
         """Whether some environments are wrapped so."""
-        return self._some(self._ask_all("env_is_wrapped", wrapper_class), indices)
+        return self._ask_some(indices, "env_is_wrapped", wrapper_class)
 
     def get_images(self) -> list[Any]:
         """Pictures are not drawn by workers."""
         return [None] * self.num_envs
-
-    def _some(self, answers: list[Any], indices: Any) -> list[Any]:
-        values = [value for answer in answers for value in answer]
-        return [values[k] for k in _numbers(indices, self.num_envs)]
-
-
-def _numbers(indices: Any, count: int) -> Iterable[int]:
-    if indices is None:
-        return range(count)
-    return [indices] if isinstance(indices, int) else indices
 
 
 def _serve(connection: Connection, make: Callable[[], gym.Env[Any, Any]], count: int) -> None:
@@ -167,7 +171,7 @@ def _carry_out(vector: DummyVecEnv, command: str, arguments: tuple[Any, ...]) ->
         return vector.reset(), vector.reset_infos
     if command == "has_attr":
         return vector.has_attr(*arguments)
-    if command == "env_method":
-        name, positional, named = arguments
-        return vector.env_method(name, *positional, **named)
-    return getattr(vector, command)(*arguments)
+    assert command == "some", command
+    name, places, positional, named = arguments
+    answers = getattr(vector, name)(*positional, indices=places, **named)
+    return [None] * len(places) if name == "set_attr" else answers

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
 from typing import Any, Final, Literal, Self
 
-from dorothie_gym.evaluation.features import BatchSpec
+from dorothie_gym.evaluation.features import HISTORY, BatchSpec, HistorySizes
 
 
 class Channel(enum.StrEnum):
@@ -70,8 +70,10 @@ class LossWeights:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TOTOConfig:
+class TOTOConfig(HistorySizes):
     """Everything that makes one TOTO differ from another. Each ablation of the table is one value of `channels`.
+
+    How much it is given of what happened is said by the fields of `HistorySizes`.
 
     Attributes:
         width: numbers of a token.
@@ -90,7 +92,6 @@ class TOTOConfig:
         image_width: numbers of a picture's vector at each token of the window; 0 where there is no camera.
         sound_width: numbers of the vector of the current utterance's sound; 0 where there is no sound.
         detector: (queries, numbers each) of an object detector; None: objects come from the world's list.
-        moves, utterances, actions, window, window_step, window_objects, objects: see `BatchSpec`.
         learning_rate, weight_decay, clip: of AdamW, and the largest norm of the gradient.
         batch_size: points of a step.
         min_epochs, max_epochs, patience: epochs at least, at most, and without a better validation loss.
@@ -123,13 +124,6 @@ class TOTOConfig:
     image_width: int = 0
     sound_width: int = 0
     detector: tuple[int, int] | None = None
-    moves: int = 32
-    utterances: int = 16
-    actions: int = 16
-    window: int = 25
-    window_step: int = 4
-    window_objects: int = 8
-    objects: int = 32
     learning_rate: float = 1e-5
     weight_decay: float = 1e-4
     clip: float = 1.0
@@ -140,6 +134,7 @@ class TOTOConfig:
     loss: LossWeights = LossWeights()
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.width % self.heads:
             raise ValueError(f"TOTOConfig.width is {self.width}; it must be a multiple of heads, {self.heads}")
         if self.width % 2:
@@ -178,10 +173,7 @@ class TOTOConfig:
     @property
     def spec(self) -> BatchSpec:
         """How much of each thing the model is given."""
-        return BatchSpec(
-            moves=self.moves, utterances=self.utterances, actions=self.actions, window=self.window,
-            window_step=self.window_step, window_objects=self.window_objects, objects=self.objects,
-        )  # fmt: skip
+        return BatchSpec(**{name: getattr(self, name) for name in HISTORY})
 
     def without(self, *channels: Channel) -> Self:
         """Returns the config of an ablation: without some inputs.

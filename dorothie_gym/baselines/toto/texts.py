@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any, Final
 
 import torch
@@ -14,7 +15,7 @@ from dorothie_gym.baselines.toto.layers import Block
 _TINY: Final = 1e-6
 
 
-class Texts(nn.Module):
+class Texts(nn.Module, ABC):
     """Turns indices of texts into vectors.
 
     The texts themselves are no part of a model's weights: a model may be used on another corpus.
@@ -25,9 +26,9 @@ class Texts(nn.Module):
 
     width: int
 
+    @abstractmethod
     def forward(self, index: Tensor) -> Tensor:
         """Returns the vectors of texts (..., width); zeros where the index (...) is -1."""
-        raise NotImplementedError
 
 
 class FrozenTexts(Texts):

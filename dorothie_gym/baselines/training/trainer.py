@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -50,7 +51,7 @@ class Schedule(Protocol):
     def to_json(self) -> dict[str, Any]: ...  # noqa: D102
 
 
-class Model(nn.Module):
+class Model(nn.Module, ABC):
     """What can be trained and asked."""
 
     config: Schedule
@@ -60,13 +61,13 @@ class Model(nn.Module):
         """How much of each thing the model is given."""
         return self.config.spec
 
+    @abstractmethod
     def loss(self, inputs: Inputs, labels: Labels) -> Tensor:
         """Returns the mean loss of B points."""
-        raise NotImplementedError
 
+    @abstractmethod
     def predict(self, inputs: Inputs, task: Tensor) -> Predicted:
         """Returns what the model takes for true at B points of some tasks (B,)."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)

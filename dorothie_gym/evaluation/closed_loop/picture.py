@@ -8,13 +8,12 @@ from typing import Any, Final
 
 from dorothie_gym.evaluation.closed_loop.leaderboard import OTHER, PARTS, Entry
 from dorothie_gym.evaluation.closed_loop.terminal import ALL_METRICS
+from dorothie_gym.world.graphics.charts import INK, dress_percent_axes, empty_figure
 
 PANELS: Final = ("success", "goal_condition_success", "driving_score", "spl")
 """Metrics that are drawn: shares, each with a panel of its own."""
 
-_DOTS = 130
 _ROW, _TOP, _BOTTOM = 0.5, 1.2, 0.6
-_INK, _SOFT, _GRID, _SHEET = "#2e3644", "#707783", "#e2ddd1", "#fbf8f1"
 _COLOURS: Final = {"seen": "#2f62c4", "unseen": "#cf7f1d", OTHER: "#5f8a3a"}
 
 
@@ -31,21 +30,14 @@ def draw_leaderboard(entries: Sequence[Entry], path: Path | str) -> Path:
     Raises:
         OSError: the file cannot be written.
     """
-    # imported here: matplotlib is slow to import
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     names = list(dict.fromkeys(entry.policy for entry in sorted(entries, key=lambda entry: entry.rank)))
     height = _TOP + _BOTTOM + _ROW * max(len(names), 1)
-    with rc_context({"font.family": "DejaVu Sans", "text.color": _INK, "axes.labelcolor": _SOFT}):
-        figure = Figure(figsize=(12.0, height), dpi=_DOTS, facecolor=_SHEET)
-        FigureCanvasAgg(figure)
+    with empty_figure(12.0, height) as figure:
         axes = figure.subplots(1, len(PANELS), sharey=True, squeeze=False)[0]
         figure.subplots_adjust(left=0.2, right=0.98, top=1 - _TOP / height, bottom=_BOTTOM / height, wspace=0.09)
         for key, panel in zip(PANELS, axes, strict=True):
             _panel(panel, entries, names, key)
-        axes[0].set_yticks(range(len(names)), names, fontsize=9, color=_INK)
+        axes[0].set_yticks(range(len(names)), names, fontsize=9, color=INK)
         axes[0].set_ylim(len(names) - 0.5, -0.5)
         figure.text(0.012, 1 - 0.38 / height, "Co-Wizards in the loop", fontsize=14, weight="bold")
         _legend(figure, entries, height)
@@ -64,20 +56,8 @@ def _panel(axes: Any, entries: Sequence[Entry], names: Sequence[str], key: str) 
         if figure["low"] is not None:
             axes.plot([100 * figure["low"], 100 * figure["high"]], [at, at], color=colour, linewidth=1.4, zorder=2)
         axes.plot([100 * figure["mean"]], [at], "o", markersize=5.5, color=colour, zorder=3)
-    for row in range(0, len(names), 2):
-        axes.axhspan(row - 0.5, row + 0.5, color="#f2ede1", zorder=0)
     title = next(metric.title for metric in ALL_METRICS if metric.key == key)
-    axes.set_facecolor(_SHEET)
-    axes.set_title(title, fontsize=10, color=_INK, pad=8)
-    axes.set_xlim(-3, 103)
-    axes.set_xticks((0, 25, 50, 75, 100), ("0", "", "50", "", "100"))
-    axes.tick_params(axis="both", length=0)
-    axes.tick_params(axis="x", labelsize=8, labelcolor=_SOFT)
-    axes.grid(axis="x", color=_GRID, linewidth=0.9)
-    axes.set_axisbelow(True)
-    axes.set_xlabel("per cent", fontsize=8)
-    for spine in axes.spines.values():
-        spine.set_visible(False)
+    dress_percent_axes(axes, title, len(names), margin=3)
 
 
 def _legend(figure: Any, entries: Sequence[Entry], height: float) -> None:

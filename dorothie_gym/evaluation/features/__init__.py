@@ -1,6 +1,6 @@
 """What a model is given: a corpus as columns, its points, and batches of what may be seen at them."""
 
-from dorothie_gym.evaluation.features.batch import Batch, BatchSpec, gather
+from dorothie_gym.evaluation.features.batch import HISTORY, Batch, BatchSpec, HistorySizes, gather
 from dorothie_gym.evaluation.features.building import build, columns_of
 from dorothie_gym.evaluation.features.columns import (
     CO_WIZARD,
@@ -31,6 +31,8 @@ __all__ = [
     "Columns",
     "Frames",
     "Goals",
+    "HISTORY",
+    "HistorySizes",
     "Landmarks",
     "Looks",
     "Moves",

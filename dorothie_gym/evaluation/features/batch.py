@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, fields
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,8 +14,8 @@ from dorothie_gym.sessions import Task
 
 
 @dataclass(frozen=True, kw_only=True)
-class BatchSpec:
-    """How much of each thing is in a batch: the newest, or nearest, where there is more.
+class HistorySizes:
+    """How much a model is given of what happened until now: the newest, or nearest, where there is more.
 
     Attributes:
         moves: dialogue moves (M).
@@ -25,10 +25,6 @@ class BatchSpec:
         window_step: rows (at 10 Hz) from a token to the next.
         window_objects: nearest objects at each token of the window (V).
         objects: nearest objects now (O).
-        landmarks: landmarks (K).
-        streets: streets (R).
-        paper_leak: at UfN points the last of the moves is the point's own label, as in the published features. For
-            showing what that does; False for anything else.
 
     Raises:
         ValueError: a size is below 0, or `window_step` below 1; the message names the field.
@@ -41,16 +37,46 @@ class BatchSpec:
     window_step: int = 4
     window_objects: int = 8
     objects: int = 32
+
+    def __post_init__(self) -> None:
+        """Checks the sizes."""
+        for name in HISTORY:
+            _check_size(self, name, least=1 if name == "window_step" else 0)
+
+
+HISTORY: Final = tuple(field.name for field in fields(HistorySizes))
+"""Names of these sizes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BatchSpec(HistorySizes):
+    """How much of each thing is in a batch.
+
+    Attributes:
+        landmarks: landmarks (K).
+        streets: streets (R).
+        paper_leak: at UfN points the last of the moves is the point's own label, as in the published features. For
+            showing what that does; False for anything else.
+
+    Raises:
+        ValueError: a size is below 0, or `window_step` below 1; the message names the field.
+    """
+
     landmarks: int = 10
     streets: int = 14
     paper_leak: bool = False
 
     def __post_init__(self) -> None:
         """Checks the sizes."""
-        for name, value in vars(self).items():
-            least = 1 if name == "window_step" else 0
-            if name != "paper_leak" and value < least:
-                raise ValueError(f"BatchSpec.{name} is {value}; it must be at least {least}")
+        super().__post_init__()
+        for name in ("landmarks", "streets"):
+            _check_size(self, name, least=0)
+
+
+def _check_size(sizes: HistorySizes, name: str, *, least: int) -> None:
+    value = getattr(sizes, name)
+    if value < least:
+        raise ValueError(f"{type(sizes).__name__}.{name} is {value}; it must be at least {least}")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

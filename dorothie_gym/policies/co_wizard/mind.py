@@ -259,7 +259,6 @@ class View:
     speaking: float
     motion: Motion
     hazard: ObjectClass
-    hazard_distance: float
     manoeuvre: PhysicalAction | None
     angle: float
     cruise: float
@@ -283,7 +282,6 @@ class View:
             speaking=scalar(observation, "speaking"),
             motion=Motion(int(observation["motion"])),
             hazard=ObjectClass(int(observation["hazard"])),
-            hazard_distance=scalar(observation, "hazard_distance"),
             manoeuvre=PhysicalAction(manoeuvre) if manoeuvre else None,
             angle=scalar(observation, "manoeuvre_angle"),
             cruise=scalar(observation, "cruise_speed"),

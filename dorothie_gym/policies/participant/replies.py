@@ -22,9 +22,10 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies.hearing import heard_utterance
 from dorothie_gym.policies.journey import first_new_street
+from dorothie_gym.policies.participant.arriving import NEAR, about_to_arrive
 from dorothie_gym.policies.participant.describing import describe
 from dorothie_gym.policies.participant.goals import announcement, reason_topic, route_length, switch_target
-from dorothie_gym.policies.participant.guidance import NEAR, about_to_arrive, next_step, note_told
+from dorothie_gym.policies.participant.guidance import next_step, note_told
 from dorothie_gym.policies.participant.mind import ParticipantMind, View
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.repairs import misunderstood, not_caught

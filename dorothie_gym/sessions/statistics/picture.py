@@ -10,17 +10,14 @@ from dorothie_gym.ontology import DialogueMove, Role
 from dorothie_gym.sessions.statistics.counts import Counts
 from dorothie_gym.sessions.statistics.handling import Handled
 from dorothie_gym.sessions.statistics.profiles import CLASSES, SLOTS, Profile, Profiles
+from dorothie_gym.world.graphics.charts import GRID, INK, SHEET, SOFT, empty_figure
 
 SIZE: Final = (12.0, 9.2)
 """Width and height of the picture [inches]."""
 
-DOTS: Final = 130
-"""Dots an inch."""
-
 LETTERS: Final = 17
 """Letters in a line below a bar."""
 
-_INK, _SOFT, _GRID, _SHEET = "#2e3644", "#707783", "#e2ddd1", "#fbf8f1"
 _COLOURS: Final = {
     Handled.ENVIRONMENTAL: ("#9bd0b5", "#2f8f62"),
     Handled.TASK: ("#f3cb8d", "#cf7f1d"),
@@ -34,7 +31,6 @@ _NAMES: Final = {
     Handled.NONE: "none",
 }
 _SPEAKERS: Final = ((Role.PARTICIPANT, "human"), (Role.CO_WIZARD, "car"))
-_FONT = "DejaVu Sans"
 
 
 def draw_profiles(profiles: Profiles, counts: Counts, title: str, path: Path) -> None:
@@ -49,14 +45,7 @@ def draw_profiles(profiles: Profiles, counts: Counts, title: str, path: Path) ->
     Raises:
         OSError: the file cannot be written.
     """
-    # imported here: matplotlib is slow to import, and a picture is not always wanted
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    with rc_context({"font.family": _FONT, "text.color": _INK, "axes.labelcolor": _SOFT}):
-        figure = Figure(figsize=SIZE, dpi=DOTS, facecolor=_SHEET)
-        FigureCanvasAgg(figure)
+    with empty_figure(*SIZE) as figure:
         grid = figure.add_gridspec(
             2, 2, left=0.06, right=0.98, top=0.84, bottom=0.09, hspace=0.42, wspace=0.13, width_ratios=(14, 8)
         )
@@ -72,7 +61,7 @@ def _words(figure: Any, counts: Counts, title: str) -> None:
         f"{_number(counts.sessions, 'session')} · {_number(counts.utterances, 'utterance')} · "
         f"{_number(counts.transactions, 'transaction')} · {_number(counts.exchanges, 'exchange')}"
     )
-    figure.text(0.06, 0.918, line, fontsize=10, color=_SOFT)
+    figure.text(0.06, 0.918, line, fontsize=10, color=SOFT)
 
 
 def _number(count: int, noun: str) -> str:
@@ -92,7 +81,7 @@ def _per_transaction(moves: Any, slots: Any, profile: Profile) -> None:
     _dress(slots, "Slot values in a transaction", [slot.label for slot in SLOTS])
     for axes in (moves, slots):
         _give_room(axes, 1.06)
-    moves.legend(frameon=True, facecolor=_SHEET, edgecolor=_SHEET, framealpha=1.0, fontsize=9, loc="upper right")
+    moves.legend(frameon=True, facecolor=SHEET, edgecolor=SHEET, framealpha=1.0, fontsize=9, loc="upper right")
 
 
 def _per_exchange(moves: Any, slots: Any, profiles: Profiles) -> None:
@@ -127,17 +116,17 @@ def _give_room(axes: Any, times: float = 1.22) -> None:
 
 
 def _dress(axes: Any, title: str, labels: list[str], *, slanted: bool = False) -> None:
-    axes.set_facecolor(_SHEET)
-    axes.set_title(title, loc="left", fontsize=11, color=_INK, pad=10)
-    axes.set_xticks(range(len(labels)), labels, fontsize=9 if "\n" not in "".join(labels) else 7.5, color=_INK)
+    axes.set_facecolor(SHEET)
+    axes.set_title(title, loc="left", fontsize=11, color=INK, pad=10)
+    axes.set_xticks(range(len(labels)), labels, fontsize=9 if "\n" not in "".join(labels) else 7.5, color=INK)
     if slanted:
         for label in axes.get_xticklabels():
             label.set(rotation=32, ha="right", rotation_mode="anchor")
     axes.tick_params(axis="both", length=0)
-    axes.tick_params(axis="y", labelsize=8, labelcolor=_SOFT)
+    axes.tick_params(axis="y", labelsize=8, labelcolor=SOFT)
     axes.set_ylabel("mean number", fontsize=8.5)
-    axes.grid(axis="y", color=_GRID, linewidth=0.8)
+    axes.grid(axis="y", color=GRID, linewidth=0.8)
     axes.set_axisbelow(True)
     for side, spine in axes.spines.items():
         spine.set_visible(side == "bottom")
-        spine.set_color(_SOFT)
+        spine.set_color(SOFT)

@@ -11,6 +11,7 @@ import numpy as np
 
 from dorothie_gym.ontology import SPEED_STEP
 from dorothie_gym.world.car.control import Control
+from dorothie_gym.world.car.pace import KMH, LATERAL_ACCELERATION, PROFILE_BRAKING
 from dorothie_gym.world.car.path import Path
 from dorothie_gym.world.car.planner import U_TURN_SPEED, LocalPlanner
 from dorothie_gym.world.car.record import CarRecord
@@ -18,30 +19,6 @@ from dorothie_gym.world.kernel.course import find_sides
 from dorothie_gym.world.kernel.parameters import CAR_LENGTH, CAR_WIDTH
 from dorothie_gym.world.kernel.records import plain
 from dorothie_gym.world.town.model import Array
-
-KMH = 1 / 3.6
-"""[m/s] of one km/h."""
-
-LATERAL_ACCELERATION = 2.2
-"""Comfortable in curves [m/s^2]."""
-
-PROFILE_BRAKING = 2.0
-"""Deceleration towards a curve or the end of the path [m/s^2]."""
-
-SURE_BRAKING = 1.8
-"""From this on, braking that is needed is applied whatever the speed controller says [m/s^2]."""
-
-APPROACH_SPEED = 14.0 * KMH
-"""Speed near a goal, under the design's 15 km/h [m/s]."""
-
-APPROACH_DISTANCE = 20.0
-"""Where a goal begins to be near [m]."""
-
-PROP_DEPTH = 1.25
-"""Half the length of the longest prop: it is in sight when its middle is [m]."""
-
-WALKING_SPEED = 1.5
-"""Speed of a car that hardly sees anything [m/s]."""
 
 END_GAP = 0.8
 """Room left between the nose of a waiting car and the end of its lane [m]."""

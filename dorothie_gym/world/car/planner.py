@@ -11,10 +11,10 @@ import math
 import numpy as np
 
 from dorothie_gym.ontology import PhysicalAction
-from dorothie_gym.world.car.hazards import HEIGHT_MARGIN
-from dorothie_gym.world.car.lanes import HORIZON, LEAD, MIN_SWITCH, SWITCH_TIME, Lanes, Step
+from dorothie_gym.world.car.clearance import BRAKING, HALF_LENGTH, LANDING, landing_is_blocked, switch_is_blocked
+from dorothie_gym.world.car.lanes import HORIZON, LEAD, MIN_SWITCH, Lanes, Step
 from dorothie_gym.world.car.path import TURNING_RADIUS, U_TURN_REACH, Path, Piece, follow, u_turn
-from dorothie_gym.world.town.model import Exit, Lane, LinkType, Town
+from dorothie_gym.world.town.model import Exit, LinkType, Town
 from dorothie_gym.world.town.oncoming import Oncoming, oncoming_lanes
 
 BEGUN = 1.0
@@ -23,24 +23,11 @@ BEGUN = 1.0
 SWEEP_STEP = 4
 """Of the points of a U-turn, which are half a metre apart, others are told every so many."""
 
-LANDING = 6.0
-"""Oncoming lane left after a U-turn, so that the car stands straight before it waits at the lane's end [m]."""
-
 U_TURN_SPEED = 3.5
 """Speed of a U-turn [m/s]."""
 
-HALF_LENGTH = 2.5
-"""Of the car [m]."""
-
-FROM_PROP = 16.5
-"""Where a lane switch or a U-turn ends, the car's middle is at least this far before that of a prop, less the way to
-stop [m]: `hazards.ROADBLOCK_GAP`, half the car and half the prop."""
-
 HARD_STOP = 5.0
 """Deceleration with which the car still stops before a junction when its plan is changed [m/s^2]."""
-
-BRAKING = 3.0
-"""Deceleration that plans count on [m/s^2]."""
 
 
 class LocalPlanner:
@@ -245,25 +232,11 @@ class LocalPlanner:
             return f"there is no lane to the {name}"
         if self._town.lanes[self.lane].length - self.station < MIN_SWITCH + LEAD:
             return f"there is no room left to switch to the {name}"
-        if self._leads_to_a_prop(target, speed):
+        lane = self._town.lanes[target]
+        beside = lane.project(self._town.lanes[self.lane].position(self.station))[0]
+        if switch_is_blocked(self.props, lane, beside, speed):
             return f"a roadblock is too close on the lane to the {name}"
         return target
-
-    def _leads_to_a_prop(self, target: int, speed: float) -> bool:
-        """Whether a car that switches to a lane would come too close to a prop to get away from it again."""
-        lane = self._town.lanes[target]
-        here = lane.project(self._town.lanes[self.lane].position(self.station))[0]
-        way = LEAD + max(MIN_SWITCH, SWITCH_TIME * speed) + speed**2 / (2 * BRAKING)
-        return self._is_blocked(lane, here - HALF_LENGTH, here + way + FROM_PROP)
-
-    def _is_blocked(self, lane: Lane, begin: float, end: float) -> bool:
-        """Whether the car sees a prop on a lane between two stations [m]."""
-        for x, y, height in self.props:
-            station, lateral = lane.project(np.array((x, y)))
-            level = abs(lane.height_at(station) - height) < HEIGHT_MARGIN
-            if level and abs(lateral) < lane.width_at(station) / 2 and begin < station < end:
-                return True
-        return False
 
     @property
     def turn_ahead(self) -> int | None:
@@ -319,8 +292,7 @@ class LocalPlanner:
             return "the car is too fast to turn round before the roadblock"
         if begin > lane.length + 0.5:
             return "there is no room left to turn round"
-        landing = oncoming.station
-        if self._is_blocked(self._town.lanes[oncoming.lane], landing - U_TURN_REACH, landing + LANDING + FROM_PROP):
+        if landing_is_blocked(self.props, self._town.lanes[oncoming.lane], oncoming.station):
             return "a roadblock is too close on the oncoming lane"
         return oncoming, min(begin, lane.length)
 

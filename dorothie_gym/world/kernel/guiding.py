@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dorothie_gym.world.car.clearance import BRAKING
 from dorothie_gym.world.car.control import LATERAL, LONGITUDINAL, MAX_ACCELERATION, MAX_BRAKING, MAX_SLIP, MAX_STEERING
-from dorothie_gym.world.car.driver import (
+from dorothie_gym.world.car.pace import (
     APPROACH_DISTANCE,
     APPROACH_SPEED,
     PROFILE_BRAKING,
@@ -14,7 +15,7 @@ from dorothie_gym.world.car.driver import (
     SURE_BRAKING,
     WALKING_SPEED,
 )
-from dorothie_gym.world.car.planner import BEGUN, BRAKING
+from dorothie_gym.world.car.planner import BEGUN
 from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.air import drift
 from dorothie_gym.world.kernel.course import advance, heading_at, point_at, take_lanes

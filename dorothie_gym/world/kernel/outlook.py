@@ -6,9 +6,10 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.world.car.clearance import BRAKING, FROM_PROP
 from dorothie_gym.world.car.hazards import HEIGHT_MARGIN, ROADBLOCK_GAP, STANDSTILL_GAP
 from dorothie_gym.world.car.path import U_TURN_REACH
-from dorothie_gym.world.car.planner import BEGUN, BRAKING, FROM_PROP
+from dorothie_gym.world.car.planner import BEGUN
 from dorothie_gym.world.compiling import compiled, inlined
 from dorothie_gym.world.kernel.conduct import CRITICAL_GAP, HARDEST_BRAKING
 from dorothie_gym.world.kernel.course import point_at

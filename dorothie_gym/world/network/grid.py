@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 
@@ -26,6 +27,10 @@ SAME_LEVEL = 3.0
 SLACK = 1e-6
 """Safety of the bounds against rounding [m]; a share of 1e-9 is added for places far away."""
 
+_Arrays: TypeAlias = tuple[Array, IntArray, Array, Array, IntArray, IntArray, float, float]
+"""Points, offsets, ends and boxes of a `LaneTable`; cells (rows, columns, 2), each with where its lanes begin and stop
+in the entries (m,); and the corner of the first cell, x and y [m]. A named tuple takes numba twice as long to read."""
+
 
 class GridIndex:
     """Lanes by square cells.
@@ -33,34 +38,34 @@ class GridIndex:
     The distance by which highway-env ranks lanes is never less than the plain distance to the centre line. So when the
     best lane of a cell's list ranks below the reach of the list, no lane that is not listed can beat it. Where this
     does not settle the question (off the road), all lanes are asked whose bounding boxes are closer than the best one.
+
+    Attributes:
+        origin: corner of the first cell, x and y [m].
     """
 
     def __init__(self, table: LaneTable) -> None:
         """List the lanes of a table; the rows of the table are the answers."""
-        self._table = table
         low = table.boxes[:, :2].min(axis=0) - REACH
         high = table.boxes[:, 2:].max(axis=0) + REACH
         columns, rows = (int(n) for n in np.ceil((high - low) / CELL))
-        self._origin = float(low[0]), float(low[1])
+        self.origin = float(low[0]), float(low[1])
         counts = np.zeros((rows, columns), dtype=np.int64)
         nothing = np.empty(0, dtype=np.int64)
-        _list_lanes(table.points, table.offsets, *self._origin, counts, nothing)
+        _list_lanes(table.points, table.offsets, *self.origin, counts, nothing)
         stops = np.cumsum(counts.ravel()).reshape(counts.shape)
         starts = stops - counts
-        self._entries = np.empty(int(stops[-1, -1]), dtype=np.int64)
-        _list_lanes(table.points, table.offsets, *self._origin, starts.copy(), self._entries)
-        self._cells = np.ascontiguousarray(np.stack((starts, stops), axis=-1))
+        entries = np.empty(int(stops[-1, -1]), dtype=np.int64)
+        _list_lanes(table.points, table.offsets, *self.origin, starts.copy(), entries)
+        cells = np.ascontiguousarray(np.stack((starts, stops), axis=-1))
+        self._arrays: _Arrays = (*table, cells, entries, *self.origin)
 
     def closest(self, x: float, y: float, heading: float | None = None, height: float | None = None) -> int:
         """Row of the lane with the least distance, the first one of several; see `TownNetwork`."""
-        table, weight = self._table, 1.0
+        weight = 1.0
         if heading is None:
             heading, weight = 0.0, 0.0
         level = math.nan if height is None else height
-        row = _closest(
-            table.points, table.offsets, table.ends, table.boxes, self._cells, self._entries, *self._origin,
-            x, y, heading, weight, level,
-        )  # fmt: skip
+        row = _closest(self._arrays, x, y, heading, weight, level)
         if row < 0:  # nothing at this height in the whole town
             return self.closest(x, y, heading if weight else None)
         return int(row)
@@ -71,34 +76,18 @@ class GridIndex:
         Raises:
             ValueError: the place is not a number.
         """
-        table = self._table
-        row, station = _closest_place(
-            table.points, table.offsets, table.ends, table.boxes, self._cells, self._entries, *self._origin,
-            x, y, heading, height,
-        )  # fmt: skip
+        row, station = _closest_place(self._arrays, x, y, heading, height)
         if row < 0:
             raise ValueError(f"no lane is closest to ({x}, {y}), heading {heading}: these must be finite numbers")
         return int(row), float(station)
 
 
 @allocating
-def _closest_place(
-    points: Array,
-    offsets: IntArray,
-    ends: Array,
-    boxes: Array,
-    cells: IntArray,
-    entries: IntArray,
-    x0: float,
-    y0: float,
-    x: float,
-    y: float,
-    heading: float,
-    height: float,
-) -> tuple[int, float]:
-    row = _closest(points, offsets, ends, boxes, cells, entries, x0, y0, x, y, heading, 1.0, height)
+def _closest_place(arrays: _Arrays, x: float, y: float, heading: float, height: float) -> tuple[int, float]:
+    row = _closest(arrays, x, y, heading, 1.0, height)
     if row < 0:  # nothing at this height in the whole town
-        row = _closest(points, offsets, ends, boxes, cells, entries, x0, y0, x, y, heading, 1.0, math.nan)
+        row = _closest(arrays, x, y, heading, 1.0, math.nan)
+    points, offsets, ends = arrays[:3]
     return row, local_coordinates(points, offsets, ends, max(row, 0), x, y)[0]
 
 
@@ -138,22 +127,9 @@ def _out_of_question(boxes: Array, lane: int, x: float, y: float, best: float) -
 
 
 @allocating
-def _closest(
-    points: Array,
-    offsets: IntArray,
-    ends: Array,
-    boxes: Array,
-    cells: IntArray,
-    entries: IntArray,
-    x0: float,
-    y0: float,
-    x: float,
-    y: float,
-    heading: float,
-    weight: float,
-    height: float,
-) -> int:
+def _closest(arrays: _Arrays, x: float, y: float, heading: float, weight: float, height: float) -> int:
     """Row of the closest lane (-1: none at this height); a height of NaN asks for none."""
+    points, offsets, ends, boxes, cells, entries, x0, y0 = arrays
     best, found = np.inf, -1
     anywhere = math.isnan(height)
     column, row = (x - x0) / CELL, (y - y0) / CELL

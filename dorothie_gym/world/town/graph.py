@@ -95,11 +95,6 @@ class LaneGraph:
         """How many streets there are."""
         return len(self.streets)
 
-    @property
-    def lane_ids(self) -> NDArray[np.int64]:
-        """OpenDRIVE lane numbers (n,)."""
-        return self.features[:, LANE_ID].astype(np.int64)
-
     @cached_property
     def street(self) -> NDArray[np.int64]:
         """The street of each lane (n,): the first that its road belongs to, or -1."""

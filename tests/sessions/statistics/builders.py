@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
-from dorothie_gym.ontology import DialogueAct, DialogueMove, MentalAction, PhysicalAction, Role, SlotValue
+from dorothie_gym.ontology import (
+    ActionValue,
+    DialogueAct,
+    DialogueMove,
+    GoalStatus,
+    LandmarkName,
+    MentalAction,
+    ObjectClass,
+    PhysicalAction,
+    Role,
+    SlotValue,
+    StreetName,
+)
 from dorothie_gym.sessions import FRAME_RATE, Event, EventType, Session
 from dorothie_gym.sessions.statistics import Talk
 from tests.sessions.builders import physical, session
 
-M = DialogueMove
+M, A, OBJ, S = DialogueMove, ActionValue, ObjectClass, GoalStatus
 HUMAN, CAR = Role.PARTICIPANT, Role.CO_WIZARD
 
+KFC, IKEA, COCO, HOUSE = LandmarkName.KFC, LandmarkName.IKEA, LandmarkName.COCO, LandmarkName.HOUSE
+FULLER, BAITS = StreetName.FULLER, StreetName.BAITS
+
+Make: TypeAlias = Callable[[], Talk]
 Span: TypeAlias = tuple[str, DialogueAct]
 
 
@@ -65,6 +81,9 @@ def subgoal(time: float, landmark: str, status: str, number: int = 0) -> list[Ev
 
 def did(time: float, action: PhysicalAction, angle: float | None = None, up: bool | None = None) -> list[Event]:
     return [physical(round(time * FRAME_RATE), action, angle, up)]
+
+
+TURNED = did(5.0, PhysicalAction.J_TURN, angle=80.0)
 
 
 def believed(time: float, action: MentalAction, **data: Any) -> list[Event]:

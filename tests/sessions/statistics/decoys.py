@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeAlias
-
 from dorothie_gym.ontology import (
-    ActionValue,
-    GoalStatus,
     LandmarkName,
     MentalAction,
-    ObjectClass,
     PhysicalAction,
     StreetName,
 )
-from dorothie_gym.sessions.statistics import Talk
 from tests.sessions.statistics.builders import (
+    BAITS,
     CAR,
+    COCO,
+    FULLER,
+    HOUSE,
     HUMAN,
+    IKEA,
+    KFC,
+    OBJ,
+    TURNED,
+    A,
     M,
+    Make,
+    S,
     act,
     believed,
     car,
@@ -30,14 +34,6 @@ from tests.sessions.statistics.builders import (
     subgoal,
     talk,
 )
-
-A, OBJ, S = ActionValue, ObjectClass, GoalStatus
-KFC, IKEA, COCO, HOUSE = LandmarkName.KFC, LandmarkName.IKEA, LandmarkName.COCO, LandmarkName.HOUSE
-FULLER, BAITS = StreetName.FULLER, StreetName.BAITS
-
-Make: TypeAlias = Callable[[], Talk]
-
-_CLOSED = did(5.0, PhysicalAction.J_TURN, angle=80.0)
 
 SKY = exception(1.0, "weather", parameter="fog_density", value=80.0)
 CLEAR = exception(30.0, "weather", parameter="fog_density", value=2.0)
@@ -112,8 +108,8 @@ DECOYS: list[tuple[int, str, Make]] = [
     (3, "a cough is no act", lambda: talk(
         said(1.0, HUMAN, ("ahem", act(M.IRRELEVANT)), ("left", act(M.INSTRUCT, A.J_TURN))))),
     (4, "stopping is no way", lambda: talk(
-        car(1.0, "what now", M.QUERY_W, A.QUERIED), human(3.0, "stop", M.REPLY_W, A.STOP), _CLOSED)),
-    (4, "nobody answers", lambda: talk(car(1.0, "left or right", M.QUERY_W, A.QUERIED), _CLOSED)),
+        car(1.0, "what now", M.QUERY_W, A.QUERIED), human(3.0, "stop", M.REPLY_W, A.STOP), TURNED)),
+    (4, "nobody answers", lambda: talk(car(1.0, "left or right", M.QUERY_W, A.QUERIED), TURNED)),
     (5, "the yes is to a check", lambda: talk(
         car(1.0, "drive on", M.QUERY_YN, A.LANE_FOLLOW), car(3.0, "to KFC", M.CHECK, KFC),
         human(5.0, "just so", M.CONFIRM))),

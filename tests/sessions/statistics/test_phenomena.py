@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeAlias
-
 import pytest
 
 from dorothie_gym.ontology import (
-    ActionValue,
-    GoalStatus,
     LandmarkName,
     MentalAction,
-    ObjectClass,
     PhysicalAction,
     StreetName,
 )
 from dorothie_gym.sessions.statistics import PHENOMENA, Phenomenon, Talk
 from tests.sessions.statistics.builders import (
+    BAITS,
     CAR,
+    COCO,
+    FULLER,
+    HOUSE,
     HUMAN,
+    IKEA,
+    KFC,
+    OBJ,
+    TURNED,
+    A,
     M,
+    Make,
+    S,
     act,
     believed,
     car,
@@ -33,14 +38,6 @@ from tests.sessions.statistics.builders import (
     talk,
 )
 from tests.sessions.statistics.decoys import DECOYS, OTHERS
-
-A, OBJ, S = ActionValue, ObjectClass, GoalStatus
-KFC, IKEA, COCO, HOUSE = LandmarkName.KFC, LandmarkName.IKEA, LandmarkName.COCO, LandmarkName.HOUSE
-FULLER, BAITS = StreetName.FULLER, StreetName.BAITS
-
-Make: TypeAlias = Callable[[], Talk]
-
-_CLOSED = did(5.0, PhysicalAction.J_TURN, angle=80.0)
 
 
 def _misheard(answer: LandmarkName) -> Talk:
@@ -67,7 +64,7 @@ PRESENT: dict[int, tuple[str, Make]] = {
     3: ("two acts", lambda: talk(said(1.0, HUMAN, ("yep", act(M.REPLY_Y)), ("now right", act(M.INSTRUCT, A.J_TURN))))),
     4: (
         "told",
-        lambda: talk(car(1.0, "left or right", M.QUERY_W, A.QUERIED), human(3.0, "left", M.REPLY_W, A.J_TURN), _CLOSED),
+        lambda: talk(car(1.0, "left or right", M.QUERY_W, A.QUERIED), human(3.0, "left", M.REPLY_W, A.J_TURN), TURNED),
     ),
     5: ("unsure", lambda: talk(car(1.0, "drive on", M.QUERY_YN, A.LANE_FOLLOW), human(3.0, "who knows", M.REPLY_U))),
     6: ("denied", lambda: talk(car(1.0, "KFC, then", M.CHECK, KFC), human(3.0, "nope", M.REPLY_N))),

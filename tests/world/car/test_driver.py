@@ -5,7 +5,8 @@ import math
 import pytest
 
 from dorothie_gym.ontology import PhysicalAction
-from dorothie_gym.world.car.driver import KMH, MAX_CRUISE, MIN_CRUISE, GoalAhead
+from dorothie_gym.world.car.driver import MAX_CRUISE, MIN_CRUISE, GoalAhead
+from dorothie_gym.world.car.pace import KMH
 from tests.world.driving import drive, long_lane, network, on_lane
 
 

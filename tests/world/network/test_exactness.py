@@ -111,7 +111,7 @@ def off_the_road(network: TownNetwork, rng: np.random.Generator, count: int) -> 
 def at_cell_borders(network: TownNetwork, rng: np.random.Generator, count: int) -> Points:
     """On the lines where one cell of the index ends and the next begins."""
     places = on_roads(network, rng, count)
-    origin = np.array(network._grid._origin)
+    origin = np.array(network._grid.origin)
     snapped = origin + CELL * np.round((places[:, :2] - origin) / CELL)
     places[:, :2] = np.where(rng.random((count, 2)) < 0.6, snapped, places[:, :2])
     return places

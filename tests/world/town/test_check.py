@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,141 +14,31 @@ from hypothesis import strategies as st
 
 from dorothie_gym.world.car.control import MAX_STEERING
 from dorothie_gym.world.town.catalogue import load_town, town_names
-from dorothie_gym.world.town.check import Fault, FaultKind, check_town
+from dorothie_gym.world.town.check import FaultKind, check_town
 from dorothie_gym.world.town.check.car import CAR_WIDTH, SMALLEST_RADIUS
-from dorothie_gym.world.town.model import (
-    Array,
-    Junction,
-    Lane,
-    LaneLink,
-    LinkType,
-    Sidewalk,
-    Signal,
-    SignalKind,
-    Town,
+from dorothie_gym.world.town.model import Array, LaneLink, LinkType, Signal, SignalKind, Town
+from tests.world.town.damaged_towns import (
+    LEFT,
+    RIGHT,
+    STRAIGHT,
+    U_TURN,
+    a_connector,
+    a_street,
+    brookside,
+    bulge,
+    eight,
+    near,
+    only,
+    paperclip,
+    pushed,
+    rebuilt,
+    resampled,
+    retyped,
+    ring,
+    with_lane,
 )
 
 from .opendrive_text import shared_map
-from .yaml_plans import TIGHT_RAMPS, compiled, star
-
-LEFT, RIGHT, STRAIGHT, U_TURN = LinkType.LEFT, LinkType.RIGHT, LinkType.STRAIGHT, LinkType.U_TURN
-
-
-def rebuilt(
-    town: Town,
-    *,
-    lanes: Sequence[Lane] | None = None,
-    links: Sequence[LaneLink] | None = None,
-    signals: Sequence[Signal] | None = None,
-    sidewalks: Sequence[Sidewalk] | None = None,
-) -> Town:
-    return Town(
-        name=town.name,
-        lanes=town.lanes if lanes is None else lanes,
-        links=town.links if links is None else links,
-        junctions=town.junctions,
-        signals=town.signals if signals is None else signals,
-        sidewalks=town.sidewalks if sidewalks is None else sidewalks,
-        programmes=town.programmes,
-    )
-
-
-def with_lane(town: Town, lane: Lane) -> Town:
-    return rebuilt(town, lanes=[lane if old.id == lane.id else old for old in town.lanes])
-
-
-def retyped(town: Town, link: LaneLink, kind: LinkType) -> Town:
-    return rebuilt(town, links=[replace(old, type=kind) if old == link else old for old in town.links])
-
-
-def resampled(lane: Lane, spacing: float = 0.5) -> Lane:
-    s = np.linspace(0.0, lane.length, max(2, math.ceil(lane.length / spacing) + 1))
-    points = np.column_stack([np.interp(s, lane.stations, column) for column in lane.points.T])
-    return replace(lane, points=points, widths=np.interp(s, lane.stations, lane.widths))
-
-
-def pushed(lane: Lane, aside: Callable[[Array, float], Array]) -> Lane:
-    """The lane with its points moved to the right by a function of their stations and the lane's length."""
-    lane = resampled(lane)
-    right = np.column_stack((-np.sin(lane.headings), np.cos(lane.headings)))
-    points = lane.points.copy()
-    points[:, :2] += aside(lane.stations, lane.length)[:, None] * right
-    return replace(lane, points=points)
-
-
-def bulge(size: float) -> Callable[[Array, float], Array]:
-    return lambda s, length: size * np.sin(np.pi * s / length) ** 2
-
-
-def lane(number: int, points: Array, *, road: int | None = None, lane_id: int = -1, width: float = 3.5) -> Lane:
-    points = points if points.shape[1] == 3 else np.column_stack((points, np.zeros(len(points))))
-    road = number if road is None else road
-    widths = np.full(len(points), width)
-    return Lane(id=number, road_id=road, lane_id=lane_id, points=points, widths=widths, speed_limit=10.0)
-
-
-def ring() -> Town:
-    """Two lanes around a circle, in two halves: 0 and 2 outside, 1 and 3 inside; driven clockwise as seen."""
-    lanes, links = [], []
-    for half in (0, 1):
-        angle = np.linspace(np.pi * half, np.pi * (half + 1), 120)
-        circle = np.column_stack((np.cos(angle), np.sin(angle)))
-        lanes += [lane(2 * half + k, circle * (60.0 - 3.5 * k), road=half, lane_id=-2 + k) for k in (0, 1)]
-        outer, inner = 2 * half, 2 * half + 1
-        links += [LaneLink(k, (k + 2) % 4, STRAIGHT) for k in (outer, inner)]
-        links += [
-            LaneLink(outer, inner, LinkType.LANE_CHANGE_RIGHT),  # the middle of a clockwise circle is on the right
-            LaneLink(inner, outer, LinkType.LANE_CHANGE_LEFT),
-        ]
-    return Town(name="ring", lanes=lanes, links=links, junctions=[])
-
-
-def eight(height: float = 6.0, *, crossing: int | None = None) -> Town:
-    """Four lanes along a figure of eight; 0 passes `height` above 2, and may be said to be a connector."""
-    lanes = []
-    for k in range(4):
-        t = np.linspace(-0.25 + 0.5 * k, 0.25 + 0.5 * k, 100) * np.pi
-        points = np.column_stack((80.0 * np.sin(t), 80.0 * np.sin(t) * np.cos(t), 0.5 * height * (1.0 + np.cos(t))))
-        lanes.append(replace(lane(k, points), junction_id=5 if k == crossing else -1))
-    junctions = [] if crossing is None else [Junction(id=5, position=(0.0, 0.0), connectors=(crossing,))]
-    links = [LaneLink(k, (k + 1) % 4, STRAIGHT) for k in range(4)]
-    return Town(name="eight", lanes=lanes, links=links, junctions=junctions)
-
-
-def paperclip(radius: float, *, step: float = 8.0) -> Town:
-    """Two straights joined by half circles: each lane is a straight and a half circle in steps of so many degrees."""
-    turn = np.radians(np.linspace(0.0, 180.0, round(180.0 / step) + 1)) - 0.5 * np.pi
-    half = np.column_stack((20.0 + radius * np.cos(turn), radius * np.sin(turn)))
-    points = np.concatenate(([[-20.0, -radius]], half))
-    links = [LaneLink(0, 1, STRAIGHT), LaneLink(1, 0, STRAIGHT)]
-    return Town(name="clip", lanes=[lane(0, points), lane(1, -points)], links=links, junctions=[])
-
-
-@lru_cache(maxsize=1)
-def brookside() -> Town:
-    return load_town("brookside")
-
-
-def a_connector(kind: LinkType) -> LaneLink:
-    """A way into a junction of brookside, of the junction that has most connectors."""
-    town = brookside()
-    busiest = max(town.junctions, key=lambda junction: len(junction.connectors))
-    return next(link for link in town.links if link.target in busiest.connectors and link.type is kind)
-
-
-def a_street() -> Lane:
-    """The longest lane of brookside outside junctions."""
-    return max((lane for lane in brookside().lanes if not lane.in_junction), key=lambda lane: lane.length)
-
-
-def only(faults: Sequence[Fault], kind: FaultKind) -> Sequence[Fault]:
-    assert faults, "nothing is found"
-    assert {fault.kind for fault in faults} == {kind}, faults
-    return faults
-
-
-def near(fault: Fault, place: Array, within: float = 1.0) -> bool:
-    return math.dist(fault.position, place[:2]) <= within
 
 
 @pytest.mark.parametrize("town", [ring(), eight(), paperclip(4.0)], ids=lambda town: town.name)
@@ -294,100 +182,6 @@ class TestCentreLines:
         only(check_town(tapered), FaultKind.NARROW)
         ended = [link for link in tapered.links if (link.source, link.target) != (0, 2)]
         assert check_town(rebuilt(tapered, links=ended)) == ()
-
-
-class TestKerbs:
-    def test_a_turn_that_cuts_the_corner(self) -> None:
-        turn = brookside().lanes[a_connector(RIGHT).target]
-        (fault,) = only(check_town(with_lane(brookside(), pushed(turn, bulge(2.0)))), FaultKind.KERB)
-        assert fault.lanes == (turn.id,) and "corner" in fault.message
-        assert near(fault, turn.position(0.5 * turn.length), within=3.5)
-
-    def test_another_turns_corner_is_a_kerb_too(self) -> None:
-        way = a_connector(STRAIGHT)
-        turn = brookside().lanes[way.target]
-        (fault,) = only(check_town(with_lane(brookside(), pushed(turn, bulge(6.0)))), FaultKind.KERB)
-        assert fault.lanes == (turn.id,) and "corner" in fault.message
-
-    def test_a_way_off_the_ground_of_a_junction_with_three_arms(self) -> None:
-        town = brookside()
-        junction = next(j for j in town.junctions if len(j.connectors) == 6)
-        middle = np.mean([town.lanes[k].position(0.5 * town.lanes[k].length) for k in junction.connectors], axis=0)
-        straight = next(
-            town.lanes[link.target]
-            for link in town.links
-            if link.target in junction.connectors
-            and link.type is STRAIGHT
-            and town.lanes[link.target].project(middle)[1] < 0
-        )
-        # The arm that goes off is on the side of the middle, so the other side of this lane is a kerb.
-        (fault,) = only(check_town(with_lane(town, pushed(straight, bulge(3.0)))), FaultKind.KERB)
-        assert fault.lanes == (straight.id,) and "ground" in fault.message
-
-    @pytest.mark.parametrize(
-        "text",
-        [
-            star({0: "lanes: 3, median: 8", 45: "", 90: "", 180: ""}),
-            star({0: "lanes: 3", 90: "lanes: 2, median: 4", 180: "", 270: "", 315: "lanes: 2, median: 4"}),
-            star({45: "", 90: "lanes: 3", 135: "", 225: "", 315: "lanes: 2"}),
-            TIGHT_RAMPS,
-        ],
-        ids=["mouth far behind its neighbours", "mouth far before its neighbour", "both", "ramps"],
-    )
-    def test_mouths_of_one_junction_may_lie_at_very_different_distances(self, tmp_path: Path, text: str) -> None:
-        assert check_town(compiled(tmp_path, text)) == ()
-
-    def test_a_turn_that_cuts_the_corner_of_a_junction_with_five_arms(self, tmp_path: Path) -> None:
-        town = compiled(tmp_path, star({0: "lanes: 2, median: 4", 72: "", 144: "lanes: 2", 216: "", 288: "lanes: 2"}))
-        junction = max(town.junctions, key=lambda junction: len(junction.connectors))
-        ways = [town.lanes[k] for k in junction.connectors]
-        turns = [way for way in ways if math.radians(100.0) < way.headings[-1] - way.headings[0] < math.radians(115.0)]
-        assert len(turns) == 5
-        for turn in turns:
-            (fault,) = only(check_town(with_lane(town, pushed(turn, bulge(2.0)))), FaultKind.KERB)
-            assert fault.lanes == (turn.id,) and "corner" in fault.message
-
-    @pytest.mark.parametrize(("offset", "faulty"), [(1.75 + 1.0, False), (1.5, True)])
-    def test_a_lane_that_runs_over_a_pavement(self, offset: float, faulty: bool) -> None:
-        street = a_street()
-        beside = pushed(street, lambda s, length: np.full(len(s), offset))
-        path = Sidewalk(id=0, points=beside.points, width=2.0)
-        faults = check_town(rebuilt(brookside(), sidewalks=[path]))
-        if faulty:
-            assert street.id in {lanes for fault in only(faults, FaultKind.KERB) for lanes in fault.lanes}
-        else:
-            assert faults == ()
-
-    def test_a_pavement_on_a_bridge_is_in_nobodys_way(self) -> None:
-        street = a_street()
-        path = Sidewalk(id=0, points=street.points + np.array([0.0, 0.0, 6.0]), width=2.0)
-        assert check_town(rebuilt(brookside(), sidewalks=[path])) == ()
-
-
-class TestSpace:
-    def test_lanes_in_the_same_place(self) -> None:
-        town = ring()
-        moved = with_lane(town, pushed(town.lanes[1], bulge(-0.9)))  # the outer lane is on the left of the inner one
-        (fault,) = only(check_town(moved), FaultKind.OVERLAP)
-        assert fault.lanes == (0, 1) and "0.9 m" in fault.message
-
-    def test_a_crossing_without_a_junction(self) -> None:
-        (fault,) = only(check_town(eight(0.0)), FaultKind.OVERLAP)
-        assert fault.lanes == (0, 2) and near(fault, np.zeros(2), within=4.0)
-
-    def test_a_connector_that_runs_over_a_lane_of_another_street(self) -> None:
-        (fault,) = only(check_town(eight(0.0, crossing=0)), FaultKind.OVERLAP)
-        assert "a car on lane 0 runs" in fault.message and "into lane 2" in fault.message
-
-    @pytest.mark.parametrize("crossing", [None, 0])
-    @pytest.mark.parametrize(("height", "faulty"), [(2.0, True), (3.8, True), (4.2, False)])
-    def test_a_bridge_too_low_to_pass_under(self, height: float, faulty: bool, crossing: int | None) -> None:
-        faults = check_town(eight(height, crossing=crossing))
-        if faulty:
-            (fault,) = only(faults, FaultKind.CLEARANCE)
-            assert fault.lanes == (0, 2) and near(fault, np.zeros(2), within=6.0)
-        else:
-            assert faults == ()
 
 
 class TestPromises:

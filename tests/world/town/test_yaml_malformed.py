@@ -13,8 +13,12 @@ from hypothesis import strategies as st
 from dorothie_gym.world.town.errors import TownError
 from dorothie_gym.world.town.yaml_town import read_yaml_town
 from dorothie_gym.world.town.yaml_town.schema import read_plan
-from tests.world.town.yaml_mistakes import MISPLACED, WRONG, WRONG_FILES
+from tests.world.town.yaml_misplaced import MISPLACED
+from tests.world.town.yaml_mistakes import MISWRITTEN, WRONG_FILES
 from tests.world.town.yaml_text import MIDTOWN, written
+from tests.world.town.yaml_wrong_plans import WRONG
+
+MISTAKES = MISWRITTEN | WRONG | MISPLACED
 
 
 def refusal(path: Path) -> TownError:
@@ -31,7 +35,7 @@ def check(path: Path, line: int | None, fragments: str) -> None:
         assert fragment in message
 
 
-@pytest.mark.parametrize("old, new, line, fragments", [*WRONG.values(), *MISPLACED.values()], ids=[*WRONG, *MISPLACED])
+@pytest.mark.parametrize("old, new, line, fragments", MISTAKES.values(), ids=MISTAKES.keys())
 def test_a_mistake_is_told_with_line_key_and_advice(
     tmp_path: Path, old: str, new: str, line: int, fragments: str
 ) -> None:
