@@ -87,7 +87,7 @@ class Training:
         self.seconds = 0.0
         begun = (folder / DESCRIPTION).is_file()
         if begun:
-            _check_same(settings, TrainingSettings(**read_description(folder)["settings"]), folder)
+            check_same(settings, TrainingSettings(**read_description(folder)["settings"]), folder)
             self.rows = _read_rows(folder / PROGRESS)
         folder.mkdir(parents=True, exist_ok=True)
         torch.set_num_threads(1)  # small networks: more threads only wait for one another
@@ -188,8 +188,8 @@ class _Evaluations(BaseCallback):
         self._since = time.perf_counter()
 
 
-def _check_same(wanted: TrainingSettings, begun: TrainingSettings, folder: Path) -> None:
-    """Fails where a run in a folder was begun with other settings."""
+def check_same(wanted: Any, begun: Any, folder: Path) -> None:
+    """Raises `SettingsError` where a run in a folder was begun with other settings than those wanted, but for `LIVE`."""
     same = replace(begun, **{name: getattr(wanted, name) for name in LIVE})
     for name, value in wanted.as_json().items():
         if same.as_json()[name] != json.loads(json.dumps(value)):
