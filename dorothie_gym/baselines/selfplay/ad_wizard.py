@@ -64,6 +64,14 @@ _TASKS = {
     Caper.CHANGE: ExceptionKind.TASK_CHANGE,
 }
 _NOTHING = AdWizardAction()
+_KINDS = [
+    int(kind)
+    for kind in (
+        ExceptionKind.NONE, *(ExceptionKind.WEATHER for _ in _WEATHER), ExceptionKind.PLACE_PROP,
+        ExceptionKind.DELETE_PROP, *(ExceptionKind.SENSOR_FAULT for _ in _FAULTS), *_CROWDS.values(), *_TASKS.values(),
+    )
+]  # fmt: skip
+"""Of what kind each caper is."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,8 +129,7 @@ class AdWizardSeat(Seat[AdWizardMemory]):
 
     def allowed(self, observation: Mapping[str, Any], masks: Mapping[str, Any]) -> Mask:
         """By the kind of exception."""
-        kinds = [self._action(Caper(choice), observation).exception for choice in range(self.actions)]
-        return np.asarray(masks["exception"])[[int(kind) for kind in kinds]].astype(np.bool_)
+        return np.asarray(masks["exception"])[_KINDS].astype(np.bool_)
 
     def act(
         self, choice: int, observation: Mapping[str, Any], memory: AdWizardMemory
@@ -167,6 +174,4 @@ class AdWizardSeat(Seat[AdWizardMemory]):
             return _NOTHING
         names = {mark.row: mark.name for mark in read_landmarks(observation, self.town)}
         words = np.random.default_rng(round(scalar(observation, "time")))
-        return AdWizardAction(
-            exception=kind, item=subgoal.index, message=context(kind, names[subgoal.landmark], words)
-        )
+        return AdWizardAction(exception=kind, item=subgoal.index, message=context(kind, names[subgoal.landmark], words))

@@ -61,12 +61,12 @@ class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
         vehicles, pedestrians = TRAFFIC[traffic]
         try:
             config = EnvConfig(max_seconds=max_seconds, world=WorldConfig(vehicles=vehicles, pedestrians=pedestrians))
+            self._progress = float(progress)
             self.duo = DuoWizardEnv(town, storyboard, config=config)
             limits = self.duo.limits
             self._adversary = None if ad_wizard == "learned" else make_policy(ad_wizard, Role.AD_WIZARD, limits)
         except (TypeError, ValueError, OSError, StoryboardError) as error:
             raise SettingsError(f"selfplay: {error}") from error
-        self._progress = float(progress)
         self._seats = [make_seat(role, self.duo.town, limits) for role in AGENT_ROLES]
         self.table = Table.of(limits, self.duo.town)
         self.observation_space = spaces.Box(-1.0, 1.0, (self.table.width,), dtype=np.float32)

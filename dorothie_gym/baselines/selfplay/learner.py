@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from gymnasium import spaces
 from numpy.typing import NDArray
-from stable_baselines3.common.logger import configure
+from stable_baselines3.common.logger import Logger, configure
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from dorothie_gym.baselines.rl.settings import TrainingSettings
@@ -76,7 +76,7 @@ class Learner:
         self.size = table.padded_size if self.padded else table.sizes[self.roles[0]]
         self.actions = table.padded_actions if self.padded else table.actions[self.roles[0]]
         self.model = make_network(settings, self.size, self.actions, len(self.players))
-        self.model.set_logger(configure(None if log is None else str(log), [] if log is None else ["tensorboard"]))
+        self.model.set_logger(Logger(None, []) if log is None else configure(str(log), ["tensorboard"]))
         self._vectors: Vector
         self._masks: Mask
         self._chosen: tuple[torch.Tensor, torch.Tensor, torch.Tensor]

@@ -26,12 +26,12 @@ class SelfPlaySettings:
     Attributes:
         shared: whether one network plays all roles; otherwise each has its own.
         town, storyboard, traffic, max_seconds, progress: see `SelfPlayEnv`.
-        past_environments: in so many of the environments the Ad-Wizard is one of earlier times; it does not learn there.
+        past_environments: in so many environments the Ad-Wizard is one of earlier times, which does not learn.
         steps: decisions of all environments together.
         environments: how many play at once.
         workers: processes that step them; 0 steps them in the process that learns.
         seed: of networks, environments and exploration.
-        evaluate_every: steps between evaluations; what is done between two of them is done again after Ctrl-C.
+        evaluate_every: steps between evaluations.
         episodes: of each of an evaluation's two parts.
         network: widths of the hidden layers.
         parameters: of MaskablePPO, as sb3-contrib names them; see `rl.settings.FINAL_RATE`.
@@ -48,7 +48,7 @@ class SelfPlaySettings:
     environments: int = 16
     workers: int = 0
     seed: int = 0
-    evaluate_every: int = 100_000
+    evaluate_every: int = 200_000
     episodes: int = 20
     network: tuple[int, ...] = (128, 128)
     parameters: Mapping[str, Any] = field(default_factory=dict)
@@ -71,7 +71,8 @@ class SelfPlaySettings:
         """What a learner needs of them; `seed` is that of its network."""
         return TrainingSettings(
             algorithm="maskable_ppo", env=SELFPLAY, seed=seed, network=self.network, parameters=self.parameters,
-            **{name: getattr(self, name) for name in ("steps", "environments", "workers", "evaluate_every", "episodes")},
+            steps=self.steps, environments=self.environments, workers=self.workers, episodes=self.episodes,
+            evaluate_every=self.evaluate_every,
         )  # fmt: skip
 
     def as_json(self) -> dict[str, Any]:

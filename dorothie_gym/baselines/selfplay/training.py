@@ -26,6 +26,9 @@ from dorothie_gym.ontology import AGENT_ROLES
 OPPONENTS = ("scripted", "learned")
 """Ad-Wizards that the team is evaluated against."""
 
+STRETCH = 16
+"""After so many rollouts all is saved, and sessions begin anew; what follows depends on nothing but what was saved."""
+
 Watch = Callable[[int, int, "Row | None"], None]
 """Is told the steps done, those there will be, and the last evaluation."""
 
@@ -39,8 +42,8 @@ class Row:
         seconds: of training, evaluations left out [s].
         scripted: what the team came to against the scripted Ad-Wizard.
         learned: the same against the one that was learning, too.
-        returns: mean sum of rewards of each role in the sessions of training that ended since the row before; None
-            where none did.
+        returns: mean sum of rewards of each role in the sessions that ended in the last stretch of training; None where
+            none did.
     """
 
     steps: int
@@ -67,8 +70,8 @@ class Run:
     Attributes:
         folder: where all is.
         rows: evaluations, in order.
-        steps: that are kept in the folder, with those of earlier calls.
-        seconds: of the training that they took, evaluations left out [s].
+        steps: done and saved, with those of earlier calls.
+        seconds: of training that they took, evaluations left out [s].
         finished: whether all steps were done.
     """
 
@@ -124,7 +127,7 @@ class SelfPlay:
         """Trains.
 
         Returns:
-            What came of it. Where Ctrl-C came between, that is what the last evaluation left in the folder.
+            What came of it. Where Ctrl-C came between, that is what the last stretch left in the folder.
         """
         finished = False
         try:
@@ -132,40 +135,40 @@ class SelfPlay:
                 self._go_on()
             finished = True
         except KeyboardInterrupt:
-            self.steps = self.rows[-1].steps if self.rows else 0
-            self.seconds = self.rows[-1].seconds if self.rows else 0.0
+            pass  # what was done since the last stretch ended will be done again
         finally:
             self.game.close()
-        return Run(
-            folder=self.folder, rows=tuple(self.rows), steps=self.steps, seconds=self.seconds, finished=finished
-        )
+        return Run(folder=self.folder, rows=tuple(self.rows), steps=self.steps, seconds=self.seconds, finished=finished)
 
     def _go_on(self) -> None:
-        """Trains up to the next evaluation."""
-        settings, game, steps, since = self.settings, self.game, self.steps, self.seconds
+        """Trains for a stretch; evaluates where it is time."""
+        settings, game, steps = self.settings, self.game, self.steps
         due = min((steps // settings.evaluate_every + 1) * settings.evaluate_every, settings.steps)
         begun = time.perf_counter()
         game.begin(steps)
-        while steps < due:
+        for _ in range(STRETCH):
             steps = game.play(steps)
             self._watch(steps, settings.steps, None)
-        self.seconds = since + time.perf_counter() - begun
-        self.steps = steps
-        self._evaluate()
+            if steps >= due:
+                break
+        seconds = self.seconds + time.perf_counter() - begun
+        game.past.keep(game.actor(AD_WIZARD).model)
+        row = self._evaluate(steps, seconds) if steps >= due else None
+        self.steps, self.seconds = steps, seconds
+        self.rows += [row] if row is not None else []
+        self._save()
+        if row is not None:
+            self._watch(steps, settings.steps, row)
 
-    def _evaluate(self) -> None:
-        """Plays the evaluation's sessions, and saves everything with what came of them."""
-        game = self.game
+    def _evaluate(self, steps: int, seconds: float) -> Row:
+        """Plays the evaluation's sessions."""
         outcomes = {name: self._outcome(name) for name in OPPONENTS}
         row = Row(
-            steps=self.steps, seconds=round(self.seconds, 2), returns=_means(game.returns),
+            steps=steps, seconds=round(seconds, 2), returns=_means(self.game.returns),
             scripted=outcomes["scripted"], learned=outcomes["learned"],
         )  # fmt: skip
         self._log(row)
-        game.past.keep(game.actor(AD_WIZARD).model)
-        self.rows.append(row)
-        self._save()
-        self._watch(row.steps, self.settings.steps, row)
+        return row
 
     def _outcome(self, ad_wizard: str) -> Outcome:
         maker = Maker(self.settings.env_settings, ad_wizard)
@@ -180,9 +183,7 @@ class SelfPlay:
             for role in range(len(AGENT_ROLES)):
                 learner = game.actor(role)
                 vectors = game.table.vectors(rows, role, padded=learner.padded)
-                chosen.append(
-                    draw(learner.model, vectors, game.table.masks(rows, role, padded=learner.padded), rng)
-                )
+                chosen.append(draw(learner.model, vectors, game.table.masks(rows, role, padded=learner.padded), rng))
             return list(np.stack(chosen, axis=1))
 
         return act
@@ -207,7 +208,8 @@ class SelfPlay:
         self.game.past.save(self.folder)
         lines = "".join(json.dumps(row.as_json()) + "\n" for row in self.rows)
         (self.folder / PROGRESS).write_text(lines, encoding="utf-8")
-        draw_curve([row.as_json() for row in self.rows], _title(settings), self.folder / CURVE)
+        if self.rows:
+            draw_curve([row.as_json() for row in self.rows], _title(settings), self.folder / CURVE)
 
     def _take_up(self) -> None:
         """Goes back to what is in the folder."""
@@ -232,5 +234,3 @@ def _means(returns: Sequence[NDArray[np.float64]]) -> dict[str, float | None]:
 
 def _title(settings: SelfPlaySettings) -> str:
     return f"self-play in {settings.town}, {'one network' if settings.shared else 'a network for each role'}"
-
-
