@@ -53,7 +53,7 @@ class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
         storyboard: str | None = None,
         traffic: str = "light",
         max_seconds: float = 300.0,
-        progress: float = 0.01,
+        progress: float = 0.02,
         ad_wizard: str = "learned",
     ) -> None:
         if traffic not in TRAFFIC:

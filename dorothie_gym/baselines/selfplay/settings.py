@@ -42,7 +42,7 @@ class SelfPlaySettings:
     storyboard: str | None = None
     traffic: str = "light"
     max_seconds: float = 300.0
-    progress: float = 0.01
+    progress: float = 0.02
     past_environments: int = 0
     steps: int = 2_000_000
     environments: int = 16

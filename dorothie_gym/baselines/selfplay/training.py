@@ -42,8 +42,8 @@ class Row:
         seconds: of training, evaluations left out [s].
         scripted: what the team came to against the scripted Ad-Wizard.
         learned: the same against the one that was learning, too.
-        returns: mean sum of rewards of each role in the sessions that ended in the last stretch of training; None where
-            none did.
+        returns: mean sum of rewards of each role in the sessions of training that ended since the row before; None
+            where none did.
     """
 
     steps: int
@@ -108,6 +108,7 @@ class SelfPlay:
         self._watch = watch or (lambda done, total, row: None)
         self.rows: list[Row] = []
         self.seconds, self.steps = 0.0, 0
+        self._tally = np.zeros(1 + len(AGENT_ROLES))  # sessions since the last row, and the sums of their rewards
         begun = (folder / AGENT_ROLES[AD_WIZARD] / DESCRIPTION).is_file()
         if begun:
             found = read_description(folder / AGENT_ROLES[AD_WIZARD])
@@ -153,18 +154,24 @@ class SelfPlay:
                 break
         seconds = self.seconds + time.perf_counter() - begun
         game.past.keep(game.actor(AD_WIZARD).model)
-        row = self._evaluate(steps, seconds) if steps >= due else None
+        self._tally[0] += len(game.returns)
+        self._tally[1:] += np.sum(np.reshape(game.returns, (-1, len(AGENT_ROLES))), axis=0)
         self.steps, self.seconds = steps, seconds
-        self.rows += [row] if row is not None else []
+        if steps < due:
+            self._save()
+            return
+        row = self._evaluate()
+        self.rows.append(row)
+        self._tally[:] = 0.0
         self._save()
-        if row is not None:
-            self._watch(steps, settings.steps, row)
+        draw_curve([row.as_json() for row in self.rows], _title(settings), self.folder / CURVE)
+        self._watch(steps, settings.steps, row)
 
-    def _evaluate(self, steps: int, seconds: float) -> Row:
+    def _evaluate(self) -> Row:
         """Plays the evaluation's sessions."""
         outcomes = {name: self._outcome(name) for name in OPPONENTS}
         row = Row(
-            steps=steps, seconds=round(seconds, 2), returns=_means(self.game.returns),
+            steps=self.steps, seconds=round(self.seconds, 2), returns=_means(self._tally),
             scripted=outcomes["scripted"], learned=outcomes["learned"],
         )  # fmt: skip
         self._log(row)
@@ -202,14 +209,12 @@ class SelfPlay:
             learner = self.game.actor(k)
             about = {
                 "kind": SELFPLAY, "role": str(role), "size": table.sizes[k], "actions": table.actions[k],
-                "padded": [learner.size, learner.actions] if learner.padded else None,
+                "padded": [learner.size, learner.actions] if learner.padded else None, "tally": self._tally.tolist(),
             }  # fmt: skip
             save_model(learner.model, settings, self.folder / role, self.seconds, about)
         self.game.past.save(self.folder)
         lines = "".join(json.dumps(row.as_json()) + "\n" for row in self.rows)
         (self.folder / PROGRESS).write_text(lines, encoding="utf-8")
-        if self.rows:
-            draw_curve([row.as_json() for row in self.rows], _title(settings), self.folder / CURVE)
 
     def _take_up(self) -> None:
         """Goes back to what is in the folder."""
@@ -223,13 +228,16 @@ class SelfPlay:
         lines = (self.folder / PROGRESS).read_text(encoding="utf-8").splitlines()
         self.steps = steps.pop()
         self.rows = [row for row in map(Row.from_json, map(json.loads, lines)) if row.steps <= self.steps]
-        self.seconds = float(found[AGENT_ROLES[AD_WIZARD]]["seconds"])
+        about = found[AGENT_ROLES[AD_WIZARD]]
+        self.seconds, self._tally = float(about["seconds"]), np.array(about["tally"], dtype=np.float64)
 
 
-def _means(returns: Sequence[NDArray[np.float64]]) -> dict[str, float | None]:
-    if not returns:
-        return {str(role): None for role in AGENT_ROLES}
-    return {str(role): round(float(mean), 4) for role, mean in zip(AGENT_ROLES, np.mean(returns, axis=0), strict=True)}
+def _means(tally: NDArray[np.float64]) -> dict[str, float | None]:
+    sessions, *sums = tally.tolist()
+    return {
+        str(role): round(total / sessions, 4) if sessions else None
+        for role, total in zip(AGENT_ROLES, sums, strict=True)
+    }
 
 
 def _title(settings: SelfPlaySettings) -> str:
