@@ -70,7 +70,7 @@ class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
         self._seats = [make_seat(role, self.duo.town, limits) for role in AGENT_ROLES]
         self.table = Table.of(limits, self.duo.town)
         self.observation_space = spaces.Box(-1.0, 1.0, (self.table.width,), dtype=np.float32)
-        self.action_space = spaces.MultiDiscrete(self.table.actions)
+        self.action_space = spaces.MultiDiscrete(list(self.table.actions))
         self._way_left = WayLeft(self.duo.town)
         self._memories: list[Any] = []
         self._seen: Mapping[str, Any] = {}
