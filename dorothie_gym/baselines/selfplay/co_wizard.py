@@ -34,7 +34,7 @@ ACROSS, FAR, CLOSE = 500.0, 100.0, 10.0
 """Ways are shares of these [m]."""
 
 
-class Remarks(enum.IntEnum):
+class OtherAction(enum.IntEnum):
     """What the Co-Wizard can do beside driving; numbers go on where `NavigationAction` ends."""
 
     NOTE_GOAL = len(ACTIONS)
@@ -45,11 +45,11 @@ class Remarks(enum.IntEnum):
 
 
 _SPEECH: Mapping[int, Speech] = {
-    Remarks.ACKNOWLEDGE: Speech(act=DialogueAct.of(DialogueMove.ACKNOWLEDGE), text="Okay."),
-    Remarks.ASK_GOAL: Speech(
+    OtherAction.ACKNOWLEDGE: Speech(act=DialogueAct.of(DialogueMove.ACKNOWLEDGE), text="Okay."),
+    OtherAction.ASK_GOAL: Speech(
         act=DialogueAct.of(DialogueMove.QUERY_W, LandmarkName.QUERIED), text="Where do you want to go?"
     ),
-    Remarks.ASK_WAY: Speech(act=DialogueAct.of(DialogueMove.QUERY_W, ActionValue.QUERIED), text="Which way now?"),
+    OtherAction.ASK_WAY: Speech(act=DialogueAct.of(DialogueMove.QUERY_W, ActionValue.QUERIED), text="Which way now?"),
 }
 _DRIVING: Mapping[int, Physical] = {
     NavigationAction.LANE_FOLLOW: Physical(action=PhysicalAction.LANE_FOLLOW),
@@ -77,11 +77,11 @@ class CoWizardMemory:
 
 
 class CoWizardSeat(Seat[CoWizardMemory]):
-    """See `NavigationAction` for how it drives, `Remarks` for the rest."""
+    """See `NavigationAction` for how it drives, `OtherAction` for the rest."""
 
     role = Role.CO_WIZARD
     speakers = (Role.PARTICIPANT,)
-    actions = len(ACTIONS) + len(Remarks)
+    actions = len(ACTIONS) + len(OtherAction)
     own_size: ClassVar[int] = 2 * len(SECTORS) + 1 + 6 + len(Motion) + len(PhysicalAction) + 1
 
     def begin(self) -> CoWizardMemory:
@@ -130,7 +130,7 @@ class CoWizardSeat(Seat[CoWizardMemory]):
         planned = None if stopped else _turn_planned(observation)
         for sector, row in self._exits(observation).items():
             mask[FIRST_TURN + sector] = int(row[ExitColumn.ANGLE]) != planned
-        mask[Remarks.NOTE_GOAL] = memory.named is not None and memory.named is not memory.noted
+        mask[OtherAction.NOTE_GOAL] = memory.named is not None and memory.named is not memory.noted
         mask[list(_SPEECH)] = scalar(observation, "speaking") <= 0.0
         return mask
 
@@ -148,7 +148,7 @@ class CoWizardSeat(Seat[CoWizardMemory]):
         self, choice: int, observation: Mapping[str, Any], memory: CoWizardMemory
     ) -> tuple[CoWizardAction, CoWizardMemory]:  # fmt: skip
         """Drives, speaks or notes."""
-        if choice == Remarks.NOTE_GOAL and memory.named is not None:
+        if choice == OtherAction.NOTE_GOAL and memory.named is not None:
             note = Mental(action=MentalAction.GOAL_UPDATE, goals=(memory.named,))
             return CoWizardAction(mental=note), replace(memory, noted=memory.named)
         if choice in _SPEECH:

@@ -101,7 +101,8 @@ class Seat(ABC, Generic[Memory]):
             for remark in self.remarks(memory)
         ]
         own = np.array(self.own(observation, memory), dtype=np.float32)
-        return np.clip(np.concatenate([squashed(flat), *heard, own]), -1.0, 1.0).astype(np.float32)
+        whole: Vector = np.clip(np.concatenate([squashed(flat), *heard, own]), -1.0, 1.0)
+        return whole
 
 
 def in_own_frame(observation: Mapping[str, Any]) -> dict[str, Any]:
@@ -122,7 +123,7 @@ def in_own_frame(observation: Mapping[str, Any]) -> dict[str, Any]:
 
 def squashed(values: Vector) -> Vector:
     """Each number x as sign(x) log(1 + |x|), so that metres, shares and seconds are all of about the same size."""
-    return (np.sign(values) * np.log1p(np.abs(values)) / math.log1p(FAR)).astype(np.float32)
+    return np.asarray(np.sign(values) * np.log1p(np.abs(values)) / math.log1p(FAR), dtype=np.float32)
 
 
 def one_hot(at: int | None, size: int) -> list[float]:

@@ -108,7 +108,7 @@ class SelfPlay:
         self._watch = watch or (lambda done, total, row: None)
         self.rows: list[Row] = []
         self.seconds, self.steps = 0.0, 0
-        self._tally = np.zeros(1 + len(AGENT_ROLES))  # sessions since the last row, and the sums of their rewards
+        self._tally = _tally([])  # of the sessions of training since the last row
         begun = (folder / AGENT_ROLES[AD_WIZARD] / DESCRIPTION).is_file()
         if begun:
             found = read_description(folder / AGENT_ROLES[AD_WIZARD])
@@ -153,25 +153,24 @@ class SelfPlay:
             if steps >= due:
                 break
         seconds = self.seconds + time.perf_counter() - begun
+        tally = self._tally + _tally(game.returns)
+        row = self._evaluate(steps, seconds, tally) if steps >= due else None
+        # from here on nothing takes time: Ctrl-C finds all of the stretch done, or none
         game.past.keep(game.actor(AD_WIZARD).model)
-        self._tally[0] += len(game.returns)
-        self._tally[1:] += np.sum(np.reshape(game.returns, (-1, len(AGENT_ROLES))), axis=0)
-        self.steps, self.seconds = steps, seconds
-        if steps < due:
-            self._save()
-            return
-        row = self._evaluate()
-        self.rows.append(row)
-        self._tally[:] = 0.0
+        self.steps, self.seconds, self._tally = steps, seconds, tally
+        if row is not None:
+            self.rows.append(row)
+            self._tally = _tally([])
         self._save()
-        draw_curve([row.as_json() for row in self.rows], _title(settings), self.folder / CURVE)
-        self._watch(steps, settings.steps, row)
+        if row is not None:
+            draw_curve([row.as_json() for row in self.rows], _title(settings), self.folder / CURVE)
+            self._watch(steps, settings.steps, row)
 
-    def _evaluate(self) -> Row:
+    def _evaluate(self, steps: int, seconds: float, tally: NDArray[np.float64]) -> Row:
         """Plays the evaluation's sessions."""
         outcomes = {name: self._outcome(name) for name in OPPONENTS}
         row = Row(
-            steps=self.steps, seconds=round(self.seconds, 2), returns=_means(self._tally),
+            steps=steps, seconds=round(seconds, 2), returns=_means(tally),
             scripted=outcomes["scripted"], learned=outcomes["learned"],
         )  # fmt: skip
         self._log(row)
@@ -230,6 +229,12 @@ class SelfPlay:
         self.rows = [row for row in map(Row.from_json, map(json.loads, lines)) if row.steps <= self.steps]
         about = found[AGENT_ROLES[AD_WIZARD]]
         self.seconds, self._tally = float(about["seconds"]), np.array(about["tally"], dtype=np.float64)
+
+
+def _tally(returns: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """How many sessions there were, and the sums of their rewards by role (4,)."""
+    sums: NDArray[np.float64] = np.sum(np.reshape(returns, (-1, len(AGENT_ROLES))), axis=0)
+    return np.concatenate(([float(len(returns))], sums))
 
 
 def _means(tally: NDArray[np.float64]) -> dict[str, float | None]:

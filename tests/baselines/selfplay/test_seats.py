@@ -8,7 +8,7 @@ pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 from dorothie_gym import DuoWizardEnv  # noqa: E402
 from dorothie_gym.baselines.rl import SettingsError  # noqa: E402
 from dorothie_gym.baselines.selfplay.ad_wizard import AdWizardSeat, Caper  # noqa: E402
-from dorothie_gym.baselines.selfplay.co_wizard import CoWizardSeat, Remarks  # noqa: E402
+from dorothie_gym.baselines.selfplay.co_wizard import CoWizardSeat, OtherAction  # noqa: E402
 from dorothie_gym.baselines.selfplay.env import SelfPlayEnv  # noqa: E402
 from dorothie_gym.baselines.selfplay.participant import ParticipantSeat, Phrase  # noqa: E402
 from dorothie_gym.dialogue import Direction  # noqa: E402
@@ -60,13 +60,13 @@ def test_the_co_wizard_hears_which_way_and_remembers(env: SelfPlayEnv) -> None:
 
 def test_the_co_wizard_notes_the_goal_that_was_named(env: SelfPlayEnv) -> None:
     row, *_ = env.step(np.array([Phrase.NAME_GOAL, 0, 0]))
-    assert not env.table.masks(row[None], 1, padded=False)[0][Remarks.NOTE_GOAL]
+    assert not env.table.masks(row[None], 1, padded=False)[0][OtherAction.NOTE_GOAL]
     for _ in range(12):
         row, *_ = env.step(NOTHING)
-    assert env.table.masks(row[None], 1, padded=False)[0][Remarks.NOTE_GOAL]
-    row, *_ = env.step(np.array([0, Remarks.NOTE_GOAL, 0]))
+    assert env.table.masks(row[None], 1, padded=False)[0][OtherAction.NOTE_GOAL]
+    row, *_ = env.step(np.array([0, OtherAction.NOTE_GOAL, 0]))
     assert env.duo.stage.beliefs.goals == (env._memories[0].errand.name,)
-    assert not env.table.masks(row[None], 1, padded=False)[0][Remarks.NOTE_GOAL]
+    assert not env.table.masks(row[None], 1, padded=False)[0][OtherAction.NOTE_GOAL]
 
 
 def test_the_co_wizard_takes_the_exit_of_a_sector() -> None:
