@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,7 @@ from dorothie_gym.policies.scenery import scalar
 RECENT = 20.0
 """The age of what was said is a share of this [s]."""
 
-_DIRECTIONS = tuple(Direction)
-
-HEARD_SIZE = len(DialogueMove) + len(LABELS) + len(_DIRECTIONS) + 1
+HEARD_SIZE = len(DialogueMove) + len(LABELS) + len(Direction) + 1
 """Numbers of one remark: one-hot move, slots, one-hot direction, age."""
 
 
@@ -39,13 +38,16 @@ class Remark:
 
     def vector(self, now: float) -> NDArray[np.float32]:
         """The remark as numbers (HEARD_SIZE,) in 0..1, at a time [s]."""
-        values = np.zeros(HEARD_SIZE, dtype=np.float32)
-        values[int(self.act.move)] = 1.0
-        values[len(DialogueMove) : len(DialogueMove) + len(LABELS)] = self.act.vector
-        if self.direction is not None:
-            values[len(DialogueMove) + len(LABELS) + _DIRECTIONS.index(self.direction)] = 1.0
+        values = self._content.copy()
         values[-1] = min((now - self.time) / RECENT, 1.0)
         return values
+
+    @cached_property
+    def _content(self) -> NDArray[np.float32]:
+        """All but the age."""
+        move = [float(int(self.act.move) == k) for k in range(len(DialogueMove))]
+        direction = [float(self.direction is known) for known in Direction]
+        return np.array([*move, *self.act.vector, *direction, 0.0], dtype=np.float32)
 
 
 def listen(observation: Mapping[str, Any], speaker: Role, before: Remark | None) -> Remark | None:

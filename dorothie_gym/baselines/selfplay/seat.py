@@ -115,8 +115,8 @@ def in_own_frame(observation: Mapping[str, Any]) -> dict[str, Any]:
             continue
         table = np.array(turned[name], dtype=np.float64)
         used = table.any(axis=1)
-        east, south = table[used, column] - x, table[used, column + 1] - y
-        table[used, column], table[used, column + 1] = east * cosine + south * sine, south * cosine - east * sine
+        east, south = (table[:, column] - x) * used, (table[:, column + 1] - y) * used
+        table[:, column], table[:, column + 1] = east * cosine + south * sine, south * cosine - east * sine
         turned[name] = table
     return turned
 
