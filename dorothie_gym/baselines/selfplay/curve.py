@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from dorothie_gym.baselines.rl.curve import DOTS, SIZE, hex_of
-from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.ontology import Role
 from dorothie_gym.world.graphics.palette import CAR, INK, INK_SOFT, NOTE, PROP, SHEET
 
 _LINES = {
@@ -37,16 +37,17 @@ def draw_curve(rows: Sequence[Mapping[str, Any]], title: str, path: Path) -> Non
         figure = Figure(figsize=SIZE, dpi=DOTS, facecolor=hex_of(SHEET), layout="constrained")
         FigureCanvasAgg(figure)
         returns, success = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        for role in AGENT_ROLES:
-            name, colour, style = _LINES[role]
+        for role, (name, colour, style) in _LINES.items():
             known = [row for row in rows if row["returns"][role] is not None]
             steps, values = [row["steps"] / 1e3 for row in known], [row["returns"][role] for row in known]
             returns.plot(steps, values, color=hex_of(colour), lw=2, ls=style, marker="o", ms=3, label=name)
         returns.set_ylabel("reward of a session")
         returns.legend(frameon=False)
-        for name, colour in (("scripted", INK_SOFT), ("learned", NOTE)):
+        for name, colour, style in (("scripted", INK_SOFT, "-"), ("learned", NOTE, "--")):
             steps, values = [row["steps"] / 1e3 for row in rows], [row[name]["success"] for row in rows]
-            success.plot(steps, values, color=hex_of(colour), lw=2, marker="o", ms=3, label=f"{name} Ad-Wizard")
+            success.plot(
+                steps, values, color=hex_of(colour), lw=2, ls=style, marker="o", ms=3, label=f"{name} Ad-Wizard"
+            )
         success.set(ylim=(-0.04, 1.04), xlabel="thousand steps", ylabel="success against")
         success.legend(frameon=False)
         for axes in (returns, success):
