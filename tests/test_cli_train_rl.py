@@ -26,6 +26,43 @@ def test_training_tells_what_came_of_it_in_json(tmp_path: Path) -> None:
     assert again.exit_code == 0 and "curve.png" in again.stdout
 
 
+def test_three_roles_learn_and_play(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    short = ["--steps", "128", "--environments", "1", "--workers", "0", "--episodes", "1", "--set", "max_seconds=5"]
+    result = CliRunner().invoke(
+        app, ["train-rl", "selfplay", "--out", str(out), *short, "--set", "shared=true", "--json"]
+    )
+    assert result.exit_code == 0, result.output
+    facts = json.loads(result.stdout)
+    assert facts["finished"] and facts["steps"] == 128 and facts["settings"]["shared"] is True
+    assert set(facts["evaluations"][0]["returns"]) == {"participant", "co_wizard", "ad_wizard"}
+    again = CliRunner().invoke(app, ["train-rl", "selfplay", "--out", str(out), *short, "--set", "shared=true"])
+    assert again.exit_code == 0 and "curve.png" in again.stdout and f"--co-wizard {out / 'co_wizard'}" in again.stdout
+    roles = [
+        word
+        for role in ("participant", "co-wizard", "ad-wizard")
+        for word in (f"--{role}", str(out / role.replace("-", "_")))
+    ]
+    played = CliRunner().invoke(
+        app,
+        [
+            "rollout",
+            *roles,
+            "--sessions",
+            "1",
+            "--towns",
+            "brookside",
+            "--max-seconds",
+            "20",
+            "--workers",
+            "1",
+            "--json",
+        ],
+    )
+    assert played.exit_code == 0, played.output
+    assert json.loads(played.stdout)["errored"] == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
@@ -34,6 +71,9 @@ def test_training_tells_what_came_of_it_in_json(tmp_path: Path) -> None:
         (["ppo", "--set", "guidance=stars"], "guidance is 'stars'"),
         (["ppo", "--env", "dorothie_gym/NoSuch-v0"], "dorothie_gym/NoSuch-v0"),
         (["sac"], "sac on dorothie_gym/Navigation-v0"),
+        (["selfplay", "--set", "colour=red"], "selfplay has no 'colour'"),
+        (["selfplay", "--set", "town=atlantis"], "atlantis"),
+        (["selfplay", "--env", "dorothie_gym/CoWizard-v0"], "leave it out"),
         (["ppo", "--environments", "1", "--workers", "2"], "workers is 2"),
     ],
 )

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,18 +10,24 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dorothie_gym.cli.options import AsJson
-from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
+from dorothie_gym.cli.output import fail, print_json, stdout, told_plainly
+from dorothie_gym.cli.training import options_of, processes, tell_interrupted, training_progress
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.rl import Run, TrainingSettings
+
+DRIVING = "dorothie_gym/Navigation-v0"
 
 NEEDS = "train-rl needs torch and stable-baselines3; pip install 'dorothie-gym[baselines]' brings them"
 
 
 def train_rl(
-    algorithm: Annotated[str, typer.Argument(metavar="ALGO", help="ppo, maskable_ppo, a2c, dqn or sac.")],
+    algorithm: Annotated[str, typer.Argument(metavar="ALGO", help="ppo, maskable_ppo, a2c, dqn, sac or selfplay.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the run; one that was begun is gone on with.")],
-    env: Annotated[str, typer.Option(metavar="ID", help="Id of the environment.")] = "dorothie_gym/Navigation-v0",
+    env: Annotated[
+        str | None,
+        typer.Option(metavar="ID", help=f"Id of the environment, {DRIVING} by default; selfplay has its own."),
+    ] = None,
     setting: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="An argument of the environment, as guidance=goals; repeat."),
@@ -42,21 +46,31 @@ def train_rl(
     """Train a driver (or any role) with stable-baselines3, from defaults that were tuned.
 
     The folder gets the model (weights in safetensors, all else in JSON), the best one so far, a line of JSON for each
-    evaluation, and the learning curve. Ctrl-C keeps what there is; the same command goes on.
+    evaluation, and the learning curve. Ctrl-C keeps what there is; the same command goes on. selfplay trains all three
+    roles at once, each in a folder of its own that rollout plays; --set shared=true gives them one network.
     """
+    given = _read_settings(setting or [])
+    changes = {
+        "steps": steps, "environments": environments, "workers": workers, "seed": seed,
+        "evaluate_every": evaluate_every, "episodes": episodes,
+    }  # fmt: skip
     try:
         from dorothie_gym.baselines.rl import SettingsError, Training, WeightsError, tuned_settings
     except ImportError:
         fail(NEEDS)
+    if algorithm == "selfplay":
+        from dorothie_gym.cli.selfplay import train_selfplay
+
+        if env is not None:
+            fail("--env: selfplay plays DuoWizardEnv; leave it out, and choose a town with --set town=NAME")
+        train_selfplay(out, given, changes, as_json=as_json)
+        return
     with told_plainly():
         try:
-            settings = tuned_settings(
-                algorithm, env, env_settings=_read_settings(setting or []), steps=steps, environments=environments,
-                workers=workers, seed=seed, evaluate_every=evaluate_every, episodes=episodes,
-            )  # fmt: skip
+            settings = tuned_settings(algorithm, env or DRIVING, env_settings=given, **changes)
             if workers is None:
-                settings = replace(settings, workers=_workers(settings.environments))
-            with _progress(settings, quiet=as_json) as watch:
+                settings = replace(settings, workers=processes(settings.environments))
+            with training_progress(settings.steps, _line, quiet=as_json) as watch:
                 run = Training(settings, out, watch).go()
         except (SettingsError, WeightsError) as error:
             fail(str(error))
@@ -65,11 +79,7 @@ def train_rl(
     else:
         _show(run, settings)
     if not run.finished:
-        stderr().print(
-            f"Interrupted after {run.steps:,} of {settings.steps:,} steps; all so far is in {out}. "
-            f"Go on with: {_command(settings, out)}", markup=False, soft_wrap=True,
-        )  # fmt: skip
-        raise typer.Exit(INTERRUPTED)
+        tell_interrupted(run.steps, settings.steps, out, _command(settings, out))
 
 
 def _read_settings(given: list[str]) -> dict[str, Any]:
@@ -86,32 +96,6 @@ def _read_settings(given: list[str]) -> dict[str, Any]:
         except yaml.YAMLError:
             fail(f"--set {item}: the value {value!r} cannot be read")
     return settings
-
-
-def _workers(environments: int) -> int:
-    """A process for each processor, where there is more than one."""
-    from dorothie_gym.world.vector_world import available_processors
-
-    processors = available_processors()
-    return min(processors, environments) if processors > 1 else 0
-
-
-@contextmanager
-def _progress(settings: TrainingSettings, *, quiet: bool) -> Iterator[Callable[[int, int, Any], None]]:
-    """A bar while standard error is a terminal, and a line for each evaluation."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    console = stderr()
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, disable=quiet or not console.is_terminal, transient=True) as progress:
-        bar = progress.add_task("Steps", total=settings.steps)
-
-        def watch(done: int, total: int, row: Any) -> None:
-            progress.update(bar, completed=done, total=total)
-            if row is not None and not quiet:
-                progress.console.print(_line(row), markup=False, soft_wrap=True)
-
-        yield watch
 
 
 def _line(row: Any) -> str:
@@ -156,6 +140,4 @@ def _command(settings: TrainingSettings, out: Path) -> str:
     words = ["dorothie-gym", "train-rl", settings.algorithm, "--env", settings.env, "--out", str(out)]
     for name, value in settings.env_settings.items():
         words += ["--set", f"{name}={value}"]
-    for name in ("steps", "environments", "workers", "seed", "evaluate_every", "episodes"):
-        words += [f"--{name.replace('_', '-')}", str(getattr(settings, name))]
-    return shlex.join(words)
+    return shlex.join([*words, *options_of(settings)])

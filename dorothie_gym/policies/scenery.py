@@ -183,3 +183,23 @@ def place_on_lanes(
         if abs(lateral) <= width and math.hypot(end[0] - x, end[1] - y) <= width + 1.0:
             return lane, station
     return None
+
+
+def place_on_path(town: Town, observation: Mapping[str, Any], ahead: float) -> tuple[int, float] | None:
+    """Lane and station of a point ahead on the path that the Ad-Wizard sees; None where the path does not reach it.
+
+    Args:
+        town: the map.
+        observation: of the Ad-Wizard.
+        ahead: how far [m].
+    """
+    lanes = [int(lane) - 1 for lane in observation["path_lanes"] if lane > 0]
+    current = int(observation["lane"])
+    if not lanes or lanes[0] != current:
+        return None
+    left = scalar(observation, "station") + ahead
+    for lane in lanes:
+        if left <= town.lanes[lane].length:
+            return lane, left
+        left -= town.lanes[lane].length
+    return None

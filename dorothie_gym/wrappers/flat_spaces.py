@@ -93,7 +93,8 @@ class FlatObservations:
     def vector(self, observation: Any) -> NDArray[np.float32]:
         """The numbers of an observation (n,)."""
         fields = {_WHOLE: observation} if _WHOLE in self._numeric else observation
-        row = np.concatenate([np.ravel(fields[name]).astype(np.float32) for name in self._numeric])
+        parts = [np.ravel(fields[name]) for name in self._numeric]
+        row = np.concatenate(parts, dtype=np.float32, casting="unsafe")
         clipped: NDArray[np.float32] = np.clip(row, self.low, self.high)
         return clipped
 

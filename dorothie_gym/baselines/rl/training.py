@@ -12,6 +12,7 @@ from typing import Any
 
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 from dorothie_gym.baselines.rl.curve import draw_curve
 from dorothie_gym.baselines.rl.environments import Maker, make_vector
@@ -24,6 +25,9 @@ PROGRESS, CURVE, BEST = "progress.jsonl", "curve.png", "best"
 
 LIVE = ("steps", "evaluate_every", "episodes", "workers")
 """Settings in which a run that goes on may differ from how it began."""
+
+LOGGED_STEPS, LOGGED_EPISODES = 1024, 4
+"""TensorBoard is told of training about as often: after so many steps, or so many episodes."""
 
 Watch = Callable[[int, int, "Row | None"], None]
 """Is told the steps done, those there will be, and the last evaluation."""
@@ -87,7 +91,7 @@ class Training:
         self.seconds = 0.0
         begun = (folder / DESCRIPTION).is_file()
         if begun:
-            _check_same(settings, TrainingSettings(**read_description(folder)["settings"]), folder)
+            check_same(settings, TrainingSettings(**read_description(folder)["settings"]), folder)
             self.rows = _read_rows(folder / PROGRESS)
         folder.mkdir(parents=True, exist_ok=True)
         torch.set_num_threads(1)  # small networks: more threads only wait for one another
@@ -113,7 +117,9 @@ class Training:
         finished = left <= 0
         try:
             if left > 0:
-                model.learn(left, callback=_Evaluations(self), reset_num_timesteps=False, log_interval=None)
+                model.learn(
+                    left, callback=_Evaluations(self), reset_num_timesteps=False, log_interval=_log_interval(model)
+                )
                 finished = True
         except KeyboardInterrupt:
             finished = False
@@ -135,6 +141,9 @@ class Training:
         row = Row(steps=int(self.model.num_timesteps), seconds=round(self.seconds, 2), outcome=outcome)
         best = Run(folder=self.folder, rows=tuple(self.rows), steps=0, seconds=0.0, finished=False).best
         self.rows.append(row)
+        for name in ("success", "reward", "length"):
+            self.model.logger.record(f"eval/{name}", getattr(outcome, name))
+        self.model.logger.dump(row.steps)
         save_model(self.model, settings, self.folder, self.seconds)
         if best is None or (outcome.success, outcome.reward) > (best.outcome.success, best.outcome.reward):
             save_model(self.model, settings, self.folder / BEST, self.seconds)
@@ -188,8 +197,8 @@ class _Evaluations(BaseCallback):
         self._since = time.perf_counter()
 
 
-def _check_same(wanted: TrainingSettings, begun: TrainingSettings, folder: Path) -> None:
-    """Fails where a run in a folder was begun with other settings."""
+def check_same(wanted: Any, begun: Any, folder: Path) -> None:
+    """Raises `SettingsError` where a run in a folder was begun with settings other than those wanted, `LIVE` aside."""
     same = replace(begun, **{name: getattr(wanted, name) for name in LIVE})
     for name, value in wanted.as_json().items():
         if same.as_json()[name] != json.loads(json.dumps(value)):
@@ -197,6 +206,13 @@ def _check_same(wanted: TrainingSettings, begun: TrainingSettings, folder: Path)
                 f"{folder}: a run with another {name} is there ({same.as_json()[name]}, not {value}); "
                 "choose another folder, or the same settings to go on"
             )
+
+
+def _log_interval(model: Any) -> int:
+    """After how many rollouts TensorBoard is told of rewards and losses; of episodes where there are no rollouts."""
+    if not isinstance(model, OnPolicyAlgorithm):
+        return LOGGED_EPISODES
+    return max(LOGGED_STEPS // (model.n_steps * model.n_envs), 1)
 
 
 def _read_rows(path: Path) -> list[Row]:

@@ -65,16 +65,19 @@ class Falling:
         return self._last + (self._first - self._last) * remaining
 
 
-def save_model(model: Any, settings: TrainingSettings, folder: Path, seconds: float) -> None:
+def save_model(
+    model: Any, settings: Any, folder: Path, seconds: float, more: Mapping[str, Any] | None = None
+) -> None:  # fmt: skip
     """Writes a model with the state of its optimisers into a folder; an older one stays whole until it is replaced.
 
     What an algorithm has in its replay buffer is not kept.
 
     Args:
         model: of stable-baselines3.
-        settings: what it was trained with.
+        settings: what it was trained with; has `as_json`.
         folder: where the two files go.
         seconds: for which it was trained [s].
+        more: further fields of the description.
     """
     tensors: dict[str, torch.Tensor] = {}
     groups: dict[str, Any] = {}
@@ -89,6 +92,7 @@ def save_model(model: Any, settings: TrainingSettings, folder: Path, seconds: fl
     tensors |= {f"variables/{name}": value for name, value in _variables(model)}
     description = {
         "format": FORMAT,
+        **(more or {}),
         "settings": settings.as_json(),
         "steps": int(model.num_timesteps),
         "seconds": round(seconds, 2),

@@ -148,17 +148,16 @@ def _serve(connection: Connection, make: Callable[[], gym.Env[Any, Any]], count:
     """What a process does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the caller decides what it means
     vector = DummyVecEnv([make] * count)
-    while True:
-        try:
+    try:
+        while True:
             command, arguments = connection.recv()
-        except EOFError:
-            vector.close()
-            return
-        try:
-            answer = True, _carry_out(vector, command, arguments)
-        except Exception as error:  # whatever it is, the caller is told
-            answer = False, f"{type(error).__name__}: {error}"
-        connection.send(answer)
+            try:
+                answer = True, _carry_out(vector, command, arguments)
+            except Exception as error:  # whatever it is, the caller is told
+                answer = False, f"{type(error).__name__}: {error}"
+            connection.send(answer)
+    except (EOFError, ConnectionResetError, BrokenPipeError):
+        vector.close()  # the caller has hung up, perhaps in the middle of a step
 
 
 def _carry_out(vector: DummyVecEnv, command: str, arguments: tuple[Any, ...]) -> Any:

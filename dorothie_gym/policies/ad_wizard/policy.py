@@ -14,7 +14,7 @@ import numpy as np
 from dorothie_gym.ontology import ExceptionKind, PropKind, Role, Sensor, WeatherParameter
 from dorothie_gym.policies.ad_wizard.messages import context
 from dorothie_gym.policies.policy import Policy
-from dorothie_gym.policies.scenery import read_landmarks, read_subgoals, scalar
+from dorothie_gym.policies.scenery import place_on_path, read_landmarks, read_subgoals, scalar
 from dorothie_gym.spaces import ActionDict, AdWizardAction, Place, PropColumn, SpaceLimits
 from dorothie_gym.world.town import Town
 
@@ -192,7 +192,7 @@ def _roadblock(
     if scalar(observation, "speed") < 3.0:
         return None
     ahead = float(rng.uniform(*ROADBLOCK_AHEAD))
-    place = _on_path(mind.town, observation, ahead)
+    place = place_on_path(mind.town, observation, ahead)
     if place is None:
         return None
     lane, station = place
@@ -210,19 +210,6 @@ def _roadblock(
         prop=PropKind.STREET_BARRIER,
         place=Place(lane=lane, metres=round(station)),
     )
-
-
-def _on_path(town: Town, observation: Mapping[str, Any], ahead: float) -> tuple[int, float] | None:
-    lanes = [int(lane) - 1 for lane in observation["path_lanes"] if lane > 0]
-    current = int(observation["lane"])
-    if not lanes or lanes[0] != current:
-        return None
-    left = scalar(observation, "station") + ahead
-    for lane in lanes:
-        if left <= town.lanes[lane].length:
-            return lane, left
-        left -= town.lanes[lane].length
-    return None
 
 
 def _weather(
@@ -268,7 +255,7 @@ def _crowd(
     mind: AdWizardMind, observation: Mapping[str, Any], now: float, rng: np.random.Generator
 ) -> AdWizardAction | None:
     """More people or cars about, further down the way."""
-    place = _on_path(mind.town, observation, float(rng.uniform(60.0, 110.0)))
+    place = place_on_path(mind.town, observation, float(rng.uniform(60.0, 110.0)))
     if place is None:
         return None
     kind = ExceptionKind.SPAWN_PEDESTRIANS if rng.random() < 0.6 else ExceptionKind.SPAWN_VEHICLES

@@ -80,6 +80,20 @@ def test_a_run_that_goes_on_keeps_weights_optimiser_and_evaluations(tmp_path: Pa
     assert [json.loads(line)["steps"] for line in lines] == [row.steps for row in more.rows]
 
 
+@pytest.mark.parametrize(("algorithm", "loss"), [("ppo", "train/value_loss"), ("dqn", "train/loss")])
+def test_tensorboard_gets_rewards_losses_and_success(
+    algorithm: str, loss: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(training_module, "LOGGED_STEPS", 32)
+    accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    Training(settings_for(algorithm, steps=128, env_settings={"max_seconds": 5.0, "traffic": "none"}), tmp_path).go()
+    (folder,) = (tmp_path / "tensorboard").iterdir()
+    events = accumulator.EventAccumulator(str(folder))
+    events.Reload()
+    wanted = {"rollout/ep_rew_mean", "rollout/ep_len_mean", "rollout/success_rate", "eval/success", "eval/length", loss}
+    assert wanted <= set(events.Tags()["scalars"])
+
+
 def test_a_finished_run_is_not_trained_again(tmp_path: Path) -> None:
     Training(settings_for("ppo"), tmp_path).go()
     again = Training(settings_for("ppo"), tmp_path).go()

@@ -1,0 +1,177 @@
+"""The Ad-Wizard's seat: the tricks of the scripted one, to be played when and where it likes."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from dorothie_gym.baselines.selfplay.heard import Remark, listen
+from dorothie_gym.baselines.selfplay.seat import Mask, Seat
+from dorothie_gym.ontology import ExceptionKind, PropKind, Role, Sensor, WeatherParameter
+from dorothie_gym.policies.ad_wizard.messages import context
+from dorothie_gym.policies.ad_wizard.policy import FIRST, SPACING
+from dorothie_gym.policies.scenery import SeenSubgoal, place_on_path, read_landmarks, read_subgoals, scalar
+from dorothie_gym.spaces import AdWizardAction, Place, PropColumn
+
+NEAR, FARTHER = 60.0, 100.0
+"""How far ahead of the car a roadblock is placed, and a crowd [m]."""
+
+CROWD, EXTENT = 3, 25
+"""How many appear at once, and half the side of the square that they appear in [m]."""
+
+
+class Caper(enum.IntEnum):
+    """What the Ad-Wizard can do."""
+
+    NOTHING = 0
+    FOG = 1
+    RAIN = 2
+    NIGHT = 3
+    CLEAR = 4
+    """Takes the fog away."""
+    ROADBLOCK = 5
+    UNBLOCK = 6
+    """Takes away the oldest prop."""
+    BLUR = 7
+    NO_GPS = 8
+    NO_VIEW = 9
+    VEHICLES = 10
+    PEDESTRIANS = 11
+    TRIGGER = 12
+    DROP = 13
+    CHANGE = 14
+
+
+_WEATHER = {
+    Caper.FOG: (WeatherParameter.FOG_DENSITY, 0.8),
+    Caper.RAIN: (WeatherParameter.PRECIPITATION, 0.9),
+    Caper.NIGHT: (WeatherParameter.SUN_ALTITUDE_ANGLE, 0.25),
+    Caper.CLEAR: (WeatherParameter.FOG_DENSITY, 0.0),
+}
+_FAULTS = {Caper.BLUR: Sensor.BLUR, Caper.NO_GPS: Sensor.GPS, Caper.NO_VIEW: Sensor.VIEW}
+_CROWDS = {
+    Caper.VEHICLES: ExceptionKind.SPAWN_VEHICLES,
+    Caper.PEDESTRIANS: ExceptionKind.SPAWN_PEDESTRIANS,
+}
+_TASKS = {
+    Caper.TRIGGER: ExceptionKind.TASK_TRIGGER,
+    Caper.DROP: ExceptionKind.TASK_DELETE,
+    Caper.CHANGE: ExceptionKind.TASK_CHANGE,
+}
+_NOTHING = AdWizardAction()
+_KINDS = [
+    int(kind)
+    for kind in (
+        ExceptionKind.NONE, *(ExceptionKind.WEATHER for _ in _WEATHER), ExceptionKind.PLACE_PROP,
+        ExceptionKind.DELETE_PROP, *(ExceptionKind.SENSOR_FAULT for _ in _FAULTS), *_CROWDS.values(), *_TASKS.values(),
+    )
+]  # fmt: skip
+"""Of what kind each caper is."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class AdWizardMemory:
+    """What the Ad-Wizard remembers: the others' last remarks, and when it played its last trick [s]."""
+
+    participant: Remark | None = None
+    co_wizard: Remark | None = None
+    last: float = -math.inf
+
+
+class AdWizardSeat(Seat[AdWizardMemory]):
+    """See `Caper` for what it can do: one at a time, with as much time between them as the scripted one leaves."""
+
+    role = Role.AD_WIZARD
+    speakers = (Role.PARTICIPANT, Role.CO_WIZARD)
+    actions = len(Caper)
+    own_size: ClassVar[int] = 2
+
+    def begin(self) -> AdWizardMemory:
+        """Nothing has happened."""
+        return AdWizardMemory()
+
+    def notice(self, observation: Mapping[str, Any], memory: AdWizardMemory) -> AdWizardMemory:
+        """Overhears the others."""
+        return replace(
+            memory,
+            participant=listen(observation, Role.PARTICIPANT, memory.participant),
+            co_wizard=listen(observation, Role.CO_WIZARD, memory.co_wizard),
+        )
+
+    def remarks(self, memory: AdWizardMemory) -> tuple[Remark | None, ...]:
+        """Of the participant and of the Co-Wizard."""
+        return memory.participant, memory.co_wizard
+
+    def own(self, observation: Mapping[str, Any], memory: AdWizardMemory) -> list[float]:
+        """How long until the next trick, and whether one can be played ahead on the path."""
+        wait = max(memory.last + SPACING, FIRST) - scalar(observation, "time")
+        return [max(wait, 0.0) / SPACING, float(place_on_path(self.town, observation, NEAR) is not None)]
+
+    def mask(self, observation: Mapping[str, Any], memory: AdWizardMemory) -> Mask:
+        """What there is occasion for; nothing else while the last trick is still fresh."""
+        mask = np.zeros(self.actions, dtype=np.bool_)
+        mask[Caper.NOTHING] = True
+        if scalar(observation, "time") < max(memory.last + SPACING, FIRST):
+            return mask
+        mask[[*_WEATHER, *_FAULTS]] = True
+        props = observation["props"][:, PropColumn.KIND] > 0
+        mask[Caper.ROADBLOCK] = not props.all() and place_on_path(self.town, observation, NEAR) is not None
+        mask[Caper.UNBLOCK] = props.any()
+        mask[list(_CROWDS)] = place_on_path(self.town, observation, FARTHER) is not None
+        for caper in _TASKS:
+            mask[caper] = self._subgoal(caper, observation) is not None
+        return mask
+
+    def allowed(self, observation: Mapping[str, Any], masks: Mapping[str, Any]) -> Mask:
+        """By the kind of exception."""
+        return np.asarray(masks["exception"])[_KINDS].astype(np.bool_)
+
+    def act(
+        self, choice: int, observation: Mapping[str, Any], memory: AdWizardMemory
+    ) -> tuple[AdWizardAction, AdWizardMemory]:  # fmt: skip
+        """Plays a trick."""
+        action = self._action(Caper(choice), observation)
+        if action.exception is ExceptionKind.NONE:
+            return action, memory
+        return action, replace(memory, last=scalar(observation, "time"))
+
+    def _action(self, caper: Caper, observation: Mapping[str, Any]) -> AdWizardAction:
+        if caper in _WEATHER:
+            parameter, share = _WEATHER[caper]
+            return AdWizardAction(exception=ExceptionKind.WEATHER, weather=parameter, share=share)
+        if caper in _FAULTS:
+            return AdWizardAction(exception=ExceptionKind.SENSOR_FAULT, sensor=_FAULTS[caper], on=True)
+        if caper is Caper.UNBLOCK:
+            return AdWizardAction(exception=ExceptionKind.DELETE_PROP)
+        if caper in _TASKS:
+            return self._task(caper, observation)
+        if caper is Caper.NOTHING:
+            return _NOTHING
+        return self._on_the_way(caper, observation)
+
+    def _on_the_way(self, caper: Caper, observation: Mapping[str, Any]) -> AdWizardAction:
+        found = place_on_path(self.town, observation, FARTHER if caper in _CROWDS else NEAR)
+        if found is None:
+            return _NOTHING
+        place = Place(lane=found[0], metres=round(found[1]))
+        if caper in _CROWDS:
+            return AdWizardAction(exception=_CROWDS[caper], place=place, count=CROWD, extent=EXTENT)
+        return AdWizardAction(exception=ExceptionKind.PLACE_PROP, prop=PropKind.STREET_BARRIER, place=place)
+
+    def _subgoal(self, caper: Caper, observation: Mapping[str, Any]) -> SeenSubgoal | None:
+        """The first subgoal with which a trick can be played."""
+        may = {Caper.TRIGGER: "can_trigger", Caper.DROP: "can_delete", Caper.CHANGE: "can_change"}[caper]
+        return next((subgoal for subgoal in read_subgoals(observation) if getattr(subgoal, may)), None)
+
+    def _task(self, caper: Caper, observation: Mapping[str, Any]) -> AdWizardAction:
+        subgoal, kind = self._subgoal(caper, observation), _TASKS[caper]
+        if subgoal is None:
+            return _NOTHING
+        names = {mark.row: mark.name for mark in read_landmarks(observation, self.town)}
+        words = np.random.default_rng(round(scalar(observation, "time")))
+        return AdWizardAction(exception=kind, item=subgoal.index, message=context(kind, names[subgoal.landmark], words))

@@ -1,0 +1,147 @@
+"""`DuoWizardEnv` for self-play: what is at all three seats in one row, and a number for each role as the action."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from dorothie_gym.baselines.rl.settings import SettingsError
+from dorothie_gym.baselines.selfplay.seats import Table, make_seat
+from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.navigation.config import TRAFFIC
+from dorothie_gym.navigation.route import WayLeft
+from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.policies import make_policy
+from dorothie_gym.policies.seeds import policy_seed
+from dorothie_gym.spaces import ActionDict
+from dorothie_gym.tasks import StoryboardError
+from dorothie_gym.world.config import WorldConfig
+
+_PARTICIPANT, _AD_WIZARD = AGENT_ROLES.index(Role.PARTICIPANT), AGENT_ROLES.index(Role.AD_WIZARD)
+
+
+class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
+    """All three roles of a session at once.
+
+    Observations are rows of a `Table`: three vectors and three masks. Actions are three numbers, see the seats.
+    Participant and Co-Wizard get the mean of their rewards, the Ad-Wizard its own; both as `DuoWizardEnv` has them,
+    and for each metre by which the way to the present errand has got shorter `progress` more, the Ad-Wizard less.
+    `info["rewards"]` has the three rewards; the reward itself is the team's.
+
+    Args:
+        town: name of a town, or path of a file.
+        storyboard: name of a template, or path of a file; None draws one each reset.
+        traffic: "none", "light", "medium" or "heavy".
+        max_seconds: of a session [s].
+        progress: see above; a difference of potentials, which leaves the best policies as they are.
+        ad_wizard: "learned" takes its action; a policy's name lets that play.
+
+    Raises:
+        SettingsError: an argument cannot be used.
+    """
+
+    def __init__(
+        self,
+        town: str = "brookside",
+        storyboard: str | None = None,
+        traffic: str = "light",
+        max_seconds: float = 300.0,
+        progress: float = 0.02,
+        ad_wizard: str = "learned",
+    ) -> None:
+        if traffic not in TRAFFIC:
+            raise SettingsError(f"traffic is {traffic!r}; it must be one of {', '.join(TRAFFIC)}")
+        vehicles, pedestrians = TRAFFIC[traffic]
+        try:
+            config = EnvConfig(max_seconds=max_seconds, world=WorldConfig(vehicles=vehicles, pedestrians=pedestrians))
+            self._progress = float(progress)
+            self.duo = DuoWizardEnv(town, storyboard, config=config)
+            limits = self.duo.limits
+            self._adversary = None if ad_wizard == "learned" else make_policy(ad_wizard, Role.AD_WIZARD, limits)
+        except (TypeError, ValueError, OSError, StoryboardError) as error:
+            raise SettingsError(f"selfplay: {error}") from error
+        self._seats = [make_seat(role, self.duo.town, limits) for role in AGENT_ROLES]
+        self.table = Table.of(limits, self.duo.town)
+        self.observation_space = spaces.Box(-1.0, 1.0, (self.table.width,), dtype=np.float32)
+        self.action_space = spaces.MultiDiscrete(list(self.table.actions))
+        self._way_left = WayLeft(self.duo.town)
+        self._memories: list[Any] = []
+        self._seen: Mapping[str, Any] = {}
+        self._plans: Any = None
+        self._left = math.inf
+
+    def reset(
+        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begins a session, see `DuoWizardEnv.reset`."""
+        super().reset(seed=seed)
+        self._seen, infos = self.duo.reset(seed=seed, options=options)
+        self._memories = [seat.begin() for seat in self._seats]
+        if self._adversary is not None:
+            own = policy_seed(self.duo.scenario.seed, Role.AD_WIZARD)
+            self._plans = self._adversary.initial_state(own, self.duo.town)
+        row = self._row(infos)
+        self._aim()
+        return row, {}
+
+    def step(
+        self, action: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:  # fmt: skip
+        """Plays a decision of all roles; raises `ValueError` where a number is no action of its role."""
+        actions: dict[str, ActionDict] = {}
+        for k, role in enumerate(AGENT_ROLES):
+            if not 0 <= int(action[k]) < self.table.actions[k]:
+                raise ValueError(f"action of {role} is {action[k]}; it must be in 0..{self.table.actions[k] - 1}")
+            seen = self._seen[role]
+            if role is Role.AD_WIZARD and self._adversary is not None:
+                actions[role], self._plans = self._adversary.step(seen, self._plans)
+                continue
+            done, self._memories[k] = self._seats[k].act(int(action[k]), seen, self._memories[k])
+            actions[role] = done.encode(self.duo.limits)
+        self._seen, rewards, terminations, truncations, infos = self.duo.step(actions)
+        nearer = self._nearer()
+        team = (rewards[Role.PARTICIPANT] + rewards[Role.CO_WIZARD]) / 2.0 + self._progress * nearer
+        against = rewards[Role.AD_WIZARD] - self._progress * nearer
+        row = self._row(infos)
+        self._aim()
+        info: dict[str, Any] = {"rewards": np.array([team, team, against], dtype=np.float32)}
+        terminated, truncated = terminations[Role.CO_WIZARD], truncations[Role.CO_WIZARD]
+        if terminated or truncated:
+            info["is_success"] = bool(self.duo.summary()["success"])
+        return row, team, terminated, truncated, info
+
+    def close(self) -> None:
+        """Closes the environment inside."""
+        self.duo.close()
+
+    def _row(self, infos: Mapping[str, Mapping[str, Any]]) -> NDArray[np.float32]:
+        """What is at the three seats now."""
+        vectors, masks = [], []
+        for k, (role, seat) in enumerate(zip(AGENT_ROLES, self._seats, strict=True)):
+            seen = self._seen[role]
+            memory = self._memories[k] = seat.notice(seen, self._memories[k])
+            vectors.append(seat.vector(seen, memory))
+            masks.append(seat.mask(seen, memory) & seat.allowed(seen, infos[role]["action_mask"]))
+        return np.concatenate([*vectors, *masks]).astype(np.float32)
+
+    def _aim(self) -> None:
+        """Measures the way left to the errand that the participant is on."""
+        errand = self._memories[_PARTICIPANT].errand
+        self._way_left.aim(None if errand is None else errand.journey.goal)
+        self._left = self._measured()
+
+    def _nearer(self) -> float:
+        """By how much the way to the errand of the last decision has got shorter [m]."""
+        left = self._measured()
+        return self._left - left if math.isfinite(left) and math.isfinite(self._left) else 0.0
+
+    def _measured(self) -> float:
+        planner = self.duo.stage.world.planner
+        return self._way_left.from_place(planner.lane, planner.station)

@@ -1,0 +1,174 @@
+"""The participant's seat: it knows the errands and the way, and has a dozen things to say."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from dorothie_gym.baselines.selfplay.heard import Remark, listen
+from dorothie_gym.baselines.selfplay.seat import Mask, Seat, one_hot
+from dorothie_gym.dialogue import Direction, load_lexicon
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role
+from dorothie_gym.policies.journey import Journey
+from dorothie_gym.policies.scenery import read_landmarks, read_subgoals, scalar
+from dorothie_gym.spaces import ParticipantAction, Speech
+from dorothie_gym.world.town.routing import Entry, Place
+
+ASTRAY = 3
+"""The way is planned anew when the car has been off it for so many decisions."""
+
+PASSED = 3.0
+"""A car this far behind its goal has missed it [m]."""
+
+ACROSS, FAR, CLOSE = 500.0, 100.0, 10.0
+"""Ways are shares of these [m]."""
+
+_DIRECTIONS = tuple(Direction)
+_ENTRIES = (Entry.CHANGE_LEFT, Entry.CHANGE_RIGHT, Entry.U_TURN)
+
+
+class Phrase(enum.IntEnum):
+    """What the participant can say."""
+
+    NOTHING = 0
+    TURN_LEFT = 1
+    TURN_RIGHT = 2
+    STRAIGHT_ON = 3
+    TURN_ROUND = 4
+    SWITCH_LEFT = 5
+    SWITCH_RIGHT = 6
+    STOP = 7
+    GO_ON = 8
+    NAME_GOAL = 9
+    """Names the place to go to next."""
+    YES = 10
+    NO = 11
+
+
+_INSTRUCTIONS: Mapping[Phrase, tuple[ActionValue, str]] = {
+    Phrase.TURN_LEFT: (ActionValue.J_TURN, "Turn left at the next junction."),
+    Phrase.TURN_RIGHT: (ActionValue.J_TURN, "Turn right at the next junction."),
+    Phrase.STRAIGHT_ON: (ActionValue.J_TURN, "Go straight on at the next junction."),
+    Phrase.TURN_ROUND: (ActionValue.U_TURN, "Please turn around."),
+    Phrase.SWITCH_LEFT: (ActionValue.LANE_SWITCH, "Change to the left lane."),
+    Phrase.SWITCH_RIGHT: (ActionValue.LANE_SWITCH, "Change to the right lane."),
+    Phrase.STOP: (ActionValue.STOP, "Stop here, please."),
+    Phrase.GO_ON: (ActionValue.START, "Start driving again, please."),
+}
+_ANSWERS: Mapping[Phrase, Speech] = {
+    Phrase.YES: Speech(act=DialogueAct.of(DialogueMove.REPLY_Y), text="Yes."),
+    Phrase.NO: Speech(act=DialogueAct.of(DialogueMove.REPLY_N), text="No."),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Errand:
+    """The way to the subgoal that is next; `goal` is a row of the landmarks."""
+
+    subgoal: int
+    goal: int
+    name: LandmarkName
+    journey: Journey
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParticipantMemory:
+    """What the participant remembers: the Co-Wizard's last remark, and the errand that it is on."""
+
+    heard: Remark | None = None
+    errand: Errand | None = None
+
+
+class ParticipantSeat(Seat[ParticipantMemory]):
+    """See `Phrase` for what it can say."""
+
+    role = Role.PARTICIPANT
+    speakers = (Role.CO_WIZARD,)
+    actions = len(Phrase)
+    own_size: ClassVar[int] = 4 + 2 + len(Direction) + 1 + len(_ENTRIES)
+
+    def begin(self) -> ParticipantMemory:
+        """Nothing has been heard, and there is no errand yet."""
+        return ParticipantMemory()
+
+    def notice(self, observation: Mapping[str, Any], memory: ParticipantMemory) -> ParticipantMemory:
+        """Takes the first errand that may be done now, and follows the way to it."""
+        heard = listen(observation, Role.CO_WIZARD, memory.heard)
+        place = int(observation["lane"]), scalar(observation, "station")
+        return ParticipantMemory(heard=heard, errand=self._errand(observation, place, memory.errand))
+
+    def remarks(self, memory: ParticipantMemory) -> tuple[Remark | None, ...]:
+        """The Co-Wizard's."""
+        return (memory.heard,)
+
+    def own(self, observation: Mapping[str, Any], memory: ParticipantMemory) -> list[float]:
+        """How far it is, where the next turn leads, and the next lane change or U-turn."""
+        errand = memory.errand
+        if errand is None:
+            return [0.0] * self.own_size
+        station, journey = scalar(observation, "station"), errand.journey
+        left = journey.left(station)
+        crossing, manoeuvre = journey.next_crossing(self.town, station), journey.next_manoeuvre(station)
+        turn = None if crossing is None else _DIRECTIONS.index(crossing.direction)
+        entry = None if manoeuvre is None or manoeuvre[0] not in _ENTRIES else _ENTRIES.index(manoeuvre[0])
+        return [
+            1.0, _share(left, ACROSS), _share(left, FAR), _share(left, CLOSE),
+            float(crossing is not None), 0.0 if crossing is None else _share(crossing.distance, FAR),
+            *one_hot(turn, len(_DIRECTIONS)),
+            0.0 if manoeuvre is None else _share(manoeuvre[1], FAR), *one_hot(entry, len(_ENTRIES)),
+        ]  # fmt: skip
+
+    def mask(self, observation: Mapping[str, Any], memory: ParticipantMemory) -> Mask:
+        """Whoever speaks lets its words out first; a goal is named where there is one."""
+        mask = np.full(self.actions, scalar(observation, "speaking") <= 0.0)
+        mask[Phrase.NOTHING] = True
+        mask[Phrase.NAME_GOAL] &= memory.errand is not None
+        return mask
+
+    def allowed(self, observation: Mapping[str, Any], masks: Mapping[str, Any]) -> Mask:
+        """Talk is never masked."""
+        return np.ones(self.actions, dtype=np.bool_)
+
+    def act(
+        self, choice: int, observation: Mapping[str, Any], memory: ParticipantMemory
+    ) -> tuple[ParticipantAction, ParticipantMemory]:  # fmt: skip
+        """Says a phrase."""
+        return ParticipantAction(speech=_speech(Phrase(choice), memory.errand)), memory
+
+    def _errand(self, observation: Mapping[str, Any], place: Place, errand: Errand | None) -> Errand | None:
+        subgoals = read_subgoals(observation)
+        if errand is not None:
+            now = subgoals[errand.subgoal]
+            if now.open and now.allowed and now.landmark == errand.goal:
+                return replace(errand, journey=self._followed(errand.journey, place))
+        landmarks = {mark.row: mark for mark in read_landmarks(observation, self.town)}
+        for subgoal in subgoals:
+            mark = landmarks.get(subgoal.landmark)
+            if subgoal.open and subgoal.allowed and mark is not None:
+                journey = Journey.plan(self.town, place, mark.place)
+                return Errand(subgoal=subgoal.index, goal=mark.row, name=mark.name, journey=journey)
+        return None
+
+    def _followed(self, journey: Journey, place: Place) -> Journey:
+        journey = journey.followed(self.town, *place)
+        if journey.astray >= ASTRAY or journey.left(place[1]) < -PASSED:
+            return journey.replanned(self.town, place)
+        return journey
+
+
+def _speech(phrase: Phrase, errand: Errand | None) -> Speech | None:
+    if phrase in _INSTRUCTIONS:
+        action, text = _INSTRUCTIONS[phrase]
+        return Speech(act=DialogueAct.of(DialogueMove.INSTRUCT, action), text=text)
+    if phrase is Phrase.NAME_GOAL and errand is not None:
+        name = load_lexicon().forms(errand.name, "say")[0]
+        return Speech(act=DialogueAct.of(DialogueMove.INSTRUCT, errand.name), text=f"We need to go to {name}.")
+    return _ANSWERS.get(phrase)
+
+
+def _share(metres: float, of: float) -> float:
+    return max(min(metres / of, 1.0), -1.0)

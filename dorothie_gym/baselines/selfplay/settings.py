@@ -1,0 +1,104 @@
+"""Settings of self-play; the defaults are in `rl/data/selfplay.yaml`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from importlib import resources
+from typing import Any, Final
+
+import yaml
+
+from dorothie_gym.baselines.rl.settings import SettingsError, TrainingSettings
+from dorothie_gym.baselines.selfplay.loading import KIND
+
+SELFPLAY: Final = KIND
+"""Name of the algorithm at the command line."""
+
+ARGUMENTS: Final = ("town", "storyboard", "traffic", "max_seconds", "progress")
+"""Fields that are arguments of `SelfPlayEnv`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SelfPlaySettings:
+    """Settings of a run.
+
+    Attributes:
+        shared: whether one network plays all roles; otherwise each has its own.
+        town, storyboard, traffic, max_seconds, progress: see `SelfPlayEnv`.
+        past_environments: in so many environments the Ad-Wizard is one of earlier times, which does not learn.
+        steps: decisions of all environments together.
+        environments: how many play at once.
+        workers: processes that step them; 0 steps them in the process that learns.
+        seed: of networks, environments and exploration.
+        evaluate_every: steps between evaluations.
+        episodes: of each of an evaluation's two parts.
+        network: widths of the hidden layers.
+        parameters: of MaskablePPO, as sb3-contrib names them; see `rl.settings.FINAL_RATE`.
+    """
+
+    shared: bool = False
+    town: str = "brookside"
+    storyboard: str | None = None
+    traffic: str = "light"
+    max_seconds: float = 300.0
+    progress: float = 0.02
+    past_environments: int = 0
+    steps: int = 2_000_000
+    environments: int = 16
+    workers: int = 0
+    seed: int = 0
+    evaluate_every: int = 200_000
+    episodes: int = 20
+    network: tuple[int, ...] = (128, 128)
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "network", tuple(self.network))
+        if not isinstance(self.shared, bool):
+            raise SettingsError(f"shared is {self.shared!r}; it must be true or false")
+        past = self.past_environments
+        if not isinstance(past, int) or not 0 <= past < self.environments:
+            raise SettingsError(f"past_environments is {past!r}; it must be in 0..{self.environments - 1}")
+        self.learner()
+
+    @property
+    def env_settings(self) -> dict[str, Any]:
+        """Arguments of `SelfPlayEnv`."""
+        return {name: getattr(self, name) for name in ARGUMENTS}
+
+    def learner(self, seed: int = 0) -> TrainingSettings:
+        """What a learner needs of them; `seed` is that of its network."""
+        return TrainingSettings(
+            algorithm="maskable_ppo", env=SELFPLAY, seed=seed, network=self.network, parameters=self.parameters,
+            steps=self.steps, environments=self.environments, workers=self.workers, episodes=self.episodes,
+            evaluate_every=self.evaluate_every,
+        )  # fmt: skip
+
+    def as_json(self) -> dict[str, Any]:
+        """The settings in JSON types; `SelfPlaySettings(**...)` reads them back."""
+        return {**asdict(self), "network": list(self.network)}
+
+
+def selfplay_settings(given: Mapping[str, Any] | None = None, **changes: Any) -> SelfPlaySettings:
+    """The defaults, with changes.
+
+    Args:
+        given: what a user sets: `shared`, `past_environments` and arguments of `SelfPlayEnv`.
+        changes: other fields; None leaves a field as it is.
+
+    Raises:
+        SettingsError: there is no such field, or it is out of its range.
+    """
+    settable = ("shared", "past_environments", *ARGUMENTS)
+    unknown = [name for name in given or {} if name not in settable]
+    if unknown:
+        raise SettingsError(f"selfplay has no {unknown[0]!r}; what can be set is {', '.join(settable)}")
+    file = resources.files("dorothie_gym.baselines.rl").joinpath("data", f"{SELFPLAY}.yaml")
+    tuned = yaml.safe_load(file.read_text(encoding="utf-8"))
+    known = {name: value for name, value in changes.items() if value is not None}
+    found = {**tuned, **known, **(given or {})}
+    if "past_environments" not in (given or {}):
+        found["past_environments"] = min(found["past_environments"], found["environments"] - 1)
+    assert set(found) <= {each.name for each in fields(SelfPlaySettings)}
+    return SelfPlaySettings(**found)

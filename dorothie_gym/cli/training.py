@@ -1,0 +1,62 @@
+"""What commands that train by reinforcement share: a bar, worker processes, and how to go on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NoReturn
+
+import typer
+
+from dorothie_gym.cli.output import INTERRUPTED, stderr
+
+_OPTIONS = ("steps", "environments", "workers", "seed", "evaluate_every", "episodes")
+
+
+def processes(environments: int) -> int:
+    """A process for each processor, where there is more than one."""
+    from dorothie_gym.world.vector_world import available_processors
+
+    processors = available_processors()
+    return min(processors, environments) if processors > 1 else 0
+
+
+@contextmanager
+def training_progress(
+    total: int, line: Callable[[Any], str], *, quiet: bool
+) -> Iterator[Callable[[int, int, Any], None]]:
+    """A bar while standard error is a terminal, and a line for each evaluation.
+
+    Args:
+        total: steps there will be.
+        line: tells of an evaluation.
+        quiet: whether nothing is told.
+    """
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = stderr()
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, disable=quiet or not console.is_terminal, transient=True) as progress:
+        bar = progress.add_task("Steps", total=total)
+
+        def watch(done: int, steps: int, row: Any) -> None:
+            progress.update(bar, completed=done, total=steps)
+            if row is not None and not quiet:
+                progress.console.print(line(row), markup=False, soft_wrap=True)
+
+        yield watch
+
+
+def options_of(settings: Any) -> list[str]:
+    """Words of a command line for the settings of a run that have options of their own."""
+    return [word for name in _OPTIONS for word in (f"--{name.replace('_', '-')}", str(getattr(settings, name)))]
+
+
+def tell_interrupted(steps: int, total: int, out: Path, command: str) -> NoReturn:
+    """Tells after Ctrl-C where everything is and what goes on with it, and exits."""
+    stderr().print(
+        f"Interrupted after {steps:,} of {total:,} steps; all so far is in {out}. Go on with: {command}",
+        markup=False, soft_wrap=True,
+    )  # fmt: skip
+    raise typer.Exit(INTERRUPTED)

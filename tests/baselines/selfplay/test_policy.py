@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
+
+import dorothie_gym.baselines  # noqa: E402, F401  (makes what is learned there playable)
+from dorothie_gym import DuoWizardEnv  # noqa: E402
+from dorothie_gym.baselines.selfplay.env import SelfPlayEnv  # noqa: E402
+from dorothie_gym.baselines.selfplay.policy import read_policy  # noqa: E402
+from dorothie_gym.baselines.selfplay.training import SelfPlay  # noqa: E402
+from dorothie_gym.ontology import AGENT_ROLES, Role  # noqa: E402
+from dorothie_gym.policies import find_player  # noqa: E402
+from dorothie_gym.rollout.play import play_session  # noqa: E402
+from tests.baselines.selfplay.test_training import settings_for  # noqa: E402
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["independent", "shared"])
+def folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("run")
+    SelfPlay(settings_for(shared=request.param, steps=32), folder).go()
+    return folder
+
+
+def test_learned_roles_play_in_brookside(folder: Path) -> None:
+    def play() -> list[object]:
+        env = DuoWizardEnv("brookside", max_cycles=40)
+        cast = {role: find_player(str(folder / role), role).make(role, env.limits) for role in AGENT_ROLES}
+        events: list[object] = []
+        summary = play_session(env, cast, seed=3, on_step=lambda env: events.extend(env.last_events))
+        assert summary["seconds"] == 20.0
+        return events
+
+    first = play()
+    assert len(first) > 5 and first == play()
+
+
+def test_a_policy_takes_in_what_was_taken_in_while_learning(folder: Path) -> None:
+    env = SelfPlayEnv(traffic="none", max_seconds=10.0)
+    row, _ = env.reset(seed=0)
+    policies = [read_policy(folder / role, role, env.duo.limits) for role in AGENT_ROLES]
+    states = [policy.initial_state(0, env.duo.town) for policy in policies]
+    for _ in range(10):
+        for k, (role, policy) in enumerate(zip(AGENT_ROLES, policies, strict=True)):
+            seat, memory = states[k].seat, states[k].memory
+            seen = env._seen[role]
+            vector = seat.vector(seen, seat.notice(seen, memory))
+            np.testing.assert_array_equal(vector, env.table.vectors(row[None], k, padded=False)[0])
+            _, states[k] = policy.step(seen, states[k])
+        env._memories = [state.memory for state in states]
+        row, *_ = env.step(np.zeros(3, dtype=np.int64))
+
+
+def test_models_of_another_role_are_told(folder: Path) -> None:
+    with pytest.raises(ValueError, match="plays participant, not co_wizard"):
+        read_policy(folder / "participant", Role.CO_WIZARD, DuoWizardEnv().limits)
+    (folder / "participant" / "model.json").write_text('{"format": 1, "kind": "selfplay"}', encoding="utf-8")
+    with pytest.raises(ValueError, match="no model of self-play"):
+        read_policy(folder / "participant", Role.PARTICIPANT, DuoWizardEnv().limits)

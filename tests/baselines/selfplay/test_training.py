@@ -1,0 +1,152 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
+
+import torch  # noqa: E402
+from safetensors.torch import load_file  # noqa: E402
+
+from dorothie_gym.baselines.rl import SettingsError, WeightsError  # noqa: E402
+from dorothie_gym.baselines.selfplay import training as training_module  # noqa: E402
+from dorothie_gym.baselines.selfplay.env import SelfPlayEnv  # noqa: E402
+from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings, selfplay_settings  # noqa: E402
+from dorothie_gym.baselines.selfplay.training import SelfPlay  # noqa: E402
+from dorothie_gym.ontology import AGENT_ROLES  # noqa: E402
+
+SMALL: dict[str, Any] = {
+    "steps": 128, "environments": 2, "past_environments": 1, "evaluate_every": 128, "episodes": 1, "network": (8,),
+    "traffic": "none", "max_seconds": 10.0, "parameters": {"n_steps": 8, "batch_size": 16, "n_epochs": 1},
+}  # fmt: skip
+
+
+def settings_for(**changes: Any) -> SelfPlaySettings:
+    return SelfPlaySettings(**{**SMALL, **changes})
+
+
+@pytest.fixture(autouse=True)
+def _short_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(training_module, "STRETCH", 2)
+
+
+def weights(folder: Path) -> dict[str, torch.Tensor]:
+    """Everything that was saved of the three roles."""
+    return {
+        f"{role}/{name}": value
+        for role in AGENT_ROLES
+        for name, value in load_file(folder / role / "model.safetensors").items()
+    }
+
+
+def assert_same(one: Path, two: Path) -> None:
+    first, second = weights(one), weights(two)
+    assert first.keys() == second.keys()
+    for name, value in first.items():
+        np.testing.assert_array_equal(value.numpy(), second[name].numpy(), err_msg=name)
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_networks_learn_and_lie_in_folders(shared: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(training_module, "STRETCH", 16)  # the Ad-Wizard has nothing to choose from at first
+    play = SelfPlay(settings_for(shared=shared, max_seconds=30.0), tmp_path)
+    before = [
+        {name: value.clone() for name, value in learner.model.policy.state_dict().items()}
+        for learner in play.game.learners
+    ]
+    run = play.go()
+    assert run.finished and run.steps == 128 and [row.steps for row in run.rows] == [128]
+    assert len(play.game.learners) == (1 if shared else 3)
+    for learner, old in zip(play.game.learners, before, strict=True):
+        assert all(not torch.equal(value, old[name]) for name, value in learner.model.policy.state_dict().items())
+    assert run.rows[-1].returns["co_wizard"] == run.rows[-1].returns["participant"] is not None
+    assert run.rows[-1].returns["ad_wizard"] != run.rows[-1].returns["co_wizard"]
+    found = {path.name for path in tmp_path.iterdir()}
+    assert {*AGENT_ROLES, "curve.png", "progress.jsonl", "past.safetensors"} <= found
+    assert json.loads((tmp_path / "co_wizard" / "model.json").read_text(encoding="utf-8"))["kind"] == "selfplay"
+    assert not list(tmp_path.rglob("*.zip")) and not list(tmp_path.rglob("*.pkl"))
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_what_was_interrupted_goes_on_to_the_same_weights(shared: bool, tmp_path: Path) -> None:
+    settings = settings_for(shared=shared, max_seconds=5.0)
+    SelfPlay(settings, tmp_path / "whole").go()
+
+    def press_ctrl_c(done: int, total: int, row: Any) -> None:
+        if done == 80:
+            raise KeyboardInterrupt
+
+    cut = SelfPlay(settings, tmp_path / "cut", press_ctrl_c).go()
+    assert not cut.finished and cut.steps == 64
+    again = SelfPlay(settings, tmp_path / "cut").go()
+    assert again.finished and again.steps == 128
+    assert_same(tmp_path / "whole", tmp_path / "cut")
+    rows = [json.loads((tmp_path / name / "progress.jsonl").read_text(encoding="utf-8")) for name in ("whole", "cut")]
+    assert {**rows[0], "seconds": 0} == {**rows[1], "seconds": 0}
+
+
+def test_the_same_seed_learns_the_same_with_worker_processes(tmp_path: Path) -> None:
+    SelfPlay(settings_for(steps=32), tmp_path / "here").go()
+    SelfPlay(settings_for(steps=32, workers=1), tmp_path / "there").go()
+    assert_same(tmp_path / "here", tmp_path / "there")
+    SelfPlay(settings_for(steps=32, seed=1), tmp_path / "other").go()
+    name = "co_wizard/policy/action_net.weight"
+    assert not torch.equal(weights(tmp_path / "here")[name], weights(tmp_path / "other")[name])
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_nobody_does_what_is_masked(shared: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    step, seen = SelfPlayEnv.step, []
+
+    def watched(self: SelfPlayEnv, action: Any) -> Any:
+        for k, (role, seat) in enumerate(zip(AGENT_ROLES, self._seats, strict=True)):
+            observation, masks = self._seen[role], self.duo.stage.masks.mask(role)
+            allowed = seat.mask(observation, self._memories[k]) & seat.allowed(observation, masks)
+            seen.append(bool(allowed[action[k]]))
+        return step(self, action)
+
+    monkeypatch.setattr(SelfPlayEnv, "step", watched)
+    SelfPlay(settings_for(shared=shared, max_seconds=60.0), tmp_path).go()
+    assert len(seen) > 3 * 128 and all(seen)
+
+
+def test_tensorboard_gets_rewards_losses_and_success(tmp_path: Path) -> None:
+    accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    SelfPlay(settings_for(steps=32, max_seconds=5.0), tmp_path).go()
+    tags = set()
+    for folder in (tmp_path / "tensorboard").iterdir():
+        events = accumulator.EventAccumulator(str(folder))
+        events.Reload()
+        tags |= {(folder.name, tag) for tag in events.Tags()["scalars"]}
+    for role in AGENT_ROLES:
+        assert {(role, "train/value_loss"), (role, f"rollout/return_{role}")} <= tags
+    assert ("participant", "eval/success_against_scripted") in tags
+
+
+def test_runs_of_other_settings_and_damaged_ones_are_left_alone(tmp_path: Path) -> None:
+    SelfPlay(settings_for(), tmp_path).go()
+    with pytest.raises(SettingsError, match="another shared"):
+        SelfPlay(settings_for(shared=True), tmp_path)
+    (tmp_path / "past.safetensors").write_bytes(b"nothing")
+    with pytest.raises(WeightsError, match=r"past\.safetensors"):
+        SelfPlay(settings_for(), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [({"colour": 1}, "colour"), ({"shared": "maybe"}, "shared"), ({"past_environments": 99}, "past_environments")],
+)
+def test_bad_settings_are_named(given: dict[str, Any], named: str) -> None:
+    with pytest.raises(SettingsError, match=named):
+        selfplay_settings(given)
+
+
+def test_few_environments_have_fewer_past_ones() -> None:
+    assert selfplay_settings(environments=1).past_environments == 0
+    settings = selfplay_settings({"shared": True}, steps=7, episodes=None)
+    assert settings.shared and settings.steps == 7
+    assert SelfPlaySettings(**json.loads(json.dumps(settings.as_json()))) == settings
