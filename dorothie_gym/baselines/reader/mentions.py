@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import cache, lru_cache
 from typing import Final
 
 import numpy as np
@@ -22,9 +23,19 @@ def label_words(label: str) -> tuple[str, ...]:
 
 def mentions(texts: Sequence[str]) -> NDArray[np.bool_]:
     """Returns which slot values each text names (n, 69): all words of the label stand in it, one after another."""
-    spelt = [" ".join(label_words(value.label)) for value in LABELS]
     table = np.zeros((len(texts), len(LABELS)), dtype=bool)
     for row, text in zip(table, texts, strict=True):
-        said = f" {' '.join(words(text))} "
-        row[:] = [f" {name} " in said or f" {name.replace(' ', '')} " in said for name in spelt]
+        row[list(_named(text))] = True
     return table
+
+
+@lru_cache(maxsize=16384)
+def _named(text: str) -> tuple[int, ...]:
+    said = f" {' '.join(words(text))} "
+    return tuple(k for k, spellings in enumerate(_spellings()) if any(f" {name} " in said for name in spellings))
+
+
+@cache
+def _spellings() -> tuple[tuple[str, str], ...]:
+    names = (" ".join(label_words(value.label)) for value in LABELS)
+    return tuple((name, name.replace(" ", "")) for name in names)

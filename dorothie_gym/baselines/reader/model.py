@@ -5,6 +5,7 @@ Letters in shapes: B points, X exits of the next junction, P pieces of a text, d
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -14,7 +15,7 @@ from torch.nn import functional as F
 
 from dorothie_gym.baselines.encoders import PAD
 from dorothie_gym.baselines.inputs import NFD, TASKS, UFN, Inputs, Labels
-from dorothie_gym.baselines.outputs import TAKES_ANGLE, TAKES_SIDE, Predicted, allowed_angle
+from dorothie_gym.baselines.outputs import TAKES_ANGLE, TAKES_SIDE, Predicted, allowed_angle, likeliest
 from dorothie_gym.baselines.reader.exits import END, EXITS, exit_table
 from dorothie_gym.baselines.reader.mentions import mentions
 from dorothie_gym.baselines.toto.config import Channel, TOTOConfig
@@ -91,11 +92,9 @@ class JunctionReader(TOTO):
         for head in (self.head, self.action_head):
             head.requires_grad_(False)  # TOTO's heads are not used
         self._keep_exits(columns, towns)
-        self.register_buffer(
-            "pieces", torch.cat((pieces, pieces.new_full((1, pieces.shape[1]), PAD))), persistent=False
-        )
-        named = torch.from_numpy(mentions(columns.texts)).float()
-        self.register_buffer("mentions", torch.cat((named, named.new_zeros(1, len(LABELS)))), persistent=False)
+        self.register_buffer("pieces", pieces, persistent=False)
+        self.register_buffer("mentions", torch.empty(0), persistent=False)
+        self.take_words(columns.texts, pieces)
 
     pieces: Tensor
     mentions: Tensor
@@ -106,6 +105,17 @@ class JunctionReader(TOTO):
     exit_distance: Tensor
     lane_end: Tensor
     lane_street: Tensor
+
+    def take_words(self, texts: Sequence[str], pieces: Tensor) -> None:
+        """Puts other texts in the place of those that there are.
+
+        Args:
+            texts: (n) of them.
+            pieces: (n, P) the pieces of each.
+        """
+        named = torch.from_numpy(mentions(texts)).float()
+        self.pieces = torch.cat((pieces, pieces.new_full((1, pieces.shape[1]), PAD)))
+        self.mentions = torch.cat((named, named.new_zeros(1, len(LABELS))))
 
     def _keep_exits(self, columns: Columns, towns: Towns) -> None:
         tables = [exit_table(graph) for graph in columns.towns]
@@ -136,12 +146,12 @@ class JunctionReader(TOTO):
         decision = decision + self.config.loss.angle * angle_error(direction, labels.angle)
         return torch.where(labels.task == NFD, decision, act).mean()
 
-    def predict(self, inputs: Inputs, task: Tensor) -> Predicted:
-        """Returns what the model takes for true at B points of some tasks (B,)."""
+    def predict(self, inputs: Inputs, task: Tensor, allowed: Tensor | None = None) -> Predicted:
+        """Returns what the model takes for true at B points; see `TOTO.predict`."""
         last, exits, there, angles = self._look(inputs, task)
         move, values = self._act(inputs, task, last)
         scores, side, direction = self._decision(last)
-        action = scores.argmax(-1)
+        action = likeliest(scores, allowed)
         chosen = angles.gather(1, exits.masked_fill(~there, -torch.inf).argmax(-1, keepdim=True))[:, 0]
         free = torch.rad2deg(torch.atan2(direction[:, 1], direction[:, 0]))
         angle = torch.where(there.any(1), chosen, free)
