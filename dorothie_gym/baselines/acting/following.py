@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Final, Self
 
 from dorothie_gym.baselines.acting.history import History
 from dorothie_gym.dialogue import Span, speech_seconds
 from dorothie_gym.ontology import PhysicalAction, Role
 from dorothie_gym.policies.co_wizard.mind import View
+from dorothie_gym.sessions import FRAME_RATE
 from dorothie_gym.spaces import Motion, Physical, Speech
 from dorothie_gym.world.town import Town
+
+_TICK: Final = 1e-6
+"""Slack for sums of decision periods, as a share of one."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -57,9 +62,10 @@ class Following:
         history = self.history
         if self.tried is not None and self.before is not None and carried_out(self.tried, self.before, view):
             history = history.done(self.tried, history.frame)
+        period = view.time - history.glimpses[-1].frame / FRAME_RATE if history.glimpses else 1.0
         history = history.seen(view, town)
         over = self.air if self.air and view.speaking == 0.0 else ()
-        spoken = [(_start(heard, view.time), Role.PARTICIPANT, heard), (self.began, Role.CO_WIZARD, over)]
+        spoken = [(_start(heard, view.time, period), Role.PARTICIPANT, heard), (self.began, Role.CO_WIZARD, over)]
         for _, speaker, spans in sorted(spoken, key=lambda each: each[0]):
             if spans:
                 history = history.said(speaker, spans, history.frame)
@@ -93,6 +99,13 @@ def carried_out(tried: Physical, before: View, after: View) -> bool:
     return after.manoeuvre is action and not (same and action is PhysicalAction.J_TURN)
 
 
-def _start(spans: tuple[Span, ...], end: float) -> float:
-    """When an utterance that ends now began, by the usual rate of speech [s]."""
-    return end - sum(speech_seconds(span.text) for span in spans)
+def _start(spans: tuple[Span, ...], end: float, period: float) -> float:
+    """The decision at which an utterance began that is over by now, at the usual rate of speech [s].
+
+    Args:
+        spans: what was said.
+        end: now [s].
+        period: time between decisions [s].
+    """
+    seconds = sum(speech_seconds(span.text) for span in spans)
+    return period * math.floor((end - seconds) / period + _TICK)

@@ -37,6 +37,9 @@ _KINDS: Final = {
     ObjectClass.STATIC.value: ActorKind.PROP,
 }
 
+_SHORTEST_CAR: Final = 2.5
+"""A vehicle that is shorter is a cycle [m]."""
+
 _TURN: Final = 2.0 * math.pi
 
 
@@ -49,7 +52,8 @@ class Glimpse:
         pose: x, y [m], heading [rad, clockwise] as estimated.
         speed: as measured [m/s].
         lane: that the car is believed to be on.
-        actors: what is perceived, rows of `ACTOR_DTYPE`; the way that something faces is not, and is the car's own.
+        actors: what is perceived, rows of `ACTOR_DTYPE`. The way that something faces is not perceived: a vehicle's is
+            taken to be that of its lane, anything else's the car's own.
         lights: what all lights of the town show, rows of `LIGHT_DTYPE`; sight and direction are looked at later.
         weather: row of `WEATHER_DTYPE`.
     """
@@ -71,7 +75,7 @@ class Glimpse:
             pose=(x, y, heading),
             speed=view.speed,
             lane=view.lane,
-            actors=_actors(view.raw["objects"], heading),
+            actors=_actors(view.raw["objects"], heading, town),
             lights=light_rows(_light_states(town).at(view.time)),
             weather=np.array([tuple(view.raw["weather"].tolist())], dtype=WEATHER_DTYPE),
         )
@@ -118,8 +122,8 @@ def way_of(glimpses: Sequence[Glimpse]) -> Trajectory:
     for name, column in columns.items():
         rows[name] = np.interp(wanted, frames, column)
     rows["heading"] = (rows["heading"] + math.pi) % _TURN - math.pi
-    last = np.searchsorted(frames, wanted, side="right") - 1
-    rows["lane"] = np.array([glimpse.lane for glimpse in glimpses])[last]
+    middles = (frames[1:] + frames[:-1]) / 2
+    rows["lane"] = np.array([glimpse.lane for glimpse in glimpses])[np.searchsorted(middles, wanted)]
     return rows
 
 
@@ -139,14 +143,30 @@ def _light_states(town: Town) -> LightStates:
     return LightStates(town)
 
 
-def _actors(objects: NDArray[np.float64], heading: float) -> Rows:
+def _actors(objects: NDArray[np.float64], heading: float, town: Town) -> Rows:
     seen = objects[objects[:, ObjectColumn.KIND] > 0]
     rows = np.zeros(len(seen), dtype=ACTOR_DTYPE)
-    rows["kind"] = [_KINDS.get(int(kind), ActorKind.OTHER) for kind in seen[:, ObjectColumn.KIND]]
-    rows["heading"] = heading
     for name in ("x", "y", "length", "width", "speed"):
         rows[name] = seen[:, ObjectColumn[name.upper()]]
+    rows["heading"] = heading
+    rows["kind"] = [_KINDS.get(int(kind), ActorKind.OTHER) for kind in seen[:, ObjectColumn.KIND]]
+    vehicles = np.flatnonzero(rows["kind"] == ActorKind.VEHICLE)
+    rows["heading"][vehicles] = [_lane_heading(town, *place) for place in rows[["x", "y"]][vehicles].tolist()]
+    rows["kind"][vehicles[rows["length"][vehicles] < _SHORTEST_CAR]] = ActorKind.CYCLIST
     return rows
+
+
+def _lane_heading(town: Town, x: float, y: float) -> float:
+    """Which way the lane nearest to a place leads [rad]."""
+    points, headings = _lane_points(town)
+    return float(headings[np.argmin(np.square(points - (x, y)).sum(1))])
+
+
+@lru_cache(maxsize=16)
+def _lane_points(town: Town) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points of all lanes (n, 2) [m] and the headings there (n,) [rad]."""
+    lanes = [lane for lane in town.lanes if not lane.in_junction] or town.lanes
+    return np.concatenate([lane.points[:, :2] for lane in lanes]), np.concatenate([lane.headings for lane in lanes])
 
 
 def _first_row(frames: NDArray[np.int64]) -> int:
