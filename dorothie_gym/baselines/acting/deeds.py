@@ -70,7 +70,7 @@ def _follow(view: View) -> Deed | None:
 
 
 def _turn(angle: float, view: View, town: Town) -> Deed | None:
-    if view.choice is None:
+    if view.choice is None or view.manoeuvring:
         return None
     way = _nearest_exit(angle, view.choice, town)
     planned = view.manoeuvre is PhysicalAction.J_TURN and abs(wrap_degrees(view.angle - way.angle)) < 1.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import enum
+import math
 from dataclasses import dataclass, replace
 from typing import Final, Self
 
@@ -14,18 +14,18 @@ BEFORE_JUNCTION: Final = 40.0
 """A junction without a turn is an occasion when it is this near [m]."""
 
 AGAIN: Final = 10.0
-"""Who waits at a junction without a turn decides again after this time [s]."""
+"""Who waits at a junction without a turn, or stands by Stop, decides again after this time [s]."""
+
+REST: Final = 4.0
+"""A car that stands by Stop does not brake for anything: what it stopped for is taken to last so long [s]."""
 
 
-class Occasion(enum.Enum):
-    """Why a decision is taken."""
+@dataclass(frozen=True)
+class Occasion:
+    """What is to be decided now: what to say, and what to do."""
 
-    WORDS = "words"
-    """The participant has spoken."""
-    JUNCTION = "junction"
-    """A junction is near, or the car waits at one, and no turn is planned."""
-    HAZARD = "hazard"
-    """A hazard begins or ends."""
+    speaks: bool = False
+    drives: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,38 +34,50 @@ class Watch:
 
     Attributes:
         junction: lane before the junction at which it was decided, -1 for none.
-        waited: when it was decided last while waiting there [s].
-        hazard: what was in the way at the last observation.
+        waited: when it was decided last at a junction [s].
+        drove: when it was decided last what to do [s].
+        hazard: since when something has been in the way [s], infinite where nothing is.
+        owed: whether a decision about what to do is put off until a lane switch or U-turn is over.
     """
 
     junction: int = -1
-    waited: float = -AGAIN
-    hazard: ObjectClass = ObjectClass.UNLABELED
+    waited: float = -math.inf
+    drove: float = -math.inf
+    hazard: float = math.inf
+    owed: bool = False
 
-    def look(self, view: View, heard: bool) -> tuple[Occasion | None, Self]:
-        """Returns why to decide now, or None, and the watch for the next observation.
+    def look(self, view: View, heard: bool) -> tuple[Occasion, Self]:
+        """Returns what is to be decided, and the watch for the next observation.
 
         Args:
             view: what is observed.
             heard: whether the participant has spoken.
         """
-        began_or_ended = (view.hazard is ObjectClass.UNLABELED) is not (self.hazard is ObjectClass.UNLABELED)
-        watch = replace(self, hazard=view.hazard)
-        at_junction = watch._is_at_junction(view)
-        if at_junction or (heard and view.choice is not None and view.choice.distance <= BEFORE_JUNCTION):
+        hazard = self._hazard(view)
+        changed = math.isinf(hazard) is not math.isinf(self.hazard)
+        near = view.choice is not None and view.choice.distance <= BEFORE_JUNCTION
+        at_junction = near and self._lacks_turn(view)
+        watch = replace(self, hazard=hazard)
+        if near and (at_junction or heard):
             assert view.choice is not None
             watch = replace(watch, junction=view.choice.lane, waited=view.time)
-        if heard:
-            return Occasion.WORDS, watch
-        if at_junction:
-            return Occasion.JUNCTION, watch
-        return (Occasion.HAZARD if began_or_ended else None), watch
+        speaks = heard or at_junction
+        stands = view.motion is Motion.STOPPED and view.time - self.drove >= AGAIN
+        wanted = speaks or changed or stands or self.owed
+        drives = wanted and not view.manoeuvring
+        drove = view.time if drives else self.drove
+        return Occasion(speaks=speaks, drives=drives), replace(watch, drove=drove, owed=wanted and not drives)
 
-    def _is_at_junction(self, view: View) -> bool:
-        choice = view.choice
-        if choice is None or choice.distance > BEFORE_JUNCTION or view.motion is Motion.STOPPED:
-            return False
-        if view.manoeuvre in (PhysicalAction.J_TURN, PhysicalAction.U_TURN, PhysicalAction.LANE_SWITCH):
+    def _lacks_turn(self, view: View) -> bool:
+        """Whether the car comes to a junction, or has waited there long, and no turn is planned."""
+        assert view.choice is not None
+        if view.motion is Motion.STOPPED or view.manoeuvring or view.manoeuvre is PhysicalAction.J_TURN:
             return False
         waits = view.motion is Motion.WAITING and view.time - self.waited >= AGAIN
-        return choice.lane != self.junction or waits
+        return view.choice.lane != self.junction or waits
+
+    def _hazard(self, view: View) -> float:
+        if view.hazard is not ObjectClass.UNLABELED:
+            return min(self.hazard, view.time)
+        lasts = view.motion is Motion.STOPPED and view.time - self.drove < REST
+        return self.hazard if lasts else math.inf

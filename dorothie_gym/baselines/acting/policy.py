@@ -11,7 +11,7 @@ import numpy as np
 from dorothie_gym.baselines.acting.deeds import Deed, deed_of
 from dorothie_gym.baselines.acting.following import Following
 from dorothie_gym.baselines.acting.history import History
-from dorothie_gym.baselines.acting.occasions import Occasion, Watch
+from dorothie_gym.baselines.acting.occasions import Watch
 from dorothie_gym.baselines.acting.segments import spans_of
 from dorothie_gym.baselines.acting.trained import TownModel, Trained
 from dorothie_gym.baselines.outputs import Predicted
@@ -99,15 +99,12 @@ class BenchmarkCoWizard(Policy[CoWizardState]):
             voice = voice.heard_other(view.time, [span.act for span in heard])
         following = before.observed(view, town, heard)
         occasion, watch = state.watch.look(view, bool(heard))
-        physical = None
-        if occasion is not None:
-            deed = _drive(model, following.history, view, town)
-            physical = deed.physical
-            if occasion is not Occasion.HAZARD and voice.idle:
-                voice = _answer(model, following.history, voice, deed)
+        deed = _drive(model, following.history, view, town) if occasion.drives else Deed(physical=None)
+        if occasion.speaks and voice.idle:
+            voice = _answer(model, following.history, voice, deed)
         speech, voice = voice.speak(view.time, view.speaking, np.random.default_rng((state.seed, count)))
-        following = following.acted(speech, physical, view, self.limits.spans)
-        action = CoWizardAction(speech=speech, physical=physical).encode(self.limits)
+        following = following.acted(speech, deed.physical, view, self.limits.spans)
+        action = CoWizardAction(speech=speech, physical=deed.physical).encode(self.limits)
         return action, replace(state, voice=voice, count=count, following=following, watch=watch)
 
 
