@@ -1,4 +1,4 @@
-"""`model.json`: what a trained model was made with, as far as its weights do not tell; who plays it reads this first."""
+"""`model.json`: what a trained model was made with, as far as its weights do not tell; who plays it reads this."""
 
 from __future__ import annotations
 
