@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import torch
@@ -132,7 +132,9 @@ def live_columns(history: History, town: Town, graph: TownGraph) -> Columns:
 
 def _only(table: PointTable, row: int) -> PointTable:
     """A table of one of its points."""
-    columns = {name: value[row : row + 1] for name, value in vars(table).items() if isinstance(value, np.ndarray)}
+    columns: dict[str, Any] = {
+        name: value[row : row + 1] for name, value in vars(table).items() if isinstance(value, np.ndarray)
+    }
     return replace(table, **columns, skipped=())
 
 
