@@ -16,6 +16,9 @@ from dorothie_gym.ontology import LABELS
 _PARTS: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z][a-z]*|[a-z]+")
 
 
+_WAYS: Final = ({"left"}, {"right"}, {"straight", "ahead", "across", "forward"})
+
+
 def label_words(label: str) -> tuple[str, ...]:
     """Returns the words of a label in small letters: "BurgerKing" is "burger", "king"."""
     return tuple(part.lower() for part in _PARTS.findall(label))
@@ -26,6 +29,15 @@ def mentions(texts: Sequence[str]) -> NDArray[np.bool_]:
     table = np.zeros((len(texts), len(LABELS)), dtype=bool)
     for row, text in zip(table, texts, strict=True):
         row[list(_named(text))] = True
+    return table
+
+
+def ways(texts: Sequence[str]) -> NDArray[np.bool_]:
+    """Returns which ways each text names (n, 3): left, right, straight on."""
+    table = np.zeros((len(texts), len(_WAYS)), dtype=bool)
+    for row, text in zip(table, texts, strict=True):
+        said = set(words(text))
+        row[:] = [bool(said & names) for names in _WAYS]
     return table
 
 
