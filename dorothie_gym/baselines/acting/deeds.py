@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.ontology import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, PhysicalAction
@@ -20,6 +21,9 @@ from dorothie_gym.spaces import Motion, Physical
 from dorothie_gym.world.town import Exit, Town
 from dorothie_gym.world.town.model import LinkType, wrap_degrees
 from dorothie_gym.world.town.oncoming import oncoming_lanes
+
+AT_END: Final = 6.0
+"""A car that stands this near to a junction has no room left to drive up to it [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +53,8 @@ def deed_of(action: PhysicalAction, angle: float, view: View, town: Town) -> Dee
         case PhysicalAction.STOP:
             return Deed(physical=Physical(action=action)) if view.motion is not Motion.STOPPED else None
         case PhysicalAction.START:
-            return Deed(physical=Physical(action=action)) if view.motion is Motion.STOPPED else None
+            starts = view.motion is Motion.STOPPED and not _at_end(view)
+            return Deed(physical=Physical(action=action)) if starts else None
         case PhysicalAction.LANE_FOLLOW:
             return _follow(view)
         case PhysicalAction.J_TURN:
@@ -63,10 +68,16 @@ def deed_of(action: PhysicalAction, angle: float, view: View, town: Town) -> Dee
 
 def _follow(view: View) -> Deed | None:
     """The car follows its lane by itself, unless it stands, or prepares something else."""
-    if view.motion is Motion.WAITING:
+    if view.motion is Motion.WAITING or _at_end(view):
         return None
     idle = view.motion is not Motion.STOPPED and view.manoeuvre is None
     return Deed(physical=None if idle else Physical(action=PhysicalAction.LANE_FOLLOW))
+
+
+def _at_end(view: View) -> bool:
+    """Whether the car stands before a junction that it could only wait at: no turn is planned."""
+    near = view.choice is not None and view.choice.distance < AT_END
+    return near and view.standing and view.manoeuvre is None
 
 
 def _turn(angle: float, view: View, town: Town) -> Deed | None:

@@ -30,7 +30,7 @@ from dorothie_gym.policies.policy import Policy
 from dorothie_gym.policies.speech import Voice, remark
 from dorothie_gym.sessions import Task
 from dorothie_gym.sessions.tenths import EACH
-from dorothie_gym.spaces import ActionDict, CoWizardAction, Physical, SpaceLimits, heard_acts
+from dorothie_gym.spaces import ActionDict, CoWizardAction, Motion, Physical, SpaceLimits, heard_acts
 from dorothie_gym.world.town import Town
 
 _TOLD_WAYS: Final = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)
@@ -99,7 +99,8 @@ class BenchmarkCoWizard(Policy[CoWizardState]):
             voice = voice.heard_other(view.time, [span.act for span in heard])
         following = before.observed(view, town, heard)
         occasion, watch = state.watch.look(view, bool(heard))
-        deed = _drive(model, following.history, view, town) if occasion.drives else Deed(physical=None)
+        waits = view.motion is Motion.WAITING and not heard
+        deed = _drive(model, following.history, view, town, waits) if occasion.drives else Deed(physical=None)
         if occasion.speaks and voice.idle:
             voice = _answer(model, following.history, voice, deed)
         speech, voice = voice.speak(view.time, view.speaking, np.random.default_rng((state.seed, count)))
@@ -129,10 +130,18 @@ def _answer(model: TownModel, history: History, voice: Voice, deed: Deed) -> Voi
     return voice.plan(remark(act.move, *act.ordered, wording=Wording(direction=told)))
 
 
-def _drive(model: TownModel, history: History, view: View, town: Town) -> Deed:
-    """What is done next: the likeliest action of those that can be carried out."""
+def _drive(model: TownModel, history: History, view: View, town: Town, waits: bool) -> Deed:
+    """What is done next: the likeliest action of those that can be carried out.
+
+    Args:
+        model: that is asked.
+        history: what is known.
+        view: what is observed.
+        town: the map.
+        waits: whether the car waits for a turn: nothing would come of stopping.
+    """
     asked = history.done(_UNDONE, history.frame + EACH)
-    allowed = [True] * len(NAVIGATION_ACTIONS)
+    allowed = [not waits or action is not PhysicalAction.STOP for action in NAVIGATION_ACTIONS]
     while any(allowed):
         predicted = model.answer(asked, Task.NFD, allowed=allowed)
         number = int(predicted.action)

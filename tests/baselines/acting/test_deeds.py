@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from dorothie_gym.baselines.acting.deeds import Deed, deed_of
@@ -63,13 +65,22 @@ def test_a_lane_switch_goes_to_the_side_of_its_angle_where_there_is_a_lane(side,
 
 def test_the_car_follows_its_lane_by_itself_but_not_across_a_junction():
     assert deed_of(FOLLOW, 0.0, view(motion=Motion.DRIVING, manoeuvre=None), town()) == Deed(physical=None)
-    for changes in ({"motion": Motion.STOPPED}, {"motion": Motion.DRIVING, "manoeuvre": TURN}):
+    for changes in ({"motion": Motion.STOPPED, "choice": None}, {"motion": Motion.DRIVING, "manoeuvre": TURN}):
         assert deed_of(FOLLOW, 0.0, view(**changes), town()).physical == Physical(action=FOLLOW)
     assert deed_of(FOLLOW, 0.0, view(motion=Motion.WAITING), town()) is None
 
 
+def test_who_stands_before_a_junction_must_take_a_turn_to_go_on():
+    near = replace(crossing(), distance=3.0)
+    stands = view(motion=Motion.STOPPED, choice=near, manoeuvre=None, speed=0.0)
+    assert deed_of(START, 0.0, stands, town()) is deed_of(FOLLOW, 0.0, stands, town()) is None
+    assert deed_of(TURN, 0.0, stands, town()).physical is not None
+    planned = view(motion=Motion.STOPPED, choice=near, manoeuvre=TURN, speed=0.0)
+    assert deed_of(START, 0.0, planned, town()).physical == Physical(action=START)
+
+
 def test_only_who_stands_starts_and_only_who_drives_stops():
-    stands, drives = view(motion=Motion.STOPPED), view(motion=Motion.DRIVING)
+    stands, drives = view(motion=Motion.STOPPED, choice=None), view(motion=Motion.DRIVING)
     assert deed_of(START, 0.0, stands, town()).physical == Physical(action=START)
     assert deed_of(STOP, 0.0, drives, town()).physical == Physical(action=STOP)
     assert deed_of(START, 0.0, drives, town()) is deed_of(STOP, 0.0, stands, town()) is None
