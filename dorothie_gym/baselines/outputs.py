@@ -58,21 +58,27 @@ TAKES_SIDE: Final = tuple(action.argument is ArgumentKind.SIDE for action in NAV
 """Whether a class of NfD takes a side, left or right."""
 
 
-def decode(outputs: Outputs, task: Tensor) -> Predicted:
+def decode(outputs: Outputs, task: Tensor, allowed: Tensor | None = None) -> Predicted:
     """Returns the likeliest of everything, as the ontology allows it (see `allowed_angle`).
 
     Args:
         outputs: what a model says.
         task: (B,) number of each point's task.
+        allowed: (B, 6) which actions it may be; all of them where None.
     """
     role = (task == RFN).long()  # (B,)
     points = torch.arange(len(task), device=task.device)
-    action = outputs.action.argmax(-1)
+    action = likeliest(outputs.action, allowed)
     angle = torch.rad2deg(torch.atan2(outputs.angle[:, 1], outputs.angle[:, 0]))
     return Predicted(
         outputs.move[points, role].argmax(-1), outputs.slot_values[points, role] > 0, action,
         allowed_angle(action, angle),
     )  # fmt: skip
+
+
+def likeliest(scores: Tensor, allowed: Tensor | None) -> Tensor:
+    """Returns the class (B,) with the highest score (B, n) among those allowed (B, n); among all where None."""
+    return (scores if allowed is None else scores.masked_fill(~allowed, -torch.inf)).argmax(-1)
 
 
 def allowed_angle(action: Tensor, angle: Tensor) -> Tensor:

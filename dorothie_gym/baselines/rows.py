@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any, Final, Literal, TypeAlias
 
 import torch
+from torch import Tensor
 
 from dorothie_gym.baselines.encoders.pretrained import find_transformers, has_minilm, load_pretrained, minilm_folder
 from dorothie_gym.baselines.material import Material
@@ -24,7 +25,6 @@ from dorothie_gym.baselines.toto import (
     Towns,
     TrainedTexts,
 )
-from dorothie_gym.baselines.training import Model
 
 Kind = Literal["toto", "reader", "ppo", "cloning"]
 
@@ -110,7 +110,7 @@ def find_row(name: str) -> Row:
     raise ValueError(f"there is no model {name!r}; choose from {', '.join(row.command for row in ROWS)}")
 
 
-def make_model(row: Row, size: str, material: Material, seed: int) -> Model:
+def make_model(row: Row, size: str, material: Material, seed: int) -> TOTO:
     """Returns a model with weights drawn from a seed.
 
     Raises:
@@ -121,39 +121,71 @@ def make_model(row: Row, size: str, material: Material, seed: int) -> Model:
     if row.change is None:
         raise ValueError(f"{row.name} is no model of its own: {row.missing or 'it is a policy'}")
     torch.manual_seed(seed)
-    config = row.change(SIZES[size]())
+    return build_model(row, row.change(SIZES[size]()), material)
+
+
+def build_model(row: Row, config: TOTOConfig, material: Material, spread: float | None = None) -> TOTO:
+    """Returns the model of a row with weights drawn by chance.
+
+    Args:
+        row: whose model.
+        config: its sizes and inputs.
+        material: towns and texts that it is made for.
+        spread: of the vectors of texts that it learns from, or has learnt from; this material's where None.
+    """
+    towns, texts = Towns(material.columns.towns), make_texts(config, material, spread)
     if row.kind == "reader":
-        return _reader(config, material)
+        assert isinstance(texts, FrozenTexts)  # of `reader_config`
+        return JunctionReader(config, towns, texts, material.columns, _pieces(config, material), config.vocabulary)
     kind = EpisodicTransformer if set(config.channels) == set(_EPISODIC) else TOTO
-    return kind(config, Towns(material.columns.towns), make_texts(config, material))
+    return kind(config, towns, texts)
 
 
-def _reader(config: TOTOConfig, material: Material) -> Model:
-    pairs = material.byte_pairs(config.vocabulary)
-    pieces = material.tokens(None, pairs, config.text_tokens)
-    towns, texts = Towns(material.columns.towns), FrozenTexts(material.vectors)
-    return JunctionReader(config, towns, texts, material.columns, pieces, config.vocabulary)
+def retell(model: TOTO, material: Material) -> None:
+    """Puts the texts of other material in the place of those that a model has: its inputs then count those."""
+    config = model.config
+    if config.text == "frozen":
+        model.texts.take(material.vectors)
+    else:
+        model.texts.take(_tokens(config, material))
+    if isinstance(model, JunctionReader):
+        model.take_words(material.columns.texts, _pieces(config, material))
 
 
-def make_texts(config: TOTOConfig, material: Material) -> Texts:
+def make_texts(config: TOTOConfig, material: Material, spread: float | None = None) -> Texts:
     """Returns how a model reads the texts of a corpus: vectors that stay, or an encoder that learns."""
     if config.text == "frozen":
-        return FrozenTexts(material.vectors)
-    if config.pretrained_text and has_minilm():
-        return _minilm(config, material)
-    pairs = material.byte_pairs(config.vocabulary)
-    length, width = config.text_tokens, config.text_width
-    reader = SmallBert(config.vocabulary, length, width, config.text_layers, config.dropout)
-    return TrainedTexts(material.tokens(None, pairs, length), reader, width)
+        return FrozenTexts(material.vectors, spread)
+    tokens = _tokens(config, material)
+    if _is_minilm(config):
+        model: Any = load_pretrained(find_transformers("minilm").BertModel, minilm_folder(), "minilm")
+        return TrainedTexts(tokens, PretrainedBert(model), int(model.config.hidden_size))
+    width = config.text_width
+    reader = SmallBert(config.vocabulary, config.text_tokens, width, config.text_layers, config.dropout)
+    return TrainedTexts(tokens, reader, width)
 
 
-def _minilm(config: TOTOConfig, material: Material) -> Texts:
-    transformers = find_transformers("minilm")
-    folder = minilm_folder()
-    model: Any = load_pretrained(transformers.BertModel, folder, "minilm")
-    tokenizer: Any = load_pretrained(transformers.AutoTokenizer, folder, "minilm")
+def needs_pieces(row: Row, config: TOTOConfig) -> bool:
+    """Whether a model reads pieces of words that were learnt from its training sessions."""
+    return row.kind == "reader" or (config.text == "trained" and not _is_minilm(config))
+
+
+def _is_minilm(config: TOTOConfig) -> bool:
+    return config.pretrained_text and has_minilm()
+
+
+def _tokens(config: TOTOConfig, material: Material) -> Tensor:
+    """The pieces of all texts (n, length), as a trained encoder reads them."""
+    if not _is_minilm(config):
+        return _pieces(config, material)
+    tokenizer: Any = load_pretrained(find_transformers("minilm").AutoTokenizer, minilm_folder(), "minilm")
     pieces = tokenizer(
         list(material.columns.texts), padding="max_length", truncation=True, max_length=config.text_tokens,
         return_tensors="pt",
     )  # fmt: skip
-    return TrainedTexts(pieces["input_ids"], PretrainedBert(model), int(model.config.hidden_size))
+    ids: Tensor = pieces["input_ids"]
+    return ids
+
+
+def _pieces(config: TOTOConfig, material: Material) -> Tensor:
+    return material.tokens(None, material.byte_pairs(config.vocabulary), config.text_tokens)

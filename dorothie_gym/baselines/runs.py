@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -12,11 +13,13 @@ import numpy as np
 import torch
 
 from dorothie_gym import __version__
+from dorothie_gym.baselines.acting.description import Description, sha256_of
 from dorothie_gym.baselines.inputs import TASKS
 from dorothie_gym.baselines.material import TEST, TRAIN, VALIDATION, Material
 from dorothie_gym.baselines.outputs import Predicted
-from dorothie_gym.baselines.rows import Row, find_row, make_model
-from dorothie_gym.baselines.training import CheckpointError, Trained, predict, train
+from dorothie_gym.baselines.rows import Row, find_row, make_model, needs_pieces
+from dorothie_gym.baselines.toto import TOTO, FrozenTexts
+from dorothie_gym.baselines.training import BEST_FILE, CheckpointError, Trained, predict, train
 from dorothie_gym.baselines.training.curves import draw_curves
 from dorothie_gym.baselines.training.trainer import OnEpoch
 from dorothie_gym.evaluation import ActionPredictions, ActPredictions, TaskPredictions, write_predictions
@@ -86,14 +89,35 @@ def run(job: Job, material: Material, on_epoch: OnEpoch = lambda epoch: None) ->
     wall, cpu = time.perf_counter() - started[0], time.process_time() - started[1]
     kept = job.folder / RESULT_FILE
     if (job.folder / PREDICTIONS_FILE).is_file() and kept.is_file():
-        return dict(json.loads(kept.read_text(encoding="utf-8")))
+        done = dict(json.loads(kept.read_text(encoding="utf-8")))
+        _describe(job, model, material, done)
+        return done
     predicted = predict(model, material.examples(TEST, spec))
     rows = task_predictions(job, material.columns, material.tables(TEST), predicted)
     write_predictions(job.folder / PREDICTIONS_FILE, rows, about={**about, "config": model.config.to_json()})
     draw_curves(trained.epochs, job.row.name, job.folder / CURVES_FILE)
     result = {**about, **_told(job, model, trained), "seconds": round(wall, 3), "cpu_seconds": round(cpu, 3)}
     write_atomically(kept, json.dumps(result, indent=1) + "\n")
+    _describe(job, model, material, result)
     return result
+
+
+def _describe(job: Job, model: TOTO, material: Material, result: Mapping[str, Any]) -> None:
+    """Writes what who plays the model must know beside its weights."""
+    pairs = material.byte_pairs(model.config.vocabulary) if needs_pieces(job.row, model.config) else None
+    Description(
+        row=job.row.command,
+        config=model.config.to_json(),
+        corpus=material.columns.key,
+        encoder=material.encoder.name,
+        encoder_id=material.encoder.id,
+        spread=model.texts.spread if isinstance(model.texts, FrozenTexts) else None,
+        merges=None if pairs is None else pairs.merges,
+        weights=BEST_FILE,
+        weights_sha256=sha256_of(job.folder / BEST_FILE),
+        steps=result["points"] * result["epochs"],
+        seconds=result["seconds"],
+    ).write(job.folder)
 
 
 def _run_policy(job: Job, about: dict[str, Any]) -> dict[str, Any]:

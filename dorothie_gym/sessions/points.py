@@ -1,8 +1,9 @@
 """The points of the three tasks, each with exactly what may be seen there (teacher forcing).
 
 Visible is what was recorded on frames strictly before the point. At a UfN point, in addition, the words of the
-utterance and the acts of its earlier spans; at an RfN point no act of the point's own utterance, which would give its
-words away. Hidden landmarks, which the car does not know, are never visible.
+utterance and the acts of its earlier spans; at an NfD point the utterances that were over in its own frame and stand
+before it in the record: who obeys at once has heard them. At an RfN point no act of the point's own utterance, which
+would give its words away. Hidden landmarks, which the car does not know, are never visible.
 """
 
 from __future__ import annotations
@@ -133,7 +134,7 @@ def nfd_points(session: Session, *, since: int = 0) -> Iterator[DecisionPoint]:
         if record.index >= since and is_decision(record):
             yield DecisionPoint(
                 index=record.index,
-                view=history.view(record.frame),
+                view=history.view(record.frame, before=record.index),
                 action=record.action,
                 angle=label_angle(record),
             )
@@ -230,9 +231,18 @@ class _History:
         self._action_frames = [action.frame for action in self._actions]
         self._landmarks = tuple(row for row in session.header.landmarks if not row["hidden"])
 
-    def view(self, frame: int, move: MoveRecord | None = None) -> View:
-        """The view at a frame; `move` is the one to be predicted, if it is one."""
-        moves = self._moves[: bisect.bisect_left(self._move_frames, frame)]
+    def view(self, frame: int, move: MoveRecord | None = None, before: int = 0) -> View:
+        """The view at a frame.
+
+        Args:
+            frame: of the point.
+            move: the one to be predicted, if it is one.
+            before: utterances of the frame itself are visible whose last event has a number below this.
+        """
+        stop = bisect.bisect_left(self._move_frames, frame)
+        while stop < len(self._moves) and self._moves[stop].frame == frame and self._moves[stop].index < before:
+            stop += 1
+        moves = self._moves[:stop]
         utterance = ""
         if move is not None:
             moves = tuple(past for past in moves if not _same_utterance(past, move))

@@ -53,13 +53,20 @@ def test_rfn_sees_no_words_and_no_act_of_its_own_utterance() -> None:
     assert [move.act for move in points[1].view.moves] == [TO_KFC]
 
 
+def test_who_turns_round_at_once_has_heard_what_was_said() -> None:
+    before = utterance(60, Role.PARTICIPANT, 0, ("Turn around,", STREET), ("please.", OKAY))
+    after = utterance(60, Role.CO_WIZARD, 1, ("Okay.", OKAY))
+    (point,) = nfd_points(session([*before, physical(60, PhysicalAction.U_TURN), *after]))
+    assert [move.span for move in point.view.moves] == ["Turn around,", "please."]
+
+
 @pytest.mark.parametrize("task", list(Task))
 def test_nothing_of_the_point_or_after_is_visible(task: Task) -> None:
     for point in task_points(session(talk()), task):
         view = point.view
-        earlier_span = [move for move in view.moves if move.frame == view.frame]
-        assert all(task is Task.UFN and move.index < point.index for move in earlier_span)
-        assert all(move.frame < view.frame for move in view.moves if move not in earlier_span)
+        same_frame = [move for move in view.moves if move.frame == view.frame]
+        assert all(task is not Task.RFN and move.index < point.index for move in same_frame)
+        assert all(move.frame < view.frame for move in view.moves if move not in same_frame)
         assert all(action.frame < view.frame for action in view.actions)
         assert view.car is not None and view.car.frame == view.frame - 1
 

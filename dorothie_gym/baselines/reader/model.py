@@ -5,6 +5,7 @@ Letters in shapes: B points, X exits of the next junction, P pieces of a text, d
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -14,9 +15,9 @@ from torch.nn import functional as F
 
 from dorothie_gym.baselines.encoders import PAD
 from dorothie_gym.baselines.inputs import NFD, TASKS, UFN, Inputs, Labels
-from dorothie_gym.baselines.outputs import TAKES_ANGLE, TAKES_SIDE, Predicted, allowed_angle
+from dorothie_gym.baselines.outputs import TAKES_ANGLE, TAKES_SIDE, Predicted, allowed_angle, likeliest
 from dorothie_gym.baselines.reader.exits import END, EXITS, exit_table
-from dorothie_gym.baselines.reader.mentions import mentions
+from dorothie_gym.baselines.reader.mentions import mentions, ways
 from dorothie_gym.baselines.toto.config import Channel, TOTOConfig
 from dorothie_gym.baselines.toto.layers import time_encoding
 from dorothie_gym.baselines.toto.losses import angle_error
@@ -34,6 +35,9 @@ NEAR_ENOUGH: Final = 15.0
 
 SLOT_THRESHOLD: Final = 0.3
 """A slot value is told from this probability on: F1 is highest at half of what it then is (Lipton et al., 2014)."""
+
+_RECENTLY: Final = 30.0
+"""Words are as old as this at most [s]."""
 
 _RANKS: Final = 16
 _SPANS: Final = 4
@@ -74,7 +78,7 @@ class JunctionReader(TOTO):
         self.piece = nn.Embedding(vocabulary, width, padding_idx=PAD)
         self.place = nn.Embedding(pieces.shape[1], width)
         self.source = nn.Embedding(RECENT + 1, width)
-        self.exit = nn.Linear(2 + 3 + 3 + texts.width, width)
+        self.exit = nn.Linear(2 + 3 + 3 + 3 + texts.width, width)
         self.state = nn.Linear(_STATE, width)
         self.spans = nn.Embedding(_SPANS, width)
         self.acts = nn.ModuleList(nn.Linear(width, len(DialogueMove)) for _ in range(2))
@@ -91,14 +95,14 @@ class JunctionReader(TOTO):
         for head in (self.head, self.action_head):
             head.requires_grad_(False)  # TOTO's heads are not used
         self._keep_exits(columns, towns)
-        self.register_buffer(
-            "pieces", torch.cat((pieces, pieces.new_full((1, pieces.shape[1]), PAD))), persistent=False
-        )
-        named = torch.from_numpy(mentions(columns.texts)).float()
-        self.register_buffer("mentions", torch.cat((named, named.new_zeros(1, len(LABELS)))), persistent=False)
+        self.register_buffer("pieces", pieces, persistent=False)
+        self.register_buffer("mentions", torch.empty(0), persistent=False)
+        self.register_buffer("ways", torch.empty(0), persistent=False)
+        self.take_words(columns.texts, pieces)
 
     pieces: Tensor
     mentions: Tensor
+    ways: Tensor
     exit_angle: Tensor
     exit_lane: Tensor
     exit_place: Tensor
@@ -106,6 +110,19 @@ class JunctionReader(TOTO):
     exit_distance: Tensor
     lane_end: Tensor
     lane_street: Tensor
+
+    def take_words(self, texts: Sequence[str], pieces: Tensor) -> None:
+        """Puts other texts in the place of those that there are.
+
+        Args:
+            texts: (n) of them.
+            pieces: (n, P) the pieces of each.
+        """
+        named = torch.from_numpy(mentions(texts)).float()
+        self.pieces = torch.cat((pieces, pieces.new_full((1, pieces.shape[1]), PAD)))
+        self.mentions = torch.cat((named, named.new_zeros(1, len(LABELS))))
+        told = torch.from_numpy(ways(texts)).float()
+        self.ways = torch.cat((told, told.new_zeros(1, told.shape[1])))
 
     def _keep_exits(self, columns: Columns, towns: Towns) -> None:
         tables = [exit_table(graph) for graph in columns.towns]
@@ -136,12 +153,12 @@ class JunctionReader(TOTO):
         decision = decision + self.config.loss.angle * angle_error(direction, labels.angle)
         return torch.where(labels.task == NFD, decision, act).mean()
 
-    def predict(self, inputs: Inputs, task: Tensor) -> Predicted:
-        """Returns what the model takes for true at B points of some tasks (B,)."""
+    def predict(self, inputs: Inputs, task: Tensor, allowed: Tensor | None = None) -> Predicted:
+        """Returns what the model takes for true at B points; see `TOTO.predict`."""
         last, exits, there, angles = self._look(inputs, task)
         move, values = self._act(inputs, task, last)
         scores, side, direction = self._decision(last)
-        action = scores.argmax(-1)
+        action = likeliest(scores, allowed)
         chosen = angles.gather(1, exits.masked_fill(~there, -torch.inf).argmax(-1, keepdim=True))[:, 0]
         free = torch.rad2deg(torch.atan2(direction[:, 1], direction[:, 0]))
         angle = torch.where(there.any(1), chosen, free)
@@ -231,12 +248,29 @@ class JunctionReader(TOTO):
         along = F.cosine_similarity(way, (mark - end)[:, None], dim=-1)
         seen = known[:, None].expand(along.shape)
         street = self._street_names(inputs, torch.where(there, self.exit_lane[row], -1))
+        sides = torch.stack((angles >= 30, angles <= -30, angles.abs() < 30), dim=-1).float()  # (B, X, 3)
         numbers = torch.stack(
-            (turn.cos(), turn.sin(), (angles.abs() < 30).float(), (angles >= 30).float(), (angles <= -30).float(),
-             seen.float(), along * seen, (nearer / METRES) * seen), dim=-1,
+            (turn.cos(), turn.sin(), seen.float(), along * seen, (nearer / METRES) * seen), dim=-1,
         )  # fmt: skip
-        tokens = self.exit(torch.cat((numbers, street), dim=-1))
+        tokens = self.exit(torch.cat((numbers, sides, self._told_way(inputs, sides), street), dim=-1))
         return tokens, there, angles, distance
+
+    def _told_way(self, inputs: Inputs, sides: Tensor) -> Tensor:
+        """Whether the human's last words name the side of each exit (B, X, 3), whether any way, and their age.
+
+        Args:
+            inputs: of the points.
+            sides: (B, X, 3) whether each exit leads to the left, to the right, straight on.
+        """
+        human = inputs["utterance_mask"] & (inputs["utterance_speaker"] == PARTICIPANT)  # (B, U)
+        place = (human * torch.arange(1, human.shape[1] + 1, device=human.device)).amax(1, keepdim=True) - 1  # (B, 1)
+        row = place.clamp(min=0)
+        text = torch.where(place >= 0, inputs["utterance_text"].gather(1, row), -1)[:, 0]
+        age = (inputs["time"] - inputs["utterance_time"].gather(1, row)[:, 0]).clamp(0.0, _RECENTLY) / _RECENTLY
+        ways = self.ways[text]  # (B, 3)
+        fits = torch.einsum("bxw,bw->bx", sides, ways)
+        any_way = ways.amax(1)[:, None].expand(fits.shape)
+        return torch.stack((fits, any_way, age[:, None].expand(fits.shape)), dim=-1)
 
     def _street_names(self, inputs: Inputs, lane: Tensor) -> Tensor:
         """Vectors of the names of the streets of lanes (B, X, E); zeros where a lane has none."""

@@ -153,9 +153,15 @@ class TOTO(Model):
         """Returns the mean loss of B points."""
         return point_losses(self(inputs), labels, self.config).mean()
 
-    def predict(self, inputs: Inputs, task: Tensor) -> Predicted:
-        """Returns what the model takes for true at B points of some tasks (B,)."""
-        return decode(self(inputs), task)
+    def predict(self, inputs: Inputs, task: Tensor, allowed: Tensor | None = None) -> Predicted:
+        """Returns what the model takes for true at B points.
+
+        Args:
+            inputs: fields of the points.
+            task: (B,) number of each point's task.
+            allowed: (B, 6) which navigation actions it may be; all of them where None.
+        """
+        return decode(self(inputs), task, allowed)
 
     def _channels(self, inputs: Inputs) -> list[Tokens]:
         """The channels that the model is given; first the token that everything is read off."""

@@ -30,21 +30,34 @@ class Texts(nn.Module, ABC):
     def forward(self, index: Tensor) -> Tensor:
         """Returns the vectors of texts (..., width); zeros where the index (...) is -1."""
 
+    def take(self, table: Tensor) -> None:
+        """Puts other texts in the place of those that there are: rows as the class was made with."""
+        raise NotImplementedError
+
 
 class FrozenTexts(Texts):
     """Vectors of a text encoder.
 
     Args:
         table: (n, width) float32, a row for each text of the corpus.
+        spread: what they are divided by, to be numbers of about 1; what does so for this table where None.
+
+    Attributes:
+        spread: see above.
     """
 
     table: Tensor
 
-    def __init__(self, table: Tensor):
+    def __init__(self, table: Tensor, spread: float | None = None):
         super().__init__()
         self.width = table.shape[1]
-        spread = table.square().mean().sqrt().clamp(min=_TINY)  # numbers of about 1, whatever the encoder's scale
-        self.register_buffer("table", torch.cat((table / spread, table.new_zeros(1, self.width))), persistent=False)
+        self.spread = spread_of(table) if spread is None else spread
+        self.register_buffer("table", table, persistent=False)
+        self.take(table)
+
+    def take(self, table: Tensor) -> None:
+        """Puts other texts in the place of those that there are: vectors (n, width)."""
+        self.table = torch.cat((table / self.spread, table.new_zeros(1, self.width)))
 
     def forward(self, index: Tensor) -> Tensor:
         """Returns the vectors of texts (..., width); zeros where the index (...) is -1."""
@@ -66,8 +79,12 @@ class TrainedTexts(Texts):
         super().__init__()
         self.width = width
         self.reader = reader
-        padding = tokens.new_full((1, tokens.shape[1]), PAD)
-        self.register_buffer("tokens", torch.cat((tokens, padding)), persistent=False)
+        self.register_buffer("tokens", tokens, persistent=False)
+        self.take(tokens)
+
+    def take(self, table: Tensor) -> None:
+        """Puts other texts in the place of those that there are: pieces (n, length)."""
+        self.tokens = torch.cat((table, table.new_full((1, table.shape[1]), PAD)))
 
     def forward(self, index: Tensor) -> Tensor:
         """Returns the vectors of texts (..., width); zeros where the index (...) is -1."""
@@ -76,6 +93,11 @@ class TrainedTexts(Texts):
         longest = max(1, int((pieces != PAD).sum(1).max()))
         vectors = self.reader(pieces[:, :longest]) * (distinct >= 0).unsqueeze(-1)
         return F.embedding(place, vectors)  # its gradient is summed in a fixed order
+
+
+def spread_of(table: Tensor) -> float:
+    """Returns how large the numbers of vectors (n, width) are: the root of their mean square."""
+    return float(table.square().mean().sqrt().clamp(min=_TINY))
 
 
 class SmallBert(nn.Module):

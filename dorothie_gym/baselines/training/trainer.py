@@ -66,8 +66,8 @@ class Model(nn.Module, ABC):
         """Returns the mean loss of B points."""
 
     @abstractmethod
-    def predict(self, inputs: Inputs, task: Tensor) -> Predicted:
-        """Returns what the model takes for true at B points of some tasks (B,)."""
+    def predict(self, inputs: Inputs, task: Tensor, allowed: Tensor | None = None) -> Predicted:
+        """Returns what the model takes for true at B points of some tasks (B,); `allowed` (B, 6) masks actions."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,7 +20,8 @@ from dorothie_gym.sessions.folds import check_fold
 class PointTable:
     """The points of a task (n,), by session and event.
 
-    What is visible at a point are rows `*_start:*_stop` of the columns: those of tenths strictly before the point's.
+    What is visible at a point are rows `*_start:*_stop` of the columns: those of tenths strictly before the point's; at
+    a point of NfD also utterances that were over in its own tenth and stand before it in the record.
 
     Attributes:
         task: the task.
@@ -102,6 +103,8 @@ def points(columns: Columns, task: Task, fold: Fold | str | None = None) -> Poin
     seen: dict[str, Any] = {}
     for name in ("moves", "utterances", "actions", "frames"):
         seen[f"{name}_start"], seen[f"{name}_stop"] = _visible(getattr(columns, name), session, tenth)
+    if task is Task.NFD:
+        _add_just_heard(columns, seen, session, tenth, event)
     table = PointTable(
         task=task,
         session=session,
@@ -133,6 +136,21 @@ def _visible(group: Any, session: Ints, tenth: Ints) -> tuple[Ints, Ints]:
     first = session.astype(np.int64) * span
     start = np.searchsorted(rows, first, side="left")
     return start.astype(np.int32), np.searchsorted(rows, first + tenth, side="left").astype(np.int32)
+
+
+def _add_just_heard(columns: Columns, seen: dict[str, Any], session: Ints, tenth: Ints, event: Ints) -> None:
+    """Adds the utterances of the points' own tenths that stand before them in the record."""
+    moves = columns.moves
+    _, through = _visible(moves, session, tenth + 1)
+    stop, said_stop = seen["moves_stop"].copy(), seen["utterances_stop"].copy()
+    for point in np.flatnonzero(through > stop).tolist():
+        while stop[point] < through[point]:
+            utterance = moves.utterance[stop[point]]
+            end = int(np.searchsorted(moves.utterance, utterance, side="right"))  # moves lie in the order of utterances
+            if moves.event[end - 1] >= event[point]:
+                break
+            stop[point], said_stop[point] = end, utterance + 1
+    seen["moves_stop"], seen["utterances_stop"] = stop, said_stop
 
 
 def _current(columns: Columns, task: Task, row: NDArray[np.int64]) -> dict[str, Any]:

@@ -45,6 +45,8 @@ def with_another_future(session: Session, index: int, *, words: bool) -> Session
             events.append(event)
         elif words and _said_together(event, point) and number <= index:
             events.append(event if number < index else _other_act(event))
+        elif number < index and _heard_before(event, point):
+            events.append(event)
         elif number <= index:
             events.append(_other(event, point if number == index else None))
     last = max((event.frame for event in session.events), default=0)
@@ -75,6 +77,11 @@ def replace_row(row: Any, **changes: Any) -> Any:
 
 
 _TABLES = ("actors", "lights", "weather")
+
+
+def _heard_before(event: Event, point: Event) -> bool:
+    """Whether an event of the tenth of a point, and before it, is one of words that an action may follow at once."""
+    return point.type is EventType.PHYSICAL_ACTION and event.type is EventType.DIALOGUE_MOVE
 
 
 def _said_together(event: Event, point: Event) -> bool:

@@ -149,6 +149,19 @@ def test_what_happened_within_the_tenth_of_a_point_is_not_visible() -> None:
     assert batch.action_mask.sum(axis=1).tolist() == [0, 0, 2]
 
 
+def test_words_that_were_over_before_an_action_of_the_same_tenth_are_visible_to_it() -> None:
+    before = utterance(60, Role.PARTICIPANT, 0, ("Turn around,", STREET), ("please.", OKAY))
+    after = utterance(62, Role.CO_WIZARD, 1, ("Okay.", OKAY))
+    columns = columns_of(session([*before, physical(61, PhysicalAction.U_TURN), *after]))
+    batch = gather(columns, points(columns, Task.NFD), [0])
+    assert [columns.texts[text] for text in batch.move_text[0][batch.move_mask[0]]] == ["Turn around,", "please."]
+    assert [columns.texts[text] for text in batch.utterance_text[0][batch.utterance_mask[0]]] == [
+        "Turn around, please."
+    ]
+    answers = gather(columns, points(columns, Task.RFN), [0])
+    assert not answers.move_mask.any(), "what is said next sees only what was over strictly before"
+
+
 def test_belief_is_the_next_frame_and_the_subgoal_reached_next() -> None:
     data = {"subgoal": 1, "status": "Complete", "landmark": "House"}
     reached = Event(frame=200, type=EventType.SUBGOAL, source=Role.AGENT, data=data)

@@ -1,0 +1,83 @@
+"""When a model that knows no "do nothing" decides; between decisions the car follows its lane."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final, Self
+
+from dorothie_gym.ontology import ObjectClass, PhysicalAction
+from dorothie_gym.policies.co_wizard.mind import View
+from dorothie_gym.spaces import Motion
+
+BEFORE_JUNCTION: Final = 40.0
+"""A junction without a turn is an occasion when it is this near [m]."""
+
+AGAIN: Final = 10.0
+"""Who waits at a junction without a turn, or stands by Stop, decides again after this time [s]."""
+
+REST: Final = 4.0
+"""A car that stands by Stop does not brake for anything: what it stopped for is taken to last so long [s]."""
+
+
+@dataclass(frozen=True)
+class Occasion:
+    """What is to be decided now: what to say, and what to do."""
+
+    speaks: bool = False
+    drives: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Watch:
+    """What has been decided upon; every change gives a new one.
+
+    Attributes:
+        junction: lane before the junction at which it was decided, -1 for none.
+        waited: when it was decided last at a junction [s].
+        drove: when it was decided last what to do [s].
+        hazard: since when something has been in the way [s], infinite where nothing is.
+        owed: whether a decision about what to do is put off until a lane switch or U-turn is over.
+    """
+
+    junction: int = -1
+    waited: float = -math.inf
+    drove: float = -math.inf
+    hazard: float = math.inf
+    owed: bool = False
+
+    def look(self, view: View, heard: bool) -> tuple[Occasion, Self]:
+        """Returns what is to be decided, and the watch for the next observation.
+
+        Args:
+            view: what is observed.
+            heard: whether the participant has spoken.
+        """
+        hazard = self._hazard(view)
+        changed = math.isinf(hazard) is not math.isinf(self.hazard)
+        near = view.choice is not None and view.choice.distance <= BEFORE_JUNCTION
+        at_junction = near and self._lacks_turn(view)
+        watch = replace(self, hazard=hazard)
+        if near and (at_junction or heard):
+            assert view.choice is not None
+            watch = replace(watch, junction=view.choice.lane, waited=view.time)
+        speaks = heard or at_junction
+        stands = view.motion is Motion.STOPPED and view.time - self.drove >= AGAIN
+        wanted = speaks or changed or stands or self.owed
+        drives = wanted and not view.manoeuvring
+        drove = view.time if drives else self.drove
+        return Occasion(speaks=speaks, drives=drives), replace(watch, drove=drove, owed=wanted and not drives)
+
+    def _lacks_turn(self, view: View) -> bool:
+        """Whether the car comes to a junction, or has waited there long, and no turn is planned."""
+        assert view.choice is not None
+        if view.motion is Motion.STOPPED or view.manoeuvring or view.manoeuvre is PhysicalAction.J_TURN:
+            return False
+        waits = view.motion is Motion.WAITING and view.time - self.waited >= AGAIN
+        return view.choice.lane != self.junction or waits
+
+    def _hazard(self, view: View) -> float:
+        if view.hazard is not ObjectClass.UNLABELED:
+            return min(self.hazard, view.time)
+        lasts = view.motion is Motion.STOPPED and view.time - self.drove < REST
+        return self.hazard if lasts else math.inf

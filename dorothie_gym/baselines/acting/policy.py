@@ -1,0 +1,157 @@
+"""A Co-Wizard that does what a model of the benchmark tells: it understands, says and drives by the three tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+import numpy as np
+
+from dorothie_gym.baselines.acting.deeds import Deed, deed_of
+from dorothie_gym.baselines.acting.following import Following
+from dorothie_gym.baselines.acting.history import History
+from dorothie_gym.baselines.acting.occasions import Watch
+from dorothie_gym.baselines.acting.segments import spans_of
+from dorothie_gym.baselines.acting.trained import TownModel, Trained
+from dorothie_gym.baselines.outputs import Predicted
+from dorothie_gym.dialogue import Span, Wording, draw_style
+from dorothie_gym.ontology import (
+    LABELS,
+    NAVIGATION_ACTIONS,
+    ActionValue,
+    DialogueAct,
+    DialogueMove,
+    PhysicalAction,
+    Role,
+)
+from dorothie_gym.policies.co_wizard.mind import View
+from dorothie_gym.policies.policy import Policy
+from dorothie_gym.policies.speech import Voice, remark
+from dorothie_gym.sessions import Task
+from dorothie_gym.sessions.tenths import EACH
+from dorothie_gym.spaces import ActionDict, CoWizardAction, Motion, Physical, SpaceLimits, heard_acts
+from dorothie_gym.world.town import Town
+
+_TOLD_WAYS: Final = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)
+"""Slot values whose words tell which way."""
+
+_UNSAID: Final = Span("-", DialogueAct(DialogueMove.IRRELEVANT))
+_UNDONE: Final = Physical(action=PhysicalAction.STOP)
+"""What stands for the next act and the next action at a point; no point shows its own label."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoWizardState:
+    """What the policy remembers.
+
+    Attributes:
+        seed: of all chance.
+        town: the map.
+        voice: what is still to be said.
+        count: decisions taken.
+        following: what has happened, None before the first observation.
+        watch: what has been decided upon.
+    """
+
+    seed: int
+    town: Town
+    voice: Voice
+    count: int = 0
+    following: Following | None = None
+    watch: Watch = field(default_factory=Watch)
+
+
+class BenchmarkCoWizard(Policy[CoWizardState]):
+    """Plays the Co-Wizard with a model that was trained on recorded points.
+
+    After each utterance of the participant it understands (UfN, where acts are not observed), answers (RfN) and drives
+    (NfD); before a junction without a turn it speaks and drives; when a hazard begins or ends it drives. Between
+    decisions the car follows its lane.
+    """
+
+    def __init__(self, trained: Trained, limits: SpaceLimits | None = None) -> None:
+        """Prepares the policy.
+
+        Args:
+            trained: the model.
+            limits: sizes of the spaces.
+        """
+        super().__init__(Role.CO_WIZARD, limits)
+        self._trained = trained
+
+    def initial_state(self, seed: int, town: Town) -> CoWizardState:
+        """A Co-Wizard before its first observation."""
+        style = draw_style(Role.CO_WIZARD, np.random.default_rng((seed, 0)))
+        return CoWizardState(seed=seed, town=town, voice=Voice(role=Role.CO_WIZARD, style=style))
+
+    def step(self, observation: Mapping[str, Any], state: CoWizardState) -> tuple[ActionDict, CoWizardState]:
+        """Listens; where there is an occasion, lets the model decide; says what is to be said."""
+        town, count = state.town, state.count + 1
+        view = View.read(observation, town)
+        before = state.following or Following(history=History.begin(observation, town))
+        acts = heard_acts(observation, Role.PARTICIPANT)
+        heard = spans_of(str(observation[f"{Role.PARTICIPANT}_text"]), acts, _last_move(state.voice))
+        model, voice = self._trained.in_town(town), state.voice
+        if heard:
+            if acts is None:
+                heard = _understood(model, before.observed(view, town, heard).history, heard)
+            voice = voice.heard_other(view.time, [span.act for span in heard])
+        following = before.observed(view, town, heard)
+        occasion, watch = state.watch.look(view, bool(heard))
+        waits = view.motion is Motion.WAITING and not heard
+        deed = _drive(model, following.history, view, town, waits) if occasion.drives else Deed(physical=None)
+        if occasion.speaks and voice.idle:
+            voice = _answer(model, following.history, voice, deed)
+        speech, voice = voice.speak(view.time, view.speaking, np.random.default_rng((state.seed, count)))
+        following = following.acted(speech, deed.physical, view, self.limits.spans)
+        action = CoWizardAction(speech=speech, physical=deed.physical).encode(self.limits)
+        return action, replace(state, voice=voice, count=count, following=following, watch=watch)
+
+
+def _last_move(voice: Voice) -> DialogueMove | None:
+    return voice.last.act.move if voice.last is not None else None
+
+
+def _understood(model: TownModel, history: History, heard: tuple[Span, ...]) -> tuple[Span, ...]:
+    """The spans of an utterance, which is the last of the history, with the acts that the model understands."""
+    known: tuple[Span, ...] = ()
+    for k, span in enumerate(heard):
+        predicted = model.answer(history, Task.UFN, last=len(heard) - k)
+        known = (*known, Span(span.text, _act(predicted)))
+        history = history.corrected((*known, *heard[k + 1 :]))
+    return known
+
+
+def _answer(model: TownModel, history: History, voice: Voice, deed: Deed) -> Voice:
+    """What is said next: an act as the model tells, worded by the grammar."""
+    act = _act(model.answer(history.said(Role.CO_WIZARD, (_UNSAID,), history.frame + EACH), Task.RFN))
+    told = deed.direction if any(value in _TOLD_WAYS for value in act.slots) else None
+    return voice.plan(remark(act.move, *act.ordered, wording=Wording(direction=told)))
+
+
+def _drive(model: TownModel, history: History, view: View, town: Town, waits: bool) -> Deed:
+    """What is done next: the likeliest action of those that can be carried out.
+
+    Args:
+        model: that is asked.
+        history: what is known.
+        view: what is observed.
+        town: the map.
+        waits: whether the car waits for a turn: nothing would come of stopping.
+    """
+    asked = history.done(_UNDONE, history.frame + EACH)
+    allowed = [not waits or action is not PhysicalAction.STOP for action in NAVIGATION_ACTIONS]
+    while any(allowed):
+        predicted = model.answer(asked, Task.NFD, allowed=allowed)
+        number = int(predicted.action)
+        deed = deed_of(NAVIGATION_ACTIONS[number], float(predicted.angle), view, town)
+        if deed is not None:
+            return deed
+        allowed[number] = False
+    return Deed(physical=None)
+
+
+def _act(predicted: Predicted) -> DialogueAct:
+    values = [value for value, told in zip(LABELS, predicted.slots[0].tolist(), strict=True) if told]
+    return DialogueAct.of(DialogueMove(int(predicted.move)), *values)

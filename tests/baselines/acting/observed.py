@@ -1,0 +1,29 @@
+"""Views of a car in brookside, made up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.ontology import Role
+from dorothie_gym.policies.co_wizard.mind import View
+from dorothie_gym.world.town import Town, load_town
+
+
+@cache
+def town() -> Town:
+    return load_town("brookside")
+
+
+@cache
+def _first() -> View:
+    env = DuoWizardEnv(town())
+    observations, _ = env.reset(seed=3)
+    return View.read(observations[str(Role.CO_WIZARD)], town())
+
+
+def view(**changes: Any) -> View:
+    """What the Co-Wizard of a session sees at first, with other values in some fields."""
+    return replace(_first(), **changes)

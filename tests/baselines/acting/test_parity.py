@@ -1,0 +1,117 @@
+"""At every recorded point, what the playing model is given is what the corpus holds of the same session.
+
+The Co-Wizard's own history comes from its observations alone. Words, acts, actions, times and the map are exactly those
+of the recording; where it was and what was around it are estimates, and close.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dorothie_gym.baselines.acting.trained import live_columns
+from dorothie_gym.dialogue import Span
+from dorothie_gym.evaluation.features import Columns, columns_of, gather, points
+from dorothie_gym.evaluation.features.towns import town_graph
+from dorothie_gym.ontology import DialogueAct, DialogueMove, Role
+from dorothie_gym.sessions import OBJECT_VALUES, Task
+from tests.baselines.acting.listening import Played, play
+from tests.evaluation.features.played import seen
+
+ESTIMATED = {
+    "window_pose", "window_speed", "window_lane", "window_kind", "window_values", "window_objects_mask",
+    "kind", "values", "objects_mask",
+}  # fmt: skip
+"""Fields that hang on where the car believes itself to be, and on what it perceives."""
+
+GUESSED = {"move_text"}
+"""The words of each act of an utterance with several: only the whole utterance is heard."""
+
+
+@pytest.fixture(scope="module", params=[("brookside", 3, 120.0), ("midtown", 5, 150.0)], ids=lambda case: case[0])
+def played(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Played:
+    town, seed, seconds = request.param
+    return play(tmp_path_factory.mktemp("parity") / "session", town=town, seed=seed, seconds=seconds)
+
+
+@pytest.fixture(scope="module")
+def both(played: Played) -> tuple[Columns, Columns]:
+    """The session as the corpus has it, and as its Co-Wizard has it."""
+    town, following = played.env.town, played.listener.following
+    assert following is not None
+    return columns_of(played.session), live_columns(following.history, town, town_graph(town.name, town))
+
+
+def batches(both: tuple[Columns, Columns], task: Task) -> tuple[dict[str, Any], dict[str, Any]]:
+    """All points of a task in both, words spelt out."""
+    found = []
+    for columns in both:
+        table = points(columns, task)
+        found.append(seen(columns, gather(columns, table, np.arange(len(table)))))
+    return found[0], found[1]
+
+
+@pytest.mark.parametrize("task", list(Task))
+def test_the_points_are_those_of_the_recording(both: tuple[Columns, Columns], task: Task) -> None:
+    recorded, live = (points(columns, task) for columns in both)
+    assert len(recorded) >= 8
+    for name in ("tenth", "label_move", "label_slots", "label_action", "label_angle"):
+        np.testing.assert_array_equal(getattr(live, name), getattr(recorded, name), name)
+
+
+@pytest.mark.parametrize("task", list(Task))
+def test_words_acts_actions_times_and_map_are_exactly_those_of_the_recording(
+    both: tuple[Columns, Columns], task: Task
+) -> None:
+    recorded, live = batches(both, task)
+    for name in sorted(set(recorded) - ESTIMATED - GUESSED):
+        np.testing.assert_array_equal(live[name], recorded[name], name)
+    assert (live["move_text"] == recorded["move_text"]).mean() > 0.9
+
+
+@pytest.mark.parametrize("task", list(Task))
+def test_way_and_surroundings_are_those_of_the_recording_but_for_errors_of_estimates(
+    both: tuple[Columns, Columns], task: Task
+) -> None:
+    recorded, live = batches(both, task)
+    there = recorded["window_mask"]
+    apart = np.abs(live["window_pose"] - recorded["window_pose"])[there]
+    turned = np.minimum(apart[:, 2], 360.0 - apart[:, 2])
+    assert apart[:, :2].mean() < 0.5 and apart[:, :2].max() < 3.0  # m: GPS, and straight ways between decisions
+    assert turned.mean() < 1.5 and turned.max() < 25.0  # degrees
+    assert np.abs(live["window_speed"] - recorded["window_speed"])[there].max() < 1.5  # m/s
+    assert (live["window_lane"] == recorded["window_lane"])[there].mean() > 0.9
+    for prefix, mask in (("window_", "window_objects_mask"), ("", "objects_mask")):
+        alike = live[mask] & recorded[mask]
+        assert alike.sum() > 0.95 * max(
+            live[mask].sum(), recorded[mask].sum()
+        )  # glimpses beyond the sight are left out
+        same = alike & (live[f"{prefix}kind"] == recorded[f"{prefix}kind"])
+        assert same.sum() > 0.9 * alike.sum()
+        values, truth = live[f"{prefix}values"][same], recorded[f"{prefix}values"][same]
+        for name in ("distance", "length", "width"):
+            column = OBJECT_VALUES.index(name)
+            assert np.median(np.abs(values[:, column] - truth[:, column])) < 0.5, name  # m
+
+
+def test_what_is_kept_while_playing_gives_the_same_batches_as_everything(played: Played) -> None:
+    town = played.env.town
+    graph = town_graph(town.name, town)
+    for moment in played.listener.moments[::4]:
+        given = []
+        for history in moment:
+            asked = history.said(Role.CO_WIZARD, (Span("-", DialogueAct(DialogueMove.IRRELEVANT)),), history.frame + 3)
+            columns = live_columns(asked, town, graph)
+            given.append(seen(columns, gather(columns, points(columns, Task.RFN), [-1])))
+        for name, values in given[0].items():
+            np.testing.assert_array_equal(values, given[1][name], name)
+
+
+def test_hidden_landmarks_are_not_in_it(played: Played) -> None:
+    following = played.listener.following
+    assert following is not None
+    known = [row["name"] for row in played.session.header.landmarks if not row["hidden"]]
+    assert [row["name"] for row in following.history.header.landmarks] == known
+    assert len(known) < len(played.session.header.landmarks)
