@@ -18,6 +18,9 @@ ALGORITHMS: Mapping[str, tuple[str, str]] = {
 }
 """Algorithms by name: the package and the class."""
 
+NAVIGATION = "dorothie_gym/Navigation-v0"
+"""Id of the environment whose drivers can play the Co-Wizard."""
+
 DEFAULT = "default"
 """Entry of a data file for environments that have none of their own."""
 
@@ -70,6 +73,11 @@ class TrainingSettings:
             raise SettingsError(f"workers is {self.workers}; it must be in 0..{self.environments}, the environments")
         if not 0 <= self.seed < 2**31:
             raise SettingsError(f"seed is {self.seed}; it must be in 0..{2**31 - 1}")
+
+    @property
+    def masked(self) -> bool:
+        """Whether the algorithm keeps to the mask of actions."""
+        return self.algorithm == "maskable_ppo"
 
     def as_json(self) -> dict[str, Any]:
         """The settings in JSON types; `TrainingSettings(**...)` reads them back."""

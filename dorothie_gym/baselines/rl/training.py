@@ -130,7 +130,7 @@ class Training:
     def evaluate(self) -> None:
         """Plays the evaluation's episodes, and saves the model with what came of them."""
         settings = self.settings
-        act = act_with(self.model, masked=settings.algorithm == "maskable_ppo")
+        act = act_with(self.model, masked=settings.masked)
         outcome = evaluate_policy(Maker(settings.env, settings.env_settings), act, settings.episodes, SEEDS_FROM)
         row = Row(steps=int(self.model.num_timesteps), seconds=round(self.seconds, 2), outcome=outcome)
         best = Run(folder=self.folder, rows=tuple(self.rows), steps=0, seconds=0.0, finished=False).best

@@ -15,6 +15,7 @@ import torch
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 
+from dorothie_gym.baselines.drivers import KIND
 from dorothie_gym.baselines.rl.environments import make_env
 from dorothie_gym.baselines.rl.settings import ALGORITHMS, FINAL_RATE, SettingsError, TrainingSettings
 
@@ -89,6 +90,7 @@ def save_model(model: Any, settings: TrainingSettings, folder: Path, seconds: fl
     tensors |= {f"variables/{name}": value for name, value in _variables(model)}
     description = {
         "format": FORMAT,
+        "kind": KIND,
         "settings": settings.as_json(),
         "steps": int(model.num_timesteps),
         "seconds": round(seconds, 2),
