@@ -36,6 +36,10 @@ def train_rl(
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Of networks and environments.")] = 0,
     evaluate_every: Annotated[int | None, typer.Option(min=1, help="Steps between evaluations; as tuned.")] = None,
     episodes: Annotated[int | None, typer.Option(min=1, help="Of an evaluation; as tuned.")] = None,
+    warm_start: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Corpus: learn first what its Co-Wizards did (Navigation-v0; PPO and A2C)."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")] = False,
 ) -> None:
     """Train a driver (or any role) with stable-baselines3, from defaults that were tuned.
@@ -47,17 +51,20 @@ def train_rl(
         from dorothie_gym.baselines.rl import SettingsError, Training, WeightsError, tuned_settings
     except ImportError:
         fail(NEEDS)
+    from dorothie_gym.sessions import SessionError
+
     with told_plainly():
         try:
             settings = tuned_settings(
                 algorithm, env, env_settings=_read_settings(setting or []), steps=steps, environments=environments,
                 workers=workers, seed=seed, evaluate_every=evaluate_every, episodes=episodes,
+                warm_start=None if warm_start is None else str(warm_start),
             )  # fmt: skip
             if workers is None:
                 settings = replace(settings, workers=_workers(settings.environments))
             with _progress(settings, quiet=as_json) as watch:
                 run = Training(settings, out, watch).go()
-        except (SettingsError, WeightsError) as error:
+        except (SettingsError, WeightsError, SessionError) as error:
             fail(str(error))
     if as_json:
         print_json(_facts(run, settings))
@@ -157,4 +164,6 @@ def _command(settings: TrainingSettings, out: Path) -> str:
         words += ["--set", f"{name}={value}"]
     for name in ("steps", "environments", "workers", "seed", "evaluate_every", "episodes"):
         words += [f"--{name.replace('_', '-')}", str(getattr(settings, name))]
+    if settings.warm_start is not None:
+        words += ["--warm-start", settings.warm_start]
     return shlex.join(words)

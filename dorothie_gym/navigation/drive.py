@@ -103,9 +103,7 @@ class Drive:
             scenario = draw_scenario(town, template, seed)
         elif not isinstance(scenario, Scenario):
             raise ValueError(f"option 'scenario' is a {type(scenario).__name__}; it must be a Scenario")
-        limits = SpaceLimits().grown_for(
-            lanes=len(town.lanes), junctions=len(town.junctions), streets=len(town.streets)
-        )
+        limits = SpaceLimits.for_town(town)
         return cls(Stage(town, network, scenario, config.session, limits), config, Ways(town))
 
     # --- a decision -------------------------------------------------------------------------------------------------

@@ -38,10 +38,13 @@ class Ways:
 
     Every way has one of the eight `SECTORS`: the one closest to its angle, or where that is taken by another way that
     fits it better, one beside it. Lanes of one direction share their ways, so that a sector means the same on all.
+
+    Attributes:
+        town: the map.
     """
 
     def __init__(self, town: Town) -> None:
-        self._town = town
+        self.town = town
         self._found: dict[int, tuple[Way | None, ...]] = {}
         self._lanes = _lanes_by_exits(town)
 
@@ -65,7 +68,7 @@ class Ways:
         lanes = self._lanes.get(tuple((int(row[ExitColumn.LANE]), int(row[ExitColumn.ANGLE])) for row in rows), ())
         if len(lanes) == 1:
             return lanes[0]
-        believed = next_choice(self._town, int(seen["lane"]), float(seen["station"][0]))
+        believed = next_choice(self.town, int(seen["lane"]), float(seen["station"][0]))
         if believed is not None and (not lanes or believed.lane in lanes):
             return believed.lane
         return next(iter(lanes), None)
@@ -79,10 +82,10 @@ class Ways:
 
     def _find(self, lane: int) -> tuple[Way | None, ...]:
         roads: dict[int, list[tuple[int, Exit]]] = {}
-        for source in sorted((lane, *lanes_beside(self._town, lane))):
-            for way in self._town.exits(source):
+        for source in sorted((lane, *lanes_beside(self.town, lane))):
+            for way in self.town.exits(source):
                 if way.junction_id >= 0:
-                    roads.setdefault(self._town.lanes[way.lane].road_id, []).append((source, way))
+                    roads.setdefault(self.town.lanes[way.lane].road_id, []).append((source, way))
         sectors = _assign({road: ways[0][1].angle for road, ways in roads.items()})
         table: list[Way | None] = [None] * len(SECTORS)
         for road, sector in sectors.items():

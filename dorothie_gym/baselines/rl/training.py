@@ -13,14 +13,18 @@ from typing import Any
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
 
+from dorothie_gym.baselines.rl.cloning import Cloned, clone, read_lessons
 from dorothie_gym.baselines.rl.curve import draw_curve
 from dorothie_gym.baselines.rl.environments import Maker, make_vector
 from dorothie_gym.baselines.rl.evaluating import SEEDS_FROM, Outcome, act_with, evaluate_policy
 from dorothie_gym.baselines.rl.settings import SettingsError, TrainingSettings
 from dorothie_gym.baselines.rl.weights import DESCRIPTION, make_model, read_description, restore, save_model
+from dorothie_gym.navigation import NavigationConfig
+from dorothie_gym.sessions import Fold
 
-PROGRESS, CURVE, BEST = "progress.jsonl", "curve.png", "best"
-"""Files of a run beside its model: a line for each evaluation, their picture, and a folder with the best model."""
+PROGRESS, CURVE, BEST, CLONED = "progress.jsonl", "curve.png", "best", "cloned.json"
+"""Files of a run beside its model: a line for each evaluation, their picture, a folder with the best model, and what
+came of cloning."""
 
 LIVE = ("steps", "evaluate_every", "episodes", "workers")
 """Settings in which a run that goes on may differ from how it began."""
@@ -79,12 +83,14 @@ class Training:
 
         Raises:
             SettingsError: the folder has a run with other settings, or nothing can be trained with these.
+            SessionError: the corpus of the warm start cannot be read or played again.
             WeightsError: the run in the folder is damaged.
         """
         self.settings, self.folder = settings, folder
         self._watch = watch or (lambda done, total, row: None)
         self.rows: list[Row] = []
         self.seconds = 0.0
+        self.cloned: Cloned | None = None
         begun = (folder / DESCRIPTION).is_file()
         if begun:
             _check_same(settings, TrainingSettings(**read_description(folder)["settings"]), folder)
@@ -98,6 +104,8 @@ class Training:
             if begun:
                 restore(self.model, folder)
                 self.seconds = float(read_description(folder)["seconds"])
+            elif settings.warm_start is not None:
+                self._learn_from(Path(settings.warm_start))
         except Exception:
             self._vector.close()
             raise
@@ -112,6 +120,8 @@ class Training:
         left = settings.steps - int(model.num_timesteps)
         finished = left <= 0
         try:
+            if self.cloned is not None:
+                self.evaluate()
             if left > 0:
                 model.learn(left, callback=_Evaluations(self), reset_num_timesteps=False, log_interval=None)
                 finished = True
@@ -126,6 +136,17 @@ class Training:
             folder=self.folder, rows=tuple(self.rows), steps=int(model.num_timesteps), seconds=self.seconds,
             finished=finished,
         )  # fmt: skip
+
+    def _learn_from(self, corpus: Path) -> None:
+        """Begins with what the Co-Wizards of a corpus did."""
+        since = time.perf_counter()
+        config = NavigationConfig(
+            max_seconds=self.settings.env_settings.get("max_seconds", NavigationConfig.max_seconds)
+        )
+        shown, held_out = (read_lessons(corpus, fold, config) for fold in (Fold.TRAIN, Fold.VAL))
+        self.cloned = clone(self.model, shown, held_out, self.settings.seed)
+        self.seconds += time.perf_counter() - since
+        (self.folder / CLONED).write_text(json.dumps(asdict(self.cloned), indent=1) + "\n", encoding="utf-8")
 
     def evaluate(self) -> None:
         """Plays the evaluation's episodes, and saves the model with what came of them."""
