@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from stable_baselines3.common.callbacks import BaseCallback
 
 from dorothie_gym.navigation import NavigationAction, NavigationConfig
 from dorothie_gym.navigation.apprentice import Apprentice, Lesson
@@ -19,9 +20,13 @@ from dorothie_gym.sessions.sdn.maps import find_town
 from dorothie_gym.spaces import CoWizardAction, SpaceLimits
 from dorothie_gym.world.town import Town
 
-LEARNING_RATE, BATCH = 1e-3, 256
+LEARNING_RATE, BATCH = 1e-3, 64
 MOST_EPOCHS, PATIENCE = 60, 5
 """It ends after so many passes, or when the held-out sessions have got no likelier for so many [passes]."""
+
+
+CRITIC_ALONE = 20_000
+"""So many steps the critic learns what a cloned actor is worth before that changes: else it would be led astray."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,6 +148,18 @@ def clone(model: Any, shown: Lessons, held_out: Lessons, seed: int) -> Cloned:
         majority=float((held_out.actions == shown.actions.mode().values).float().mean()),
         deeds=float(right[deeds].float().mean()),
     )  # fmt: skip
+
+
+class CriticFirst(BaseCallback):
+    """Keeps the actor as it was cloned for the first steps of a run (`CRITIC_ALONE`)."""
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        learns = self.num_timesteps > CRITIC_ALONE
+        for part in (self.model.policy.mlp_extractor.policy_net, self.model.policy.action_net):
+            part.requires_grad_(learns)
 
 
 def _distribution(policy: Any, lessons: Lessons, rows: torch.Tensor) -> Any:

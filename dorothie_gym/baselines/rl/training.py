@@ -13,7 +13,7 @@ from typing import Any
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
 
-from dorothie_gym.baselines.rl.cloning import Cloned, clone, read_lessons
+from dorothie_gym.baselines.rl.cloning import Cloned, CriticFirst, clone, read_lessons
 from dorothie_gym.baselines.rl.curve import draw_curve
 from dorothie_gym.baselines.rl.environments import Maker, make_vector
 from dorothie_gym.baselines.rl.evaluating import SEEDS_FROM, Outcome, act_with, evaluate_policy
@@ -123,7 +123,10 @@ class Training:
             if self.cloned is not None:
                 self.evaluate()
             if left > 0:
-                model.learn(left, callback=_Evaluations(self), reset_num_timesteps=False, log_interval=None)
+                callbacks: list[BaseCallback] = [_Evaluations(self)]
+                if settings.warm_start is not None:
+                    callbacks.append(CriticFirst())
+                model.learn(left, callback=callbacks, reset_num_timesteps=False, log_interval=None)
                 finished = True
         except KeyboardInterrupt:
             finished = False
