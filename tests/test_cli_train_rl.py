@@ -35,6 +35,8 @@ def test_training_tells_what_came_of_it_in_json(tmp_path: Path) -> None:
         (["ppo", "--env", "dorothie_gym/NoSuch-v0"], "dorothie_gym/NoSuch-v0"),
         (["sac"], "sac on dorothie_gym/Navigation-v0"),
         (["ppo", "--environments", "1", "--workers", "2"], "workers is 2"),
+        (["dqn", "--warm-start", "corpus"], "warm_start: dqn"),
+        (["ppo", "--warm-start", "no-such-corpus"], "no-such-corpus"),
     ],
 )
 def test_mistakes_are_told_in_one_line(arguments: list[str], told: str, tmp_path: Path) -> None:
