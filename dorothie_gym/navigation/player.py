@@ -106,7 +106,7 @@ class NavigationPlayer(Policy[Watched]):
         super().__init__(Role.CO_WIZARD, limits)
         self._choose, self._config = choose, config if config is not None else NavigationConfig()
         self._scripted = ScriptedCoWizard(limits, PLAIN)
-        self._seats: dict[int, tuple[Town, Seat]] = {}
+        self._seats: dict[Town, Seat] = {}
 
     def initial_state(self, seed: int, town: Town) -> Watched:
         """A driver who has not been told anything yet."""
@@ -134,9 +134,9 @@ class NavigationPlayer(Policy[Watched]):
 
     def _seat(self, town: Town) -> Seat:
         """The seat in a town; one is kept for each."""
-        if id(town) not in self._seats:
-            self._seats[id(town)] = town, Seat(town, self._config.max_seconds)
-        return self._seats[id(town)][1]
+        if town not in self._seats:
+            self._seats[town] = Seat(town, self._config.max_seconds)
+        return self._seats[town]
 
 
 def _oblige(watched: Watched, view: View) -> tuple[Physical | None, Watched]:

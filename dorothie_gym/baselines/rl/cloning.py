@@ -157,9 +157,9 @@ class CriticFirst(BaseCallback):
         return True
 
     def _on_rollout_end(self) -> None:
-        learns = self.num_timesteps > CRITIC_ALONE
-        for part in (self.model.policy.mlp_extractor.policy_net, self.model.policy.action_net):
-            part.requires_grad_(learns)
+        policy: Any = self.model.policy
+        for part in (policy.mlp_extractor.policy_net, policy.action_net):
+            part.requires_grad_(self.num_timesteps > CRITIC_ALONE)
 
 
 def _distribution(policy: Any, lessons: Lessons, rows: torch.Tensor) -> Any:
