@@ -75,6 +75,8 @@ def test_three_roles_learn_and_play(tmp_path: Path) -> None:
         (["selfplay", "--set", "town=atlantis"], "atlantis"),
         (["selfplay", "--env", "dorothie_gym/CoWizard-v0"], "leave it out"),
         (["ppo", "--environments", "1", "--workers", "2"], "workers is 2"),
+        (["dqn", "--warm-start", "corpus"], "warm_start: dqn"),
+        (["ppo", "--warm-start", "no-such-corpus"], "no-such-corpus"),
     ],
 )
 def test_mistakes_are_told_in_one_line(arguments: list[str], told: str, tmp_path: Path) -> None:

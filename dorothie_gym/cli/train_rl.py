@@ -41,6 +41,10 @@ def train_rl(
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Of networks and environments.")] = 0,
     evaluate_every: Annotated[int | None, typer.Option(min=1, help="Steps between evaluations; as tuned.")] = None,
     episodes: Annotated[int | None, typer.Option(min=1, help="Of an evaluation; as tuned.")] = None,
+    warm_start: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Corpus: learn first what its Co-Wizards did (Navigation-v0; PPO and A2C)."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Train a driver (or any role) with stable-baselines3, from defaults that were tuned.
@@ -58,21 +62,26 @@ def train_rl(
         from dorothie_gym.baselines.rl import SettingsError, Training, WeightsError, tuned_settings
     except ImportError:
         fail(NEEDS)
+    from dorothie_gym.sessions import SessionError
+
     if algorithm == "selfplay":
         from dorothie_gym.cli.selfplay import train_selfplay
 
         if env is not None:
             fail("--env: selfplay plays DuoWizardEnv; leave it out, and choose a town with --set town=NAME")
+        if warm_start is not None:
+            fail("--warm-start: selfplay begins with networks that know nothing; leave it out")
         train_selfplay(out, given, changes, as_json=as_json)
         return
     with told_plainly():
         try:
-            settings = tuned_settings(algorithm, env or DRIVING, env_settings=given, **changes)
+            warm = None if warm_start is None else str(warm_start)
+            settings = tuned_settings(algorithm, env or DRIVING, env_settings=given, warm_start=warm, **changes)
             if workers is None:
                 settings = replace(settings, workers=processes(settings.environments))
             with training_progress(settings.steps, _line, quiet=as_json) as watch:
                 run = Training(settings, out, watch).go()
-        except (SettingsError, WeightsError) as error:
+        except (SettingsError, WeightsError, SessionError) as error:
             fail(str(error))
     if as_json:
         print_json(_facts(run, settings))
@@ -140,4 +149,5 @@ def _command(settings: TrainingSettings, out: Path) -> str:
     words = ["dorothie-gym", "train-rl", settings.algorithm, "--env", settings.env, "--out", str(out)]
     for name, value in settings.env_settings.items():
         words += ["--set", f"{name}={value}"]
-    return shlex.join([*words, *options_of(settings)])
+    warm = [] if settings.warm_start is None else ["--warm-start", settings.warm_start]
+    return shlex.join([*words, *options_of(settings), *warm])

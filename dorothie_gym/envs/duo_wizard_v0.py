@@ -95,9 +95,7 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
         self.town = town if isinstance(town, Town) else load_town(town)
         self.template = load_template(storyboard) if isinstance(storyboard, str | Path) else storyboard
         self.max_cycles = max_cycles
-        self.limits = SpaceLimits().grown_for(
-            lanes=len(self.town.lanes), junctions=len(self.town.junctions), streets=len(self.town.streets)
-        )
+        self.limits = SpaceLimits.for_town(self.town)
         self.possible_agents = [str(role) for role in AGENT_ROLES]
         self.agents: list[str] = []
         self.observation_spaces = {

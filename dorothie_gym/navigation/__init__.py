@@ -6,6 +6,7 @@ from dorothie_gym.navigation.navigation_continuous_v0 import NavigationContinuou
 from dorothie_gym.navigation.navigation_v0 import NavigationEnv
 from dorothie_gym.navigation.observations import FIELDS, layout
 from dorothie_gym.navigation.pedals import PEDAL_FIELDS
+from dorothie_gym.navigation.player import NavigationPlayer
 
 __all__ = [
     "FIELDS",
@@ -17,6 +18,7 @@ __all__ = [
     "NavigationConfig",
     "NavigationContinuousEnv",
     "NavigationEnv",
+    "NavigationPlayer",
     "NavigationWeights",
     "layout",
 ]

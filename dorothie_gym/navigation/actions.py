@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dorothie_gym.envs.prospect import Prospect
 from dorothie_gym.navigation.ways import SECTORS, Ways
 from dorothie_gym.ontology import PhysicalAction
-from dorothie_gym.spaces import Physical
+from dorothie_gym.spaces import Motion, Observation, Physical
 from dorothie_gym.world.car.driver import MAX_CRUISE, MIN_CRUISE
 from dorothie_gym.world.town import LinkType
 from dorothie_gym.world.world import World
@@ -77,8 +77,40 @@ _UNDER_WAY = {
 """Manoeuvres, and what `LocalPlanner.manoeuvre` is while they are prepared or driven."""
 
 
+def physical_of(action: NavigationAction, seen: Observation, ways: Ways) -> Physical | None:
+    """What the Co-Wizard does for an action; None for nothing.
+
+    A U-turn or lane switch that is being prepared just goes on: asked for again, the car would put it off.
+    A turn into a sector without a way on is a turn with the sector's angle: the car refuses it, or takes the way
+    that fits best.
+
+    Args:
+        action: what was chosen.
+        seen: what the Co-Wizard observes.
+        ways: ways on at the town's junctions.
+    """
+    if action is NavigationAction.NOTHING or prepares(action, seen):
+        return None
+    if action is NavigationAction.LIGHTS:
+        return Physical(action=PhysicalAction.LIGHT_CHANGE, up=not seen["lights"])
+    sector = action.sector
+    if sector is None:
+        return _PLAIN[action]
+    choice = ways.choice_ahead(seen)
+    way = ways.after(choice)[sector] if choice is not None else None
+    return Physical(action=PhysicalAction.J_TURN, angle=way.angle if way is not None else SECTORS[sector])
+
+
+def prepares(action: NavigationAction, seen: Observation) -> bool:
+    """Whether an action is what the car is about to do anyway."""
+    manoeuvre = _UNDER_WAY.get(action)
+    if manoeuvre is None or int(seen["motion"]) == Motion.STOPPED:
+        return False
+    return manoeuvre == (int(seen["manoeuvre"]), int(seen["manoeuvre_angle"][0]))
+
+
 class Controls:
-    """Reads actions and tells which would be carried out, for the car of a session.
+    """Tells which actions would be carried out, for the car of a session.
 
     Attributes:
         ways: ways on at the town's junctions.
@@ -94,31 +126,8 @@ class Controls:
         options = self._prospect.options()
         return (options.lane, options.distance) if options.exits else None
 
-    def read(self, action: NavigationAction) -> Physical | None:
-        """What the Co-Wizard does; None for nothing.
-
-        A U-turn or lane switch that is being prepared just goes on: asked for again, the car would put it off.
-        A turn into a sector without a way on is a turn with the sector's angle: the car refuses it, or takes the way
-        that fits best.
-        """
-        if action is NavigationAction.NOTHING or self._prepares(action):
-            return None
-        if action is NavigationAction.LIGHTS:
-            return Physical(action=PhysicalAction.LIGHT_CHANGE, up=not self._world.lights)
-        sector = action.sector
-        if sector is None:
-            return _PLAIN[action]
-        choice = self.choice
-        way = self.ways.after(choice[0])[sector] if choice is not None else None
-        return Physical(action=PhysicalAction.J_TURN, angle=way.angle if way is not None else SECTORS[sector])
-
-    def _prepares(self, action: NavigationAction) -> bool:
-        """Whether an action is what the car is about to do anyway."""
-        planner = self._world.planner
-        return not planner.held and _UNDER_WAY.get(action) == planner.manoeuvre
-
-    def mask(self) -> NDArray[np.int8]:
-        """Which actions make a difference now (18,): 1 for those that do."""
+    def mask(self, seen: Observation) -> NDArray[np.int8]:
+        """Which actions make a difference now (18,): 1 for those that do; `seen` is what the Co-Wizard observes."""
         world, planner = self._world, self._world.planner
         speed, cruise = float(world.car.speed), world.driver.cruise
         mask = np.zeros(len(ACTIONS), dtype=np.int8)
@@ -133,7 +142,7 @@ class Controls:
             leaves = planner.held or planner.manoeuvre[0] is not None
             mask[NavigationAction.LANE_FOLLOW] = leaves and not committed
             for action in _UNDER_WAY:
-                mask[action] &= not self._prepares(action)
+                mask[action] &= not prepares(action, seen)
         choice = None if committed else self.choice
         if choice is not None:
             planned = None if planner.held else planner.turn_ahead

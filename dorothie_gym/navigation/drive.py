@@ -29,7 +29,6 @@ from dorothie_gym.spaces import (
 )
 from dorothie_gym.spaces import Place as Mark
 from dorothie_gym.tasks import StoryboardTemplate
-from dorothie_gym.world.config import FRAME_COLUMNS, FRAME_RATE
 from dorothie_gym.world.network.network import TownNetwork
 from dorothie_gym.world.reports import INFRACTION_KINDS, WorldEventKind
 from dorothie_gym.world.town import Town
@@ -41,7 +40,6 @@ NEARER = 1.0
 OFF_ROAD = 15.0
 """A car that is farther from its path than this has left the road for good [m]."""
 
-_SPEED = FRAME_COLUMNS.index("speed")
 _RULES = tuple(kind.value for kind in INFRACTION_KINDS if kind is not WorldEventKind.COLLISION)
 _SILENCE, _INTACT = ParticipantAction(), AdWizardAction()
 
@@ -105,9 +103,7 @@ class Drive:
             scenario = draw_scenario(town, template, seed)
         elif not isinstance(scenario, Scenario):
             raise ValueError(f"option 'scenario' is a {type(scenario).__name__}; it must be a Scenario")
-        limits = SpaceLimits().grown_for(
-            lanes=len(town.lanes), junctions=len(town.junctions), streets=len(town.streets)
-        )
+        limits = SpaceLimits.for_town(town)
         return cls(Stage(town, network, scenario, config.session, limits), config, Ways(town))
 
     # --- a decision -------------------------------------------------------------------------------------------------
@@ -122,9 +118,8 @@ class Drive:
             action = replace(action, mental=self._notes.pop(0))
         reached = self._count_reached()
         self.stage.play({Role.PARTICIPANT: _SILENCE, Role.CO_WIZARD: action, Role.AD_WIZARD: self.interfere()})
-        self.seen = self.stage.observations()
-        driven = float(self.stage.world.frames[:, _SPEED].sum()) / FRAME_RATE
-        self.heard = replace(self.heard, driven=self.heard.driven + driven)
+        before, self.seen = self.seen, self.stage.observations()
+        self.heard = self.heard.driven_on(before[Role.CO_WIZARD], self.seen[Role.CO_WIZARD])
         progress = self._progress()
         self._listen()
         self._left = self._way_left()
@@ -132,9 +127,9 @@ class Drive:
         self._end()
         self._reward(progress, self._count_reached() - reached, action.physical is not None)
 
-    def observe(self, choice: int | None) -> Vector:
-        """What the driver observes; `choice` is the lane at whose end it has to choose a way."""
-        return self._viewpoint.observe(self.seen[Role.CO_WIZARD], self.heard, choice, self.instructor.blocked)
+    def observe(self) -> Vector:
+        """What the driver observes."""
+        return self._viewpoint.observe(self.seen[Role.CO_WIZARD], self.heard, self.instructor.blocked)
 
     def info(self) -> dict[str, Any]:
         """What else the driver is told; everything in it is the taker's own."""

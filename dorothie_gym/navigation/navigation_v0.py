@@ -10,10 +10,11 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from dorothie_gym.navigation.actions import ACTIONS, Controls, NavigationAction
+from dorothie_gym.navigation.actions import ACTIONS, Controls, NavigationAction, physical_of
 from dorothie_gym.navigation.config import Guidance, NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.navigation.drive_env import DriveEnv, Info
 from dorothie_gym.navigation.observations import Vector, navigation_space
+from dorothie_gym.ontology import Role
 from dorothie_gym.spaces import CoWizardAction
 from dorothie_gym.tasks import StoryboardTemplate
 from dorothie_gym.world.town import Town
@@ -105,11 +106,11 @@ class NavigationEnv(DriveEnv[np.int64]):
             ValueError: the action is none of `NavigationAction`.
             gymnasium.error.ResetNeeded: no session is being played, or it is over.
         """
-        drive, controls = self.drive, self._controls
-        assert controls is not None
+        drive = self.drive
         if not 0 <= int(action) < len(ACTIONS):
             raise ValueError(f"action is {action}; it must be in 0..{len(ACTIONS) - 1}, see NavigationAction")
-        drive.play(CoWizardAction(physical=controls.read(NavigationAction(int(action)))))
+        physical = physical_of(NavigationAction(int(action)), drive.seen[Role.CO_WIZARD], drive.ways)
+        drive.play(CoWizardAction(physical=physical))
         if self.render_mode == "human":
             self.render()
         return self._observe(), drive.reward, drive.terminated, drive.truncated, self._info()
@@ -120,9 +121,8 @@ class NavigationEnv(DriveEnv[np.int64]):
 
     def _observe(self) -> Vector:
         assert self._controls is not None
-        choice = self._controls.choice
-        self._mask = self._controls.mask()
-        return self.drive.observe(None if choice is None else choice[0])
+        self._mask = self._controls.mask(self.drive.seen[Role.CO_WIZARD])
+        return self.drive.observe()
 
     def _info(self) -> Info:
         return {"action_mask": self._mask.copy(), **self.drive.info()}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TypeAlias
 
@@ -118,9 +118,14 @@ class Heard:
     driven: float = 0.0
     goal: Place | None = None
 
+    def driven_on(self, before: Observation, now: Observation) -> Heard:
+        """The same after a decision; how far the car has come in it follows from its speeds before and after it."""
+        seconds = float(now["time"][0] - before["time"][0])
+        return replace(self, driven=self.driven + seconds * float(before["speed"][0] + now["speed"][0]) / 2.0)
+
 
 class Viewpoint:
-    """Makes observations for a driver in a town.
+    """Makes observations for a driver in a town, be it in `NavigationEnv` or in `DuoWizardEnv`.
 
     Everything follows from the Co-Wizard's observation in `DuoWizardEnv`, from the map, and from what was said: what
     the Co-Wizard does not know is nowhere in it.
@@ -131,19 +136,19 @@ class Viewpoint:
         self._oncoming = oncoming_lanes(town)
         self._way_left = WayLeft(town)
 
-    def observe(self, seen: Observation, heard: Heard, choice: int | None, blocked: tuple[Place, ...]) -> Vector:
+    def observe(self, seen: Observation, heard: Heard, blocked: tuple[Place, ...]) -> Vector:
         """The observation.
 
         Args:
             seen: what the Co-Wizard observes.
             heard: what it remembers.
-            choice: the lane at whose end it has to choose a way, or None.
-            blocked: roadblocks that the participant pointed out.
+            blocked: roadblocks that it knows of.
 
         Returns:
             Numbers (n,) of `navigation_space`.
         """
         lane, station = int(seen["lane"]), float(seen["station"][0])
+        choice = self._ways.choice_ahead(seen)
         ways = self._ways.after(choice) if choice is not None else (None,) * len(SECTORS)
         self._way_left.aim(heard.goal, blocked if heard.goal is not None else ())
         values = [

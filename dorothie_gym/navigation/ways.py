@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dorothie_gym.policies.journey import lanes_beside
+from dorothie_gym.policies.journey import is_choice, lanes_beside, next_choice
+from dorothie_gym.spaces import ExitColumn, Observation
 from dorothie_gym.world.town import Exit, Town
 from dorothie_gym.world.town.model import wrap_degrees
 
@@ -37,11 +38,15 @@ class Ways:
 
     Every way has one of the eight `SECTORS`: the one closest to its angle, or where that is taken by another way that
     fits it better, one beside it. Lanes of one direction share their ways, so that a sector means the same on all.
+
+    Attributes:
+        town: the map.
     """
 
     def __init__(self, town: Town) -> None:
-        self._town = town
+        self.town = town
         self._found: dict[int, tuple[Way | None, ...]] = {}
+        self._lanes = _lanes_by_exits(town)
 
     def after(self, lane: int) -> tuple[Way | None, ...]:
         """Ways on behind a lane (8,), by sector."""
@@ -49,6 +54,24 @@ class Ways:
         if found is None:
             found = self._found[lane] = self._find(lane)
         return found
+
+    def choice_ahead(self, seen: Observation) -> int | None:
+        """The lane at whose end the Co-Wizard has to choose a way; None where it comes to no junction with a choice.
+
+        Its turn options tell it, wherever the Co-Wizard believes to be; only where several lanes have the same ones,
+        or where there are more than are observed, its place decides.
+        """
+        rows = seen["exits"]
+        rows = rows[rows[:, ExitColumn.PRESENT] > 0.0]
+        if not len(rows):
+            return None
+        lanes = self._lanes.get(tuple((int(row[ExitColumn.LANE]), int(row[ExitColumn.ANGLE])) for row in rows), ())
+        if len(lanes) == 1:
+            return lanes[0]
+        believed = next_choice(self.town, int(seen["lane"]), float(seen["station"][0]))
+        if believed is not None and (not lanes or believed.lane in lanes):
+            return believed.lane
+        return next(iter(lanes), None)
 
     def sector_of(self, lane: int, connector: int) -> int | None:
         """Sector of the way that a connector at the end of a lane takes, or None if it is no way on from there."""
@@ -59,10 +82,10 @@ class Ways:
 
     def _find(self, lane: int) -> tuple[Way | None, ...]:
         roads: dict[int, list[tuple[int, Exit]]] = {}
-        for source in sorted((lane, *lanes_beside(self._town, lane))):
-            for way in self._town.exits(source):
+        for source in sorted((lane, *lanes_beside(self.town, lane))):
+            for way in self.town.exits(source):
                 if way.junction_id >= 0:
-                    roads.setdefault(self._town.lanes[way.lane].road_id, []).append((source, way))
+                    roads.setdefault(self.town.lanes[way.lane].road_id, []).append((source, way))
         sectors = _assign({road: ways[0][1].angle for road, ways in roads.items()})
         table: list[Way | None] = [None] * len(SECTORS)
         for road, sector in sectors.items():
@@ -77,6 +100,15 @@ class Ways:
 def nearest_sector(angle: float) -> int:
     """Number of the sector whose middle is closest to an angle [degrees, positive left]."""
     return round((angle + 180.0) / SECTOR) % len(SECTORS)
+
+
+def _lanes_by_exits(town: Town) -> dict[tuple[tuple[int, int], ...], list[int]]:
+    """Lanes that end at a junction with a choice, by their exits: the lanes that those lead to, and their angles."""
+    found: dict[tuple[tuple[int, int], ...], list[int]] = {}
+    for lane in town.lanes:
+        if is_choice(town, lane.id) and not lane.in_junction:
+            found.setdefault(tuple((way.lane, way.angle) for way in town.exits(lane.id)), []).append(lane.id)
+    return found
 
 
 def _assign(angles: dict[int, int]) -> dict[int, int]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from dorothie_gym.envs.compact import expand, idle_actions
 from dorothie_gym.envs.config import EnvConfig, RewardWeights
@@ -13,9 +13,16 @@ from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.recorder import SessionRecorder
 from dorothie_gym.envs.scenario import Scenario, draw_scenario
 from dorothie_gym.sessions import Session, SessionError, SessionHeader, SessionWriter
+from dorothie_gym.spaces import ActionDict, Observation
 from dorothie_gym.tasks import StoryboardTemplate, load_template, template_names
 from dorothie_gym.world.config import WorldConfig
 from dorothie_gym.world.town import Town
+
+Observations: TypeAlias = Mapping[str, Observation]
+"""What each role observes."""
+
+Actions: TypeAlias = Mapping[str, ActionDict]
+"""What each role does."""
 
 
 def resimulate(session: Session, town: Town, *, storyboard: StoryboardTemplate | None = None) -> Session:
@@ -33,22 +40,50 @@ def resimulate(session: Session, town: Town, *, storyboard: StoryboardTemplate |
         SessionError: what the roles decided is not known, or the seed gives another session in this town, or an action
             cannot be taken.
     """
+    env, observations = _begin(session, town, storyboard)
+    with tempfile.TemporaryDirectory(prefix="dorothie_gym-") as folder:
+        with SessionWriter(Path(folder) / "again", env.session_header()) as writer:
+            recorder = SessionRecorder(env, writer)
+            for _, actions in _play(env, session, observations):
+                recorder.record(actions)
+            if not env.agents:
+                writer.finish(env.summary())
+        return Session.load(Path(folder) / "again")
+
+
+def watch_session(
+    session: Session, town: Town, *, storyboard: StoryboardTemplate | None = None
+) -> Iterator[tuple[Observations, Actions]]:
+    """Plays a session again, and yields what the roles observed at each decision with what they did.
+
+    Args:
+        session: one that this package has recorded.
+        town: the town that it was played in.
+        storyboard: its storyboard's template, where that is none of those that are shipped.
+
+    Raises:
+        SessionError: see `resimulate`.
+    """
+    env, observations = _begin(session, town, storyboard)
+    yield from _play(env, session, observations)
+
+
+def _begin(
+    session: Session, town: Town, storyboard: StoryboardTemplate | None
+) -> tuple[DuoWizardEnv, Observations]:  # fmt: skip
+    """The environment as the session began, and what was observed then."""
     if session.decisions is None:
         raise SessionError(f"{session.name}: what the roles decided was not recorded; it cannot be played again")
     if session.header.seed is None:
         raise SessionError(f"{session.name}: has no seed; it cannot be played again")
     config = _config(session.header)
     env = DuoWizardEnv(town, config=config, max_cycles=_cycles(session, config))
-    env.reset(options={"scenario": _scenario(session, town, storyboard)})
-    with tempfile.TemporaryDirectory(prefix="dorothie_gym-") as folder:
-        with SessionWriter(Path(folder) / "again", env.session_header()) as writer:
-            _play(env, session, SessionRecorder(env, writer))
-            if not env.agents:
-                writer.finish(env.summary())
-        return Session.load(Path(folder) / "again")
+    observations, _ = env.reset(options={"scenario": _scenario(session, town, storyboard)})
+    return env, observations
 
 
-def _play(env: DuoWizardEnv, session: Session, recorder: SessionRecorder) -> None:
+def _play(env: DuoWizardEnv, session: Session, observations: Observations) -> Iterator[tuple[Observations, Actions]]:
+    """Yields, after each decision, what was observed before it and what was done."""
     decided = {decision.frame: decision for decision in session.decisions or ()}
     idle = idle_actions(env.limits)
     last = int(session.trajectory["frame"][-1]) if len(session.trajectory) else 0
@@ -56,11 +91,12 @@ def _play(env: DuoWizardEnv, session: Session, recorder: SessionRecorder) -> Non
     while env.agents and world.frame < last:
         decision = decided.get(world.frame)
         actions = idle if decision is None else expand(decision, env.limits)
+        before = observations
         try:
-            env.step(actions)
+            observations, *_ = env.step(actions)
         except ValueError as error:
             raise SessionError(f"{session.name}: decision at frame {world.frame}: {error}") from None
-        recorder.record(actions)
+        yield before, actions
 
 
 def _cycles(session: Session, config: EnvConfig) -> int | None:

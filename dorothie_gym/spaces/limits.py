@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import string
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+
+from dorothie_gym.world.town import Town
 
 TEXT_CHARACTERS = string.ascii_letters + string.digits + string.punctuation + " \n"
 """What utterances, messages and stories may be written with."""
@@ -46,11 +48,11 @@ class SpaceLimits:
             if value < 1:
                 raise ValueError(f"SpaceLimits.{name} is {value}; it must be at least 1")
 
-    def grown_for(self, *, lanes: int, junctions: int, streets: int) -> SpaceLimits:
-        """The same limits, larger where a town needs it."""
-        return replace(
-            self,
-            lanes=max(self.lanes, lanes),
-            junctions=max(self.junctions, junctions),
-            streets=max(self.streets, streets),
+    @classmethod
+    def for_town(cls, town: Town) -> SpaceLimits:
+        """The defaults, larger where a town needs it."""
+        return cls(
+            lanes=max(cls.lanes, len(town.lanes)),
+            junctions=max(cls.junctions, len(town.junctions)),
+            streets=max(cls.streets, len(town.streets)),
         )

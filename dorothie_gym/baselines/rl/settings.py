@@ -18,6 +18,12 @@ ALGORITHMS: Mapping[str, tuple[str, str]] = {
 }
 """Algorithms by name: the package and the class."""
 
+CLONING = ("ppo", "maskable_ppo", "a2c")
+"""Algorithms whose policies can begin with what the Co-Wizards of a corpus did."""
+
+NAVIGATION = "dorothie_gym/Navigation-v0"
+"""Id of the environment whose drivers can play the Co-Wizard."""
+
 DEFAULT = "default"
 """Entry of a data file for environments that have none of their own."""
 
@@ -45,6 +51,7 @@ class TrainingSettings:
         episodes: of an evaluation.
         network: widths of the hidden layers.
         parameters: of the algorithm, as stable-baselines3 names them; see `FINAL_RATE`.
+        warm_start: folder of a corpus whose Co-Wizards' driving is learned first; None for nothing.
     """
 
     algorithm: str
@@ -58,6 +65,7 @@ class TrainingSettings:
     episodes: int = 50
     network: tuple[int, ...] = (64, 64)
     parameters: Mapping[str, Any] = field(default_factory=dict)
+    warm_start: str | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "network", tuple(self.network))
@@ -68,8 +76,18 @@ class TrainingSettings:
                 raise SettingsError(f"{name} is {getattr(self, name)!r}; it must be a whole number of at least 1")
         if not 0 <= self.workers <= self.environments:
             raise SettingsError(f"workers is {self.workers}; it must be in 0..{self.environments}, the environments")
+        if self.warm_start is not None and (self.algorithm not in CLONING or self.env != NAVIGATION):
+            raise SettingsError(
+                f"warm_start: {self.algorithm} on {self.env} cannot learn from a corpus; {', '.join(CLONING)} "
+                f"on {NAVIGATION} can"
+            )
         if not 0 <= self.seed < 2**31:
             raise SettingsError(f"seed is {self.seed}; it must be in 0..{2**31 - 1}")
+
+    @property
+    def masked(self) -> bool:
+        """Whether the algorithm keeps to the mask of actions."""
+        return self.algorithm == "maskable_ppo"
 
     def as_json(self) -> dict[str, Any]:
         """The settings in JSON types; `TrainingSettings(**...)` reads them back."""

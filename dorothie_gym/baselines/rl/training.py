@@ -14,14 +14,18 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
+from dorothie_gym.baselines.rl.cloning import Cloned, CriticFirst, clone, read_lessons
 from dorothie_gym.baselines.rl.curve import draw_curve
 from dorothie_gym.baselines.rl.environments import Maker, make_vector
 from dorothie_gym.baselines.rl.evaluating import SEEDS_FROM, Outcome, act_with, evaluate_policy
 from dorothie_gym.baselines.rl.settings import SettingsError, TrainingSettings
 from dorothie_gym.baselines.rl.weights import DESCRIPTION, make_model, read_description, restore, save_model
+from dorothie_gym.navigation import NavigationConfig
+from dorothie_gym.sessions import Fold
 
-PROGRESS, CURVE, BEST = "progress.jsonl", "curve.png", "best"
-"""Files of a run beside its model: a line for each evaluation, their picture, and a folder with the best model."""
+PROGRESS, CURVE, BEST, CLONED = "progress.jsonl", "curve.png", "best", "cloned.json"
+"""Files of a run beside its model: a line for each evaluation, their picture, a folder with the best model, and what
+came of cloning."""
 
 LIVE = ("steps", "evaluate_every", "episodes", "workers")
 """Settings in which a run that goes on may differ from how it began."""
@@ -83,12 +87,14 @@ class Training:
 
         Raises:
             SettingsError: the folder has a run with other settings, or nothing can be trained with these.
+            SessionError: the corpus of the warm start cannot be read or played again.
             WeightsError: the run in the folder is damaged.
         """
         self.settings, self.folder = settings, folder
         self._watch = watch or (lambda done, total, row: None)
         self.rows: list[Row] = []
         self.seconds = 0.0
+        self.cloned: Cloned | None = None
         begun = (folder / DESCRIPTION).is_file()
         if begun:
             check_same(settings, TrainingSettings(**read_description(folder)["settings"]), folder)
@@ -102,6 +108,8 @@ class Training:
             if begun:
                 restore(self.model, folder)
                 self.seconds = float(read_description(folder)["seconds"])
+            elif settings.warm_start is not None:
+                self._learn_from(Path(settings.warm_start))
         except Exception:
             self._vector.close()
             raise
@@ -116,10 +124,13 @@ class Training:
         left = settings.steps - int(model.num_timesteps)
         finished = left <= 0
         try:
+            if self.cloned is not None:
+                self.evaluate()
             if left > 0:
-                model.learn(
-                    left, callback=_Evaluations(self), reset_num_timesteps=False, log_interval=_log_interval(model)
-                )
+                callbacks: list[BaseCallback] = [_Evaluations(self)]
+                if settings.warm_start is not None:
+                    callbacks.append(CriticFirst())
+                model.learn(left, callback=callbacks, reset_num_timesteps=False, log_interval=_log_interval(model))
                 finished = True
         except KeyboardInterrupt:
             finished = False
@@ -133,10 +144,21 @@ class Training:
             finished=finished,
         )  # fmt: skip
 
+    def _learn_from(self, corpus: Path) -> None:
+        """Begins with what the Co-Wizards of a corpus did."""
+        since = time.perf_counter()
+        config = NavigationConfig(
+            max_seconds=self.settings.env_settings.get("max_seconds", NavigationConfig.max_seconds)
+        )
+        shown, held_out = (read_lessons(corpus, fold, config) for fold in (Fold.TRAIN, Fold.VAL))
+        self.cloned = clone(self.model, shown, held_out, self.settings.seed)
+        self.seconds += time.perf_counter() - since
+        (self.folder / CLONED).write_text(json.dumps(asdict(self.cloned), indent=1) + "\n", encoding="utf-8")
+
     def evaluate(self) -> None:
         """Plays the evaluation's episodes, and saves the model with what came of them."""
         settings = self.settings
-        act = act_with(self.model, masked=settings.algorithm == "maskable_ppo")
+        act = act_with(self.model, masked=settings.masked)
         outcome = evaluate_policy(Maker(settings.env, settings.env_settings), act, settings.episodes, SEEDS_FROM)
         row = Row(steps=int(self.model.num_timesteps), seconds=round(self.seconds, 2), outcome=outcome)
         best = Run(folder=self.folder, rows=tuple(self.rows), steps=0, seconds=0.0, finished=False).best

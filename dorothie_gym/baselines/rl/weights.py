@@ -15,6 +15,7 @@ import torch
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 
+from dorothie_gym.baselines.drivers import KIND
 from dorothie_gym.baselines.rl.environments import make_env
 from dorothie_gym.baselines.rl.settings import ALGORITHMS, FINAL_RATE, SettingsError, TrainingSettings
 
@@ -92,6 +93,7 @@ def save_model(
     tensors |= {f"variables/{name}": value for name, value in _variables(model)}
     description = {
         "format": FORMAT,
+        "kind": KIND,
         **(more or {}),
         "settings": settings.as_json(),
         "steps": int(model.num_timesteps),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from dorothie_gym.policies.co_wizard.obstacles import watch_road
 from dorothie_gym.policies.co_wizard.talking import scene_of, speak_up, tell_action
 from dorothie_gym.policies.policy import Policy
 from dorothie_gym.policies.speech import Voice
-from dorothie_gym.spaces import ActionDict, CoWizardAction, Mental, Motion, SpaceLimits
+from dorothie_gym.spaces import ActionDict, CoWizardAction, Mental, Motion, Physical, SpaceLimits
 from dorothie_gym.world.town import Town
 
 ASTRAY = 2
@@ -61,23 +61,53 @@ class ScriptedCoWizard(Policy[CoWizardMind]):
 
     def step(self, observation: Mapping[str, Any], state: CoWizardMind) -> tuple[ActionDict, CoWizardMind]:
         """Listens, looks, drives, and says something or nothing."""
-        mind = copy(state)
-        mind.count += 1
-        rng = np.random.default_rng((mind.seed, mind.count))
-        view = View.read(observation, mind.town)
-        _notice(mind, view)
-        listen(mind, view, rng)
-        watch_road(mind, view, rng)
-        rest(mind, view, rng)
+        attention = attend(observation, state)
+        mind, view = attention.mind, attention.view
+        rest(mind, view, attention.rng)
         see_green(mind, view)
-        search_on(mind, view)
-        creep(mind, view)
-        physical = drive(mind, view)
-        tell_action(mind, view, physical, rng)
-        speak_up(mind, view, rng)
-        scene = None if mind.voice.idle else scene_of(mind, view)
-        speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng, scene)
-        return CoWizardAction(speech=speech, physical=physical, mental=_next_note(mind)).encode(self.limits), mind
+        return respond(attention, drive(mind, view)).encode(self.limits), mind
+
+
+class Attention(NamedTuple):
+    """A decision in progress: the mind, which is brought up to date, what is seen, and chance."""
+
+    mind: CoWizardMind
+    view: View
+    rng: np.random.Generator
+
+
+def attend(observation: Mapping[str, Any], state: CoWizardMind) -> Attention:
+    """Listens and looks: the first part of a decision, before anything is done or said.
+
+    Args:
+        observation: of the Co-Wizard.
+        state: its mind; it is left as it is.
+    """
+    mind = copy(state)
+    mind.count += 1
+    rng = np.random.default_rng((mind.seed, mind.count))
+    view = View.read(observation, mind.town)
+    _notice(mind, view)
+    listen(mind, view, rng)
+    watch_road(mind, view, rng)
+    search_on(mind, view)
+    creep(mind, view)
+    return Attention(mind, view, rng)
+
+
+def respond(attention: Attention, physical: Physical | None) -> CoWizardAction:
+    """Says something or nothing, and notes what is believed: the last part of a decision.
+
+    Args:
+        attention: of `attend`.
+        physical: what the car does.
+    """
+    mind, view, rng = attention
+    tell_action(mind, view, physical, rng)
+    speak_up(mind, view, rng)
+    scene = None if mind.voice.idle else scene_of(mind, view)
+    speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng, scene)
+    return CoWizardAction(speech=speech, physical=physical, mental=_next_note(mind))
 
 
 def _notice(mind: CoWizardMind, view: View) -> None:

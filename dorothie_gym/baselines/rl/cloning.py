@@ -1,0 +1,184 @@
+"""Behaviour cloning: a policy learns what the Co-Wizards of a corpus did, before it learns by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3.common.callbacks import BaseCallback
+
+from dorothie_gym.navigation import NavigationAction, NavigationConfig
+from dorothie_gym.navigation.apprentice import Apprentice, Lesson
+from dorothie_gym.ontology import Role
+from dorothie_gym.rollout import watch_session
+from dorothie_gym.sessions import Corpus, Session, SessionError
+from dorothie_gym.sessions.sdn.maps import find_town
+from dorothie_gym.spaces import CoWizardAction, SpaceLimits
+from dorothie_gym.world.town import Town
+
+LEARNING_RATE, BATCH = 1e-3, 64
+MOST_EPOCHS, PATIENCE = 60, 5
+"""It ends after so many passes, or when the held-out sessions have got no likelier for so many [passes]."""
+
+
+CRITIC_ALONE = 20_000
+"""So many steps the critic learns what a cloned actor is worth before that changes: else it would be led astray."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lessons:
+    """Decisions of Co-Wizards.
+
+    Attributes:
+        observations: what a driver observed at each (n, 161), float32.
+        masks: which actions were likely to be carried out (n, 18), bool.
+        actions: what was done (n,), int64.
+    """
+
+    observations: torch.Tensor
+    masks: torch.Tensor
+    actions: torch.Tensor
+
+    @classmethod
+    def of(cls, lessons: Iterable[Lesson]) -> Lessons:
+        """Stacks single decisions, at least one."""
+        observations, masks, actions = zip(*lessons, strict=True)
+        return cls(
+            torch.from_numpy(np.stack(observations)), torch.from_numpy(np.stack(masks)), torch.tensor(actions)
+        )  # fmt: skip
+
+    def __len__(self) -> int:
+        """How many."""
+        return len(self.actions)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cloned:
+    """What came of cloning.
+
+    Attributes:
+        lessons: decisions learned from.
+        epochs: passes over them.
+        losses: mean negative log-likelihood of the held-out decisions, before and after [nats].
+        agreement: share of the held-out decisions at which the policy's best action is what was done.
+        majority: the same of a policy that always does what is most often done.
+        deeds: as `agreement`, of those in which something was done.
+    """
+
+    lessons: int
+    epochs: int
+    losses: tuple[float, float]
+    agreement: float
+    majority: float
+    deeds: float
+
+
+def read_lessons(corpus: Path, fold: str, config: NavigationConfig | None = None) -> Lessons:
+    """Plays the sessions of a fold again, and watches.
+
+    Args:
+        corpus: its folder.
+        fold: of `Fold`.
+        config: with which the driver is to learn afterwards.
+
+    Raises:
+        SessionError: the corpus cannot be read or played again, or has nothing in the fold.
+    """
+    found: list[Lesson] = []
+    towns: dict[str, Town] = {}
+    for entry in Corpus.load(corpus).filter(fold=fold).entries:
+        session = entry.load()
+        name = session.header.town
+        town = towns.get(name) or find_town(name, entry.maps)
+        if town is None:
+            raise SessionError(f"{session.name}: there is no map of {name}; it cannot be played again")
+        towns[name] = town
+        found += lessons_of(session, town, config)
+    if not found:
+        raise SessionError(f"{corpus}: fold {fold!r} has no decision to learn from")
+    return Lessons.of(found)
+
+
+def lessons_of(session: Session, town: Town, config: NavigationConfig | None = None) -> list[Lesson]:
+    """What there is to learn from a session."""
+    apprentice, limits = Apprentice(town, config), SpaceLimits.for_town(town)
+    role = str(Role.CO_WIZARD)
+    watched = (
+        apprentice.watch(seen[role], CoWizardAction.decode(done[role], limits))
+        for seen, done in watch_session(session, town)
+    )
+    return [lesson for lesson in watched if lesson is not None]
+
+
+def clone(model: Any, shown: Lessons, held_out: Lessons, seed: int) -> Cloned:
+    """Makes what was done likely; of all passes, that is kept after which the held-out decisions are likeliest.
+
+    Args:
+        model: of stable-baselines3, PPO, MaskablePPO or A2C; its actor learns, its critic does not.
+        shown: what it learns from.
+        held_out: decisions of other sessions.
+        seed: of the order.
+    """
+    policy, generator = model.policy, torch.Generator().manual_seed(seed)
+    optimiser = torch.optim.Adam(policy.parameters(), lr=LEARNING_RATE)
+    before = lowest = _evaluate(policy, held_out)
+    best, weights, epoch = 0, _weights(policy), 0
+    policy.set_training_mode(True)
+    while epoch < MOST_EPOCHS and epoch - best < PATIENCE:
+        epoch += 1
+        for rows in torch.split(torch.randperm(len(shown), generator=generator), BATCH):
+            optimiser.zero_grad()
+            _surprise(policy, shown, rows).backward()  # type: ignore[no-untyped-call]
+            torch.nn.utils.clip_grad_norm_(policy.parameters(), 1.0)
+            optimiser.step()
+        loss = _evaluate(policy, held_out)
+        if loss < lowest:
+            lowest, best, weights = loss, epoch, _weights(policy)
+    policy.load_state_dict(weights)
+    policy.set_training_mode(False)
+    with torch.no_grad():
+        chosen = _distribution(policy, held_out, torch.arange(len(held_out))).get_actions(deterministic=True)
+    right, deeds = chosen == held_out.actions, held_out.actions != NavigationAction.NOTHING
+    return Cloned(
+        lessons=len(shown), epochs=epoch, losses=(before, lowest), agreement=float(right.float().mean()),
+        majority=float((held_out.actions == shown.actions.mode().values).float().mean()),
+        deeds=float(right[deeds].float().mean()),
+    )  # fmt: skip
+
+
+class CriticFirst(BaseCallback):
+    """Keeps the actor as it was cloned for the first steps of a run (`CRITIC_ALONE`)."""
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        policy: Any = self.model.policy
+        for part in (policy.mlp_extractor.policy_net, policy.action_net):
+            part.requires_grad_(self.num_timesteps > CRITIC_ALONE)
+
+
+def _distribution(policy: Any, lessons: Lessons, rows: torch.Tensor) -> Any:
+    from sb3_contrib.common.maskable.policies import MaskableActorCriticPolicy
+
+    more = (lessons.masks[rows],) if isinstance(policy, MaskableActorCriticPolicy) else ()
+    return policy.get_distribution(lessons.observations[rows], *more)
+
+
+def _surprise(policy: Any, lessons: Lessons, rows: torch.Tensor) -> torch.Tensor:
+    """Mean negative log-likelihood of what was done [nats]."""
+    likely: torch.Tensor = _distribution(policy, lessons, rows).log_prob(lessons.actions[rows])
+    return -likely.mean()
+
+
+def _evaluate(policy: Any, lessons: Lessons) -> float:
+    with torch.no_grad():
+        return float(_surprise(policy, lessons, torch.arange(len(lessons))))
+
+
+def _weights(policy: Any) -> dict[str, torch.Tensor]:
+    return {name: value.clone() for name, value in policy.state_dict().items()}

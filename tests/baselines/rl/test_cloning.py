@@ -1,0 +1,71 @@
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
+pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
+
+from dorothie_gym.baselines.rl import SettingsError, Training, TrainingSettings, tuned_settings  # noqa: E402
+from dorothie_gym.baselines.rl.cloning import clone, read_lessons  # noqa: E402
+from dorothie_gym.baselines.rl.environments import make_env  # noqa: E402
+from dorothie_gym.baselines.rl.weights import make_model  # noqa: E402
+from dorothie_gym.envs.config import EnvConfig  # noqa: E402
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv  # noqa: E402
+from dorothie_gym.ontology import AGENT_ROLES  # noqa: E402
+from dorothie_gym.policies import make_policy  # noqa: E402
+from dorothie_gym.rollout import play_session  # noqa: E402
+from dorothie_gym.sessions import SessionError  # noqa: E402
+
+NAVIGATION = "dorothie_gym/Navigation-v0"
+SMALL = {"n_steps": 16, "batch_size": 32, "n_epochs": 1}
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Fourteen sessions of the scripted three, two of them held out."""
+    root = tmp_path_factory.mktemp("corpus")
+    env = DuoWizardEnv("brookside", config=EnvConfig(max_seconds=300.0))
+    policies = {role: make_policy("scripted", role, env.limits) for role in AGENT_ROLES}
+    for seed in range(14):
+        fold = "train" if seed < 12 else "val/seen"
+        play_session(env, policies, seed=seed, folder=root / fold / f"{seed:04}")
+    yield root
+
+
+def test_what_co_wizards_did_is_learned_and_holds_for_other_sessions(corpus: Path) -> None:
+    shown, held_out = read_lessons(corpus, "train"), read_lessons(corpus, "val")
+    assert shown.observations.shape == (len(shown), 161) and shown.masks.shape == (len(shown), 18)
+    settings = tuned_settings("maskable_ppo", NAVIGATION, parameters=SMALL | {"batch_size": 16})
+    cloned = clone(make_model(settings, make_env(NAVIGATION)), shown, held_out, seed=0)
+    assert cloned.losses[1] < 0.2 * cloned.losses[0]
+    assert cloned.agreement > cloned.majority
+    assert cloned.deeds > 0.25
+
+
+def test_a_run_with_a_warm_start_is_evaluated_before_it_goes_on(corpus: Path, tmp_path: Path) -> None:
+    small = tmp_path / "corpus"
+    for session in ("train/0000", "val/seen/0012"):
+        shutil.copytree(corpus / session, small / session)
+    settings = TrainingSettings(
+        algorithm="ppo", env=NAVIGATION, steps=32, environments=2, evaluate_every=32, episodes=1, network=(8,),
+        parameters=SMALL, env_settings={"max_seconds": 10.0, "traffic": "none"}, warm_start=str(small),
+    )  # fmt: skip
+    run = Training(settings, tmp_path / "run").go()
+    assert [row.steps for row in run.rows] == [0, 32]  # the first is what cloning alone is worth
+    told = json.loads((tmp_path / "run" / "cloned.json").read_text())
+    assert told["losses"][1] < told["losses"][0] and told["lessons"] > 200
+    assert Training(settings, tmp_path / "run").cloned is None  # what has been begun is not begun anew
+
+
+def test_who_cannot_learn_from_a_corpus_is_told(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="warm_start.*dqn"):
+        tuned_settings("dqn", NAVIGATION, warm_start=str(tmp_path))
+    with pytest.raises(SettingsError, match="warm_start.*CoWizard"):
+        tuned_settings("ppo", "dorothie_gym/CoWizard-v0", warm_start=str(tmp_path))
+    with pytest.raises(SessionError, match="no session"):
+        Training(tuned_settings("ppo", NAVIGATION, workers=0, warm_start=str(tmp_path)), tmp_path / "run")
