@@ -38,7 +38,12 @@ _DOWN = re.compile(
 )
 _LIGHTS = re.compile(r"\blights?\b|\bbeams?\b|\bheadlights?\b|\bheadlamps?\b|\blamps?\b")
 _ORDER = re.compile(r"\b(before|after)(?= that\b| it\b| (?:the )?#landmark| or | ,| \?|$)")
-_FURTHER = re.compile(r"\b(further|farther|a (bit|little|touch) more|keep going|some more|few more)\b")
+_FURTHER = re.compile(
+    r"\b((a|just a|a wee|another) (bit|little|touch|tad|hair|smidge|notch)(?= (more|further|farther|forward|closer|ahead|longer)\b)"
+    r"|(some|few) more|(going|go|roll|rolling|move|forward|up|ahead|on|inch|creep|more) (a|just a) (bit|little|touch|tad|hair)(?! \w+er\b)"
+    r"|(inch|edge|creep|crawl|nudge|scoot) (it )?(up|forward|ahead|along|closer)"
+    r"|(further|farther)(?! (straight|down|along|than|up|away|from)))\b"
+)
 # The first four letters of words without which the expressions above need not be tried.
 _SPEED_STEMS = frozenset(
     "spee fast hurr step floo acce quic up pick hit give move slow brak dece easi ease down drop easy redu lowe".split()
@@ -87,7 +92,7 @@ class Heard:
         speed: a speed [km/h].
         distance: a distance [m].
         here: whether it is to be on the spot.
-        further: whether the car is to go on a bit.
+        further: whether the car is to go on, but only a bit.
         affirms: True for a yes, False for a no at the beginning.
         question: whether it is put as a question with a question mark.
     """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 
 import numpy as np
@@ -40,8 +39,8 @@ from dorothie_gym.policies.hearing import HeardUtterance, heard_utterance
 from dorothie_gym.policies.scenery import street_of
 from dorothie_gym.policies.speech import remark
 
-NUDGE = 4.0
-"""How far "a bit further" is [m]."""
+NUDGE = 3.0
+"""How far "a bit further" is: less than from where a car is short of a place to where it is past it [m]."""
 
 WISH_TIME = 30.0
 """A manoeuvre that finds no place for this long is given up [s]."""
@@ -50,7 +49,6 @@ _MOVES = frozenset(
     {ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH, ActionValue.START}
 )
 _STOPS = frozenset({ActionValue.STOP, ActionValue.LANE_FOLLOW})
-_A_BIT = re.compile(r"\b(bit|little)\b")
 SLOW = 25
 """Speed in bad weather [km/h]."""
 
@@ -118,7 +116,7 @@ def _instruction(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard,
         if mind.voice.idle and rng.random() > mind.style.silent:
             mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
     elif actions:
-        if mind.arrived and _MOVES & set(actions) and not _A_BIT.search(words.text.lower()):
+        if mind.arrived and _MOVES & set(actions) and not words.further:
             doubt(mind)
         mind.proposed = None
         if _MOVES & set(actions) and not mind.exact:
@@ -190,8 +188,7 @@ def _do_turn(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> 
 
 def _do_follow(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> None:
     close = mind.halted or mind.creeping or view.standing
-    bit = words.further and _A_BIT.search(words.text.lower()) is not None
-    if close and (bit or words.distance is not None):
+    if close and (words.further or words.distance is not None):
         distance = float(words.distance) if words.distance is not None else NUDGE
         mind.nudge, mind.halted = place_ahead(mind, view, distance), False
         return

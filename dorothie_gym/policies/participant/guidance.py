@@ -12,6 +12,7 @@ from dorothie_gym.dialogue.phrases import Register
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, Slot, SlotValue, StreetName
 from dorothie_gym.policies.journey import (
     BRAKING,
+    END_ROOM,
     U_TURN_SPEED_SQUARED,
     Choice,
     Crossing,
@@ -75,8 +76,17 @@ TOO_SHORT = 4.0
 SETS_OFF, PULL = 0.6, 3.0
 """A car that gains more speed than the first has just set off, and goes on gaining as much as the second [m/s^2]."""
 
+READY = 1.6
+"""A car that has been standing for longer than this is told how to go on [s]."""
+
+SHORTER = 8.0
+"""A distance is said to be this much less than it is, for it is said in tens, and the car rolls on [m]."""
+
 INCHES_ON = 7.0
 """A car that has been told to go a bit further is left alone for this long [s]."""
+
+RUN_UP, RUN_UP_FOR_LANE = 45.0, 50.0
+"""A place is to be so far behind a U-turn that leads to it, and so much farther for each lane change between [m]."""
 
 CIRCLES = 3
 """After having the car turned round so often for a place, the participant leads it there some other way."""
@@ -148,6 +158,9 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
         return
     key, distance, words = step
     if _ease(mind, view):
+        return
+    if key[0] == "round" and _takes_a_run_up(mind, view):
+        _send_on(mind, view)
         return
     near = distance < (_turning_distance(mind, view) if key[0] == "round" else TELL_DISTANCE)
     if _left_to_ask(mind, view, key, distance, words.wording.direction is Direction.STRAIGHT, rng):
@@ -256,6 +269,31 @@ def _turning_distance(mind: ParticipantMind, view: View) -> float:
         return 1.5 * view.speed
     # what the car drives while it is being told, and while it slows down
     return 1.5 * view.speed + max(view.speed**2 - U_TURN_SPEED_SQUARED, 0.0) / (2 * BRAKING)
+
+
+def _takes_a_run_up(mind: ParticipantMind, view: View) -> bool:
+    """Whether to go on for now: a car that turned round here would be past the place before it could be stopped."""
+    assert mind.journey is not None
+    after = mind.journey.run_up()
+    if after is None or not mind.journey.turns_round_on(view.lane):
+        return False
+    if mind.journey.next_crossing(mind.town, view.station) is not None:
+        return False  # the place is not right behind the U-turn
+    rest, changes = after
+    room = mind.town.lanes[view.lane].length - view.station - _turning_distance(mind, view)
+    if rest > RUN_UP + changes * RUN_UP_FOR_LANE or room < END_ROOM + view.speed:
+        return False
+    if mind.journey.next_manoeuvre(view.station) == (Entry.U_TURN, 0.0):
+        mind.journey = mind.journey.replanned(mind.town, view.place, mind.blocked + mind.avoided)
+    return True
+
+
+def _send_on(mind: ParticipantMind, view: View) -> None:
+    """Has a car that stands drive on, to turn round later."""
+    waited = view.time - max(mind.guided_at, mind.heard_at, mind.voice.last_end)
+    if view.standing and waited > READY and view.time > mind.excused_until:
+        note_told(mind, view, ("on", view.lane, 0))
+        mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW))
 
 
 def note_told(mind: ParticipantMind, view: View, key: tuple[str, int, int]) -> None:
@@ -397,9 +435,9 @@ def _from_standing(mind: ParticipantMind, view: View, left: float) -> bool:
     if mind.standing_since is None or left > 45.0:
         return False
     waited = view.time - max(mind.standing_since, mind.nudged_at, mind.voice.last_end, mind.heard_at)
-    if waited > 6.0 if abs(left) <= WITHIN or not mind.guiding else waited > 1.6:
+    if waited > 6.0 if abs(left) <= WITHIN or not mind.guiding else waited > READY:
         mind.nudged_at = view.time
-        distance = left if left > 9.0 else None
+        distance = max(left - SHORTER, 10.0) if left > 9.0 else None
         wording = Wording(distance=distance) if distance else Wording(topic="further")
         mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording=wording))
         if left > 30.0:
