@@ -38,9 +38,10 @@ _DOWN = re.compile(
 )
 _LIGHTS = re.compile(r"\blights?\b|\bbeams?\b|\bheadlights?\b|\bheadlamps?\b|\blamps?\b")
 _ORDER = re.compile(r"\b(before|after)(?= that\b| it\b| (?:the )?#landmark| or | ,| \?|$)")
+_BIT = r"(a|just a|a wee|another) (bit|little|touch|tad|hair)"
 _FURTHER = re.compile(
-    r"\b((a|just a|a wee|another) (bit|little|touch|tad|hair|smidge|notch)(?= (more|further|farther|forward|closer|ahead|longer)\b)"
-    r"|(some|few) more|(going|go|roll|rolling|move|forward|up|ahead|on|inch|creep|more) (a|just a) (bit|little|touch|tad|hair)(?! \w+er\b)"
+    rf"\b({_BIT} (more|further|farther|forward|closer|ahead|longer)|(some|few) more"
+    rf"|(going|go|roll|rolling|move|forward|up|ahead|on|inch|creep) {_BIT}(?! \w+er\b)"
     r"|(inch|edge|creep|crawl|nudge|scoot) (it )?(up|forward|ahead|along|closer)"
     r"|(further|farther)(?! (straight|down|along|than|up|away|from)))\b"
 )

@@ -119,6 +119,8 @@ def _instruction(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard,
         if mind.arrived and _MOVES & set(actions) and not words.further:
             doubt(mind)
         mind.proposed = None
+        if _MOVES & set(actions):
+            mind.steered_at = view.time
         if _MOVES & set(actions) and not mind.exact:
             mind.journey = None  # it is guided, and need not look for the place by itself
         for action in actions:
@@ -149,7 +151,7 @@ def _told_place(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, 
             mind.voice = mind.voice.plan(remark(move, dropped, GoalStatus.ABANDONED))
     elif GoalStatus.PENDING in statuses:
         hear_later(mind, view, landmarks[0], rng)
-    elif landmarks[0] is mind.goal and mind.exact and not mind.arrived and not streets:
+    elif landmarks[0] is mind.goal and (mind.exact or mind.described) and not mind.arrived and not streets:
         mind.halted = False
         mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, landmarks[0]))
     else:

@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dorothie_gym.dialogue import Direction, SpeakerStyle, Wording, speech_seconds, word_act
-from dorothie_gym.dialogue.phrases import Register
+from dorothie_gym.dialogue import Direction, Wording, speech_seconds, word_act
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, Slot, SlotValue, StreetName
 from dorothie_gym.policies.journey import (
     BRAKING,
@@ -18,8 +17,8 @@ from dorothie_gym.policies.journey import (
     Crossing,
     find_exit,
     next_choice,
-    stopping_distance,
 )
+from dorothie_gym.policies.participant.arriving import NEAR, READY, SLOW_SPEED, WITHIN, about_to_arrive, approach
 from dorothie_gym.policies.participant.mind import ParticipantMind, View
 from dorothie_gym.policies.scenery import street_of
 from dorothie_gym.policies.speech import Remark, remark
@@ -43,17 +42,8 @@ AGAIN = 9.0
 SWITCHING = 13.0
 """The car is given this long for a lane change before the next one is told [s]."""
 
-DECISION = 0.5
-"""Time between decisions [s]."""
-
-FASTEST = 11.0
-"""The car is not expected to get faster than this [m/s]."""
-
 TAKES_OVER = 130.0
 """A car that looks for a place by itself is guided from here on [m]."""
-
-NEAR = 95.0
-"""A place is announced when it is this near [m]."""
 
 CORNER, RIGHT_BEHIND = 50.0, 55.0
 """At a junction nearer than the first, a place no further behind it than the second is easily missed [m]."""
@@ -61,44 +51,11 @@ CORNER, RIGHT_BEHIND = 50.0, 55.0
 CAREFUL = 15.0
 """Speed that the car is told to go at when it has missed a place before [km/h]."""
 
-SLOW_WITHIN = 20.0
-"""A car that has been told of the place is slow from here on [m]."""
-
-SLOW_SPEED = 5.0
-"""A car that is this slow need not be told to come up slowly [m/s]."""
-
-SOON_AT = 8.0
-"""A car that has just set off or turned will soon be this fast [m/s]."""
-
-TOO_SHORT = 4.0
-"""Who has missed a place before rather stops the car up to this much before it [m]."""
-
-SETS_OFF, PULL = 0.6, 3.0
-"""A car that gains more speed than the first has just set off, and goes on gaining as much as the second [m/s^2]."""
-
-READY = 1.6
-"""A car that has been standing for longer than this is told how to go on [s]."""
-
-SHORTER = 8.0
-"""A distance is said to be this much less than it is, for it is said in tens, and the car rolls on [m]."""
-
-INCHES_ON = 7.0
-"""A car that has been told to go a bit further is left alone for this long [s]."""
-
 RUN_UP, RUN_UP_FOR_LANE = 45.0, 50.0
 """A place is to be so far behind a U-turn that leads to it, and so much farther for each lane change between [m]."""
 
 CIRCLES = 3
 """After having the car turned round so often for a place, the participant leads it there some other way."""
-
-LATE_STOP = 1.0
-"""Who would stop the car further behind the place than this says less [m]."""
-
-LAST_STRETCH = 60.0
-"""With no junction and no manoeuvre before the place, nothing else is talked about from here on [m]."""
-
-WITHIN = 1.9
-"""A car that stands this close to the place has arrived [m]."""
 
 
 def follow_journey(mind: ParticipantMind, view: View) -> None:
@@ -151,16 +108,13 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     _stop_circling(mind, view)
     if not _may_speak(mind, view):
         return
-    if _approach(mind, view, rng) or not mind.guiding:
+    if approach(mind, view, rng) or not mind.guiding:
         return
     step = next_step(mind, view, DialogueMove.INSTRUCT, rng)
     if step is None:
         return
     key, distance, words = step
-    if _ease(mind, view):
-        return
-    if key[0] == "round" and _takes_a_run_up(mind, view):
-        _send_on(mind, view)
+    if _ease(mind, view) or (key[0] == "round" and _takes_a_run_up(mind, view)):
         return
     near = distance < (_turning_distance(mind, view) if key[0] == "round" else TELL_DISTANCE)
     if _left_to_ask(mind, view, key, distance, words.wording.direction is Direction.STRAIGHT, rng):
@@ -275,16 +229,16 @@ def _takes_a_run_up(mind: ParticipantMind, view: View) -> bool:
     """Whether to go on for now: a car that turned round here would be past the place before it could be stopped."""
     assert mind.journey is not None
     after = mind.journey.run_up()
-    if after is None or not mind.journey.turns_round_on(view.lane):
+    crosses = mind.journey.next_crossing(mind.town, view.station) is not None
+    if after is None or crosses or not mind.journey.turns_round_on(view.lane):
         return False
-    if mind.journey.next_crossing(mind.town, view.station) is not None:
-        return False  # the place is not right behind the U-turn
     rest, changes = after
     room = mind.town.lanes[view.lane].length - view.station - _turning_distance(mind, view)
     if rest > RUN_UP + changes * RUN_UP_FOR_LANE or room < END_ROOM + view.speed:
         return False
     if mind.journey.next_manoeuvre(view.station) == (Entry.U_TURN, 0.0):
         mind.journey = mind.journey.replanned(mind.town, view.place, mind.blocked + mind.avoided)
+    _send_on(mind, view)
     return True
 
 
@@ -361,85 +315,3 @@ def _ambiguous(mind: ParticipantMind, view: View, crossing: Crossing) -> bool:
     assert asked is not None
     meant = find_exit(mind.town, asked, crossing.direction)
     return meant is not None and mind.town.lanes[meant.lane].road_id != mind.town.lanes[crossing.exit.lane].road_id
-
-
-def _approach(mind: ParticipantMind, view: View, rng: np.random.Generator) -> bool:
-    """Talks the car up to the place when nothing but the last stretch is left; tells whether that is so."""
-    journey = mind.journey
-    assert journey is not None
-    if journey.next_crossing(mind.town, view.station) is not None or journey.next_manoeuvre(view.station) is not None:
-        return False
-    left = journey.left(view.station)
-    if view.standing:
-        return _from_standing(mind, view, left)
-    if not mind.guiding or view.time - mind.nudged_at < INCHES_ON:
-        return left < NEAR  # a car that is told to go on a bit stops by itself
-    if not mind.stop_text:
-        mind.stop_text = word_act(_STOP, Role.PARTICIPANT, rng, Wording(here=True), style=mind.voice.style)
-    if _room_to_stop(mind, view, left, mind.stop_text)[0] < -LATE_STOP:
-        # there is only time for a shout
-        shouts = [word_act(_STOP, Role.PARTICIPANT, rng, Wording(), style=_SHOUTING) for _ in range(3)]
-        mind.stop_text = min(*shouts, mind.stop_text, key=speech_seconds)
-    if _time_to_stop(mind, view, left):
-        if view.time - mind.stopped_at > 5.0 and left > 0.0:
-            mind.stopped_at = view.time
-            mind.voice = mind.voice.plan(Remark(act=_STOP, text=mind.stop_text, urgent=True))
-        return True
-    if not mind.announced and left < NEAR and view.speed > SLOW_SPEED and mind.goal is not None:
-        if left > 3.5 * max(view.speed, SOON_AT) + 20.0:
-            wording = Wording(distance=max(left - view.speed * 3.0, 10.0))
-            words = remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, mind.goal.name, wording=wording, urgent=True)
-            mind.announced, mind.voice = True, mind.voice.plan(words)
-        elif left > 3.0 * max(view.speed, SOON_AT) + 12.0:
-            slower = remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=Wording(faster=False), urgent=True)
-            mind.announced, mind.voice = True, mind.voice.plan(slower)
-    return left < NEAR
-
-
-_STOP = DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.STOP)
-_SHOUTING = SpeakerStyle(register=Register.BLUNT, chattiness=0.0, indirectness=0.0)
-
-
-def about_to_arrive(mind: ParticipantMind, view: View) -> bool:
-    """Whether nothing but the last stretch to the place is left."""
-    journey = mind.journey
-    if journey is None or journey.left(view.station) > LAST_STRETCH:
-        return False
-    return journey.next_crossing(mind.town, view.station) is None and journey.next_manoeuvre(view.station) is None
-
-
-def _time_to_stop(mind: ParticipantMind, view: View, left: float) -> bool:
-    """Whether the words, begun now, stop the car closer to the place than if begun at the next decision."""
-    if mind.announced and left > SLOW_WITHIN:
-        return False  # it is about to slow down
-    room, after = _room_to_stop(mind, view, left, mind.stop_text)
-    return room <= (TOO_SHORT if mind.misses else 0.0) or room < -after
-
-
-def _room_to_stop(mind: ParticipantMind, view: View, left: float, text: str) -> tuple[float, float]:
-    """How far before the place the car stands if told so now, and at the next decision [m]; negative: behind it."""
-    delay = math.ceil(speech_seconds(text) / DECISION - 1e-6) * DECISION
-    gain = min(max((view.speed - mind.speed_before) / DECISION, -2.0), 2.0)
-    if gain > SETS_OFF:
-        gain = PULL
-    now, top = view.speed, max(FASTEST, view.speed)
-    soon = min(max(now + gain * DECISION, 0.0), top)
-    rooms = []
-    for speed, ahead in ((now, left), (soon, left - (now + soon) / 2 * DECISION)):
-        then = min(max(speed + gain * delay, 0.0), top)
-        rooms.append(ahead - (speed + then) / 2 * delay - stopping_distance(then))
-    return rooms[0], rooms[1]
-
-
-def _from_standing(mind: ParticipantMind, view: View, left: float) -> bool:
-    if mind.standing_since is None or left > 45.0:
-        return False
-    waited = view.time - max(mind.standing_since, mind.nudged_at, mind.voice.last_end, mind.heard_at)
-    if waited > 6.0 if abs(left) <= WITHIN or not mind.guiding else waited > READY:
-        mind.nudged_at = view.time
-        distance = max(left - SHORTER, 10.0) if left > 9.0 else None
-        wording = Wording(distance=distance) if distance else Wording(topic="further")
-        mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording=wording))
-        if left > 30.0:
-            mind.announced = False
-    return True
