@@ -54,6 +54,9 @@ CAREFUL = 15.0
 RUN_UP, RUN_UP_FOR_LANE = 45.0, 50.0
 """A place is to be so far behind a U-turn that leads to it, and so much farther for each lane change between [m]."""
 
+COMES_BACK = 30.0
+"""A car that is told again after this time to leave a lane has come back to it [s]."""
+
 CIRCLES = 3
 """After having the car turned round so often for a place, the participant leads it there some other way."""
 
@@ -139,11 +142,13 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
 
 
 def _stop_circling(mind: ParticipantMind, view: View) -> None:
-    """Leads the car another way to a place that it was turned round for again and again."""
-    if mind.rounds < CIRCLES or mind.journey is None:
+    """Leads the car another way that it was turned round for, or told to change lanes on, again and again."""
+    assert mind.journey is not None
+    in_vain = sum(lane == view.lane for lane, _ in mind.changes) > 1
+    if mind.rounds < CIRCLES and not in_vain:
         return
-    mind.rounds = 0
-    way_in = mind.journey.way_in()
+    way_in = (view.lane, mind.town.lanes[view.lane].length / 2) if in_vain else mind.journey.way_in()
+    mind.rounds, mind.changes = 0, tuple(told for told in mind.changes if told[0] != view.lane)
     if way_in is not None:
         mind.avoided = (*mind.avoided, way_in)
         mind.journey = mind.journey.replanned(mind.town, view.place, mind.blocked + mind.avoided)
@@ -234,12 +239,21 @@ def _takes_a_run_up(mind: ParticipantMind, view: View) -> bool:
         return False
     rest, changes = after
     room = mind.town.lanes[view.lane].length - view.station - _turning_distance(mind, view)
-    if rest > RUN_UP + changes * RUN_UP_FOR_LANE or room < END_ROOM + view.speed:
+    missing = RUN_UP + changes * RUN_UP_FOR_LANE - rest
+    if missing < 0.0 or room < END_ROOM + view.speed or not _turns_better(mind, view, min(missing, room - END_ROOM)):
         return False
     if mind.journey.next_manoeuvre(view.station) == (Entry.U_TURN, 0.0):
         mind.journey = mind.journey.replanned(mind.town, view.place, mind.blocked + mind.avoided)
     _send_on(mind, view)
     return True
+
+
+def _turns_better(mind: ParticipantMind, view: View, farther: float) -> bool:
+    """Whether a car that drives on a bit [m] can turn round there, too, and has more road for it before the place."""
+    assert mind.journey is not None
+    later = mind.journey.replanned(mind.town, (view.lane, view.station + farther), mind.blocked + mind.avoided)
+    now, then = mind.journey.run_up(), later.run_up()
+    return now is not None and then is not None and later.turns_round_on(view.lane) and then[0] > now[0] + farther / 2
 
 
 def _send_on(mind: ParticipantMind, view: View) -> None:
@@ -254,6 +268,8 @@ def note_told(mind: ParticipantMind, view: View, key: tuple[str, int, int]) -> N
     """Remembers what the car has been told to do."""
     mind.repeats = mind.repeats + 1 if mind.guided == key else 0
     mind.rounds += key[0] == "round"
+    if key[0] == "lane" and all(lane != key[1] or view.time - told > COMES_BACK for lane, told in mind.changes):
+        mind.changes = (*mind.changes, (key[1], view.time))
     mind.guided, mind.guided_at = key, view.time
 
 

@@ -109,6 +109,7 @@ class ParticipantMind:
         guided_at: when [s].
         repeats: how often that has been repeated.
         rounds: how often the car has been told to turn round.
+        changes: lanes that it has been told to leave, and when [s].
         announced: whether the car has been told that the place is near.
         misses: how often the car has gone past the place.
         avoided: places that the car is not led by any more, for it went past the target when it was.
@@ -156,6 +157,7 @@ class ParticipantMind:
     guided_at: float = -math.inf
     repeats: int = 0
     rounds: int = 0
+    changes: tuple[tuple[int, float], ...] = ()
     announced: bool = False
     misses: int = 0
     avoided: tuple[Place, ...] = ()
