@@ -85,6 +85,7 @@ class Heard:
         streets: streets named.
         objects: objects named.
         statuses: goal statuses expressed.
+        guessed: landmarks and streets that words are only like.
         past: landmarks behind which something is said to be or to happen.
         dropped: landmarks that are given up or denied.
         order: "before" or "after" where the text says one.
@@ -109,6 +110,7 @@ class Heard:
     streets: tuple[StreetName, ...] = ()
     objects: tuple[ObjectClass, ...] = ()
     statuses: tuple[GoalStatus, ...] = ()
+    guessed: tuple[SlotValue, ...] = ()
     past: tuple[LandmarkName, ...] = ()
     dropped: tuple[LandmarkName, ...] = ()
     order: str | None = None
@@ -167,6 +169,7 @@ def understand(text: str) -> Heard:
         streets=tuple(value for value in named if isinstance(value, StreetName)),
         objects=tuple(value for value in named if isinstance(value, ObjectClass)),
         statuses=tuple(value for value in named if isinstance(value, GoalStatus)),
+        guessed=tuple(mention.value for mention in mentions if mention.guessed),
         past=_behind(landmarks, words, _PAST) if landmarks else (),
         dropped=_behind(landmarks, words, lists.dropping) if landmarks else (),
         order=order[1] if not _ORDER_WORDS.isdisjoint(words) and (order := _ORDER.search(joined)) else None,

@@ -90,6 +90,7 @@ def hear_goal(
     rng: np.random.Generator,
     dropped: LandmarkName | None = None,
     corrected: bool = False,
+    sure: bool = True,
 ) -> None:
     """Takes up a place that it is told to go to.
 
@@ -101,6 +102,7 @@ def hear_goal(
         rng: for the words.
         dropped: a place that is given up for it.
         corrected: whether it had taken another place for it.
+        sure: whether it has understood the name; else it asks whether that was meant.
     """
     mark = known(mind, view, name, streets)
     if dropped is not None:
@@ -116,7 +118,7 @@ def hear_goal(
             mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, ActionValue.U_TURN, joined=True))
     elif corrected:
         mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, name, wording=Wording(topic="sorry")))
-    elif not streets and rng.random() < mind.style.checks * (2.0 if name in _COMMON else 0.6):
+    elif not sure or not streets and rng.random() < mind.style.checks * (2.0 if name in _COMMON else 0.6):
         mind.voice = mind.voice.plan(remark(DialogueMove.CHECK, name, mark.street))
     else:
         values: list[SlotValue] = [name]

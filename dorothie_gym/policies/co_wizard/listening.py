@@ -130,6 +130,8 @@ def _instruction(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard,
         _told_street(mind, view, streets[0])
     elif mind.detour_at is not None:
         detour(mind, view, rng)
+    elif not act.slots and mind.goal is None:
+        mind.voice = mind.voice.plan(remark(DialogueMove.CONFUSE))  # what it is to do it has not understood
 
 
 def _told_place(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
@@ -155,7 +157,7 @@ def _told_place(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, 
         mind.halted = False
         mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, landmarks[0]))
     else:
-        hear_goal(mind, view, landmarks[0], _streets(streets), rng)
+        hear_goal(mind, view, landmarks[0], _streets(streets), rng, sure=landmarks[0] not in words.guessed)
 
 
 def _streets(values: tuple[object, ...]) -> tuple[StreetName, ...]:
@@ -363,7 +365,9 @@ def _confusion(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, r
 
 
 def _small_talk(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
-    if rng.random() < mind.style.chats:
+    if view.time - mind.asked_at < ASKED_LATELY and mind.goal is None:
+        mind.voice = mind.voice.plan(remark(DialogueMove.CONFUSE))  # an answer was expected
+    elif rng.random() < mind.style.chats:
         move = DialogueMove.IRRELEVANT if rng.random() < 0.6 else DialogueMove.ACKNOWLEDGE
         mind.voice = mind.voice.plan(remark(move))
 
