@@ -78,9 +78,9 @@ class Style:
             chat=float(rng.uniform(40.0, 120.0)),
             waits=float(rng.uniform(0.5, 0.95)),
             hints=float(rng.uniform(0.45, 0.9)),
-            reasons=float(rng.uniform(0.2, 0.5)),
+            reasons=float(rng.uniform(0.3, 0.6)),
             aligns=float(rng.uniform(0.0, 0.15)),
-            nods=float(rng.uniform(0.35, 0.7)),
+            nods=float(rng.uniform(0.5, 0.85)),
             curious=float(rng.uniform(0.02, 0.25)),
             puzzled=float(rng.uniform(0.0, 0.35)),
         )
