@@ -44,6 +44,9 @@ NODS_FIRST = 0.85
 JUST_TOLD = 5.0
 """A question that was put while the answer was being given needs no other one [s]."""
 
+UNSURE = 0.08
+"""Chance that a yes does not come at once."""
+
 ASKED_BACK = 8.0
 """What the car asks back about it has been told no longer ago than this [s]."""
 
@@ -160,7 +163,7 @@ def _yes_or_no(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard
         _judge_proposal(mind, view, act, words, rng)
     elif not act.slots and _just_short(mind, view):
         mind.voice = mind.voice.cleared().plan(remark(DialogueMove.REPLY_N), replace(inch_on(mind, view), joined=True))
-    elif rng.random() < 0.05:
+    elif rng.random() < UNSURE:
         mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_U), remark(DialogueMove.REPLY_Y))
     else:
         mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y), *_more(mind, rng))
@@ -210,7 +213,8 @@ def _judge_proposal(
     step = next_step(mind, view, DialogueMove.INSTRUCT, rng)
     if step is not None:
         note_told(mind, view, step[0])
-    mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y), *_more(mind, rng))
+    first = (remark(DialogueMove.REPLY_U),) if rng.random() < UNSURE else ()
+    mind.voice = mind.voice.plan_first(*first, remark(DialogueMove.REPLY_Y), *_more(mind, rng))
 
 
 def _open_question(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
