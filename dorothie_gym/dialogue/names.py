@@ -38,10 +38,12 @@ class Mention:
     Attributes:
         value: what is named.
         start: index of the token that stands for it in the masked words.
+        guessed: whether the word is only like the name.
     """
 
     value: SlotValue
     start: int
+    guessed: bool = False
 
 
 def find_names(words: Sequence[str]) -> tuple[list[Mention], list[str]]:
@@ -69,7 +71,9 @@ def find_names(words: Sequence[str]) -> tuple[list[Mention], list[str]]:
         if value is None:
             masked += words[place : place + length]
         else:
-            mentions.append(Mention(value, len(masked)))
+            mentions.append(
+                Mention(value, len(masked), guessed=word not in index and word.removesuffix("'s") not in index)
+            )
             masked.append("#what" if value.label == "Queried" else f"#{value.slot.label.lower()}")
             if value.slot is Slot.STREET and place + length < len(words):
                 length += words[place + length] in _STREET_KINDS

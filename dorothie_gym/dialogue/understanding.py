@@ -38,7 +38,13 @@ _DOWN = re.compile(
 )
 _LIGHTS = re.compile(r"\blights?\b|\bbeams?\b|\bheadlights?\b|\bheadlamps?\b|\blamps?\b")
 _ORDER = re.compile(r"\b(before|after)(?= that\b| it\b| (?:the )?#landmark| or | ,| \?|$)")
-_FURTHER = re.compile(r"\b(further|farther|a (bit|little|touch) more|keep going|some more|few more)\b")
+_BIT = r"(a|just a|a wee|another) (bit|little|touch|tad|hair)"
+_FURTHER = re.compile(
+    rf"\b({_BIT} (more|further|farther|forward|closer|ahead|longer)|(some|few) more"
+    rf"|(going|go|roll|rolling|move|forward|up|ahead|on|inch|creep) {_BIT}(?! \w+er\b)"
+    r"|(inch|edge|creep|crawl|nudge|scoot) (it )?(up|forward|ahead|along|closer)"
+    r"|(further|farther)(?! (straight|down|along|than|up|away|from)))\b"
+)
 # The first four letters of words without which the expressions above need not be tried.
 _SPEED_STEMS = frozenset(
     "spee fast hurr step floo acce quic up pick hit give move slow brak dece easi ease down drop easy redu lowe".split()
@@ -79,6 +85,7 @@ class Heard:
         streets: streets named.
         objects: objects named.
         statuses: goal statuses expressed.
+        guessed: landmarks and streets that words are only like.
         past: landmarks behind which something is said to be or to happen.
         dropped: landmarks that are given up or denied.
         order: "before" or "after" where the text says one.
@@ -87,7 +94,7 @@ class Heard:
         speed: a speed [km/h].
         distance: a distance [m].
         here: whether it is to be on the spot.
-        further: whether the car is to go on a bit.
+        further: whether the car is to go on, but only a bit.
         affirms: True for a yes, False for a no at the beginning.
         question: whether it is put as a question with a question mark.
     """
@@ -103,6 +110,7 @@ class Heard:
     streets: tuple[StreetName, ...] = ()
     objects: tuple[ObjectClass, ...] = ()
     statuses: tuple[GoalStatus, ...] = ()
+    guessed: tuple[SlotValue, ...] = ()
     past: tuple[LandmarkName, ...] = ()
     dropped: tuple[LandmarkName, ...] = ()
     order: str | None = None
@@ -161,6 +169,7 @@ def understand(text: str) -> Heard:
         streets=tuple(value for value in named if isinstance(value, StreetName)),
         objects=tuple(value for value in named if isinstance(value, ObjectClass)),
         statuses=tuple(value for value in named if isinstance(value, GoalStatus)),
+        guessed=tuple(mention.value for mention in mentions if mention.guessed),
         past=_behind(landmarks, words, _PAST) if landmarks else (),
         dropped=_behind(landmarks, words, lists.dropping) if landmarks else (),
         order=order[1] if not _ORDER_WORDS.isdisjoint(words) and (order := _ORDER.search(joined)) else None,

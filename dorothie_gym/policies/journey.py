@@ -278,6 +278,15 @@ class Journey:
                 return before.lane == lane
         return False
 
+    def run_up(self) -> tuple[float, int] | None:
+        """How far the goal is behind the next U-turn [m], and how many lane changes lie between; None without one."""
+        for k, leg in enumerate(self.legs):
+            if k and leg.entry is Entry.U_TURN:
+                after = self.legs[k:]
+                changes = sum(one.entry in (Entry.CHANGE_LEFT, Entry.CHANGE_RIGHT) for one in after)
+                return sum(one.end - one.start for one in after), changes
+        return None
+
     def needs_switch(self, town: Town, lane: int, station: float, crossing: Crossing) -> bool:
         """Whether a lane change before a junction has to be made on its own, not on the way into the turn.
 

@@ -9,24 +9,25 @@ from dorothie_gym.dialogue import guess_spans, understand
 from tests.dialogue.heard import read_annotated, score
 
 
-@pytest.mark.parametrize("name", ["dev", "test", "voices", "more"])
+@pytest.mark.parametrize("name", ["dev", "test", "voices", "more", "cabin", "fresh"])
 def test_hand_written_utterances_are_understood(name):
     annotated = read_annotated(name)
-    assert len(annotated) >= 75
+    assert len(annotated) >= 60
     alone = score(annotated, context=False)
     assert alone.moves >= 0.8 and alone.f1 >= 0.8, alone.wrong
     # The move before settles what short answers are.
     assert score(annotated).moves >= alone.moves
 
 
-def test_utterances_that_no_rule_was_written_for_are_understood():
-    annotated = read_annotated("unseen")
+@pytest.mark.parametrize("name", ["unseen", "held"])
+def test_utterances_that_no_rule_was_written_for_are_understood(name):
+    annotated = read_annotated(name)
     assert len(annotated) >= 60
     found = score(annotated)
     assert found.moves >= 0.75 and found.f1 >= 0.65, found.wrong
 
 
-@pytest.mark.parametrize("name", ["dev", "test", "voices", "more", "unseen"])
+@pytest.mark.parametrize("name", ["dev", "test", "voices", "more", "cabin", "fresh", "unseen", "held"])
 def test_hand_written_utterances_are_parted_into_their_acts(name):
     annotated = read_annotated(name)
     right = sum(len(guess_spans(item.text, item.after)) == len(item.acts) for item in annotated)

@@ -109,6 +109,8 @@ def test_references_are_understood():
     assert understand("After.").order == "after"
     assert understand("let's do Shell after all").order is None
     assert understand("a bit further").further
+    assert understand("then roll forward a bit").further and understand("a touch further, pal").further
+    assert not understand("keep going").further and not understand("further straight on").further
     assert understand("stop here").here
     assert understand("yeah, then straight on").affirms is True
     assert understand("hmm, not sure").affirms is None

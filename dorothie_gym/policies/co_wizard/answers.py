@@ -50,16 +50,21 @@ def answer_yes_no(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard
                 remark(DialogueMove.EXPLAIN, ActionValue.LIGHT_CHANGE, wording=wording, joined=True)
             )
         return
+    topic = None
     if objects:
+        topic = "seen"
         yes = any(thing.kind in objects for thing in view.objects) or view.hazard in objects
     elif landmarks:
+        topic = "known"
         yes = any(mark.name in landmarks for mark in view.landmarks)
     elif actions:
+        topic = "doing"
         yes = _doing(mind, view) in actions
     else:
         yes = mind.journey is not None and mind.journey.left(view.station) < CLOSE
     more = _why_not_seen(view, rng) if objects and not yes else musing(mind, rng, joined=True)
-    mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_Y if yes else DialogueMove.REPLY_N), *more)
+    answer = remark(DialogueMove.REPLY_Y if yes else DialogueMove.REPLY_N, wording=Wording(topic=topic))
+    mind.voice = mind.voice.plan(answer, *more)
 
 
 def _why_not_seen(view: View, rng: np.random.Generator) -> tuple[Remark, ...]:

@@ -32,6 +32,9 @@ MOST_LANES = 40
 CONFIRMS_CHANGES = 0.8
 """Chance that a change of the tasks is confirmed, not only acknowledged."""
 
+STEERED = 15.0
+"""Who has been told the way no longer ago than this does not look for the place by itself [s]."""
+
 LOOKED = 8.0
 """A place that has been guessed is given up when the car is this close to the guess [m]."""
 
@@ -87,6 +90,7 @@ def hear_goal(
     rng: np.random.Generator,
     dropped: LandmarkName | None = None,
     corrected: bool = False,
+    sure: bool = True,
 ) -> None:
     """Takes up a place that it is told to go to.
 
@@ -98,6 +102,7 @@ def hear_goal(
         rng: for the words.
         dropped: a place that is given up for it.
         corrected: whether it had taken another place for it.
+        sure: whether it has understood the name; else it asks whether that was meant.
     """
     mark = known(mind, view, name, streets)
     if dropped is not None:
@@ -113,7 +118,7 @@ def hear_goal(
             mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, ActionValue.U_TURN, joined=True))
     elif corrected:
         mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, name, wording=Wording(topic="sorry")))
-    elif not streets and rng.random() < mind.style.checks * (2.0 if name in _COMMON else 0.6):
+    elif not sure or not streets and rng.random() < mind.style.checks * (2.0 if name in _COMMON else 0.6):
         mind.voice = mind.voice.plan(remark(DialogueMove.CHECK, name, mark.street))
     else:
         values: list[SlotValue] = [name]
@@ -129,6 +134,7 @@ def _unknown(
 ) -> None:
     """The place is not on the map: says so, and goes where it is told to."""
     again = mind.goal is name and not mind.exact
+    mind.described = again and mind.described
     mind.goal, mind.place, mind.exact, mind.journey = name, None, False, None
     mind.creeping, mind.arrived, mind.plan = False, False, ()
     mind.note_status(name, GoalStatus.UNKNOWN)
@@ -205,8 +211,9 @@ def hear_description(
 ) -> None:  # fmt: skip
     """It is told where a place is: notes a guess if a place close to it is on the map, and says that it has heard."""
     if mind.goal is not None and not mind.exact:
+        mind.described = True
         place = _described(mind, view, streets, landmarks)
-        if place is not None:
+        if place is not None and view.time - mind.steered_at > STEERED:
             guess = Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=mind.goal, place=_map_place(*place))
             mind.note(guess)
             mind.journey = Journey.plan(mind.town, view.here, place, mind.blocked)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 
 import numpy as np
@@ -40,8 +39,8 @@ from dorothie_gym.policies.hearing import HeardUtterance, heard_utterance
 from dorothie_gym.policies.scenery import street_of
 from dorothie_gym.policies.speech import remark
 
-NUDGE = 4.0
-"""How far "a bit further" is [m]."""
+NUDGE = 3.0
+"""How far "a bit further" is: less than from where a car is short of a place to where it is past it [m]."""
 
 WISH_TIME = 30.0
 """A manoeuvre that finds no place for this long is given up [s]."""
@@ -50,7 +49,6 @@ _MOVES = frozenset(
     {ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH, ActionValue.START}
 )
 _STOPS = frozenset({ActionValue.STOP, ActionValue.LANE_FOLLOW})
-_A_BIT = re.compile(r"\b(bit|little)\b")
 SLOW = 25
 """Speed in bad weather [km/h]."""
 
@@ -118,9 +116,11 @@ def _instruction(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard,
         if mind.voice.idle and rng.random() > mind.style.silent:
             mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
     elif actions:
-        if mind.arrived and _MOVES & set(actions) and not _A_BIT.search(words.text.lower()):
+        if mind.arrived and _MOVES & set(actions) and not words.further:
             doubt(mind)
         mind.proposed = None
+        if _MOVES & set(actions):
+            mind.steered_at = view.time
         if _MOVES & set(actions) and not mind.exact:
             mind.journey = None  # it is guided, and need not look for the place by itself
         for action in actions:
@@ -130,6 +130,8 @@ def _instruction(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard,
         _told_street(mind, view, streets[0])
     elif mind.detour_at is not None:
         detour(mind, view, rng)
+    elif not act.slots and mind.goal is None:
+        mind.voice = mind.voice.plan(remark(DialogueMove.CONFUSE))  # what it is to do it has not understood
 
 
 def _told_place(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
@@ -151,11 +153,11 @@ def _told_place(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, 
             mind.voice = mind.voice.plan(remark(move, dropped, GoalStatus.ABANDONED))
     elif GoalStatus.PENDING in statuses:
         hear_later(mind, view, landmarks[0], rng)
-    elif landmarks[0] is mind.goal and mind.exact and not mind.arrived and not streets:
+    elif landmarks[0] is mind.goal and (mind.exact or mind.described) and not mind.arrived and not streets:
         mind.halted = False
         mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, landmarks[0]))
     else:
-        hear_goal(mind, view, landmarks[0], _streets(streets), rng)
+        hear_goal(mind, view, landmarks[0], _streets(streets), rng, sure=landmarks[0] not in words.guessed)
 
 
 def _streets(values: tuple[object, ...]) -> tuple[StreetName, ...]:
@@ -190,8 +192,7 @@ def _do_turn(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> 
 
 def _do_follow(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard) -> None:
     close = mind.halted or mind.creeping or view.standing
-    bit = words.further and _A_BIT.search(words.text.lower()) is not None
-    if close and (bit or words.distance is not None):
+    if close and (words.further or words.distance is not None):
         distance = float(words.distance) if words.distance is not None else NUDGE
         mind.nudge, mind.halted = place_ahead(mind, view, distance), False
         return
@@ -364,7 +365,9 @@ def _confusion(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, r
 
 
 def _small_talk(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
-    if rng.random() < mind.style.chats:
+    if view.time - mind.asked_at < ASKED_LATELY and mind.goal is None:
+        mind.voice = mind.voice.plan(remark(DialogueMove.CONFUSE))  # an answer was expected
+    elif rng.random() < mind.style.chats:
         move = DialogueMove.IRRELEVANT if rng.random() < 0.6 else DialogueMove.ACKNOWLEDGE
         mind.voice = mind.voice.plan(remark(move))
 

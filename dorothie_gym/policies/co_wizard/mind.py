@@ -173,6 +173,8 @@ class CoWizardMind:
         offer: place that it has proposed to go to first and waits for an answer about.
         missed: act that it has not caught.
         lost_told: whether it has said that it does not know where it is.
+        described: whether it has been told where the goal is, which is not on the map.
+        steered_at: when it was last told what to do next [s].
     """
 
     seed: int
@@ -225,6 +227,8 @@ class CoWizardMind:
     offer: LandmarkName | None = None
     missed: bool = False
     lost_told: bool = False
+    described: bool = False
+    steered_at: float = -math.inf
 
     def note(self, mental: Mental) -> None:
         """Adds a belief update, unless the same one waits already."""

@@ -29,7 +29,10 @@ ASK_DISTANCE = 75.0
 """A way is asked for when the junction is this near [m]."""
 
 ASK_AGAIN = 8.0
-"""A question without an answer is put again after this time [s]."""
+"""A question about the way that has no answer is put again after this time [s]."""
+
+NO_ANSWER = 10.0
+"""So is one about what comes next, which takes longer to answer [s]."""
 
 REASON = 5.0
 """A hazard is explained when it holds the car for longer than this [s]."""
@@ -131,10 +134,11 @@ def _say_arrived(mind: CoWizardMind, view: View, rng: np.random.Generator) -> No
     if mind.asked_at > mind.stop_sent_at:
         return
     mind.asked_at = view.time
+    arrived = Wording(topic="arrived")
     if mind.exact and rng.random() < mind.style.echoes + 0.15:
-        mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, mind.goal, wording=Wording(topic="arrived")))
+        mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, mind.goal, wording=arrived))
     elif not mind.exact:
-        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_YN))
+        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_YN, wording=arrived))
 
 
 def _ask_goal(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
@@ -144,9 +148,10 @@ def _ask_goal(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
         return
     if view.time - mind.idle_since < (NEXT if mind.halted else START):
         return
-    if view.time - mind.asked_at < ASK_AGAIN or not (mind.halted or view.standing):
+    silent = view.time - max(mind.asked_at, mind.voice.last_end)
+    if silent < NO_ANSWER and mind.asked_at > mind.heard_at or not (mind.halted or view.standing):
         return
-    again = view.time - mind.asked_at < 2.0 * ASK_AGAIN
+    again = view.time - mind.asked_at < 2.0 * NO_ANSWER
     mind.asked_at = view.time
     draw = rng.random()
     if again and draw < 0.5:

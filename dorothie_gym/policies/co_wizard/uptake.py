@@ -35,7 +35,8 @@ def take_up(mind: CoWizardMind, action: ActionValue, words: Heard, rng: np.rando
         lights=words.lights,
         speed=words.speed if action is ActionValue.SPEED_CHANGE else None,
     )
-    if rng.random() < mind.style.checks * 0.25 and action not in _AT_ONCE:
+    at_once = action in _AT_ONCE or words.further or words.distance is not None
+    if rng.random() < mind.style.checks * 0.25 and not at_once:
         mind.voice = mind.voice.plan(remark(DialogueMove.CHECK, action, wording=wording))
     elif rng.random() < mind.style.echoes:
         mind.voice = mind.voice.plan(*_repeated(action, wording, rng))

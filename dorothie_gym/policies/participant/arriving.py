@@ -1,4 +1,4 @@
-"""Arriving: coming up to the place, and stopping the car at it."""
+"""Talking the car up to the very place: slower, stop, a bit further."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role
 from dorothie_gym.policies.journey import stopping_distance
 from dorothie_gym.policies.participant.mind import ParticipantMind, View
 from dorothie_gym.policies.speech import Remark, remark
-from dorothie_gym.world.town.routing import Entry
 
 DECISION = 0.5
 """Time between decisions [s]."""
@@ -22,12 +21,6 @@ FASTEST = 11.0
 
 NEAR = 95.0
 """A place is announced when it is this near [m]."""
-
-CORNER, RIGHT_BEHIND = 50.0, 55.0
-"""At a junction nearer than the first, a place no further behind it than the second is easily missed [m]."""
-
-CAREFUL = 15.0
-"""Speed that the car is told to go at when it has missed a place before [km/h]."""
 
 SLOW_WITHIN = 20.0
 """A car that has been told of the place is slow from here on [m]."""
@@ -44,6 +37,12 @@ TOO_SHORT = 4.0
 SETS_OFF, PULL = 0.6, 3.0
 """A car that gains more speed than the first has just set off, and goes on gaining as much as the second [m/s^2]."""
 
+READY = 1.6
+"""A car that has been standing for longer than this is told how to go on [s]."""
+
+SHORTER = 8.0
+"""A distance is said to be this much less than it is, for it is said in tens, and the car rolls on [m]."""
+
 INCHES_ON = 7.0
 """A car that has been told to go a bit further is left alone for this long [s]."""
 
@@ -55,42 +54,6 @@ LAST_STRETCH = 60.0
 
 WITHIN = 1.9
 """A car that stands this close to the place has arrived [m]."""
-
-_STOP = DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.STOP)
-_SHOUTING = SpeakerStyle(register=Register.BLUNT, chattiness=0.0, indirectness=0.0)
-
-
-def about_to_arrive(mind: ParticipantMind, view: View) -> bool:
-    """Whether nothing but the last stretch to the place is left."""
-    journey = mind.journey
-    if journey is None or journey.left(view.station) > LAST_STRETCH:
-        return False
-    return journey.next_crossing(mind.town, view.station) is None and journey.next_manoeuvre(view.station) is None
-
-
-def ease(mind: ParticipantMind, view: View) -> bool:
-    """Has the car slow down for a place that is easily missed: one missed before, or one right behind a manoeuvre."""
-    assert mind.journey is not None
-    if mind.eased or mind.journey.left(view.station) > NEAR or view.speed < SLOW_SPEED:
-        return False
-    if not mind.misses and not _hidden_behind(mind, view):
-        return False
-    mind.eased = True
-    wording = Wording(faster=False, speed=CAREFUL)
-    mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=wording))
-    return True
-
-
-def _hidden_behind(mind: ParticipantMind, view: View) -> bool:
-    """Whether there is hardly time to stop the car between the next junction, or lane change, and the place."""
-    assert mind.journey is not None
-    left = mind.journey.left(view.station)
-    crossing = mind.journey.next_crossing(mind.town, view.station)
-    if crossing is None:
-        manoeuvre = mind.journey.next_manoeuvre(view.station)
-        return manoeuvre is not None and manoeuvre[0] is not Entry.U_TURN
-    told = mind.guided is not None and mind.guided[0] == "turn"
-    return told and crossing.distance < CORNER and left - crossing.distance < RIGHT_BEHIND
 
 
 def approach(mind: ParticipantMind, view: View, rng: np.random.Generator) -> bool:
@@ -115,23 +78,27 @@ def approach(mind: ParticipantMind, view: View, rng: np.random.Generator) -> boo
             mind.stopped_at = view.time
             mind.voice = mind.voice.plan(Remark(act=_STOP, text=mind.stop_text, urgent=True))
         return True
-    if not mind.announced and left < NEAR and view.speed > SLOW_SPEED:
-        _announce(mind, view, left)
+    if not mind.announced and left < NEAR and view.speed > SLOW_SPEED and mind.goal is not None:
+        if left > 3.5 * max(view.speed, SOON_AT) + 20.0:
+            wording = Wording(distance=max(left - view.speed * 3.0, 10.0))
+            words = remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, mind.goal.name, wording=wording, urgent=True)
+            mind.announced, mind.voice = True, mind.voice.plan(words)
+        elif left > 3.0 * max(view.speed, SOON_AT) + 12.0:
+            slower = remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=Wording(faster=False), urgent=True)
+            mind.announced, mind.voice = True, mind.voice.plan(slower)
     return left < NEAR
 
 
-def _announce(mind: ParticipantMind, view: View, left: float) -> None:
-    """Tells of the place, or has the car slow down, while there is time for the words."""
-    if mind.goal is None:
-        return
-    if left > 3.5 * max(view.speed, SOON_AT) + 20.0:
-        wording = Wording(distance=max(left - view.speed * 3.0, 10.0))
-        words = remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, mind.goal.name, wording=wording, urgent=True)
-    elif left > 3.0 * max(view.speed, SOON_AT) + 12.0:
-        words = remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=Wording(faster=False), urgent=True)
-    else:
-        return
-    mind.announced, mind.voice = True, mind.voice.plan(words)
+_STOP = DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.STOP)
+_SHOUTING = SpeakerStyle(register=Register.BLUNT, chattiness=0.0, indirectness=0.0)
+
+
+def about_to_arrive(mind: ParticipantMind, view: View) -> bool:
+    """Whether nothing but the last stretch to the place is left."""
+    journey = mind.journey
+    if journey is None or journey.left(view.station) > LAST_STRETCH:
+        return False
+    return journey.next_crossing(mind.town, view.station) is None and journey.next_manoeuvre(view.station) is None
 
 
 def _time_to_stop(mind: ParticipantMind, view: View, left: float) -> bool:
@@ -161,11 +128,17 @@ def _from_standing(mind: ParticipantMind, view: View, left: float) -> bool:
     if mind.standing_since is None or left > 45.0:
         return False
     waited = view.time - max(mind.standing_since, mind.nudged_at, mind.voice.last_end, mind.heard_at)
-    if waited > 6.0 if abs(left) <= WITHIN or not mind.guiding else waited > 1.6:
-        mind.nudged_at = view.time
-        distance = left if left > 9.0 else None
-        wording = Wording(distance=distance) if distance else Wording(topic="further")
-        mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording=wording))
-        if left > 30.0:
-            mind.announced = False
+    if waited > 6.0 if abs(left) <= WITHIN or not mind.guiding else waited > READY:
+        mind.voice = mind.voice.plan(inch_on(mind, view))
     return True
+
+
+def inch_on(mind: ParticipantMind, view: View) -> Remark:
+    """What to say to a car that stands a little before the place."""
+    assert mind.journey is not None
+    mind.nudged_at = view.time
+    left = mind.journey.left(view.station)
+    if left > 30.0:
+        mind.announced = False
+    wording = Wording(distance=max(left - SHORTER, 10.0)) if left > 9.0 else Wording(topic="further")
+    return remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording=wording)

@@ -188,7 +188,7 @@ def forget_target(mind: ParticipantMind) -> None:
     """Leaves the present target."""
     mind.target, mind.goal, mind.journey = None, None, None
     mind.told, mind.described, mind.guiding, mind.best = False, False, False, math.inf
-    mind.guided, mind.repeats, mind.rounds = None, 0, 0
+    mind.guided, mind.repeats, mind.rounds, mind.changes = None, 0, 0, ()
     mind.announced, mind.stop_text = False, ""
     mind.misses, mind.eased, mind.avoided = 0, False, ()
     mind.stopped_at = mind.nudged_at = -math.inf

@@ -1,4 +1,4 @@
-"""Telling the way: turns, turning round and lanes; `arriving` tells the last stretch."""
+"""Telling the way: turns, turning round, lanes, and stopping at the very place."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from dorothie_gym.dialogue import Direction, Wording, speech_seconds, word_act
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, Slot, SlotValue, StreetName
 from dorothie_gym.policies.journey import (
     BRAKING,
+    END_ROOM,
     U_TURN_SPEED_SQUARED,
     Choice,
     Crossing,
     find_exit,
     next_choice,
 )
-from dorothie_gym.policies.participant.arriving import WITHIN, about_to_arrive, approach, ease
+from dorothie_gym.policies.participant.arriving import NEAR, READY, SLOW_SPEED, WITHIN, about_to_arrive, approach
 from dorothie_gym.policies.participant.mind import ParticipantMind, View
 from dorothie_gym.policies.scenery import street_of
 from dorothie_gym.policies.speech import Remark, remark
@@ -43,6 +44,18 @@ SWITCHING = 13.0
 
 TAKES_OVER = 130.0
 """A car that looks for a place by itself is guided from here on [m]."""
+
+CORNER, RIGHT_BEHIND = 50.0, 55.0
+"""At a junction nearer than the first, a place no further behind it than the second is easily missed [m]."""
+
+CAREFUL = 15.0
+"""Speed that the car is told to go at when it has missed a place before [km/h]."""
+
+RUN_UP, RUN_UP_FOR_LANE = 45.0, 50.0
+"""A place is to be so far behind a U-turn that leads to it, and so much farther for each lane change between [m]."""
+
+COMES_BACK = 30.0
+"""A car that is told again after this time to leave a lane has come back to it [s]."""
 
 CIRCLES = 3
 """After having the car turned round so often for a place, the participant leads it there some other way."""
@@ -104,7 +117,7 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     if step is None:
         return
     key, distance, words = step
-    if ease(mind, view):
+    if _ease(mind, view) or (key[0] == "round" and _takes_a_run_up(mind, view)):
         return
     near = distance < (_turning_distance(mind, view) if key[0] == "round" else TELL_DISTANCE)
     if _left_to_ask(mind, view, key, distance, words.wording.direction is Direction.STRAIGHT, rng):
@@ -129,11 +142,13 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
 
 
 def _stop_circling(mind: ParticipantMind, view: View) -> None:
-    """Leads the car another way to a place that it was turned round for again and again."""
-    if mind.rounds < CIRCLES or mind.journey is None:
+    """Leads the car another way that it was turned round for, or told to change lanes on, again and again."""
+    assert mind.journey is not None
+    in_vain = sum(lane == view.lane for lane, _ in mind.changes) > 1
+    if mind.rounds < CIRCLES and not in_vain:
         return
-    mind.rounds = 0
-    way_in = mind.journey.way_in()
+    way_in = (view.lane, mind.town.lanes[view.lane].length / 2) if in_vain else mind.journey.way_in()
+    mind.rounds, mind.changes = 0, tuple(told for told in mind.changes if told[0] != view.lane)
     if way_in is not None:
         mind.avoided = (*mind.avoided, way_in)
         mind.journey = mind.journey.replanned(mind.town, view.place, mind.blocked + mind.avoided)
@@ -181,6 +196,31 @@ def _left_to_ask(
     return distance > TOO_LATE or goes_straight
 
 
+def _ease(mind: ParticipantMind, view: View) -> bool:
+    """Has the car slow down for a place that is easily missed: one missed before, or one right behind a manoeuvre."""
+    assert mind.journey is not None
+    if mind.eased or mind.journey.left(view.station) > NEAR or view.speed < SLOW_SPEED:
+        return False
+    if not mind.misses and not _hidden_behind(mind, view):
+        return False
+    mind.eased = True
+    wording = Wording(faster=False, speed=CAREFUL)
+    mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=wording))
+    return True
+
+
+def _hidden_behind(mind: ParticipantMind, view: View) -> bool:
+    """Whether there is hardly time to stop the car between the next junction, or lane change, and the place."""
+    assert mind.journey is not None
+    left = mind.journey.left(view.station)
+    crossing = mind.journey.next_crossing(mind.town, view.station)
+    if crossing is None:
+        manoeuvre = mind.journey.next_manoeuvre(view.station)
+        return manoeuvre is not None and manoeuvre[0] is not Entry.U_TURN
+    told = mind.guided is not None and mind.guided[0] == "turn"
+    return told and crossing.distance < CORNER and left - crossing.distance < RIGHT_BEHIND
+
+
 def _turning_distance(mind: ParticipantMind, view: View) -> float:
     """How far ahead turning round is told, so that the car turns about where it is planned."""
     assert mind.journey is not None
@@ -190,10 +230,46 @@ def _turning_distance(mind: ParticipantMind, view: View) -> float:
     return 1.5 * view.speed + max(view.speed**2 - U_TURN_SPEED_SQUARED, 0.0) / (2 * BRAKING)
 
 
+def _takes_a_run_up(mind: ParticipantMind, view: View) -> bool:
+    """Whether to go on for now: a car that turned round here would be past the place before it could be stopped."""
+    assert mind.journey is not None
+    after = mind.journey.run_up()
+    crosses = mind.journey.next_crossing(mind.town, view.station) is not None
+    if after is None or crosses or not mind.journey.turns_round_on(view.lane):
+        return False
+    rest, changes = after
+    room = mind.town.lanes[view.lane].length - view.station - _turning_distance(mind, view)
+    missing = RUN_UP + changes * RUN_UP_FOR_LANE - rest
+    if missing < 0.0 or room < END_ROOM + view.speed or not _turns_better(mind, view, min(missing, room - END_ROOM)):
+        return False
+    if mind.journey.next_manoeuvre(view.station) == (Entry.U_TURN, 0.0):
+        mind.journey = mind.journey.replanned(mind.town, view.place, mind.blocked + mind.avoided)
+    _send_on(mind, view)
+    return True
+
+
+def _turns_better(mind: ParticipantMind, view: View, farther: float) -> bool:
+    """Whether a car that drives on a bit [m] can turn round there, too, and has more road for it before the place."""
+    assert mind.journey is not None
+    later = mind.journey.replanned(mind.town, (view.lane, view.station + farther), mind.blocked + mind.avoided)
+    now, then = mind.journey.run_up(), later.run_up()
+    return now is not None and then is not None and later.turns_round_on(view.lane) and then[0] > now[0] + farther / 2
+
+
+def _send_on(mind: ParticipantMind, view: View) -> None:
+    """Has a car that stands drive on, to turn round later."""
+    waited = view.time - max(mind.guided_at, mind.heard_at, mind.voice.last_end)
+    if view.standing and waited > READY and view.time > mind.excused_until:
+        note_told(mind, view, ("on", view.lane, 0))
+        mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW))
+
+
 def note_told(mind: ParticipantMind, view: View, key: tuple[str, int, int]) -> None:
     """Remembers what the car has been told to do."""
     mind.repeats = mind.repeats + 1 if mind.guided == key else 0
     mind.rounds += key[0] == "round"
+    if key[0] == "lane" and all(lane != key[1] or view.time - told > COMES_BACK for lane, told in mind.changes):
+        mind.changes = (*mind.changes, (key[1], view.time))
     mind.guided, mind.guided_at = key, view.time
 
 

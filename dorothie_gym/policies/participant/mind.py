@@ -77,10 +77,10 @@ class Style:
             patience=float(rng.uniform(7.0, 14.0)),
             chat=float(rng.uniform(40.0, 120.0)),
             waits=float(rng.uniform(0.5, 0.95)),
-            hints=float(rng.uniform(0.45, 0.9)),
-            reasons=float(rng.uniform(0.2, 0.5)),
+            hints=float(rng.uniform(0.42, 0.87)),
+            reasons=float(rng.uniform(0.24, 0.54)),
             aligns=float(rng.uniform(0.0, 0.15)),
-            nods=float(rng.uniform(0.35, 0.7)),
+            nods=float(rng.uniform(0.5, 0.85)),
             curious=float(rng.uniform(0.02, 0.25)),
             puzzled=float(rng.uniform(0.0, 0.35)),
         )
@@ -109,6 +109,7 @@ class ParticipantMind:
         guided_at: when [s].
         repeats: how often that has been repeated.
         rounds: how often the car has been told to turn round.
+        changes: lanes that it has been told to leave, and when [s].
         announced: whether the car has been told that the place is near.
         misses: how often the car has gone past the place.
         avoided: places that the car is not led by any more, for it went past the target when it was.
@@ -156,6 +157,7 @@ class ParticipantMind:
     guided_at: float = -math.inf
     repeats: int = 0
     rounds: int = 0
+    changes: tuple[tuple[int, float], ...] = ()
     announced: bool = False
     misses: int = 0
     avoided: tuple[Place, ...] = ()

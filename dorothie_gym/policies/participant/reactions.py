@@ -171,11 +171,12 @@ def _wonder(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None
 def _chat(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
     if view.time < mind.chat_at or view.standing or mind.journey is None or mind.goal is None:
         return
-    crossing = mind.journey.next_crossing(mind.town, view.station)
-    busy = mind.journey.left(view.station) < 130.0 or (
-        mind.guiding and crossing is not None and crossing.distance < 140.0
-    )
-    if busy:
+    crossing, manoeuvre = mind.journey.next_crossing(mind.town, view.station), mind.journey.next_manoeuvre(view.station)
+    steps = [
+        crossing.distance if crossing is not None else math.inf,
+        manoeuvre[1] if manoeuvre is not None else math.inf,
+    ]
+    if mind.journey.left(view.station) < 130.0 or (mind.guiding and min(steps) < 140.0):
         return
     mind.chat_at = view.time + float(rng.exponential(mind.style.chat)) + 20.0
     options = _topics(mind, view, rng)

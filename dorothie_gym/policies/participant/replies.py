@@ -22,7 +22,7 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies.hearing import heard_utterance
 from dorothie_gym.policies.journey import first_new_street
-from dorothie_gym.policies.participant.arriving import NEAR, about_to_arrive
+from dorothie_gym.policies.participant.arriving import NEAR, about_to_arrive, inch_on
 from dorothie_gym.policies.participant.describing import describe
 from dorothie_gym.policies.participant.goals import announcement, reason_topic, route_length, switch_target
 from dorothie_gym.policies.participant.guidance import next_step, note_told
@@ -30,7 +30,7 @@ from dorothie_gym.policies.participant.mind import ParticipantMind, View
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.repairs import misunderstood, not_caught
 from dorothie_gym.policies.scenery import SeenSubgoal
-from dorothie_gym.policies.speech import Remark, remark
+from dorothie_gym.policies.speech import LONGEST_BREATH, Remark, remark
 
 ELSEWHERE = 40.0
 """A car that stands farther than this from the target has not come to it [m]."""
@@ -44,11 +44,19 @@ NODS_FIRST = 0.85
 JUST_TOLD = 5.0
 """A question that was put while the answer was being given needs no other one [s]."""
 
+UNSURE = 0.08
+"""Chance that a yes does not come at once."""
+
+ASKED_BACK = 8.0
+"""What the car asks back about it has been told no longer ago than this [s]."""
+
 _FREE = frozenset({ActionValue.LIGHT_CHANGE, ActionValue.SPEED_CHANGE, ActionValue.START})
 """What the car may do as it likes."""
 
 _WAYS = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH})
 """Actions that lead somewhere else."""
+
+_UPTAKES = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 
 _AFTER_A_NOD = frozenset({DialogueMove.EXPLAIN, DialogueMove.INSTRUCT})
 
@@ -68,12 +76,15 @@ def listen(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
         made_clear = any(act.move is DialogueMove.CLARIFY for act in heard.acts)
         heard, mind.puzzled_by = (mind.puzzled_by if made_clear else heard), None
     asked = any(act.move is DialogueMove.QUERY_W for act in heard.acts)
+    before = mind.voice
     for act in heard.acts:
         answer = _ANSWERS.get(act.move)
         if asked and GoalStatus.UNKNOWN in act.slots:
             continue  # the question that follows is what is answered
         if answer is not None:
             answer(mind, view, act, heard.words, rng)
+    if mind.voice is before and any(act.move is DialogueMove.EXPLAIN for act in heard.acts):
+        _nod(mind, view, rng, alone=heard.acts[0].move not in _UPTAKES)  # what takes up an instruction needs no nod
 
 
 def _check(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
@@ -100,9 +111,9 @@ def _fits(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng
     actions = set(act.values(Slot.ACTION))
     if step is None or actions & _FREE:
         return True
-    last = mind.voice.last
-    if last is not None and view.time - mind.voice.last_end < JUST_TOLD and actions & set(last.act.values(Slot.ACTION)):
-        return last.wording.direction in (None, words.direction)
+    told = next((item for item in reversed(mind.voice.said) if item.act.values(Slot.ACTION)), None)
+    if told is not None and mind.voice.has_just_spoken(view.time, ASKED_BACK) and actions & set(told.act.slots):
+        return told.wording.direction in (None, words.direction)
     meant, wanted = set(step[2].act.values(Slot.ACTION)), step[2].wording.direction
     if wanted is Direction.STRAIGHT:
         return bool(actions & _AHEAD) and words.direction in (None, Direction.STRAIGHT)
@@ -150,9 +161,9 @@ def _yes_or_no(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard
     elif set(act.values(Slot.ACTION)) & _WAYS:
         mind.guiding = True
         _judge_proposal(mind, view, act, words, rng)
-    elif not objects and not landmarks and not act.values(Slot.ACTION) and _elsewhere(mind, view):
-        mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y))
-    elif rng.random() < 0.05:
+    elif not act.slots and _just_short(mind, view):
+        mind.voice = mind.voice.cleared().plan(remark(DialogueMove.REPLY_N), replace(inch_on(mind, view), joined=True))
+    elif rng.random() < UNSURE:
         mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_U), remark(DialogueMove.REPLY_Y))
     else:
         mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y), *_more(mind, rng))
@@ -202,7 +213,8 @@ def _judge_proposal(
     step = next_step(mind, view, DialogueMove.INSTRUCT, rng)
     if step is not None:
         note_told(mind, view, step[0])
-    mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y), *_more(mind, rng))
+    first = (remark(DialogueMove.REPLY_U),) if rng.random() < UNSURE else ()
+    mind.voice = mind.voice.plan_first(*first, remark(DialogueMove.REPLY_Y), *_more(mind, rng))
 
 
 def _open_question(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
@@ -214,15 +226,11 @@ def _open_question(mind: ParticipantMind, view: View, act: DialogueAct, words: H
     elif _put_right(mind, view, act, words):
         return
     elif GoalStatus.QUERIED in act.values(Slot.STATUS):
-        mind.told, mind.told_at = True, view.time
-        target = announcement(mind, view, rng).act.slots
-        mind.voice = mind.voice.cleared().plan(remark(DialogueMove.REPLY_W, *target))
-    elif landmarks == (LandmarkName.QUERIED,) and view.time - mind.told_at < JUST_TOLD:
+        _say_target(mind, view, rng)
+    elif landmarks == (LandmarkName.QUERIED,) and (view.time - mind.told_at < JUST_TOLD or _just_named(mind, view)):
         return
     elif landmarks == (LandmarkName.QUERIED,):
-        mind.told, mind.told_at = True, view.time
-        target = announcement(mind, view, rng).act.slots
-        mind.voice = mind.voice.cleared().plan(remark(DialogueMove.REPLY_W, *target), *_more(mind, rng))
+        _say_target(mind, view, rng, *_more(mind, rng))
     elif actions and _just_named(mind, view):
         return
     elif actions:
@@ -230,6 +238,14 @@ def _open_question(mind: ParticipantMind, view: View, act: DialogueAct, words: H
         _say_way(mind, view, DialogueMove.REPLY_W, rng)
     else:
         describe(mind, view, DialogueMove.REPLY_W, rng)
+
+
+def _say_target(mind: ParticipantMind, view: View, rng: np.random.Generator, *more: Remark) -> None:
+    """To "where to?": the place that comes next."""
+    mind.told, mind.told_at = True, view.time
+    named = [value for value in announcement(mind, view, rng).act.slots if value.slot in (Slot.LANDMARK, Slot.STREET)]
+    answer = remark(DialogueMove.REPLY_W, *named, wording=Wording(topic="goal"))
+    mind.voice = mind.voice.cleared().plan(answer, *more)
 
 
 def _say_order(mind: ParticipantMind, rng: np.random.Generator) -> None:
@@ -243,9 +259,9 @@ def _say_order(mind: ParticipantMind, rng: np.random.Generator) -> None:
 
 def _just_named(mind: ParticipantMind, view: View) -> bool:
     """Whether the car has been told of the place a moment ago and cannot have taken it up yet."""
-    last = mind.voice.last
-    recent = mind.voice.has_just_spoken(view.time, JUST_TOLD)
-    return recent and last is not None and mind.goal is not None and mind.goal.name in last.act.values(Slot.LANDMARK)
+    if mind.goal is None or not mind.voice.has_just_spoken(view.time, JUST_TOLD):
+        return False
+    return any(mind.goal.name in item.act.values(Slot.LANDMARK) for item in mind.voice.said[-LONGEST_BREATH:])
 
 
 def _say_way(mind: ParticipantMind, view: View, move: DialogueMove, rng: np.random.Generator) -> None:
@@ -265,6 +281,12 @@ def _say_way(mind: ParticipantMind, view: View, move: DialogueMove, rng: np.rand
 def _elsewhere(mind: ParticipantMind, view: View) -> bool:
     """Whether the car stands, and not at the target."""
     return view.standing and mind.journey is not None and mind.journey.left(view.station) > ELSEWHERE
+
+
+def _just_short(mind: ParticipantMind, view: View) -> bool:
+    """Whether the car stands just before the target, to which it is guided."""
+    near = mind.guiding and view.standing and mind.journey is not None and about_to_arrive(mind, view)
+    return near and mind.journey is not None and mind.journey.left(view.station) > 0.0
 
 
 def _not_here(mind: ParticipantMind, view: View) -> None:
@@ -288,17 +310,19 @@ def _explanation(mind: ParticipantMind, view: View, act: DialogueAct, words: Hea
         mind.excused_until = view.time + 30.0
         if ObjectClass.STATIC in act.values(Slot.OBJECT):
             note_blocked(mind, view, near=True)
-    _nod(mind, view, rng)
 
 
-def _nod(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
-    """Shows that it has heard: before what it was about to say anyway, else in a word of its own, now and then."""
+def _nod(mind: ParticipantMind, view: View, rng: np.random.Generator, *, alone: bool) -> None:
+    """Shows that it has heard: before what it says anyway, else now and then `alone`, in a word of its own."""
     waiting = mind.voice.queue
     if waiting and not waiting[0].urgent and not waiting[0].text:
-        if waiting[0].act.move in _AFTER_A_NOD and rng.random() < NODS_FIRST:
+        done = GoalStatus.COMPLETE in waiting[0].act.slots
+        if waiting[0].act.move in _AFTER_A_NOD and not done and rng.random() < NODS_FIRST:
             first = replace(waiting[0], joined=True)
             mind.voice = replace(mind.voice, queue=(remark(DialogueMove.ACKNOWLEDGE), first, *waiting[1:]))
-    elif mind.voice.idle and not (mind.guiding and about_to_arrive(mind, view)) and rng.random() < mind.style.nods:
+    elif not alone or not mind.voice.idle or (mind.guiding and about_to_arrive(mind, view)):
+        return
+    elif rng.random() < mind.style.nods:
         mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE), *_more(mind, rng))
 
 

@@ -1,0 +1,111 @@
+"""The last metres: the human talks the car up to the place, and answers what it asks there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role, Slot
+from dorothie_gym.policies.co_wizard.listening import NUDGE
+from dorothie_gym.policies.journey import Journey
+from dorothie_gym.policies.participant.arriving import WITHIN
+from dorothie_gym.policies.participant.guidance import RUN_UP, guide
+from dorothie_gym.policies.participant.replies import listen
+from dorothie_gym.world.town.routing import Entry
+from tests.policies.said import with_words
+from tests.policies.test_repairs import Human
+
+M = DialogueMove
+
+
+class Guide(Human):
+    """A participant who tells the way, of a car on the lane of the place, some way before it."""
+
+    def __init__(self, before: float, speed: float = 0.0) -> None:
+        super().__init__()
+        assert self.mind.goal is not None
+        self.mind.guiding = True
+        self.put(self.mind.goal.lane, self.mind.goal.station - before, speed)
+
+    def put(self, lane: int, station: float, speed: float) -> None:
+        assert self.mind.goal is not None
+        where = self.env.town.lanes[lane]
+        self.observation |= {
+            "time": np.array([50.0]), "speed": np.array([speed]),
+            "lane": np.int64(lane), "station": np.array([station]),
+            "pose": np.array([*where.position(station), where.heading_at(station)]),
+        }  # fmt: skip
+        self.mind.journey = Journey.plan(self.env.town, (lane, station), self.mind.goal.place)
+        self.mind.standing_since = None if speed else 40.0
+
+    def says(self) -> list[ActionValue]:
+        guide(self.mind, self.view, self.rng)
+        return [value for item in self.mind.voice.queue for value in item.act.values(Slot.ACTION)]
+
+
+def test_a_bit_further_never_leads_from_one_side_of_the_place_to_the_other() -> None:
+    rolls_on = 0.6  # what the car needs to stop, measured
+    assert WITHIN - NUDGE - rolls_on > -WITHIN
+
+
+@pytest.mark.parametrize(("before", "told"), [(4.0, "bit"), (14.0, "10"), (26.0, "10"), (30.0, "20")])
+def test_a_car_that_stands_before_the_place_is_told_a_distance_that_does_not_lead_past_it(before, told) -> None:
+    human = Guide(before)
+    assert human.says() == [ActionValue.LANE_FOLLOW]
+    distance = human.mind.voice.queue[0].wording.distance
+    assert (distance is None) is (told == "bit")
+    if distance is not None:
+        assert 10 * round(distance / 10) <= before
+
+
+def test_is_this_it_before_the_place_is_answered_by_no_and_a_bit_further() -> None:
+    human = Guide(4.0)
+    human.hears(M.QUERY_YN)
+    assert human.moves() == [M.REPLY_N, M.INSTRUCT]
+
+
+def test_where_to_is_not_answered_again_by_who_has_just_said_it() -> None:
+    human = Human()
+    human.observation["time"] = np.array([60.0])
+    human.mind.voice = replace(human.mind.voice, last_end=58.0)  # the place was named in the last breath
+    human.hears(M.QUERY_W, LandmarkName.QUERIED)
+    assert human.moves() == []
+
+
+@pytest.mark.parametrize("uptake", [True, False])
+def test_what_takes_up_an_instruction_is_not_nodded_at(uptake: bool) -> None:
+    human = Human()
+    human.mind.style = replace(human.mind.style, nods=1.0)
+    turning = DialogueAct.of(M.EXPLAIN, ActionValue.J_TURN)
+    acts = (DialogueAct.of(M.ACKNOWLEDGE), turning) if uptake else (turning,)
+    raw = with_words(human.observation, Role.CO_WIZARD, "okay, turning left", *acts)
+    listen(human.mind, replace(human.view, raw=raw), human.rng)
+    assert (M.ACKNOWLEDGE in human.moves()) is not uptake
+
+
+def test_who_turns_round_for_a_place_keeps_road_enough_to_stop() -> None:
+    human = Guide(1.0)
+    longest = max(human.env.town.lanes, key=lambda lane: lane.length)
+    human.mind.goal = replace(human.mind.goal, lane=longest.id, station=longest.length / 2)
+    told: dict[bool, list[bool]] = {True: [], False: []}
+    for lane in human.env.town.lanes:
+        for station in np.arange(2.0, lane.length - RUN_UP - 15.0, 4.0):
+            human.put(lane.id, float(station), 8.0)
+            journey = human.mind.journey
+            assert journey is not None
+            rest = journey.run_up()
+            manoeuvre = journey.next_manoeuvre(float(station))
+            if rest is None or rest[1] or manoeuvre is None or manoeuvre[1] > 12.0:
+                continue
+            if RUN_UP / 2 < rest[0] < RUN_UP + 5.0 or not journey.turns_round_on(lane.id):
+                continue
+            human.mind.voice, human.mind.guided = human.mind.voice.cleared(), None
+            told[rest[0] > RUN_UP].append(ActionValue.U_TURN in human.says())
+    assert told[True] and all(told[True])
+    assert told[False] and not any(told[False])
+
+
+def test_the_run_up_of_a_way_without_a_u_turn_is_none() -> None:
+    human = Guide(10.0)
+    assert human.mind.journey is not None and human.mind.journey.run_up() is None
+    assert Entry.U_TURN not in {leg.entry for leg in human.mind.journey.legs}
