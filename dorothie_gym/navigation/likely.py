@@ -9,9 +9,10 @@ from dorothie_gym.navigation.actions import ACTIONS, FIRST_TURN, NavigationActio
 from dorothie_gym.navigation.ways import Ways
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.spaces import ExitColumn, Motion, Observation
+from dorothie_gym.world.car.clearance import BRAKING, HALF_LENGTH
 from dorothie_gym.world.car.driver import MAX_CRUISE, MIN_CRUISE
 from dorothie_gym.world.car.lanes import LEAD, MIN_SWITCH
-from dorothie_gym.world.car.planner import BRAKING, HALF_LENGTH, HARD_STOP, U_TURN_SPEED
+from dorothie_gym.world.car.planner import HARD_STOP, U_TURN_SPEED
 from dorothie_gym.world.town import LinkType, Town
 from dorothie_gym.world.town.oncoming import oncoming_lanes
 
