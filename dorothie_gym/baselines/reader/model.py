@@ -18,6 +18,7 @@ from dorothie_gym.baselines.inputs import NFD, TASKS, UFN, Inputs, Labels
 from dorothie_gym.baselines.outputs import TAKES_ANGLE, TAKES_SIDE, Predicted, allowed_angle, likeliest
 from dorothie_gym.baselines.reader.exits import END, EXITS, exit_table
 from dorothie_gym.baselines.reader.mentions import mentions, ways
+from dorothie_gym.baselines.reader.recent import SIZE, recent
 from dorothie_gym.baselines.toto.config import Channel, TOTOConfig
 from dorothie_gym.baselines.toto.layers import time_encoding
 from dorothie_gym.baselines.toto.losses import angle_error
@@ -80,6 +81,8 @@ class JunctionReader(TOTO):
         self.source = nn.Embedding(RECENT + 1, width)
         self.exit = nn.Linear(2 + 3 + 3 + 3 + texts.width, width)
         self.state = nn.Linear(_STATE, width)
+        self.recent = nn.Linear(SIZE, width)
+        self.next_move = nn.ModuleList(nn.Linear(SIZE, len(DialogueMove)) for _ in range(2))
         self.spans = nn.Embedding(_SPANS, width)
         self.acts = nn.ModuleList(nn.Linear(width, len(DialogueMove)) for _ in range(2))
         self.direct = nn.ModuleList(nn.Linear(texts.width, len(DialogueMove) + len(LABELS)) for _ in range(2))
@@ -172,6 +175,7 @@ class JunctionReader(TOTO):
         channels = self._channels(inputs)
         _, here, now = channels[0]
         readout = self.now + self.task(task) + self.state(self._state(inputs, there, distance))
+        readout = readout + self.recent(recent(inputs))
         readout = readout + self.spans(self._understood(inputs)[0].sum(1).clamp(max=_SPANS - 1))
         channels[0] = (readout[:, None], here, now)
         channels += [(exits, there, now.expand(there.shape)), *self._words(inputs)]
@@ -189,13 +193,13 @@ class JunctionReader(TOTO):
     def _act(self, inputs: Inputs, task: Tensor, last: Tensor) -> tuple[Tensor, Tensor]:
         """Scores of the moves (B, 15) and of the slot values (B, 69), for who speaks in the task."""
         words = self.texts(self._heard(inputs))  # (B, E)
-        named = self._named(inputs)  # (B, 69, n)
+        named, before = self._named(inputs), recent(inputs)  # (B, 69, n), (B, SIZE)
         moves, slots = [], []
         for role in range(2):
             direct = self.direct[role](words)
             move, value = direct.split((len(DialogueMove), len(LABELS)), dim=-1)
             hidden = F.relu(self.value_of[role](last)[:, None] + self.value[role] + self.named[role](named))
-            moves.append(self.acts[role](last) + move)
+            moves.append(self.acts[role](last) + move + self.next_move[role](before))
             slots.append(self.value_score[role](hidden).squeeze(-1) + value)
         understands = (task == UFN)[:, None]
         return torch.where(understands, moves[0], moves[1]), torch.where(understands, slots[0], slots[1])
