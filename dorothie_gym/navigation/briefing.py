@@ -9,6 +9,7 @@ from dorothie_gym.navigation.observations import Heard
 from dorothie_gym.navigation.ways import Ways, nearest_sector
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, PhysicalAction, StreetName
 from dorothie_gym.policies.co_wizard.driving import distance_ahead, wanted_exit
+from dorothie_gym.policies.co_wizard.listening import NUDGE
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View, Wish
 from dorothie_gym.policies.journey import stopping_distance
 from dorothie_gym.spaces import Motion
@@ -17,6 +18,9 @@ from dorothie_gym.world.town.routing import Place
 
 AT_PLACE = 3.0
 """A car that stands this close to where it wanted to stop has come there, as far as it can tell [m]."""
+
+WENT_ON = NUDGE / 2
+"""A car that was to go a bit further has done so when it stands this close to where that ends [m]."""
 
 PASSED = 2.0
 """A place that lies farther behind than this will not be stopped at any more [m]."""
@@ -111,7 +115,8 @@ def note_deeds(mind: CoWizardMind, view: View) -> None:
         return
     left = distance_ahead(mind, view, place)
     stands = view.standing and view.motion is Motion.STOPPED
-    if stands and left is not None and abs(left) <= AT_PLACE:
+    near = AT_PLACE if mind.nudge is None else WENT_ON
+    if stands and left is not None and abs(left) <= near:
         mind.halted, mind.nudge, mind.arrived = True, None, mind.goal is not None
         mind.stop_sent_at = view.time
     elif mind.nudge is not None and (left is None or left < -PASSED):

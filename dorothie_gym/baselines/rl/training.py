@@ -124,8 +124,6 @@ class Training:
         left = settings.steps - int(model.num_timesteps)
         finished = left <= 0
         try:
-            if self.cloned is not None:
-                self.evaluate()
             if left > 0:
                 callbacks: list[BaseCallback] = [_Evaluations(self)]
                 if settings.warm_start is not None:
@@ -191,6 +189,8 @@ class _Evaluations(BaseCallback):
         self._due = (training.rows[-1].steps // every + 1) * every if training.rows else every
 
     def _on_training_start(self) -> None:
+        if self._training.cloned is not None:
+            self._training.evaluate()
         self._since = time.perf_counter()
 
     def _on_step(self) -> bool:
