@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from dorothie_gym.evaluation.catalogue import SHOWN, TASK_NAMES, has_paper_figure, shown_title, task_of, title_of
 from dorothie_gym.evaluation.findings import MARGIN, Claim, Finding
@@ -168,8 +168,10 @@ def points_rows(table: ResultsTable) -> tuple[list[str], list[list[str]]]:
 
 
 def notes(table: ResultsTable) -> Iterator[str]:
-    """Yields what was not scored and why, a sentence each."""
+    """Yields what the figures come from, and what was not scored and why, a sentence each."""
     labels = table.labels
+    for corpus, encoder in sorted(_origins(table.about)):
+        yield f"Trained on the corpus {corpus}; encoder of texts {encoder}."
     yield f"Scored: split {labels.split}, {len(labels.part_of)} sessions; divided: {labels.division}."
     for name, reason in labels.unreadable.items():
         yield f"Session {name} cannot be read: {reason}."
@@ -186,6 +188,13 @@ def notes(table: ResultsTable) -> Iterator[str]:
                 f"{run.model}, seed {run.seed}: {task} point at session {skipped.session}, event {skipped.event} was "
                 f"left out: {skipped.reason}."
             )
+
+
+def _origins(about: Mapping[str, Any]) -> set[tuple[str, str]]:
+    """Hash of the corpus and name of the encoder, wherever it is told how predictions were made."""
+    if isinstance(about.get("corpus"), str) and isinstance(about.get("encoder"), str):
+        return {(about["corpus"], about["encoder"])}
+    return {origin for told in about.values() if isinstance(told, Mapping) for origin in _origins(told)}
 
 
 # --- LaTeX ----------------------------------------------------------------------------------------------------------

@@ -51,6 +51,16 @@ def test_markdown_tells_findings_and_points(table: ResultsTable) -> None:
     assert "| sum | 5 | 60 | 20 | 15 | 25 | 0 |" in text
 
 
+def test_markdown_tells_which_corpus_and_encoder_each_training_had(table: ResultsTable) -> None:
+    runs = {
+        "0": {"corpus": "c0ffee", "encoder": "hashing", "epochs": 3},
+        "1": {"corpus": "c0ffee", "encoder": "hashing"},
+    }
+    page = markdown(replace(table, about={"TOTO": runs}))
+    assert page.count("Trained on the corpus c0ffee; encoder of texts hashing.") == 1
+    assert "Trained on" not in markdown(replace(table, about={"ours": {"epochs": 3}}))
+
+
 def test_latex_has_as_many_cells_in_each_row_and_escapes_names(table: ResultsTable) -> None:
     text = tex(table)
     rows = [line for line in text.splitlines() if line.endswith(r"\\") and "multicolumn" not in line]
