@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dorothie_gym.cli.output import fail, print_json, stdout, told_plainly
-from dorothie_gym.cli.training import options_of, processes, tell_interrupted, training_progress
+from dorothie_gym.cli.training import facts_of, options_of, processes, rate_line, tell_interrupted, training_progress
 from dorothie_gym.ontology import AGENT_ROLES
 
 if TYPE_CHECKING:
-    from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings
     from dorothie_gym.baselines.selfplay.training import Row, Run
 
 
@@ -40,7 +39,7 @@ def train_selfplay(out: Path, given: Mapping[str, Any], changes: Mapping[str, An
         except (SettingsError, WeightsError) as error:
             fail(str(error))
     if as_json:
-        print_json(_facts(run, settings))
+        print_json(facts_of(run, settings))
     else:
         _show(run)
     if not run.finished:
@@ -61,25 +60,9 @@ def _show(run: Run) -> None:
     from dorothie_gym.baselines.rl.training import CURVE
 
     console = stdout()
-    rate = run.steps / run.seconds if run.seconds else 0.0
-    console.print(
-        f"selfplay: {run.steps:,} steps in {run.seconds:.0f} s ({rate:.0f} a second, evaluations left out)",
-        markup=False, soft_wrap=True,
-    )  # fmt: skip
+    console.print(rate_line("selfplay", run), markup=False, soft_wrap=True)
     if run.rows:
         console.print(f"Curve: {run.folder / CURVE}", markup=False, soft_wrap=True)
     if run.steps:
         roles = " ".join(f"--{role.replace('_', '-')} {shlex.quote(str(run.folder / role))}" for role in AGENT_ROLES)
         console.print(f"Play: dorothie-gym rollout {roles}", markup=False, soft_wrap=True)
-
-
-def _facts(run: Run, settings: SelfPlaySettings) -> dict[str, Any]:
-    return {
-        "out": str(run.folder),
-        "finished": run.finished,
-        "steps": run.steps,
-        "seconds": round(run.seconds, 3),
-        "steps_per_second": round(run.steps / run.seconds, 1) if run.seconds else None,
-        "evaluations": [row.as_json() for row in run.rows],
-        "settings": settings.as_json(),
-    }

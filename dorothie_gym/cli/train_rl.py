@@ -11,7 +11,7 @@ import typer
 
 from dorothie_gym.cli.options import AsJson
 from dorothie_gym.cli.output import fail, print_json, stdout, told_plainly
-from dorothie_gym.cli.training import options_of, processes, tell_interrupted, training_progress
+from dorothie_gym.cli.training import facts_of, options_of, processes, rate_line, tell_interrupted, training_progress
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.rl import Run, TrainingSettings
@@ -121,9 +121,7 @@ def _show(run: Run, settings: TrainingSettings) -> None:
     from dorothie_gym.baselines.rl.weights import DESCRIPTION
 
     console = stdout()
-    rate = run.steps / run.seconds if run.seconds else 0.0
-    console.print(f"{settings.algorithm} on {settings.env}: {run.steps:,} steps in {run.seconds:.0f} s ({rate:.0f} a "
-                  "second, evaluations left out)", markup=False, soft_wrap=True)  # fmt: skip
+    console.print(rate_line(f"{settings.algorithm} on {settings.env}", run), markup=False, soft_wrap=True)
     if run.best is not None:
         console.print(f"Best: {_line(run.best).strip()}", markup=False, soft_wrap=True)
         console.print(f"Curve: {run.folder / CURVE}", markup=False, soft_wrap=True)
@@ -132,16 +130,7 @@ def _show(run: Run, settings: TrainingSettings) -> None:
 
 
 def _facts(run: Run, settings: TrainingSettings) -> dict[str, Any]:
-    return {
-        "out": str(run.folder),
-        "finished": run.finished,
-        "steps": run.steps,
-        "seconds": round(run.seconds, 3),
-        "steps_per_second": round(run.steps / run.seconds, 1) if run.seconds else None,
-        "best": None if run.best is None else run.best.as_json(),
-        "evaluations": [row.as_json() for row in run.rows],
-        "settings": settings.as_json(),
-    }
+    return {**facts_of(run, settings), "best": None if run.best is None else run.best.as_json()}
 
 
 def _command(settings: TrainingSettings, out: Path) -> str:

@@ -48,6 +48,25 @@ def training_progress(
         yield watch
 
 
+def facts_of(run: Any, settings: Any) -> dict[str, Any]:
+    """What came of a run and how, in JSON types."""
+    return {
+        "out": str(run.folder),
+        "finished": run.finished,
+        "steps": run.steps,
+        "seconds": round(run.seconds, 3),
+        "steps_per_second": round(run.steps / run.seconds, 1) if run.seconds else None,
+        "evaluations": [row.as_json() for row in run.rows],
+        "settings": settings.as_json(),
+    }
+
+
+def rate_line(name: str, run: Any) -> str:
+    """How far a run has come, and how fast."""
+    rate = run.steps / run.seconds if run.seconds else 0.0
+    return f"{name}: {run.steps:,} steps in {run.seconds:.0f} s ({rate:.0f} a second, evaluations left out)"
+
+
 def options_of(settings: Any) -> list[str]:
     """Words of a command line for the settings of a run that have options of their own."""
     return [word for name in _OPTIONS for word in (f"--{name.replace('_', '-')}", str(getattr(settings, name)))]

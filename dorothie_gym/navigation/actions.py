@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Mapping
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +59,7 @@ FIRST_TURN = 10
 ACTIONS = tuple(NavigationAction)
 assert len(ACTIONS) == FIRST_TURN + len(SECTORS)
 
-_PLAIN = {
+PLAIN: Final[Mapping[int, Physical]] = {
     NavigationAction.LANE_FOLLOW: Physical(action=PhysicalAction.LANE_FOLLOW),
     NavigationAction.SWITCH_LEFT: Physical(action=PhysicalAction.LANE_SWITCH, angle=LEFT),
     NavigationAction.SWITCH_RIGHT: Physical(action=PhysicalAction.LANE_SWITCH, angle=RIGHT),
@@ -67,6 +69,7 @@ _PLAIN = {
     NavigationAction.FASTER: Physical(action=PhysicalAction.SPEED_CHANGE, up=True),
     NavigationAction.SLOWER: Physical(action=PhysicalAction.SPEED_CHANGE, up=False),
 }
+"""What the car is told to do by the actions that mean the same everywhere."""
 
 
 _UNDER_WAY = {
@@ -95,7 +98,7 @@ def physical_of(action: NavigationAction, seen: Observation, ways: Ways) -> Phys
         return Physical(action=PhysicalAction.LIGHT_CHANGE, up=not seen["lights"])
     sector = action.sector
     if sector is None:
-        return _PLAIN[action]
+        return PLAIN[action]
     choice = ways.choice_ahead(seen)
     way = ways.after(choice)[sector] if choice is not None else None
     return Physical(action=PhysicalAction.J_TURN, angle=way.angle if way is not None else SECTORS[sector])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import Enum
 from types import MappingProxyType
-from typing import Self, TypeAlias
+from typing import ClassVar, Self, TypeAlias
 
 from dorothie_gym.ontology.labelled import LabelledInt
 
@@ -32,6 +32,7 @@ class SlotEnum(Enum):
     """
 
     label: str
+    _slot: ClassVar[Slot]
 
     # The default is never used by a member: it lets type checkers accept the look-up by number, `Enum(3)`.
     def __new__(cls, value: int, label: str = "") -> Self:
@@ -46,13 +47,18 @@ class SlotEnum(Enum):
         """Returns a number that is the same in every process."""
         return 32 * self.slot.value + int(self.value)
 
+    def __init_subclass__(cls, *, slot: Slot) -> None:
+        """Notes the slot that all values of a class fill."""
+        super().__init_subclass__()
+        cls._slot = slot
+
     @property
     def slot(self) -> Slot:
         """The slot that the value fills."""
-        raise NotImplementedError
+        return self._slot
 
 
-class ActionValue(SlotEnum):
+class ActionValue(SlotEnum, slot=Slot.ACTION):
     """Values of Slot.ACTION; ids 1 to 8 are those of `PhysicalAction`."""
 
     UNKNOWN = 0, "Unknown"
@@ -66,13 +72,8 @@ class ActionValue(SlotEnum):
     LIGHT_CHANGE = 8, "LightChange"
     QUERIED = 9, "Queried"
 
-    @property
-    def slot(self) -> Slot:
-        """The slot that the value fills."""
-        return Slot.ACTION
 
-
-class StreetName(SlotEnum):
+class StreetName(SlotEnum, slot=Slot.STREET):
     """Values of Slot.STREET."""
 
     UNKNOWN = 0, "Unknown"
@@ -93,13 +94,8 @@ class StreetName(SlotEnum):
     QUERIED = 15, "Queried"
     HIGHWAY = 16, "Highway"
 
-    @property
-    def slot(self) -> Slot:
-        """The slot that the value fills."""
-        return Slot.STREET
 
-
-class LandmarkName(SlotEnum):
+class LandmarkName(SlotEnum, slot=Slot.LANDMARK):
     """Values of Slot.LANDMARK."""
 
     UNKNOWN = 0, "Unknown"
@@ -115,13 +111,8 @@ class LandmarkName(SlotEnum):
     PERSON = 10, "Person"
     QUERIED = 11, "Queried"
 
-    @property
-    def slot(self) -> Slot:
-        """The slot that the value fills."""
-        return Slot.LANDMARK
 
-
-class GoalStatus(SlotEnum):
+class GoalStatus(SlotEnum, slot=Slot.STATUS):
     """Values of Slot.STATUS, and how far a subgoal has got."""
 
     UNKNOWN = 0, "Unknown"
@@ -131,13 +122,8 @@ class GoalStatus(SlotEnum):
     PENDING = 4, "Pending"
     QUERIED = 5, "Queried"
 
-    @property
-    def slot(self) -> Slot:
-        """The slot that the value fills."""
-        return Slot.STATUS
 
-
-class ObjectClass(SlotEnum):
+class ObjectClass(SlotEnum, slot=Slot.OBJECT):
     """Values of Slot.OBJECT: the semantic classes of CARLA's cameras, and Queried."""
 
     UNLABELED = 0, "Unlabeled"
@@ -164,11 +150,6 @@ class ObjectClass(SlotEnum):
     WATER = 21, "Water"
     TERRAIN = 22, "Terrain"
     QUERIED = 23, "Queried"
-
-    @property
-    def slot(self) -> Slot:
-        """The slot that the value fills."""
-        return Slot.OBJECT
 
 
 SlotValue: TypeAlias = ActionValue | StreetName | LandmarkName | GoalStatus | ObjectClass

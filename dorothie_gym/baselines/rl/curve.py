@@ -2,18 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dorothie_gym.world.graphics.charts import INK, SHEET, SOFT, hexadecimal
 from dorothie_gym.world.graphics.palette import CAR
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SIZE = (7.0, 4.0)
 """Of the picture [inches]."""
 
 DOTS = 150
 """Dots an inch."""
+
+
+@contextmanager
+def sheet(path: Path) -> Iterator[Figure]:
+    """An empty figure, which is written into a PNG file when all is drawn.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    # imported here: matplotlib is slow to import
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with rc_context({"font.family": "DejaVu Sans", "font.size": 9}):
+        figure = Figure(figsize=SIZE, dpi=DOTS, facecolor=SHEET, layout="constrained")
+        FigureCanvasAgg(figure)
+        yield figure
+        figure.savefig(path, format="png")
 
 
 def draw_curve(rows: Sequence[Mapping[str, Any]], title: str, path: Path) -> None:
@@ -27,15 +50,8 @@ def draw_curve(rows: Sequence[Mapping[str, Any]], title: str, path: Path) -> Non
     Raises:
         OSError: the file cannot be written.
     """
-    # imported here: matplotlib is slow to import
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     steps = [row["steps"] / 1e3 for row in rows]
-    with rc_context({"font.family": "DejaVu Sans", "font.size": 9}):
-        figure = Figure(figsize=SIZE, dpi=DOTS, facecolor=SHEET, layout="constrained")
-        FigureCanvasAgg(figure)
+    with sheet(path) as figure:
         axes = figure.add_subplot()
         axes.set_facecolor(SHEET)
         axes.fill_between(
@@ -48,4 +64,3 @@ def draw_curve(rows: Sequence[Mapping[str, Any]], title: str, path: Path) -> Non
         rewards.plot(steps, [row["reward"] for row in rows], color=SOFT, lw=1.2, ls="--")
         rewards.set_ylabel("mean reward of an episode (dashed)", color=SOFT)
         axes.set_title(f"{title}; {rows[-1]['seconds'] / 60:.1f} min of training", color=INK, fontsize=10)
-        figure.savefig(path, format="png")

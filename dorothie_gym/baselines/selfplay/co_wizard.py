@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.baselines.selfplay.heard import Remark, listen
 from dorothie_gym.baselines.selfplay.seat import Mask, Seat
-from dorothie_gym.navigation.actions import ACTIONS, FIRST_TURN, LEFT, RIGHT, NavigationAction
+from dorothie_gym.navigation.actions import ACTIONS, FIRST_TURN, LEFT, PLAIN, RIGHT, NavigationAction
 from dorothie_gym.navigation.ways import SECTORS, nearest_sector
 from dorothie_gym.ontology import (
     ActionValue,
@@ -50,16 +50,6 @@ _SPEECH: Mapping[int, Speech] = {
         act=DialogueAct.of(DialogueMove.QUERY_W, LandmarkName.QUERIED), text="Where do you want to go?"
     ),
     OtherAction.ASK_WAY: Speech(act=DialogueAct.of(DialogueMove.QUERY_W, ActionValue.QUERIED), text="Which way now?"),
-}
-_DRIVING: Mapping[int, Physical] = {
-    NavigationAction.LANE_FOLLOW: Physical(action=PhysicalAction.LANE_FOLLOW),
-    NavigationAction.SWITCH_LEFT: Physical(action=PhysicalAction.LANE_SWITCH, angle=LEFT),
-    NavigationAction.SWITCH_RIGHT: Physical(action=PhysicalAction.LANE_SWITCH, angle=RIGHT),
-    NavigationAction.U_TURN: Physical(action=PhysicalAction.U_TURN),
-    NavigationAction.STOP: Physical(action=PhysicalAction.STOP),
-    NavigationAction.START: Physical(action=PhysicalAction.START),
-    NavigationAction.FASTER: Physical(action=PhysicalAction.SPEED_CHANGE, up=True),
-    NavigationAction.SLOWER: Physical(action=PhysicalAction.SPEED_CHANGE, up=False),
 }
 _SIDES = {
     NavigationAction.SWITCH_LEFT: (LinkType.LANE_CHANGE_LEFT, LEFT),
@@ -161,7 +151,7 @@ class CoWizardSeat(Seat[CoWizardMemory]):
         if FIRST_TURN <= choice < len(ACTIONS):
             row = self._exits(observation).get(choice - FIRST_TURN)
             return None if row is None else Physical(action=PhysicalAction.J_TURN, angle=int(row[ExitColumn.ANGLE]))
-        return _DRIVING.get(choice)
+        return PLAIN.get(choice)
 
     def _exits(self, observation: Mapping[str, Any]) -> dict[int, NDArray[np.float64]]:
         """The exit of each sector that has one: of several the one closest to its middle."""

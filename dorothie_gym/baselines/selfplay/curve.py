@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dorothie_gym.baselines.rl.curve import DOTS, SIZE
+from dorothie_gym.baselines.rl.curve import sheet
 from dorothie_gym.ontology import Role
 from dorothie_gym.world.graphics.charts import INK, SHEET, hexadecimal
 from dorothie_gym.world.graphics.palette import CAR, INK_SOFT, NOTE, PROP
@@ -29,14 +29,7 @@ def draw_curve(rows: Sequence[Mapping[str, Any]], title: str, path: Path) -> Non
     Raises:
         OSError: the file cannot be written.
     """
-    # imported here: matplotlib is slow to import
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    with rc_context({"font.family": "DejaVu Sans", "font.size": 9}):
-        figure = Figure(figsize=SIZE, dpi=DOTS, facecolor=SHEET, layout="constrained")
-        FigureCanvasAgg(figure)
+    with sheet(path) as figure:
         returns, success = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         for role, (name, colour, style) in _LINES.items():
             known = [row for row in rows if row["returns"][role] is not None]
@@ -55,4 +48,3 @@ def draw_curve(rows: Sequence[Mapping[str, Any]], title: str, path: Path) -> Non
             axes.set_facecolor(SHEET)
         minutes = rows[-1]["seconds"] / 60
         returns.set_title(f"{title}; {minutes:.1f} min of training", color=INK, fontsize=10)
-        figure.savefig(path, format="png")

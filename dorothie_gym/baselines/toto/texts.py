@@ -30,9 +30,9 @@ class Texts(nn.Module, ABC):
     def forward(self, index: Tensor) -> Tensor:
         """Returns the vectors of texts (..., width); zeros where the index (...) is -1."""
 
+    @abstractmethod
     def take(self, table: Tensor) -> None:
         """Puts other texts in the place of those that there are: rows as the class was made with."""
-        raise NotImplementedError
 
 
 class FrozenTexts(Texts):
