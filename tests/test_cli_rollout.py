@@ -51,6 +51,8 @@ def test_tables_tell_seeds_and_where_sessions_are_kept(tmp_path: Path) -> None:
         (("--towns", "atlantis"), "atlantis"),
         (("--towns", ","), "give seen, unseen, all"),
         (("--co-wizard", "weights.json"), "which cannot be played"),
+        (("--co-wizard", "hollow"), "co_wizard: hollow/model."),
+        (("--participant", "hollow"), "it can play the co_wizard, and no participant"),
     ],
 )
 def test_mistakes_are_told(
@@ -58,6 +60,8 @@ def test_mistakes_are_told(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("weights.json").write_text('{"kind": "nothing known"}')
+    Path("hollow").mkdir()
+    Path("hollow/model.json").write_text('{"kind": "dorothie_gym-rl"}')
     done = invoke(*arguments)
     assert done.exit_code == 2 and message in done.stderr and "Traceback" not in done.stderr
 

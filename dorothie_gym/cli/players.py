@@ -26,6 +26,22 @@ def find_cast(participant: str, co_wizard: str, ad_wizard: str) -> dict[Role, Pl
     if any(name not in policy_names(role) for role, name in given.items()):
         import dorothie_gym.baselines  # noqa: F401  # what is learned there makes itself known
     try:
-        return {role: find_player(name, role) for role, name in given.items()}
+        cast = {role: find_player(name, role) for role, name in given.items()}
     except CastError as error:
         fail(str(error))
+    for role, player in cast.items():
+        if player.path is not None:
+            _try(player, role)
+    return cast
+
+
+def _try(player: Player, role: Role) -> None:
+    """Reads a learned player once, so that a damaged or unfit file is told before the first session, not in each."""
+    from dorothie_gym.spaces import SpaceLimits
+
+    try:
+        player.make(role, SpaceLimits())
+    except ImportError as error:
+        fail(f"{role}: {player.name} needs {error.name}; pip install 'dorothie-gym[baselines]' brings it")
+    except ValueError as error:
+        fail(f"{role}: {error}")
