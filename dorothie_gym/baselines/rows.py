@@ -91,11 +91,16 @@ ROWS: Final[tuple[Row, ...]] = (
     Row(name="Map Encoder Only", command="map", change=_only(Channel.MAP)),
     Row(name="E.T.", command="et", change=_only(*_EPISODIC)),
     Row(name="E.T. (+ Fine-tuned BERT)", command="et-bert", change=lambda config: _bert(config.only(_EPISODIC))),
+    Row(
+        name="TOTO (point clock)",
+        command="toto-point-clock",
+        change=lambda config: replace(config, clock="point"),
+    ),
     Row(name="Behaviour Cloning", command="cloning", kind="cloning"),
     Row(name="PPO", command="ppo", kind="ppo"),
     Row(name="Junction Reader (ours)", command="reader", change=reader_config, kind="reader"),
 )
-"""The rows of the paper's table, in its order; then policies, and our own model."""
+"""The rows of the paper's table, in its order; then TOTO with another clock, policies, and our own model."""
 
 
 class EpisodicTransformer(TOTO):

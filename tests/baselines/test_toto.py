@@ -98,6 +98,31 @@ def test_a_point_alone_is_told_what_it_is_told_among_others():
     torch.testing.assert_close(alone, values(model(given)), atol=1e-5, rtol=1e-4)
 
 
+def later(given, seconds):
+    """The same points, everything that has a time so much later."""
+    times = ("time", "move_time", "utterance_time", "action_time", "window_time")
+    return {**given, **{name: given[name] + seconds for name in times}}
+
+
+@pytest.mark.parametrize(("clock", "told"), [("point", False), ("session", True)])
+def test_what_happened_when_is_told_back_from_the_point_and_by_the_published_clock_since_the_session_began(clock, told):
+    config = replace(TINY, clock=clock).without(Channel.MAP)  # known from the beginning: it has the session's time
+    model, given = make(config).eval(), samples.inputs()
+    assert torch.allclose(values(model(later(given, 60.0))), values(model(given)), atol=1e-4) is not told
+
+
+def test_the_map_tells_how_long_the_session_has_gone_on_whatever_the_clock():
+    model, given = make(replace(TINY, clock="point")).eval(), samples.inputs()
+    assert not torch.allclose(values(model(later(given, 60.0))), values(model(given)), atol=1e-4)
+
+
+def test_settings_of_another_version_are_refused():
+    fields = TINY.to_json()
+    del fields["clock"]
+    with pytest.raises(ValueError, match="fit this version.*clock"):
+        TOTOConfig.from_json(fields)
+
+
 def test_a_town_without_lanes_is_no_obstacle():
     given = samples.on_no_lane(samples.inputs())
     assert values(make(graphs=[samples.no_town()]).eval()(given)).isfinite().all()

@@ -20,9 +20,8 @@ from dorothie_gym.baselines.reader.exits import END, EXITS, exit_table
 from dorothie_gym.baselines.reader.mentions import mentions, ways
 from dorothie_gym.baselines.reader.recent import SIZE, recent
 from dorothie_gym.baselines.toto.config import Channel, TOTOConfig
-from dorothie_gym.baselines.toto.layers import time_encoding
 from dorothie_gym.baselines.toto.losses import angle_error
-from dorothie_gym.baselines.toto.model import TOTO, Tokens, gather_tokens
+from dorothie_gym.baselines.toto.model import TOTO, Tokens
 from dorothie_gym.baselines.toto.texts import FrozenTexts
 from dorothie_gym.baselines.toto.towns import METRES, Towns
 from dorothie_gym.evaluation.features import PARTICIPANT, Columns
@@ -179,9 +178,7 @@ class JunctionReader(TOTO):
         readout = readout + self.spans(self._understood(inputs)[0].sum(1).clamp(max=_SPANS - 1))
         channels[0] = (readout[:, None], here, now)
         channels += [(exits, there, now.expand(there.shape)), *self._words(inputs)]
-        tokens, times, mask = gather_tokens(channels)
-        age = (inputs["time"][:, None] - times).clamp(min=0.0)
-        tokens = self.norm(tokens) + time_encoding(age, self.config.width)
+        tokens, mask = self._timed(channels, inputs["time"])
         for block in self.blocks[:-1]:
             tokens = block(tokens, mask)
         # The readout is first of all; the exits' own tokens are asked again, so that each knows what was said.
@@ -356,9 +353,11 @@ class JunctionReader(TOTO):
 
 
 def reader_config(config: TOTOConfig) -> TOTOConfig:
-    """Returns the sizes of the reader from those of TOTO: the same, but that slots weigh as they must to be learnt."""
+    """Returns the config of the reader from that of TOTO: the same sizes; time is told back from the point, and slots
+    weigh as they must to be learnt.
+    """
     channels = tuple(channel for channel in config.channels if channel is not Channel.SPEECH)
-    return replace(config, channels=channels, loss=replace(config.loss, slot_values=0.3))
+    return replace(config, channels=channels, clock="point", loss=replace(config.loss, slot_values=0.3))
 
 
 def _newest(values: Tensor, mask: Tensor, back: int = 1) -> Tensor:

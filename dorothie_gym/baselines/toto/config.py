@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
+from dataclasses import fields as dataclass_fields
 from types import MappingProxyType
 from typing import Any, Final, Literal, Self
 
@@ -49,6 +50,8 @@ current utterance go too where there is no sound (`TOTOConfig.current_text`)."""
 
 TextTraining = Literal["frozen", "trained"]
 
+Clock = Literal["point", "session"]
+
 
 @dataclass(frozen=True, kw_only=True)
 class LossWeights:
@@ -82,6 +85,8 @@ class TOTOConfig(HistorySizes):
         channels: what the model is given.
         current_text: whether the words of the current utterance are among the transcript.
         belief: whether the model also learns to tell where the car will be, and where it is to go.
+        clock: from where the time of a token is told: since the "session" began, as published, or back from the "point".
+            What is known from the beginning has the session's time either way: neither tells more than the other.
         text: "frozen" vectors of a text encoder, or a "trained" one, which learns with the rest.
         text_width, text_layers, text_tokens, vocabulary: of the trained text encoder, where it is not a BERT's.
         pretrained_text: whether the trained text encoder is MiniLM, where its weights are installed.
@@ -110,6 +115,7 @@ class TOTOConfig(HistorySizes):
     channels: tuple[Channel, ...] = ALL_CHANNELS
     current_text: bool = True
     belief: bool = False
+    clock: Clock = "session"
     text: TextTraining = "frozen"
     text_width: int = 128
     text_layers: int = 2
@@ -201,10 +207,12 @@ class TOTOConfig(HistorySizes):
         """Reads what `to_json` returned.
 
         Raises:
-            ValueError: a field is unknown or out of its range.
+            ValueError: a field is unknown, missing or out of its range.
         """
         known = dict(fields)
         try:
+            if missing := {field.name for field in dataclass_fields(cls)} - set(known):
+                raise KeyError(*sorted(missing))
             known["channels"] = tuple(Channel(name) for name in known["channels"])
             known["detector"] = None if known["detector"] is None else tuple(known["detector"])
             known["loss"] = LossWeights(**known["loss"])

@@ -22,7 +22,7 @@ def time_encoding(seconds: Tensor, width: int) -> Tensor:
     """Returns the encoding of moments in all channels (..., width): sines in the first half, cosines in the second.
 
     Args:
-        seconds: (...) since the session began [s].
+        seconds: (...) of 0 or more [s].
         width: even.
     """
     exponents = torch.arange(width // 2, device=seconds.device, dtype=torch.float32) * (2.0 / width)

@@ -127,12 +127,18 @@ class TOTO(Model):
 
     def read(self, inputs: Inputs) -> Tensor:
         """Returns the last token after the encoder (B, d)."""
-        tokens, times, mask = gather_tokens(self._channels(inputs))
-        tokens = self.norm(tokens) + time_encoding(times, self.config.width)
+        tokens, mask = self._timed(self._channels(inputs), inputs["time"])
         for block in self.blocks[:-1]:
             tokens = block(tokens, mask)
         last: Tensor = self.blocks[-1](tokens, mask, tokens[:, :1])  # of the last layer one token is looked at
         return last[:, 0]
+
+    def _timed(self, channels: list[Tokens], now: Tensor) -> tuple[Tensor, Tensor]:
+        """All tokens (B, T, d) with their times in all channels, and their mask (B, T)."""
+        tokens, times, mask = gather_tokens(channels)
+        if self.config.clock == "point":
+            times = (now[:, None] - times).clamp(min=0.0)
+        return self.norm(tokens) + time_encoding(times, self.config.width), mask
 
     def token_count(self, inputs: Inputs) -> int:
         """Returns how many tokens the longest of B points has."""
