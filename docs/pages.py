@@ -2,6 +2,7 @@
 
 python docs/pages.py transcripts          # plays three sessions, some seconds each
 python docs/pages.py figures CORPUS       # counts a corpus that `dorothie-gym generate` made
+python docs/pages.py curves ppo=DIR,DIR maskable_ppo=DIR,DIR   # draws runs of `dorothie-gym train-rl`, a seed each
 """
 
 from __future__ import annotations
@@ -32,9 +33,11 @@ from dorothie_gym.sessions.statistics import (
 )
 from dorothie_gym.sessions.statistics.handling import kind_of
 from dorothie_gym.sessions.transcript import markdown
+from dorothie_gym.world.graphics.charts import SHEET, SOFT, empty_figure, hexadecimal
+from dorothie_gym.world.graphics.palette import CAR, NOTE, PROP
 
 DOCS = Path(__file__).parent
-TRANSCRIPTS, DATA_SHEET = DOCS / "transcripts.md", DOCS / "data-sheet.md"
+TRANSCRIPTS, DATA_SHEET, CURVES = DOCS / "transcripts.md", DOCS / "data-sheet.md", DOCS / "navigation_curve.png"
 BEGIN, END = "<!-- figures: written by docs/pages.py -->", "<!-- end of the figures -->"
 
 LONGEST = 420.0
@@ -185,13 +188,44 @@ def _phenomena(corpus: Corpus) -> Iterator[tuple[str, ...]]:
         yield str(row["number"]), row["title"], str(row["sessions"]), share
 
 
+def curves(runs: dict[str, list[Path]]) -> str:
+    """Draws success over steps, a thin line for each run and a thick one for their mean; returns it as a table."""
+    colours = [hexadecimal(colour) for colour in (CAR, PROP, NOTE)]
+    rows, episodes = [], 0
+    with empty_figure(7.0, 4.0) as figure:
+        figure.set_layout_engine("constrained")
+        axes = figure.add_subplot(facecolor=SHEET)
+        for colour, (name, folders) in zip(colours, runs.items(), strict=False):
+            told = [[json.loads(line) for line in (each / "progress.jsonl").open(encoding="utf-8")] for each in folders]
+            shared = list(zip(*told, strict=False))  # as far as all of them got
+            steps = [now[0]["steps"] / 1e3 for now in shared]
+            for run in told:
+                axes.plot([row["steps"] / 1e3 for row in run], [row["success"] for row in run], color=colour, lw=0.8)
+            means = [sum(row["success"] for row in now) / len(now) for now in shared]
+            axes.plot(steps, means, color=colour, lw=2.4, marker="o", ms=3, label=f"{name}, {len(told)} seeds")
+            episodes = told[0][0]["episodes"]
+            rows += [(name, f"{at:.0f}", *(f"{100 * row['success']:.0f} % ({row['seconds']:.0f} s)" for row in now))
+                     for at, now in zip(steps, shared, strict=True)]  # fmt: skip
+        axes.axhline(0.8, color=SOFT, lw=0.8, ls="--")
+        axes.set(ylim=(-0.02, 1.02), xlabel="thousand steps", ylabel=f"success of {episodes} episodes")
+        axes.legend(frameon=False, loc="lower right")
+        figure.savefig(CURVES, format="png", dpi=150)
+    seeds = (f"seed {k}" for k in range(max(map(len, runs.values()))))
+    return "\n".join(_table(iter(rows), "", "thousand steps", *seeds))
+
+
 def main(arguments: list[str]) -> None:
     """Writes a page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", required=True)
     commands.add_parser("transcripts").add_argument("--first-seed", type=int, default=1)
     commands.add_parser("figures").add_argument("corpus", type=Path)
+    commands.add_parser("curves").add_argument("runs", nargs="+", metavar="NAME=DIR,DIR,...")
     given = parser.parse_args(arguments)
+    if given.command == "curves":
+        named = dict(run.split("=", 1) for run in given.runs)
+        print(curves({name: [Path(each) for each in folders.split(",")] for name, folders in named.items()}))
+        return
     if given.command == "transcripts":
         TRANSCRIPTS.write_text(transcripts(given.first_seed), encoding="utf-8", newline="\n")
         return

@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from dorothie_gym.world.graphics.charts import INK, SHEET, SOFT, hexadecimal
+from dorothie_gym.world.graphics.charts import INK, SHEET, SOFT, empty_figure, hexadecimal
 from dorothie_gym.world.graphics.palette import CAR
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 SIZE = (7.0, 4.0)
 """Of the picture [inches]."""
@@ -21,22 +18,16 @@ DOTS = 150
 
 
 @contextmanager
-def sheet(path: Path) -> Iterator[Figure]:
+def sheet(path: Path) -> Iterator[Any]:
     """An empty figure, which is written into a PNG file when all is drawn.
 
     Raises:
         OSError: the file cannot be written.
     """
-    # imported here: matplotlib is slow to import
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    with rc_context({"font.family": "DejaVu Sans", "font.size": 9}):
-        figure = Figure(figsize=SIZE, dpi=DOTS, facecolor=SHEET, layout="constrained")
-        FigureCanvasAgg(figure)
+    with empty_figure(*SIZE) as figure:
+        figure.set_layout_engine("constrained")
         yield figure
-        figure.savefig(path, format="png")
+        figure.savefig(path, format="png", dpi=DOTS)
 
 
 def draw_curve(rows: Sequence[Mapping[str, Any]], title: str, path: Path) -> None:
