@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dorothie_gym.cli.output import fail, print_json, stdout, told_plainly
+from dorothie_gym.cli.output import FAILED, fail, print_json, stdout, told_plainly
 from dorothie_gym.cli.training import facts_of, options_of, processes, rate_line, tell_interrupted, training_progress
 from dorothie_gym.ontology import AGENT_ROLES
 
@@ -16,28 +16,34 @@ if TYPE_CHECKING:
     from dorothie_gym.baselines.selfplay.training import Row, Run
 
 
-def train_selfplay(out: Path, given: Mapping[str, Any], changes: Mapping[str, Any], *, as_json: bool) -> None:
+def train_selfplay(
+    out: Path, given: Mapping[str, Any], changes: Mapping[str, Any], *, ray: str | None, as_json: bool
+) -> None:
     """Trains and tells what came of it.
 
     Args:
         out: folder of the run.
         given: what was set by `--set`.
         changes: options; None for what is left to the defaults.
+        ray: address of a cluster that steps the sessions, or None.
         as_json: whether to write one JSON object, and nothing else.
     """
     from dorothie_gym.baselines.rl import SettingsError, WeightsError
     from dorothie_gym.baselines.selfplay.settings import selfplay_settings
     from dorothie_gym.baselines.selfplay.training import SelfPlay
+    from dorothie_gym.rollout import ProcessError
 
     with told_plainly():
         try:
             settings = selfplay_settings(given, **changes)
-            if changes["workers"] is None:
+            if changes["workers"] is None and ray is None:
                 settings = replace(settings, workers=processes(settings.environments))
             with training_progress(settings.steps, _line, quiet=as_json) as watch:
-                run = SelfPlay(settings, out, watch).go()
+                run = SelfPlay(settings, out, watch, ray).go()
         except (SettingsError, WeightsError) as error:
             fail(str(error))
+        except ProcessError as error:
+            fail(str(error), FAILED)
     if as_json:
         print_json(facts_of(run, settings))
     else:
@@ -45,7 +51,8 @@ def train_selfplay(out: Path, given: Mapping[str, Any], changes: Mapping[str, An
     if not run.finished:
         words = ["dorothie-gym", "train-rl", "selfplay", "--out", str(out)]
         words += [word for name, value in given.items() for word in ("--set", f"{name}={value}")]
-        tell_interrupted(run.steps, settings.steps, out, shlex.join([*words, *options_of(settings)]))
+        cluster = [] if ray is None else ["--ray", ray]
+        tell_interrupted(run.steps, settings.steps, out, shlex.join([*words, *options_of(settings), *cluster]))
 
 
 def _line(row: Row) -> str:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dorothie_gym.cli.options import AsJson
-from dorothie_gym.cli.output import fail, print_json, stdout, told_plainly
+from dorothie_gym.cli.options import AsJson, Ray
+from dorothie_gym.cli.output import FAILED, fail, print_json, stdout, told_plainly
 from dorothie_gym.cli.training import facts_of, options_of, processes, rate_line, tell_interrupted, training_progress
 
 if TYPE_CHECKING:
@@ -36,7 +36,11 @@ def train_rl(
     environments: Annotated[int | None, typer.Option(min=1, max=256, help="How many play at once; as tuned.")] = None,
     workers: Annotated[
         int | None,
-        typer.Option(min=0, max=256, help="Processes that step them; 0: the one that learns. One for each processor."),
+        typer.Option(
+            min=0,
+            max=256,
+            help="Processes that step them, one for each processor without it; 0: the one that learns.",
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Of networks and environments.")] = 0,
     evaluate_every: Annotated[int | None, typer.Option(min=1, help="Steps between evaluations; as tuned.")] = None,
@@ -45,6 +49,7 @@ def train_rl(
         Path | None,
         typer.Option(metavar="DIR", help="Corpus: learn first what its Co-Wizards did (Navigation-v0; PPO and A2C)."),
     ] = None,
+    ray: Ray = None,
     as_json: AsJson = False,
 ) -> None:
     """Train a driver (or any role) with stable-baselines3, from defaults that were tuned.
@@ -62,6 +67,7 @@ def train_rl(
         from dorothie_gym.baselines.rl import SettingsError, Training, WeightsError, tuned_settings
     except ImportError:
         fail(NEEDS)
+    from dorothie_gym.rollout import ProcessError
     from dorothie_gym.sessions import SessionError
 
     if algorithm == "selfplay":
@@ -71,24 +77,26 @@ def train_rl(
             fail("--env: selfplay plays DuoWizardEnv; leave it out, and choose a town with --set town=NAME")
         if warm_start is not None:
             fail("--warm-start: selfplay begins with networks that know nothing; leave it out")
-        train_selfplay(out, given, changes, as_json=as_json)
+        train_selfplay(out, given, changes, ray=ray, as_json=as_json)
         return
     with told_plainly():
         try:
             warm = None if warm_start is None else str(warm_start)
             settings = tuned_settings(algorithm, env or DRIVING, env_settings=given, warm_start=warm, **changes)
-            if workers is None:
+            if workers is None and ray is None:
                 settings = replace(settings, workers=processes(settings.environments))
             with training_progress(settings.steps, _line, quiet=as_json) as watch:
-                run = Training(settings, out, watch).go()
+                run = Training(settings, out, watch, ray).go()
         except (SettingsError, WeightsError, SessionError) as error:
             fail(str(error))
+        except ProcessError as error:
+            fail(str(error), FAILED)
     if as_json:
         print_json(_facts(run, settings))
     else:
         _show(run, settings)
     if not run.finished:
-        tell_interrupted(run.steps, settings.steps, out, _command(settings, out))
+        tell_interrupted(run.steps, settings.steps, out, _command(settings, out, ray))
 
 
 def _read_settings(given: list[str]) -> dict[str, Any]:
@@ -133,10 +141,10 @@ def _facts(run: Run, settings: TrainingSettings) -> dict[str, Any]:
     return {**facts_of(run, settings), "best": None if run.best is None else run.best.as_json()}
 
 
-def _command(settings: TrainingSettings, out: Path) -> str:
+def _command(settings: TrainingSettings, out: Path, ray: str | None) -> str:
     """The command that goes on."""
     words = ["dorothie-gym", "train-rl", settings.algorithm, "--env", settings.env, "--out", str(out)]
     for name, value in settings.env_settings.items():
         words += ["--set", f"{name}={value}"]
     warm = [] if settings.warm_start is None else ["--warm-start", settings.warm_start]
-    return shlex.join([*words, *options_of(settings), *warm])
+    return shlex.join([*words, *options_of(settings), *warm, *([] if ray is None else ["--ray", ray])])

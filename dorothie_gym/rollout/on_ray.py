@@ -49,7 +49,7 @@ def share_out_on_ray(
     there = {plan.path: plan for plan in plans if plan not in here}
     if not there:
         return
-    ray = _connected(address)
+    ray = connect(address)
     try:
         remote = ray.remote(num_cpus=1, max_retries=RETRIES)(_play)
         waiting = {remote.remote(prepare, plan): plan for plan in there.values()}
@@ -59,15 +59,22 @@ def share_out_on_ray(
             try:
                 result, files = ray.get(done)
             except ray.exceptions.RayError as error:
-                raise ProcessError(f"{plan}: {_reason(error)}") from None
+                raise ProcessError(f"{plan}: {reason(error)}") from None
             _keep(root, plan.path, files)
             yield result
     finally:
         ray.shutdown()
 
 
-def _connected(address: str) -> Any:
-    """Ray, connected to a cluster."""
+def connect(address: str) -> Any:
+    """Returns Ray, connected to a cluster; whoever asks for it shuts it down.
+
+    Args:
+        address: of the cluster, see `share_out_on_ray`.
+
+    Raises:
+        ProcessError: Ray is not installed, or there is no cluster at the address.
+    """
     try:
         import ray
     except ImportError:
@@ -110,7 +117,7 @@ def _keep(root: Path, path: str, files: Mapping[str, bytes]) -> None:
     part.rename(folder)
 
 
-def _reason(error: BaseException) -> str:
+def reason(error: BaseException) -> str:
     """The error of the session itself, where it is known."""
     cause = getattr(error, "cause", None)
     lines = [line for line in str(error).splitlines() if line.strip()]

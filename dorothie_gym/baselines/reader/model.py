@@ -39,7 +39,6 @@ SLOT_THRESHOLD: Final = 0.3
 _RECENTLY: Final = 30.0
 """Words are as old as this at most [s]."""
 
-_RANKS: Final = 16
 _SPANS: Final = 4
 _SAME_TIME: Final = 0.05
 _MEMORY: Final = (1, 2, 4, 8)
@@ -54,9 +53,9 @@ _STATE: Final = 7
 class JunctionReader(TOTO):
     """TOTO's channels and encoder, with what it lacks.
 
-    The order of what happened stands beside its age; the last words are read piece by piece, and what was understood of
-    the current utterance already is marked; the exits of the next junction are tokens, and a turn is one of them; each
-    slot value has a score of its own, from where it was named; and the task is known.
+    Time is told back from the point, and what happened last stands apart; the last words are read piece by piece, and
+    what was understood of the current utterance already is marked; the exits of the next junction are tokens, and a
+    turn is one of them; each slot value has a score of its own, from where it was named; and the task is known.
 
     Args:
         config: sizes and inputs.
@@ -73,7 +72,6 @@ class JunctionReader(TOTO):
         super().__init__(config, towns, texts)
         width = config.width
         self.task = nn.Embedding(len(TASKS), width)
-        self.rank = nn.Embedding(3 * _RANKS, width)
         self.move_text = nn.Linear(texts.width, width)
         self.piece = nn.Embedding(vocabulary, width, padding_idx=PAD)
         self.place = nn.Embedding(pieces.shape[1], width)
@@ -81,10 +79,9 @@ class JunctionReader(TOTO):
         self.exit = nn.Linear(2 + 3 + 3 + 3 + texts.width, width)
         self.state = nn.Linear(_STATE, width)
         self.recent = nn.Linear(SIZE, width)
-        self.next_move = nn.ModuleList(nn.Linear(SIZE, len(DialogueMove)) for _ in range(2))
         self.spans = nn.Embedding(_SPANS, width)
         self.acts = nn.ModuleList(nn.Linear(width, len(DialogueMove)) for _ in range(2))
-        self.direct = nn.ModuleList(nn.Linear(texts.width, len(DialogueMove) + len(LABELS)) for _ in range(2))
+        self.direct = nn.Linear(texts.width, len(DialogueMove) + len(LABELS))
         self.value_of = nn.ModuleList(nn.Linear(width, _HIDDEN) for _ in range(2))
         self.value = nn.Parameter(torch.zeros(2, len(LABELS), _HIDDEN))
         self.named = nn.ModuleList(nn.Linear(_NAMED, _HIDDEN) for _ in range(2))
@@ -92,7 +89,7 @@ class JunctionReader(TOTO):
         self.decision = nn.Linear(width, len(NAVIGATION_ACTIONS) + _SIDES + 2)
         self.which_exit = nn.Linear(width, width)
         nn.init.normal_(self.value, std=0.1)
-        for weights in (self.task, self.rank, self.piece, self.place, self.source, self.spans):
+        for weights in (self.task, self.piece, self.place, self.source, self.spans):
             nn.init.normal_(weights.weight, std=0.3)
         for head in (self.head, self.action_head):
             head.requires_grad_(False)  # TOTO's heads are not used
@@ -189,15 +186,14 @@ class JunctionReader(TOTO):
 
     def _act(self, inputs: Inputs, task: Tensor, last: Tensor) -> tuple[Tensor, Tensor]:
         """Scores of the moves (B, 15) and of the slot values (B, 69), for who speaks in the task."""
-        words = self.texts(self._heard(inputs))  # (B, E)
-        named, before = self._named(inputs), recent(inputs)  # (B, 69, n), (B, SIZE)
+        named = self._named(inputs)  # (B, 69, n)
+        heard = self.direct(self.texts(inputs["current_text"])).split((len(DialogueMove), len(LABELS)), dim=-1)
         moves, slots = [], []
         for role in range(2):
-            direct = self.direct[role](words)
-            move, value = direct.split((len(DialogueMove), len(LABELS)), dim=-1)
             hidden = F.relu(self.value_of[role](last)[:, None] + self.value[role] + self.named[role](named))
-            moves.append(self.acts[role](last) + move + self.next_move[role](before))
-            slots.append(self.value_score[role](hidden).squeeze(-1) + value)
+            moves.append(self.acts[role](last))
+            slots.append(self.value_score[role](hidden).squeeze(-1))
+        moves[0], slots[0] = moves[0] + heard[0], slots[0] + heard[1]
         understands = (task == UFN)[:, None]
         return torch.where(understands, moves[0], moves[1]), torch.where(understands, slots[0], slots[1])
 
@@ -220,21 +216,7 @@ class JunctionReader(TOTO):
 
     def _moves(self, inputs: Inputs) -> Tokens:
         tokens, mask, times = super()._moves(inputs)
-        return tokens + self._ranked(mask, 0) + self.move_text(self.texts(inputs["move_text"])), mask, times
-
-    def _actions(self, inputs: Inputs) -> Tokens:
-        tokens, mask, times = super()._actions(inputs)
-        return tokens + self._ranked(mask, 1), mask, times
-
-    def _transcript(self, inputs: Inputs) -> list[Tokens]:
-        (tokens, mask, times), *current = super()._transcript(inputs)
-        return [(tokens + self._ranked(mask, 2), mask, times), *current]
-
-    def _ranked(self, mask: Tensor, kind: int) -> Tensor:
-        """How many came after each of a sequence (B, n, d)."""
-        after = (mask.sum(1, keepdim=True) - 1 - torch.arange(mask.shape[1], device=mask.device)).clamp(0, _RANKS - 1)
-        ranks: Tensor = self.rank(kind * _RANKS + after)
-        return ranks
+        return tokens + self.move_text(self.texts(inputs["move_text"])), mask, times
 
     def _exits(self, inputs: Inputs) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Tokens of the exits of the next junction (B, X, d), mask and angles (B, X), how far it is (B,) [m]."""
@@ -353,9 +335,7 @@ class JunctionReader(TOTO):
 
 
 def reader_config(config: TOTOConfig) -> TOTOConfig:
-    """Returns the config of the reader from that of TOTO: the same sizes; time is told back from the point, and slots
-    weigh as they must to be learnt.
-    """
+    """Returns the reader's config from TOTO's: the same sizes, the point's clock, and slots that can be learnt."""
     channels = tuple(channel for channel in config.channels if channel is not Channel.SPEECH)
     return replace(config, channels=channels, clock="point", loss=replace(config.loss, slot_values=0.3))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 import dorothie_gym  # noqa: F401  (its import registers the environments)
 from dorothie_gym.baselines.rl.settings import SettingsError, TrainingSettings
 from dorothie_gym.spaces.limits import REACH
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.rl.sharing import Make
 
 _PLAIN = (spaces.Discrete, spaces.MultiDiscrete, spaces.Box)
 
@@ -72,19 +75,35 @@ def masks_of(env: gym.Env[Any, Any]) -> NDArray[np.bool_] | None:
     return masks
 
 
-def make_vector(settings: TrainingSettings) -> Any:
-    """stable-baselines3's vector environment for a run: in this process, or shared out among others."""
-    from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
+def make_vector(settings: TrainingSettings, ray: str | None = None) -> Any:
+    """Returns stable-baselines3's vector environment for a run; see `shared_out`."""
+    from stable_baselines3.common.vec_env import VecMonitor
 
-    from dorothie_gym.baselines.rl.workers import WorkerVecEnv
-
-    maker = Maker(settings.env, settings.env_settings)
-    if settings.workers:
-        vector: Any = WorkerVecEnv(maker, settings.environments, settings.workers)
-    else:
-        vector = DummyVecEnv([maker] * settings.environments)
+    vector = shared_out(Maker(settings.env, settings.env_settings), settings.environments, settings.workers, ray)
     vector.seed(settings.seed * 10_000)
     return VecMonitor(vector)
+
+
+def shared_out(make: Make, environments: int, workers: int, ray: str | None = None) -> Any:
+    """Returns environments as one vector.
+
+    Args:
+        make: makes an environment.
+        environments: how many.
+        workers: processes that step them; 0: this one, or as many as a cluster has processors.
+        ray: address of a Ray cluster whose machines step them; None: this one does.
+
+    Raises:
+        ProcessError: Ray is not installed, or there is no cluster at the address.
+    """
+    from stable_baselines3.common.vec_env import DummyVecEnv
+
+    from dorothie_gym.baselines.rl.on_ray import RayVecEnv
+    from dorothie_gym.baselines.rl.workers import WorkerVecEnv
+
+    if ray is not None:
+        return RayVecEnv(make, environments, workers, ray)
+    return WorkerVecEnv(make, environments, workers) if workers else DummyVecEnv([make] * environments)
 
 
 class Maker:

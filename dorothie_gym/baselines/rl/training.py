@@ -77,16 +77,20 @@ class Run:
 class Training:
     """A run; `go` trains until all steps are done or Ctrl-C is pressed."""
 
-    def __init__(self, settings: TrainingSettings, folder: Path, watch: Watch | None = None) -> None:
+    def __init__(
+        self, settings: TrainingSettings, folder: Path, watch: Watch | None = None, ray: str | None = None
+    ) -> None:
         """Prepares a run, or takes up one that is in the folder.
 
         Args:
             settings: what is trained.
             folder: where all is written.
             watch: is told how far it is.
+            ray: address of a Ray cluster that steps the environments; None: this machine does.
 
         Raises:
             SettingsError: the folder has a run with other settings, or nothing can be trained with these.
+            ProcessError: Ray is not installed, or there is no cluster at the address.
             SessionError: the corpus of the warm start cannot be read or played again.
             WeightsError: the run in the folder is damaged.
         """
@@ -101,7 +105,7 @@ class Training:
             self.rows = _read_rows(folder / PROGRESS)
         folder.mkdir(parents=True, exist_ok=True)
         torch.set_num_threads(1)  # small networks: more threads only wait for one another
-        self._vector = make_vector(settings)
+        self._vector = make_vector(settings, ray)
         log = folder / "tensorboard" if find_spec("tensorboard") is not None else None
         try:
             self.model = make_model(settings, self._vector, log=log)

@@ -155,7 +155,7 @@ def restore(model: Any, folder: Path) -> None:
     model.num_timesteps, model._n_updates = int(description["steps"]), int(description["updates"])
 
 
-def load_model(folder: Path) -> tuple[Any, TrainingSettings]:
+def load_model(folder: str | Path) -> tuple[Any, TrainingSettings]:
     """A trained model and what it was trained with.
 
     Args:
@@ -165,6 +165,7 @@ def load_model(folder: Path) -> tuple[Any, TrainingSettings]:
         WeightsError: the files are missing or damaged.
         SettingsError: the environment that it was trained in cannot be made.
     """
+    folder = Path(folder)
     folder = folder.parent if folder.is_file() else folder
     settings = TrainingSettings(**read_description(folder)["settings"])
     env = make_env(settings.env, settings.env_settings)

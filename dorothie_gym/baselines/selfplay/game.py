@@ -10,9 +10,8 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.utils import set_random_seed
-from stable_baselines3.common.vec_env import DummyVecEnv
 
-from dorothie_gym.baselines.rl.workers import WorkerVecEnv
+from dorothie_gym.baselines.rl.environments import shared_out
 from dorothie_gym.baselines.selfplay.env import SelfPlayEnv
 from dorothie_gym.baselines.selfplay.learner import Learner, draw, make_network
 from dorothie_gym.baselines.selfplay.past import Past
@@ -46,12 +45,13 @@ class Game:
         returns: sums of rewards of the sessions that have ended since `begin`, by role (n, 3).
     """
 
-    def __init__(self, settings: SelfPlaySettings, log: Path | None) -> None:
+    def __init__(self, settings: SelfPlaySettings, log: Path | None, ray: str | None = None) -> None:
         """Prepares a game; raises `SettingsError` where nothing can be played with the settings.
 
         Args:
             settings: what is played, and with which networks.
             log: folder for TensorBoard, or None.
+            ray: address of a Ray cluster that steps the sessions; None: this machine does.
         """
         self._settings = settings
         count = settings.environments
@@ -70,9 +70,7 @@ class Game:
         against = self.learners[-1]
         self._opponent = make_network(settings.learner(), against.size, against.actions)
         self._old = np.arange(count - settings.past_environments, count)  # where past Ad-Wizards play
-        self._vector: Any = (
-            WorkerVecEnv(maker, count, settings.workers) if settings.workers else DummyVecEnv([maker] * count)
-        )
+        self._vector = shared_out(maker, count, settings.workers, ray)
         self._rng = np.random.default_rng()
         self.returns: list[NDArray[np.float64]] = []
 

@@ -92,16 +92,20 @@ class SelfPlay:
         rows: evaluations so far.
     """
 
-    def __init__(self, settings: SelfPlaySettings, folder: Path, watch: Watch | None = None) -> None:
+    def __init__(
+        self, settings: SelfPlaySettings, folder: Path, watch: Watch | None = None, ray: str | None = None
+    ) -> None:
         """Prepares a run, or takes up one that is in the folder.
 
         Args:
             settings: what is trained.
             folder: where all is written.
             watch: is told how far it is.
+            ray: address of a Ray cluster that steps the environments; None: this machine does.
 
         Raises:
             SettingsError: the folder has a run with other settings, or nothing can be trained with these.
+            ProcessError: Ray is not installed, or there is no cluster at the address.
             WeightsError: the run in the folder is damaged.
         """
         self.settings, self.folder = settings, folder
@@ -116,7 +120,7 @@ class SelfPlay:
         folder.mkdir(parents=True, exist_ok=True)
         torch.set_num_threads(1)  # small networks: more threads only wait for one another
         log = folder / "tensorboard" if find_spec("tensorboard") is not None else None
-        self.game = Game(settings, log)
+        self.game = Game(settings, log, ray)
         if begun:
             try:
                 self._take_up()

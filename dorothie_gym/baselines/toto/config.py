@@ -85,8 +85,8 @@ class TOTOConfig(HistorySizes):
         channels: what the model is given.
         current_text: whether the words of the current utterance are among the transcript.
         belief: whether the model also learns to tell where the car will be, and where it is to go.
-        clock: from where the time of a token is told: since the "session" began, as published, or back from the "point".
-            What is known from the beginning has the session's time either way: neither tells more than the other.
+        clock: from where the time of a token is told: since the "session" began, as published, or back from the
+            "point". What is known from the beginning then has the session's time: neither tells more than the other.
         text: "frozen" vectors of a text encoder, or a "trained" one, which learns with the rest.
         text_width, text_layers, text_tokens, vocabulary: of the trained text encoder, where it is not a BERT's.
         pretrained_text: whether the trained text encoder is MiniLM, where its weights are installed.
