@@ -107,6 +107,24 @@ def default_successor(town: Town, lane: int) -> int | None:
     return min(exits, key=lambda way: (abs(way.angle), way.connector)).connector
 
 
+def way_ahead(town: Town, here: Place, place: Place, distance: float) -> float | None:
+    """Returns how far a place is along the lanes that a car takes by default [m]; None if it is not on them so near.
+
+    Args:
+        town: the map.
+        here: where the car is.
+        place: that is looked for.
+        distance: so far it is looked for [m].
+    """
+    lane, station = here
+    ahead = -station
+    for passed in lanes_ahead(town, lane, station, distance):
+        if passed == place[0]:
+            return ahead + place[1]
+        ahead += town.lanes[passed].length
+    return None
+
+
 def lanes_ahead(town: Town, lane: int, station: float, distance: float) -> tuple[int, ...]:
     """The lane itself and those that follow by default, as far as `distance` [m]."""
     found, ahead = [lane], town.lanes[lane].length - station

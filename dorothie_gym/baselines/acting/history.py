@@ -11,7 +11,7 @@ from typing import Any, Final, Self
 
 from dorothie_gym.baselines.acting.glimpses import Glimpse, header_of, scene_of, way_of
 from dorothie_gym.dialogue import Span
-from dorothie_gym.ontology import NAVIGATION_ACTIONS, ArgumentKind, Role
+from dorothie_gym.ontology import NAVIGATION_ACTIONS, ArgumentKind, Role, Slot
 from dorothie_gym.policies.co_wizard.mind import View
 from dorothie_gym.sessions import FRAME_RATE, Event, EventType, Session, SessionHeader
 from dorothie_gym.spaces import Physical
@@ -58,6 +58,12 @@ class History:
     def frame(self) -> int:
         """Frame of the last glimpse."""
         return self.glimpses[-1].frame
+
+    @property
+    def landmark(self) -> str | None:
+        """Label of the landmark that was named last, by whomever."""
+        moves = (event.data["slots"] for event in reversed(self.events) if event.type is EventType.DIALOGUE_MOVE)
+        return next((slots[Slot.LANDMARK.label][-1] for slots in moves if Slot.LANDMARK.label in slots), None)
 
     def seen(self, view: View, town: Town) -> Self:
         """Returns the history with what an observation shows."""

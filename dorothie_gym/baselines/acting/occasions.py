@@ -8,6 +8,7 @@ from typing import Final, Self
 
 from dorothie_gym.ontology import ObjectClass, PhysicalAction
 from dorothie_gym.policies.co_wizard.mind import View
+from dorothie_gym.policies.journey import stopping_distance
 from dorothie_gym.spaces import Motion
 
 BEFORE_JUNCTION: Final = 40.0
@@ -15,6 +16,15 @@ BEFORE_JUNCTION: Final = 40.0
 
 AGAIN: Final = 10.0
 """Who waits at a junction without a turn, or stands by Stop, decides again after this time [s]."""
+
+DECISION: Final = 0.5
+"""Time between decisions [s]."""
+
+NEAR: Final = 1.0
+"""Who stands so near to a place has come there [m]."""
+
+PASSED: Final = 2.0
+"""A place that lies further behind has been passed [m]."""
 
 REST: Final = 4.0
 """A car that stands by Stop does not brake for anything: what it stopped for is taken to last so long [s]."""
@@ -37,6 +47,7 @@ class Watch:
         waited: when it was decided last at a junction [s].
         drove: when it was decided last what to do [s].
         hazard: since when something has been in the way [s], infinite where nothing is.
+        at_place: whether the place that was named last is where the car would stop now.
         owed: whether a decision about what to do is put off until a lane switch or U-turn is over.
     """
 
@@ -44,26 +55,29 @@ class Watch:
     waited: float = -math.inf
     drove: float = -math.inf
     hazard: float = math.inf
+    at_place: bool = False
     owed: bool = False
 
-    def look(self, view: View, heard: bool) -> tuple[Occasion, Self]:
+    def look(self, view: View, heard: bool, place: float | None = None) -> tuple[Occasion, Self]:
         """Returns what is to be decided, and the watch for the next observation.
 
         Args:
             view: what is observed.
             heard: whether the participant has spoken.
+            place: how far the place that was named last is along the way [m]; None where it is not near, or not known.
         """
         hazard = self._hazard(view)
         changed = math.isinf(hazard) is not math.isinf(self.hazard)
         near = view.choice is not None and view.choice.distance <= BEFORE_JUNCTION
         at_junction = near and self._lacks_turn(view)
-        watch = replace(self, hazard=hazard)
+        at_place = place is not None and _would_stop_at(place, view.speed)
+        watch = replace(self, hazard=hazard, at_place=at_place)
         if near and (at_junction or heard):
             assert view.choice is not None
             watch = replace(watch, junction=view.choice.lane, waited=view.time)
         speaks = heard or at_junction
         stands = view.motion is Motion.STOPPED and view.time - self.drove >= AGAIN
-        wanted = speaks or changed or stands or self.owed
+        wanted = speaks or changed or stands or self.owed or (at_place and not self.at_place)
         drives = wanted and not view.manoeuvring
         drove = view.time if drives else self.drove
         return Occasion(speaks=speaks, drives=drives), replace(watch, drove=drove, owed=wanted and not drives)
@@ -81,3 +95,8 @@ class Watch:
             return min(self.hazard, view.time)
         lasts = view.motion is Motion.STOPPED and view.time - self.drove < REST
         return self.hazard if lasts else math.inf
+
+
+def _would_stop_at(place: float, speed: float) -> bool:
+    """Whether it is time for a car at a speed [m/s] to stop at a place so far ahead [m]."""
+    return -PASSED < place < stopping_distance(speed) + DECISION * speed + NEAR

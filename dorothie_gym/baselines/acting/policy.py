@@ -26,7 +26,9 @@ from dorothie_gym.ontology import (
     Role,
 )
 from dorothie_gym.policies.co_wizard.mind import View
+from dorothie_gym.policies.journey import way_ahead
 from dorothie_gym.policies.policy import Policy
+from dorothie_gym.policies.scenery import IN_VIEW
 from dorothie_gym.policies.speech import Voice, remark
 from dorothie_gym.sessions import Task
 from dorothie_gym.sessions.tenths import EACH
@@ -66,8 +68,8 @@ class BenchmarkCoWizard(Policy[CoWizardState]):
     """Plays the Co-Wizard with a model that was trained on recorded points.
 
     After each utterance of the participant it understands (UfN, where acts are not observed), answers (RfN) and drives
-    (NfD); before a junction without a turn it speaks and drives; when a hazard begins or ends it drives. Between
-    decisions the car follows its lane.
+    (NfD); before a junction without a turn it speaks and drives; when a hazard begins or ends, and where it would have
+    to stop for the place that was named last, it drives. Between decisions the car follows its lane.
     """
 
     def __init__(self, trained: Trained, limits: SpaceLimits | None = None) -> None:
@@ -98,7 +100,7 @@ class BenchmarkCoWizard(Policy[CoWizardState]):
                 heard = _understood(model, before.observed(view, town, heard).history, heard)
             voice = voice.heard_other(view.time, [span.act for span in heard])
         following = before.observed(view, town, heard)
-        occasion, watch = state.watch.look(view, bool(heard))
+        occasion, watch = state.watch.look(view, bool(heard), _way_to_place(following.history, view, town))
         waits = view.motion is Motion.WAITING and not heard
         deed = _drive(model, following.history, view, town, waits) if occasion.drives else Deed(physical=None)
         if occasion.speaks and voice.idle:
@@ -111,6 +113,13 @@ class BenchmarkCoWizard(Policy[CoWizardState]):
 
 def _last_move(voice: Voice) -> DialogueMove | None:
     return voice.last.act.move if voice.last is not None else None
+
+
+def _way_to_place(history: History, view: View, town: Town) -> float | None:
+    """How far the place that was named last is along the way [m]; None where it is not near, or not on the map."""
+    name = history.landmark
+    named = next((landmark for landmark in view.landmarks if landmark.name.label == name), None)
+    return None if named is None else way_ahead(town, view.here, named.place, IN_VIEW)
 
 
 def _understood(model: TownModel, history: History, heard: tuple[Span, ...]) -> tuple[Span, ...]:

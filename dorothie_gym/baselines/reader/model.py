@@ -47,7 +47,9 @@ _NAMED: Final = 3 + 2 * len(_MEMORY) + 2
 
 _HIDDEN: Final = 32
 _SIDES: Final = 2
-_STATE: Final = 7
+_STATE: Final = 9
+_AT_PLACE: Final = 20.0
+"""How near the place that was named is, is told as what is left after this way of something that decays [m]."""
 
 
 class JunctionReader(TOTO):
@@ -82,6 +84,7 @@ class JunctionReader(TOTO):
         self.spans = nn.Embedding(_SPANS, width)
         self.acts = nn.ModuleList(nn.Linear(width, len(DialogueMove)) for _ in range(2))
         self.direct = nn.Linear(texts.width, len(DialogueMove) + len(LABELS))
+        self.echo = nn.Linear(texts.width, len(LABELS))
         self.value_of = nn.ModuleList(nn.Linear(width, _HIDDEN) for _ in range(2))
         self.value = nn.Parameter(torch.zeros(2, len(LABELS), _HIDDEN))
         self.named = nn.ModuleList(nn.Linear(_NAMED, _HIDDEN) for _ in range(2))
@@ -187,13 +190,14 @@ class JunctionReader(TOTO):
     def _act(self, inputs: Inputs, task: Tensor, last: Tensor) -> tuple[Tensor, Tensor]:
         """Scores of the moves (B, 15) and of the slot values (B, 69), for who speaks in the task."""
         named = self._named(inputs)  # (B, 69, n)
-        heard = self.direct(self.texts(inputs["current_text"])).split((len(DialogueMove), len(LABELS)), dim=-1)
+        words = self.texts(self._heard(inputs))  # (B, E)
+        heard = self.direct(words).split((len(DialogueMove), len(LABELS)), dim=-1)
         moves, slots = [], []
         for role in range(2):
             hidden = F.relu(self.value_of[role](last)[:, None] + self.value[role] + self.named[role](named))
             moves.append(self.acts[role](last))
             slots.append(self.value_score[role](hidden).squeeze(-1))
-        moves[0], slots[0] = moves[0] + heard[0], slots[0] + heard[1]
+        moves[0], slots[0], slots[1] = moves[0] + heard[0], slots[0] + heard[1], slots[1] + self.echo(words)
         understands = (task == UFN)[:, None]
         return torch.where(understands, moves[0], moves[1]), torch.where(understands, slots[0], slots[1])
 
@@ -325,12 +329,15 @@ class JunctionReader(TOTO):
         return torch.stack(parts, dim=-1)
 
     def _state(self, inputs: Inputs, there: Tensor, distance: Tensor) -> Tensor:
-        """Where the car stands, in numbers of about 1 (B, 7)."""
+        """Where the car stands, in numbers of about 1 (B, 9)."""
         speed = _newest(inputs["window_speed"], inputs["window_mask"])
         ahead = inputs["values"][..., 0].masked_fill(~inputs["objects_mask"], METRES).amin(1)
+        place, known = self._wanted_place(inputs)
+        far = (place - _newest_pose(inputs)[:, :2]).norm(dim=-1)
         return torch.stack(
             (speed / 10.0, (speed < 0.3).float(), (distance / 50.0).clamp(max=4.0), (distance < 15.0).float(),
-             there.sum(1) / EXITS, (ahead / 30.0).clamp(max=3.0), (inputs["current_text"] >= 0).float()), dim=-1,
+             there.sum(1) / EXITS, (ahead / 30.0).clamp(max=3.0), (inputs["current_text"] >= 0).float(),
+             known.float(), torch.exp(-far / _AT_PLACE) * known), dim=-1,
         )  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from dorothie_gym.policies.journey import (
     light_ahead,
     stopping_distance,
     streets_named,
+    way_ahead,
 )
 from dorothie_gym.spaces import Motion, Physical
 from dorothie_gym.world.town.lights import LightColour
@@ -56,6 +57,9 @@ GENTLE_WITHIN = 70.0
 
 HELD_UP = 0.4
 """A hazard that stops the car for longer than this holds it up [s]."""
+
+SIGHT = 80.0
+"""So far a place is looked for along the lanes ahead [m]."""
 
 REST = 4.0
 """So long it stands when it has stopped for good for something in the way [s]."""
@@ -103,13 +107,8 @@ def _stop_at_place(mind: CoWizardMind, view: View) -> Physical | None:
 
 
 def distance_ahead(mind: CoWizardMind, view: View, place: Place) -> float | None:
-    """How far a place is along the lanes that the car takes by default [m]; None if it is not on them within 80 m."""
-    ahead = -view.station
-    for lane in lanes_ahead(mind.town, view.lane, view.station, 80.0):
-        if lane == place[0]:
-            return ahead + place[1]
-        ahead += mind.town.lanes[lane].length
-    return None
+    """How far a place is along the lanes that the car takes by default [m]; None if it is not on them in `SIGHT`."""
+    return way_ahead(mind.town, view.here, place, SIGHT)
 
 
 def place_ahead(mind: CoWizardMind, view: View, distance: float) -> Place:

@@ -65,6 +65,14 @@ def test_who_stops_for_a_hazard_looks_again_after_a_while_though_nothing_makes_t
     assert [number for number, occasion in enumerate(found) if occasion == DRIVES] == [1, 9]
 
 
+def test_a_car_that_comes_to_the_place_that_was_named_decides_once():
+    watch, drives = Watch(), []
+    for way in (60.0, 20.0, 12.0, 6.0, 1.0, None):  # at 6 m/s Stop takes about 9 m
+        occasion, watch = watch.look(view(speed=6.0, choice=None, motion=Motion.DRIVING, manoeuvre=None), False, way)
+        drives.append(occasion == DRIVES)
+    assert drives == [False, False, True, False, False, False]
+
+
 def test_nobody_stands_for_ever():
     found = decided({"motion": Motion.STOPPED}, *[{"motion": Motion.STOPPED}] * 41, heard=(1,))
     assert [number for number, occasion in enumerate(found) if occasion.drives] == [0, 1, 21, 41]
