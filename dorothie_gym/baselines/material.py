@@ -55,7 +55,7 @@ class Material:
 
     def about(self) -> dict[str, Any]:
         """Returns what decided the features, in JSON types: part of every checkpoint and of every result."""
-        return {"corpus": self.columns.key, "encoder": self.encoder.id}
+        return {"corpus": self.columns.content, "encoder": self.encoder.id}
 
     def tables(self, fold: str) -> tuple[PointTable, ...]:
         """Returns the points of a fold, task by task.

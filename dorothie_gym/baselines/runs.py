@@ -108,7 +108,7 @@ def _describe(job: Job, model: TOTO, material: Material, result: Mapping[str, An
     Description(
         row=job.row.command,
         config=model.config.to_json(),
-        corpus=material.columns.key,
+        corpus=material.columns.content,
         encoder=material.encoder.name,
         encoder_id=material.encoder.id,
         spread=model.texts.spread if isinstance(model.texts, FrozenTexts) else None,

@@ -7,6 +7,10 @@ indices, -1 where there is none. Rows of a session follow one another, in the or
 
 from __future__ import annotations
 
+import dataclasses
+import functools
+import hashlib
+import json
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
@@ -252,7 +256,7 @@ class Columns:
     """A corpus as columns; arrays may be views of files.
 
     Attributes:
-        key: hash of all that decided the content.
+        key: hash of all that decided the content, our own sources among it: what a cache goes by.
         texts: every distinct text: what was said, what was recognised, names of streets and landmarks.
         towns: towns of the sessions, by name.
         unreadable: sessions that could not be read, (name, reason) each.
@@ -274,6 +278,19 @@ class Columns:
     towns: tuple[TownGraph, ...]
     unreadable: tuple[tuple[str, str], ...] = ()
     unpointed: tuple[tuple[int, int, str], ...] = ()
+
+    @functools.cached_property
+    def content(self) -> str:
+        """Hash of what is told of the sessions: the same for the same corpus, whatever its layout and our version."""
+        names = [self.sessions.folds, self.texts, [town.name for town in self.towns]]
+        digest = hashlib.sha256(json.dumps(names).encode())
+        for part in (*(getattr(self, group) for group in GROUPS), *self.towns):
+            for field in dataclasses.fields(part):
+                values = getattr(part, field.name)
+                if isinstance(values, np.ndarray):
+                    digest.update(f"{field.name} {values.dtype.str} {values.shape}\n".encode())
+                    digest.update(values.tobytes())
+        return digest.hexdigest()
 
 
 GROUPS: Final[dict[str, type[Any]]] = {

@@ -46,6 +46,7 @@ def test_columns_do_not_depend_on_the_layout(tmp_path: Path) -> None:
     write(corpus / "test" / "seen" / "c", talk())
     ours, theirs = build(corpus, cache=False), build(in_sdn(corpus, tmp_path / "sdn"), cache=False)
     assert_same(ours, theirs)
+    assert ours.content == theirs.content and ours.key != theirs.key
     assert len(ours.objects.kind) > 0 and len(ours.towns[0].lanes) > 0
     assert ours.sessions.names != theirs.sessions.names
     for task in Task:

@@ -62,6 +62,15 @@ def test_what_changes_in_a_session_or_its_place_is_built_anew(corpus: Path) -> N
     assert len(keys) == 4
 
 
+def test_a_corpus_is_known_by_what_it_holds_whatever_its_sessions_are_called(corpus: Path) -> None:
+    first = build(corpus).content
+    (corpus / "train" / "a").rename(corpus / "train" / "b")
+    assert build(corpus).content == build(corpus, cache=False).content == first
+    events = corpus / "train" / "b" / "events.jsonl"
+    events.write_text(events.read_text().replace("turning left.", "turning right."))
+    assert build(corpus).content != first
+
+
 @pytest.mark.parametrize("name", ["moves.slots.npy", "frames.pose.npy", INDEX_FILE])
 @pytest.mark.parametrize("damage", ["torn", "changed", "gone"])
 def test_damaged_files_are_built_anew(corpus: Path, name: str, damage: str) -> None:
