@@ -1,9 +1,12 @@
-"""What holds for all tests: nothing is written into the user's own folders."""
+"""What holds for all tests: nothing is written into the user's own folders. And a Ray cluster for who wants one."""
 
 from __future__ import annotations
 
 import os
 import tempfile
+import warnings
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -24,3 +27,18 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     folder = config.stash.get(_FOLDER, None)
     if folder is not None:
         folder.cleanup()
+
+
+@pytest.fixture
+def cluster() -> Iterator[Any]:
+    """A Ray cluster of two nodes with a processor each, the other one than the head being `second`."""
+    pytest.importorskip("ray")
+    from ray.cluster_utils import Cluster
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        made = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+        made.second = made.add_node(num_cpus=1)
+        made.wait_for_nodes()
+    yield made
+    made.shutdown()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,21 +15,6 @@ from tests.rollout.killing import contents
 pytestmark = [pytest.mark.integrations, pytest.mark.timeout(900), pytest.mark.filterwarnings("ignore")]
 
 SHORT = EnvConfig(max_seconds=40.0)
-
-
-@pytest.fixture
-def cluster() -> Iterator[Any]:
-    """Two nodes of one processor each."""
-    pytest.importorskip("ray")
-    from ray.cluster_utils import Cluster
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        made = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
-        made.second = made.add_node(num_cpus=1)
-        made.wait_for_nodes()
-    yield made
-    made.shutdown()
 
 
 def test_corpus_of_a_cluster_that_loses_a_machine_has_the_bytes_of_a_local_one(cluster: Any, tmp_path: Path) -> None:

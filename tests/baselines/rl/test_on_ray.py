@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,21 +20,6 @@ from dorothie_gym.rollout import ProcessError  # noqa: E402
 pytestmark = [pytest.mark.integrations, pytest.mark.timeout(900), pytest.mark.filterwarnings("ignore")]
 
 POLE = partial(gym.make, "CartPole-v1")
-
-
-@pytest.fixture
-def cluster() -> Iterator[Any]:
-    """Two nodes of one processor each."""
-    pytest.importorskip("ray")
-    from ray.cluster_utils import Cluster
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        made = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
-        made.second = made.add_node(num_cpus=1)
-        made.wait_for_nodes()
-    yield made
-    made.shutdown()
 
 
 def test_a_run_on_a_cluster_that_loses_a_machine_learns_the_weights_of_a_local_one(
