@@ -32,7 +32,7 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 @pytest.fixture
 def cluster() -> Iterator[Any]:
     """A Ray cluster of two nodes with a processor each, the other one than the head being `second`."""
-    pytest.importorskip("ray")
+    ray = pytest.importorskip("ray")
     from ray.cluster_utils import Cluster
 
     with warnings.catch_warnings():
@@ -41,4 +41,5 @@ def cluster() -> Iterator[Any]:
         made.second = made.add_node(num_cpus=1)
         made.wait_for_nodes()
     yield made
+    ray.shutdown()  # a test that failed is still connected, and the nodes would wait for it
     made.shutdown()

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Self
 
 from dorothie_gym.ontology import ObjectClass, PhysicalAction
+from dorothie_gym.policies.co_wizard.driving import DECISION
 from dorothie_gym.policies.co_wizard.mind import View
 from dorothie_gym.policies.journey import stopping_distance
 from dorothie_gym.spaces import Motion
@@ -16,9 +17,6 @@ BEFORE_JUNCTION: Final = 40.0
 
 AGAIN: Final = 10.0
 """Who waits at a junction without a turn, or stands by Stop, decides again after this time [s]."""
-
-DECISION: Final = 0.5
-"""Time between decisions [s]."""
 
 NEAR: Final = 1.0
 """Who stands so near to a place has come there [m]."""
