@@ -69,6 +69,8 @@ def test_three_roles_learn_and_play(tmp_path: Path) -> None:
         (["trpo"], "algorithm is 'trpo'"),
         (["ppo", "--set", "guidance"], "NAME=VALUE"),
         (["ppo", "--set", "guidance=stars"], "guidance is 'stars'"),
+        (["ppo", "--set", "guidance=stars", "--workers", "1"], "guidance is 'stars'"),
+        (["ppo", "--env", "dorothie_gym/Nope-v0", "--workers", "1"], "Nope"),
         (["ppo", "--env", "dorothie_gym/NoSuch-v0"], "dorothie_gym/NoSuch-v0"),
         (["sac"], "sac on dorothie_gym/Navigation-v0"),
         (["selfplay", "--set", "colour=red"], "selfplay has no 'colour'"),

@@ -79,7 +79,9 @@ def make_vector(settings: TrainingSettings, ray: str | None = None) -> Any:
     """Returns stable-baselines3's vector environment for a run; see `shared_out`."""
     from stable_baselines3.common.vec_env import VecMonitor
 
-    vector = shared_out(Maker(settings.env, settings.env_settings), settings.environments, settings.workers, ray)
+    maker = Maker(settings.env, settings.env_settings)
+    maker().close()  # says in this process what is wrong with the settings
+    vector = shared_out(maker, settings.environments, settings.workers, ray)
     vector.seed(settings.seed * 10_000)
     return VecMonitor(vector)
 
