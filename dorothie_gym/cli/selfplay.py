@@ -51,8 +51,7 @@ def train_selfplay(
     if not run.finished:
         words = ["dorothie-gym", "train-rl", "selfplay", "--out", str(out)]
         words += [word for name, value in given.items() for word in ("--set", f"{name}={value}")]
-        cluster = [] if ray is None else ["--ray", ray]
-        tell_interrupted(run.steps, settings.steps, out, shlex.join([*words, *options_of(settings), *cluster]))
+        tell_interrupted(run.steps, settings.steps, out, shlex.join([*words, *options_of(settings, ray)]))
 
 
 def _line(row: Row) -> str:

@@ -147,4 +147,4 @@ def _command(settings: TrainingSettings, out: Path, ray: str | None) -> str:
     for name, value in settings.env_settings.items():
         words += ["--set", f"{name}={value}"]
     warm = [] if settings.warm_start is None else ["--warm-start", settings.warm_start]
-    return shlex.join([*words, *options_of(settings), *warm, *([] if ray is None else ["--ray", ray])])
+    return shlex.join([*words, *options_of(settings, ray), *warm])

@@ -67,9 +67,10 @@ def rate_line(name: str, run: Any) -> str:
     return f"{name}: {run.steps:,} steps in {run.seconds:.0f} s ({rate:.0f} a second, evaluations left out)"
 
 
-def options_of(settings: Any) -> list[str]:
-    """Words of a command line for the settings of a run that have options of their own."""
-    return [word for name in _OPTIONS for word in (f"--{name.replace('_', '-')}", str(getattr(settings, name)))]
+def options_of(settings: Any, ray: str | None) -> list[str]:
+    """Words of a command line for the settings of a run that have options of their own, and for the cluster."""
+    words = [word for name in _OPTIONS for word in (f"--{name.replace('_', '-')}", str(getattr(settings, name)))]
+    return words if ray is None else [*words, "--ray", ray]
 
 
 def tell_interrupted(steps: int, total: int, out: Path, command: str) -> NoReturn:

@@ -8,7 +8,7 @@ from dorothie_gym.navigation.instructor import AGAIN, TELL_DISTANCE, Instruction
 from dorothie_gym.navigation.observations import Heard
 from dorothie_gym.navigation.ways import Ways, nearest_sector
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, PhysicalAction, StreetName
-from dorothie_gym.policies.co_wizard.driving import distance_ahead, wanted_exit
+from dorothie_gym.policies.co_wizard.driving import PASSED, distance_ahead, wanted_exit
 from dorothie_gym.policies.co_wizard.listening import NUDGE
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View, Wish
 from dorothie_gym.policies.journey import stopping_distance
@@ -21,9 +21,6 @@ AT_PLACE = 3.0
 
 WENT_ON = NUDGE / 2
 """A car that was to go a bit further has done so when it stands this close to where that ends [m]."""
-
-PASSED = 2.0
-"""A place that lies farther behind than this will not be stopped at any more [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)

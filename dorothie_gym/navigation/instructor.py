@@ -43,12 +43,6 @@ SIGHT = 80.0
 WITHIN = 1.9
 """A car that stands this close to the place has arrived [m]."""
 
-PASSED = 3.0
-"""A car this far behind the place has missed it [m]."""
-
-ASTRAY = 3
-"""The way is planned anew when the car has been off it for so many decisions."""
-
 COMFORTABLE, U_TURN_SPEED = 3.0, 3.5
 """With which the car slows down for a U-turn [m/s^2], and to which [m/s]."""
 
@@ -204,7 +198,7 @@ class Instructor:
     def _follow(self, place: Place) -> None:
         assert self.journey is not None
         self.journey = self.journey.followed(self._town, *place)
-        if self.journey.astray >= ASTRAY or self.journey.left(place[1]) < -PASSED:
+        if self.journey.lost(place[1]):
             self.journey = self.journey.replanned(self._town, place)
             self._key = ()
 

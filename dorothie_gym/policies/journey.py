@@ -19,6 +19,9 @@ from dorothie_gym.world.town.routing import Entry, Leg, Place, Route, router
 PASSED = 3.0
 """A goal that lies further behind than this has been passed [m]."""
 
+ASTRAY = 3
+"""Who has been off the way for so many decisions has left it."""
+
 SWITCH_ROOM = 16.0
 """Least room for a lane switch [m]."""
 
@@ -236,6 +239,10 @@ class Journey:
             if leg.lane == lane and (ahead or not self._overdue(town, station)):
                 return replace(self, leg=self.leg + ahead, astray=0)
         return replace(self, astray=self.astray + 1)
+
+    def lost(self, station: float) -> bool:
+        """Whether the way has been left, or its goal passed, so that a new one is wanted."""
+        return self.astray >= ASTRAY or self.left(station) < -PASSED
 
     def _overdue(self, town: Town, station: float) -> bool:
         legs = self.legs

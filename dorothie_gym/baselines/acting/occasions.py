@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Self
 
 from dorothie_gym.ontology import ObjectClass, PhysicalAction
-from dorothie_gym.policies.co_wizard.driving import DECISION
+from dorothie_gym.policies.co_wizard.driving import DECISION, PASSED
 from dorothie_gym.policies.co_wizard.mind import View
 from dorothie_gym.policies.journey import stopping_distance
 from dorothie_gym.spaces import Motion
@@ -20,9 +20,6 @@ AGAIN: Final = 10.0
 
 NEAR: Final = 1.0
 """Who stands so near to a place has come there [m]."""
-
-PASSED: Final = 2.0
-"""A place that lies further behind has been passed [m]."""
 
 REST: Final = 4.0
 """A car that stands by Stop does not brake for anything: what it stopped for is taken to last so long [s]."""

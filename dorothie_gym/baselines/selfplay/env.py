@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import gymnasium as gym
@@ -24,7 +24,7 @@ from dorothie_gym.spaces import ActionDict
 from dorothie_gym.tasks import StoryboardError
 from dorothie_gym.world.config import WorldConfig
 
-_PARTICIPANT, _AD_WIZARD = AGENT_ROLES.index(Role.PARTICIPANT), AGENT_ROLES.index(Role.AD_WIZARD)
+_PARTICIPANT = AGENT_ROLES.index(Role.PARTICIPANT)
 
 
 class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
@@ -41,7 +41,8 @@ class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
         traffic: "none", "light", "medium" or "heavy".
         max_seconds: of a session [s].
         progress: see above; a difference of potentials, which leaves the best policies as they are.
-        ad_wizard: "learned" takes its action; a policy's name lets that play.
+        scripted: roles that the built-in policies play; what is chosen for them counts for nothing. It may be set
+            anew, for the sessions that begin then.
 
     Raises:
         SettingsError: an argument cannot be used.
@@ -54,7 +55,7 @@ class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
         traffic: str = "light",
         max_seconds: float = 300.0,
         progress: float = 0.02,
-        ad_wizard: str = "learned",
+        scripted: Collection[Role] = (),
     ) -> None:
         if traffic not in TRAFFIC:
             raise SettingsError(f"traffic is {traffic!r}; it must be one of {', '.join(TRAFFIC)}")
@@ -63,10 +64,11 @@ class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
             config = EnvConfig(max_seconds=max_seconds, world=WorldConfig(vehicles=vehicles, pedestrians=pedestrians))
             self._progress = float(progress)
             self.duo = DuoWizardEnv(town, storyboard, config=config)
-            limits = self.duo.limits
-            self._adversary = None if ad_wizard == "learned" else make_policy(ad_wizard, Role.AD_WIZARD, limits)
         except (TypeError, ValueError, OSError, StoryboardError) as error:
             raise SettingsError(f"selfplay: {error}") from error
+        limits = self.duo.limits
+        self.scripted = scripted
+        self._policies = {role: make_policy("scripted", role, limits) for role in AGENT_ROLES}
         self._seats = [make_seat(role, self.duo.town, limits) for role in AGENT_ROLES]
         self.table = Table.of(limits, self.duo.town)
         self.observation_space = spaces.Box(-1.0, 1.0, (self.table.width,), dtype=np.float32)
@@ -74,7 +76,7 @@ class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
         self._way_left = WayLeft(self.duo.town)
         self._memories: list[Any] = []
         self._seen: Mapping[str, Any] = {}
-        self._plans: Any = None
+        self._plans: dict[Role, Any] = {}
         self._left = math.inf
 
     def reset(
@@ -84,9 +86,10 @@ class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
         super().reset(seed=seed)
         self._seen, infos = self.duo.reset(seed=seed, options=options)
         self._memories = [seat.begin() for seat in self._seats]
-        if self._adversary is not None:
-            own = policy_seed(self.duo.scenario.seed, Role.AD_WIZARD)
-            self._plans = self._adversary.initial_state(own, self.duo.town)
+        self._plans = {
+            role: self._policies[role].initial_state(policy_seed(self.duo.scenario.seed, role), self.duo.town)
+            for role in self.scripted
+        }
         row = self._row(infos)
         self._aim()
         return row, {}
@@ -100,8 +103,8 @@ class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
             if not 0 <= int(action[k]) < self.table.actions[k]:
                 raise ValueError(f"action of {role} is {action[k]}; it must be in 0..{self.table.actions[k] - 1}")
             seen = self._seen[role]
-            if role is Role.AD_WIZARD and self._adversary is not None:
-                actions[role], self._plans = self._adversary.step(seen, self._plans)
+            if role in self._plans:
+                actions[role], self._plans[role] = self._policies[role].step(seen, self._plans[role])
                 continue
             done, self._memories[k] = self._seats[k].act(int(action[k]), seen, self._memories[k])
             actions[role] = done.encode(self.duo.limits)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings
 from dorothie_gym.ontology import AGENT_ROLES, Role
 
 AD_WIZARD = AGENT_ROLES.index(Role.AD_WIZARD)
+TEAM = (Role.CO_WIZARD, Role.PARTICIPANT)
 ALL = "all"
 """Name of the learner that plays all roles."""
 
@@ -27,12 +28,12 @@ ALL = "all"
 class Maker:
     """Makes an environment of a run; can be sent to another process."""
 
-    def __init__(self, settings: Mapping[str, Any], ad_wizard: str = "learned") -> None:
-        self._settings, self._ad_wizard = dict(settings), ad_wizard
+    def __init__(self, settings: Mapping[str, Any], scripted: Collection[Role] = ()) -> None:
+        self._settings, self._scripted = dict(settings), tuple(scripted)
 
     def __call__(self) -> gym.Env[Any, Any]:
         """A new environment."""
-        return SelfPlayEnv(**self._settings, ad_wizard=self._ad_wizard)
+        return SelfPlayEnv(**self._settings, scripted=self._scripted)
 
 
 class Game:
@@ -42,7 +43,7 @@ class Game:
         table: what is at the seats.
         learners: one for each role, or one for all.
         past: earlier Ad-Wizards, which play in the last few environments.
-        returns: sums of rewards of the sessions that have ended since `begin`, by role (n, 3).
+        returns: sums of rewards of the sessions without scripted roles that have ended since `begin`, by role (n, 3).
     """
 
     def __init__(self, settings: SelfPlaySettings, log: Path | None, ray: str | None = None) -> None:
@@ -58,9 +59,12 @@ class Game:
         maker = Maker(settings.env_settings)
         template = SelfPlayEnv(**settings.env_settings)  # says in this process what is wrong with the settings
         self.table: Table = template.table
-        everywhere = range(count)
-        places = {k: everywhere for k in range(len(AGENT_ROLES))}
-        places[AD_WIZARD] = range(count - settings.past_environments)
+        coached = _coached(settings)
+        self._together = np.array([env not in coached for env in range(count)])
+        places = {
+            k: [env for env in range(count) if role not in coached.get(env, ())] for k, role in enumerate(AGENT_ROLES)
+        }
+        del places[AD_WIZARD][len(places[AD_WIZARD]) - settings.past_environments :]
         shares = {ALL: places} if settings.shared else {str(AGENT_ROLES[k]): {k: envs} for k, envs in places.items()}
         self.learners = [
             Learner(name, settings.learner(settings.seed + k), self.table, own, None if log is None else log / name)
@@ -71,6 +75,8 @@ class Game:
         self._opponent = make_network(settings.learner(), against.size, against.actions)
         self._old = np.arange(count - settings.past_environments, count)  # where past Ad-Wizards play
         self._vector = shared_out(maker, count, settings.workers, ray)
+        for env, scripted in coached.items():
+            self._vector.set_attr("scripted", scripted, indices=[env])
         self._rng = np.random.default_rng()
         self.returns: list[NDArray[np.float64]] = []
 
@@ -133,7 +139,7 @@ class Game:
                 learner.look_beyond(rewards, ends, cut)
         for learner in self.learners:
             learner.learn_from(rewards, self._starts)
-        self.returns += list(self._sums[dones])
+        self.returns += list(self._sums[dones & self._together])
         self._sums[dones] = 0.0
         self._starts = dones
 
@@ -151,3 +157,12 @@ class Game:
                 latest = [float(sums[role]) for sums in self.returns[-len(self._rows) :]]
                 logger.record(f"rollout/return_{AGENT_ROLES[role]}", sum(latest) / len(latest))
         logger.dump(steps)
+
+
+def _coached(settings: SelfPlaySettings) -> dict[int, tuple[Role, ...]]:
+    """The environments where one of the team learns beside scripted roles, and which roles those are."""
+    found = {}
+    for env in range(settings.coached_environments):
+        learns = TEAM[env % len(TEAM)]
+        found[env] = tuple(role for role in AGENT_ROLES if role is not learns)
+    return found

@@ -18,12 +18,6 @@ from dorothie_gym.policies.scenery import read_landmarks, read_subgoals, scalar
 from dorothie_gym.spaces import ParticipantAction, Speech
 from dorothie_gym.world.town.routing import Entry, Place
 
-ASTRAY = 3
-"""The way is planned anew when the car has been off it for so many decisions."""
-
-PASSED = 3.0
-"""A car this far behind its goal has missed it [m]."""
-
 ACROSS, FAR, CLOSE = 500.0, 100.0, 10.0
 """Ways are shares of these [m]."""
 
@@ -155,9 +149,7 @@ class ParticipantSeat(Seat[ParticipantMemory]):
 
     def _followed(self, journey: Journey, place: Place) -> Journey:
         journey = journey.followed(self.town, *place)
-        if journey.astray >= ASTRAY or journey.left(place[1]) < -PASSED:
-            return journey.replanned(self.town, place)
-        return journey
+        return journey.replanned(self.town, place) if journey.lost(place[1]) else journey
 
 
 def _speech(phrase: Phrase, errand: Errand | None) -> Speech | None:

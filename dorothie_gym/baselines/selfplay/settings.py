@@ -18,6 +18,9 @@ SELFPLAY: Final = KIND
 ARGUMENTS: Final = ("town", "storyboard", "traffic", "max_seconds", "progress")
 """Fields that are arguments of `SelfPlayEnv`."""
 
+PARTS: Final = ("past_environments", "coached_environments")
+"""Fields that say in how many environments not all roles learn."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SelfPlaySettings:
@@ -26,6 +29,9 @@ class SelfPlaySettings:
     Attributes:
         shared: whether one network plays all roles; otherwise each has its own.
         town, storyboard, traffic, max_seconds, progress: see `SelfPlayEnv`.
+        coached_environments: in so many, in turn Co-Wizard and participant learn with the others scripted. Who only
+            plays with one another has to find a language first, and finds none that others understand (Lowe et al.
+            2020, "On the interaction between supervision and self-play in emergent communication").
         past_environments: in so many environments the Ad-Wizard is one of earlier times, which does not learn.
         steps: decisions of all environments together.
         environments: how many play at once.
@@ -43,6 +49,7 @@ class SelfPlaySettings:
     traffic: str = "light"
     max_seconds: float = 300.0
     progress: float = 0.02
+    coached_environments: int = 0
     past_environments: int = 0
     steps: int = 2_000_000
     environments: int = 16
@@ -57,9 +64,12 @@ class SelfPlaySettings:
         object.__setattr__(self, "network", tuple(self.network))
         if not isinstance(self.shared, bool):
             raise SettingsError(f"shared is {self.shared!r}; it must be true or false")
-        past = self.past_environments
-        if not isinstance(past, int) or not 0 <= past < self.environments:
-            raise SettingsError(f"past_environments is {past!r}; it must be in 0..{self.environments - 1}")
+        left = self.environments - 1
+        for name in PARTS:
+            value = getattr(self, name)
+            if not isinstance(value, int) or not 0 <= value <= left:
+                raise SettingsError(f"{name} is {value!r}; it must be in 0..{left}: all roles learn in one at least")
+            left -= value
         self.learner()
 
     @property
@@ -84,13 +94,13 @@ def selfplay_settings(given: Mapping[str, Any] | None = None, **changes: Any) ->
     """The defaults, with changes.
 
     Args:
-        given: what a user sets: `shared`, `past_environments` and arguments of `SelfPlayEnv`.
+        given: what a user sets: `shared`, `PARTS` and arguments of `SelfPlayEnv`.
         changes: other fields; None leaves a field as it is.
 
     Raises:
         SettingsError: there is no such field, or it is out of its range.
     """
-    settable = ("shared", "past_environments", *ARGUMENTS)
+    settable = ("shared", *PARTS, *ARGUMENTS)
     unknown = [name for name in given or {} if name not in settable]
     if unknown:
         raise SettingsError(f"selfplay has no {unknown[0]!r}; what can be set is {', '.join(settable)}")
@@ -98,7 +108,7 @@ def selfplay_settings(given: Mapping[str, Any] | None = None, **changes: Any) ->
     tuned = yaml.safe_load(file.read_text(encoding="utf-8"))
     known = {name: value for name, value in changes.items() if value is not None}
     found = {**tuned, **known, **(given or {})}
-    if "past_environments" not in (given or {}):
-        found["past_environments"] = min(found["past_environments"], found["environments"] - 1)
+    for name in set(PARTS) - set(given or {}):  # in proportion, where there are fewer environments
+        found[name] = tuned[name] * min(found["environments"], tuned["environments"]) // tuned["environments"]
     assert set(found) <= {each.name for each in fields(SelfPlaySettings)}
     return SelfPlaySettings(**found)

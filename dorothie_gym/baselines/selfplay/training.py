@@ -21,7 +21,7 @@ from dorothie_gym.baselines.selfplay.curve import draw_curve
 from dorothie_gym.baselines.selfplay.game import AD_WIZARD, Game, Maker
 from dorothie_gym.baselines.selfplay.learner import draw
 from dorothie_gym.baselines.selfplay.settings import SELFPLAY, SelfPlaySettings
-from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.ontology import AGENT_ROLES, Role
 
 OPPONENTS = ("scripted", "learned")
 """Ad-Wizards that the team is evaluated against."""
@@ -42,8 +42,8 @@ class Row:
         seconds: of training, evaluations left out [s].
         scripted: what the team came to against the scripted Ad-Wizard.
         learned: the same against the one that was learning, too.
-        returns: mean sum of rewards of each role in the sessions of training that ended since the row before; None
-            where none did.
+        returns: mean sum of rewards of each role in the sessions of training without scripted roles that ended since
+            the row before; None where none did.
     """
 
     steps: int
@@ -181,7 +181,7 @@ class SelfPlay:
         return row
 
     def _outcome(self, ad_wizard: str) -> Outcome:
-        maker = Maker(self.settings.env_settings, ad_wizard)
+        maker = Maker(self.settings.env_settings, (Role.AD_WIZARD,) if ad_wizard == "scripted" else ())
         return evaluate_policy(maker, self.act_with(SEEDS_FROM), self.settings.episodes, SEEDS_FROM)
 
     def act_with(self, seed: int) -> Act:

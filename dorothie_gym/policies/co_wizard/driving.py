@@ -35,6 +35,9 @@ DECISION = 0.5
 TURN_LEAD = 85.0
 """A turn is commanded when the junction is this near [m]."""
 
+PASSED = 2.0
+"""A place that lies farther behind than this will not be stopped at any more [m]."""
+
 PATIENCE = 2.0
 """A command that has shown no effect is given again after this time [s]."""
 
@@ -92,10 +95,10 @@ def _stop_at_place(mind: CoWizardMind, view: View) -> Physical | None:
     if target is None:
         return None
     distance = distance_ahead(mind, view, target)
-    if mind.nudge is not None and (distance is None or distance < -2.0):
+    if mind.nudge is not None and (distance is None or distance < -PASSED):
         mind.nudge = None
         return None
-    if distance is None or distance < -2.0:
+    if distance is None or distance < -PASSED:
         return None
     left = distance - stopping_distance(view.speed)
     if left > view.speed * DECISION / 2 + 0.2:

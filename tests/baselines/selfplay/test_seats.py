@@ -13,7 +13,7 @@ from dorothie_gym.baselines.selfplay.env import SelfPlayEnv  # noqa: E402
 from dorothie_gym.baselines.selfplay.participant import ParticipantSeat, Phrase  # noqa: E402
 from dorothie_gym.dialogue import Direction  # noqa: E402
 from dorothie_gym.navigation import NavigationAction  # noqa: E402
-from dorothie_gym.ontology import ActionValue, DialogueMove, Role  # noqa: E402
+from dorothie_gym.ontology import AGENT_ROLES, ActionValue, DialogueMove, Role  # noqa: E402
 
 NOTHING = np.zeros(3, dtype=np.int64)
 
@@ -107,7 +107,7 @@ def test_the_participant_has_the_first_errand_and_the_way_to_it() -> None:
 
 
 def test_a_scripted_ad_wizard_can_play_instead() -> None:
-    env = SelfPlayEnv(max_seconds=60.0, ad_wizard="scripted")
+    env = SelfPlayEnv(max_seconds=60.0, scripted=[Role.AD_WIZARD])
     env.reset(seed=0)
     for _ in range(119):
         _, _, terminated, truncated, _ = env.step(np.array([0, 0, Caper.NOTHING]))
@@ -115,6 +115,21 @@ def test_a_scripted_ad_wizard_can_play_instead() -> None:
     *_, truncated, info = env.step(NOTHING)
     assert truncated and info["is_success"] is False
     assert env.duo.summary()["exceptions"] > 0
+
+
+def test_scripted_roles_finish_their_errands_whatever_is_chosen_for_them() -> None:
+    env = SelfPlayEnv(max_seconds=900.0, scripted=AGENT_ROLES)
+    env.reset(seed=0)
+    ended = False
+    while not ended:
+        _, _, terminated, truncated, info = env.step(np.array([Phrase.STOP, NavigationAction.STOP, Caper.FOG]))
+        ended = terminated or truncated
+    assert info["is_success"]
+    env.scripted = ()
+    env.reset(seed=0)
+    for _ in range(120):
+        env.step(NOTHING)
+    assert env.duo.summary()["exceptions"] == 0
 
 
 def test_what_nobody_can_do_is_refused(env: SelfPlayEnv) -> None:

@@ -17,7 +17,7 @@ from dorothie_gym.baselines.selfplay import training as training_module  # noqa:
 from dorothie_gym.baselines.selfplay.env import SelfPlayEnv  # noqa: E402
 from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings, selfplay_settings  # noqa: E402
 from dorothie_gym.baselines.selfplay.training import SelfPlay  # noqa: E402
-from dorothie_gym.ontology import AGENT_ROLES  # noqa: E402
+from dorothie_gym.ontology import AGENT_ROLES, Role  # noqa: E402
 
 SMALL: dict[str, Any] = {
     "steps": 128, "environments": 2, "past_environments": 1, "evaluate_every": 128, "episodes": 1, "network": (8,),
@@ -90,12 +90,29 @@ def test_what_was_interrupted_goes_on_to_the_same_weights(shared: bool, tmp_path
 
 
 def test_the_same_seed_learns_the_same_with_worker_processes(tmp_path: Path) -> None:
-    SelfPlay(settings_for(steps=32), tmp_path / "here").go()
-    SelfPlay(settings_for(steps=32, workers=1), tmp_path / "there").go()
+    more = {"steps": 64, "environments": 4, "coached_environments": 2}
+    SelfPlay(settings_for(**more), tmp_path / "here").go()
+    SelfPlay(settings_for(**more, workers=2), tmp_path / "there").go()
     assert_same(tmp_path / "here", tmp_path / "there")
-    SelfPlay(settings_for(steps=32, seed=1), tmp_path / "other").go()
+    SelfPlay(settings_for(**more, seed=1), tmp_path / "other").go()
     name = "co_wizard/policy/action_net.weight"
     assert not torch.equal(weights(tmp_path / "here")[name], weights(tmp_path / "other")[name])
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_who_is_coached_learns_beside_scripted_roles(shared: bool, tmp_path: Path) -> None:
+    settings = settings_for(environments=4, coached_environments=2, shared=shared)
+    game = SelfPlay(settings, tmp_path).game
+    learns = {
+        env: {AGENT_ROLES[role] for learner in game.learners for k, role in learner.players.tolist() if k == env}
+        for env in range(4)
+    }
+    team = {Role.PARTICIPANT, Role.CO_WIZARD}
+    assert learns == {0: {Role.CO_WIZARD}, 1: {Role.PARTICIPANT}, 2: {*AGENT_ROLES}, 3: team}
+    assert [set(env.scripted) for env in game._vector.envs] == [{*AGENT_ROLES} - learns[k] for k in range(2)] + [
+        set()
+    ] * 2
+    game.close()
 
 
 @pytest.mark.parametrize("shared", [False, True])
@@ -138,15 +155,22 @@ def test_runs_of_other_settings_and_damaged_ones_are_left_alone(tmp_path: Path) 
 
 @pytest.mark.parametrize(
     ("given", "named"),
-    [({"colour": 1}, "colour"), ({"shared": "maybe"}, "shared"), ({"past_environments": 99}, "past_environments")],
+    [
+        ({"colour": 1}, "colour"),
+        ({"shared": "maybe"}, "shared"),
+        ({"past_environments": 99}, "past_environments"),
+        ({"past_environments": 4, "coached_environments": 12}, "coached_environments"),
+    ],
 )
 def test_bad_settings_are_named(given: dict[str, Any], named: str) -> None:
     with pytest.raises(SettingsError, match=named):
         selfplay_settings(given)
 
 
-def test_few_environments_have_fewer_past_ones() -> None:
-    assert selfplay_settings(environments=1).past_environments == 0
+def test_few_environments_have_fewer_in_which_not_all_learn() -> None:
+    one, eight = selfplay_settings(environments=1), selfplay_settings(environments=8)
+    assert (one.past_environments, one.coached_environments) == (0, 0)
+    assert (eight.past_environments, eight.coached_environments) == (2, 4)
     settings = selfplay_settings({"shared": True}, steps=7, episodes=None)
     assert settings.shared and settings.steps == 7
     assert SelfPlaySettings(**json.loads(json.dumps(settings.as_json()))) == settings
