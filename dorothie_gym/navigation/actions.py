@@ -83,33 +83,42 @@ _UNDER_WAY = {
 def physical_of(action: NavigationAction, seen: Observation, ways: Ways) -> Physical | None:
     """What the Co-Wizard does for an action; None for nothing.
 
-    A U-turn or lane switch that is being prepared just goes on: asked for again, the car would put it off.
-    A turn into a sector without a way on is a turn with the sector's angle: the car refuses it, or takes the way
-    that fits best.
+    What is being prepared just goes on when it is asked for again: drivers may ask for what they want as long as they
+    want it. A turn into a sector without a way on is a turn with the sector's angle: the car refuses it, or takes the
+    way that fits best.
 
     Args:
         action: what was chosen.
         seen: what the Co-Wizard observes.
         ways: ways on at the town's junctions.
     """
-    if action is NavigationAction.NOTHING or prepares(action, seen):
+    if action is NavigationAction.NOTHING or prepares(action, seen, ways):
         return None
     if action is NavigationAction.LIGHTS:
         return Physical(action=PhysicalAction.LIGHT_CHANGE, up=not seen["lights"])
     sector = action.sector
     if sector is None:
         return PLAIN[action]
+    angle = _angle_of(sector, seen, ways)
+    return Physical(action=PhysicalAction.J_TURN, angle=SECTORS[sector] if angle is None else angle)
+
+
+def prepares(action: NavigationAction, seen: Observation, ways: Ways) -> bool:
+    """Whether an action is what the car is about to do anyway."""
+    if int(seen["motion"]) == Motion.STOPPED:
+        return False
+    manoeuvre = _UNDER_WAY.get(action)
+    if action.sector is not None:
+        angle = _angle_of(action.sector, seen, ways)
+        manoeuvre = None if angle is None else (PhysicalAction.J_TURN, angle)
+    return manoeuvre == (int(seen["manoeuvre"]), int(seen["manoeuvre_angle"][0]))
+
+
+def _angle_of(sector: int, seen: Observation, ways: Ways) -> int | None:
+    """Angle of the turn into a sector at the next choice of ways [degrees]; None where no way leads there."""
     choice = ways.choice_ahead(seen)
     way = ways.after(choice)[sector] if choice is not None else None
-    return Physical(action=PhysicalAction.J_TURN, angle=way.angle if way is not None else SECTORS[sector])
-
-
-def prepares(action: NavigationAction, seen: Observation) -> bool:
-    """Whether an action is what the car is about to do anyway."""
-    manoeuvre = _UNDER_WAY.get(action)
-    if manoeuvre is None or int(seen["motion"]) == Motion.STOPPED:
-        return False
-    return manoeuvre == (int(seen["manoeuvre"]), int(seen["manoeuvre_angle"][0]))
+    return None if way is None else way.angle
 
 
 class Controls:
@@ -130,7 +139,7 @@ class Controls:
         return (options.lane, options.distance) if options.exits else None
 
     def mask(self, seen: Observation) -> NDArray[np.int8]:
-        """Which actions make a difference now (18,): 1 for those that do; `seen` is what the Co-Wizard observes."""
+        """Which actions the car follows now (18,): 1 for those; `seen` is what the Co-Wizard observes."""
         world, planner = self._world, self._world.planner
         speed, cruise = float(world.car.speed), world.driver.cruise
         mask = np.zeros(len(ACTIONS), dtype=np.int8)
@@ -144,11 +153,9 @@ class Controls:
             mask[NavigationAction.U_TURN] = planner.may_turn_round(speed)
             leaves = planner.held or planner.manoeuvre[0] is not None
             mask[NavigationAction.LANE_FOLLOW] = leaves and not committed
-            for action in _UNDER_WAY:
-                mask[action] &= not prepares(action, seen)
+        for action in _UNDER_WAY:
+            mask[action] |= prepares(action, seen, self.ways)
         choice = None if committed else self.choice
         if choice is not None:
-            planned = None if planner.held else planner.turn_ahead
-            for sector, way in enumerate(self.ways.after(choice[0])):
-                mask[FIRST_TURN + sector] = way is not None and way.angle != planned
+            mask[FIRST_TURN:] = [way is not None for way in self.ways.after(choice[0])]
         return mask

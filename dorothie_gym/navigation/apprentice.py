@@ -104,7 +104,7 @@ def action_of(physical: Physical | None, seen: Observation, ways: Ways) -> Navig
         action = NavigationAction.SWITCH_LEFT if left else NavigationAction.SWITCH_RIGHT
     else:
         action = _PLAIN_ACTIONS.get(physical.action, NavigationAction.NOTHING)
-    return NavigationAction.NOTHING if prepares(action, seen) else action
+    return NavigationAction.NOTHING if prepares(action, seen, ways) else action
 
 
 def _turn(angle: int, seen: Observation, ways: Ways) -> NavigationAction:

@@ -31,7 +31,7 @@ class LikelyActions:
         self._oncoming = oncoming_lanes(town)
 
     def mask(self, seen: Observation) -> NDArray[np.bool_]:
-        """Which actions make a difference now (18,)."""
+        """Which actions the car follows now (18,)."""
         town, held = self._town, int(seen["motion"]) == Motion.STOPPED
         lane, station, speed = town.lanes[int(seen["lane"])], float(seen["station"][0]), float(seen["speed"][0])
         cruise, manoeuvre = float(seen["cruise_speed"][0]), int(seen["manoeuvre"])
@@ -54,13 +54,10 @@ class LikelyActions:
         if not lane.in_junction and not committed:
             mask[NavigationAction.LANE_FOLLOW] = held or manoeuvre > 0
         for action in (NavigationAction.SWITCH_LEFT, NavigationAction.SWITCH_RIGHT, NavigationAction.U_TURN):
-            mask[action] &= not prepares(action, seen)
+            mask[action] |= prepares(action, seen, self._ways)
         choice = None if committed else self._ways.choice_ahead(seen)
         if choice is not None:
-            turning = manoeuvre == PhysicalAction.J_TURN and not held
-            planned = int(seen["manoeuvre_angle"][0]) if turning else None
-            for sector, way in enumerate(self._ways.after(choice)):
-                mask[FIRST_TURN + sector] = way is not None and way.angle != planned
+            mask[FIRST_TURN:] = [way is not None for way in self._ways.after(choice)]
         return mask
 
     def _is_committed(self, seen: Observation, speed: float) -> bool:

@@ -62,7 +62,7 @@ def test_an_action_that_was_carried_out_is_read_back(env: NavigationEnv) -> None
             seen = env.drive.seen[Role.CO_WIZARD]
             physical = physical_of(action, seen, env.drive.ways)
             set_as_asked = action in (NavigationAction.FASTER, NavigationAction.SLOWER, NavigationAction.LIGHTS)
-            expected = NavigationAction.NOTHING if set_as_asked else action
+            expected = NavigationAction.NOTHING if set_as_asked or physical is None else action
             assert action_of(physical, seen, env.drive.ways) is expected
             told += expected is not NavigationAction.NOTHING
             _, _, over, cut, info = env.step(action)

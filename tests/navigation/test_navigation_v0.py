@@ -96,6 +96,19 @@ def test_what_the_mask_lets_through_is_not_refused(settings: dict[str, Any]) -> 
                 break
 
 
+def test_a_turn_that_is_planned_may_be_asked_for_again(env: NavigationEnv) -> None:
+    env.reset(seed=0)
+    planner, again = env.drive.stage.world.planner, 0
+    for _ in range(60):
+        turns = np.flatnonzero(env.action_masks()[NavigationAction.turn(0) :])
+        planned = planner.turn_ahead
+        _, _, _, _, info = env.step(NavigationAction.turn(int(turns[0])) if len(turns) else NavigationAction.NOTHING)
+        if planned is not None and planned == planner.turn_ahead and len(turns):
+            assert info["refused"] == [] and info["reward_terms"]["action"] == 0.0
+            again += 1
+    assert again > 5
+
+
 def test_what_the_mask_holds_back_is_refused(env: NavigationEnv) -> None:
     _, info = env.reset(seed=0)
     assert not info["action_mask"][NavigationAction.START]

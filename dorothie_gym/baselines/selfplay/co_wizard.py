@@ -102,7 +102,7 @@ class CoWizardSeat(Seat[CoWizardMemory]):
         return [*values, min(distance / FAR, 1.0), *self._goal(observation, memory), *motion, *manoeuvre]
 
     def mask(self, observation: Mapping[str, Any], memory: CoWizardMemory) -> Mask:
-        """What would change nothing is left out, as is what the map has no room for."""
+        """What would change nothing is left out, as is what the map has no room for; turns may be asked for again."""
         lane = self.town.lanes[int(observation["lane"])]
         stopped = int(observation["motion"]) == Motion.STOPPED
         manoeuvre, cruise = int(observation["manoeuvre"]), scalar(observation, "cruise_speed")
@@ -117,9 +117,7 @@ class CoWizardSeat(Seat[CoWizardMemory]):
                 beside = self.town.neighbour(lane.id, side) is not None
                 mask[action] = beside and under_way != (PhysicalAction.LANE_SWITCH, angle)
             mask[NavigationAction.U_TURN] = manoeuvre != PhysicalAction.U_TURN
-        planned = None if stopped else _turn_planned(observation)
-        for sector, row in self._exits(observation).items():
-            mask[FIRST_TURN + sector] = int(row[ExitColumn.ANGLE]) != planned
+        mask[[FIRST_TURN + sector for sector in self._exits(observation)]] = True
         mask[OtherAction.NOTE_GOAL] = memory.named is not None and memory.named is not memory.noted
         mask[list(_SPEECH)] = scalar(observation, "speaking") <= 0.0
         return mask
@@ -128,6 +126,8 @@ class CoWizardSeat(Seat[CoWizardMemory]):
         """What the car would carry out."""
         allowed = np.ones(self.actions, dtype=np.bool_)
         for choice in range(1, len(ACTIONS)):
+            if self._plans_turn(choice, observation):
+                continue
             physical = self._physical(choice, observation)
             allowed[choice] = physical is not None and bool(masks["physical"][physical.action])
             if physical is not None and physical.action in (PhysicalAction.J_TURN, PhysicalAction.LANE_SWITCH):
@@ -143,7 +143,16 @@ class CoWizardSeat(Seat[CoWizardMemory]):
             return CoWizardAction(mental=note), replace(memory, noted=memory.named)
         if choice in _SPEECH:
             return CoWizardAction(speech=_SPEECH[choice]), memory
+        if self._plans_turn(choice, observation):
+            return CoWizardAction(), memory  # it just goes on
         return CoWizardAction(physical=self._physical(choice, observation)), memory
+
+    def _plans_turn(self, choice: int, observation: Mapping[str, Any]) -> bool:
+        """Whether a choice is the turn that the car is about to take."""
+        if int(observation["motion"]) == Motion.STOPPED:
+            return False
+        planned, row = _turn_planned(observation), self._exits(observation).get(choice - FIRST_TURN)
+        return planned is not None and row is not None and int(row[ExitColumn.ANGLE]) == planned
 
     def _physical(self, choice: int, observation: Mapping[str, Any]) -> Physical | None:
         if choice == NavigationAction.LIGHTS:
