@@ -32,6 +32,7 @@ def train_selfplay(
     from dorothie_gym.baselines.selfplay.settings import selfplay_settings
     from dorothie_gym.baselines.selfplay.training import SelfPlay
     from dorothie_gym.rollout import ProcessError
+    from dorothie_gym.sessions import SessionError
 
     with told_plainly():
         try:
@@ -40,7 +41,7 @@ def train_selfplay(
                 settings = replace(settings, workers=processes(settings.environments))
             with training_progress(settings.steps, _line, quiet=as_json) as watch:
                 run = SelfPlay(settings, out, watch, ray).go()
-        except (SettingsError, WeightsError) as error:
+        except (SettingsError, WeightsError, SessionError) as error:
             fail(str(error))
         except ProcessError as error:
             fail(str(error), FAILED)

@@ -47,7 +47,9 @@ def train_rl(
     episodes: Annotated[int | None, typer.Option(min=1, help="Of an evaluation; as tuned.")] = None,
     warm_start: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Corpus: learn first what its Co-Wizards did (Navigation-v0; PPO and A2C)."),
+        typer.Option(
+            metavar="DIR", help="Corpus: learn first what was done in it (PPO and A2C on Navigation-v0; selfplay)."
+        ),
     ] = None,
     ray: Ray = None,
     as_json: AsJson = False,
@@ -62,6 +64,7 @@ def train_rl(
     changes = {
         "steps": steps, "environments": environments, "workers": workers, "seed": seed,
         "evaluate_every": evaluate_every, "episodes": episodes,
+        "warm_start": None if warm_start is None else str(warm_start),
     }  # fmt: skip
     try:
         from dorothie_gym.baselines.rl import SettingsError, Training, WeightsError, tuned_settings
@@ -75,14 +78,11 @@ def train_rl(
 
         if env is not None:
             fail("--env: selfplay plays DuoWizardEnv; leave it out, and choose a town with --set town=NAME")
-        if warm_start is not None:
-            fail("--warm-start: selfplay begins with networks that know nothing; leave it out")
         train_selfplay(out, given, changes, ray=ray, as_json=as_json)
         return
     with told_plainly():
         try:
-            warm = None if warm_start is None else str(warm_start)
-            settings = tuned_settings(algorithm, env or DRIVING, env_settings=given, warm_start=warm, **changes)
+            settings = tuned_settings(algorithm, env or DRIVING, env_settings=given, **changes)
             if workers is None and ray is None:
                 settings = replace(settings, workers=processes(settings.environments))
             with training_progress(settings.steps, _line, quiet=as_json) as watch:
@@ -146,5 +146,4 @@ def _command(settings: TrainingSettings, out: Path, ray: str | None) -> str:
     words = ["dorothie-gym", "train-rl", settings.algorithm, "--env", settings.env, "--out", str(out)]
     for name, value in settings.env_settings.items():
         words += ["--set", f"{name}={value}"]
-    warm = [] if settings.warm_start is None else ["--warm-start", settings.warm_start]
-    return shlex.join([*words, *options_of(settings, ray), *warm])
+    return shlex.join([*words, *options_of(settings, ray)])

@@ -70,7 +70,8 @@ def rate_line(name: str, run: Any) -> str:
 def options_of(settings: Any, ray: str | None) -> list[str]:
     """Words of a command line for the settings of a run that have options of their own, and for the cluster."""
     words = [word for name in _OPTIONS for word in (f"--{name.replace('_', '-')}", str(getattr(settings, name)))]
-    return words if ray is None else [*words, "--ray", ray]
+    more = {"--warm-start": settings.warm_start, "--ray": ray}
+    return words + [word for name, value in more.items() if value is not None for word in (name, value)]
 
 
 def tell_interrupted(steps: int, total: int, out: Path, command: str) -> NoReturn:

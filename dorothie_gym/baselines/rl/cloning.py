@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from stable_baselines3.common.callbacks import BaseCallback
 
 from dorothie_gym.navigation import NavigationAction, NavigationConfig
@@ -19,6 +20,9 @@ from dorothie_gym.sessions import Corpus, Session, SessionError
 from dorothie_gym.sessions.sdn.maps import find_town
 from dorothie_gym.spaces import CoWizardAction, SpaceLimits
 from dorothie_gym.world.town import Town
+
+NOTHING = int(NavigationAction.NOTHING)
+"""Doing nothing has this number everywhere."""
 
 LEARNING_RATE, BATCH = 1e-3, 64
 MOST_EPOCHS, PATIENCE = 60, 5
@@ -31,11 +35,11 @@ CRITIC_ALONE = 20_000
 
 @dataclass(frozen=True, eq=False)
 class Lessons:
-    """Decisions of Co-Wizards.
+    """Decisions of those who are watched.
 
     Attributes:
-        observations: what a driver observed at each (n, 161), float32.
-        masks: which actions were likely to be carried out (n, 18), bool.
+        observations: what the learner would have observed at each (n, m), float32.
+        masks: which actions were likely to be carried out (n, k), bool.
         actions: what was done (n,), int64.
     """
 
@@ -44,7 +48,7 @@ class Lessons:
     actions: torch.Tensor
 
     @classmethod
-    def of(cls, lessons: Iterable[Lesson]) -> Lessons:
+    def of(cls, lessons: Iterable[tuple[NDArray[np.float32], NDArray[np.bool_], int]]) -> Lessons:
         """Stacks single decisions, at least one."""
         observations, masks, actions = zip(*lessons, strict=True)
         return cls(
@@ -88,7 +92,14 @@ def read_lessons(corpus: Path, fold: str, config: NavigationConfig | None = None
     Raises:
         SessionError: the corpus cannot be read or played again, or has nothing in the fold.
     """
-    found: list[Lesson] = []
+    found = [lesson for session, town in sessions_of(corpus, fold) for lesson in lessons_of(session, town, config)]
+    if not found:
+        raise SessionError(f"{corpus}: fold {fold!r} has no decision to learn from")
+    return Lessons.of(found)
+
+
+def sessions_of(corpus: Path, fold: str) -> Iterator[tuple[Session, Town]]:
+    """Yields the sessions of a fold, with their towns; raises `SessionError` where one cannot be played again."""
     towns: dict[str, Town] = {}
     for entry in Corpus.load(corpus).filter(fold=fold).entries:
         session = entry.load()
@@ -97,10 +108,7 @@ def read_lessons(corpus: Path, fold: str, config: NavigationConfig | None = None
         if town is None:
             raise SessionError(f"{session.name}: there is no map of {name}; it cannot be played again")
         towns[name] = town
-        found += lessons_of(session, town, config)
-    if not found:
-        raise SessionError(f"{corpus}: fold {fold!r} has no decision to learn from")
-    return Lessons.of(found)
+        yield session, town
 
 
 def lessons_of(session: Session, town: Town, config: NavigationConfig | None = None) -> list[Lesson]:
@@ -142,7 +150,7 @@ def clone(model: Any, shown: Lessons, held_out: Lessons, seed: int) -> Cloned:
     policy.set_training_mode(False)
     with torch.no_grad():
         chosen = _distribution(policy, held_out, torch.arange(len(held_out))).get_actions(deterministic=True)
-    right, deeds = chosen == held_out.actions, held_out.actions != NavigationAction.NOTHING
+    right, deeds = chosen == held_out.actions, held_out.actions != NOTHING
     return Cloned(
         lessons=len(shown), epochs=epoch, losses=(before, lowest), agreement=float(right.float().mean()),
         majority=float((held_out.actions == shown.actions.mode().values).float().mean()),
@@ -157,9 +165,13 @@ class CriticFirst(BaseCallback):
         return True
 
     def _on_rollout_end(self) -> None:
-        policy: Any = self.model.policy
-        for part in (policy.mlp_extractor.policy_net, policy.action_net):
-            part.requires_grad_(self.num_timesteps > CRITIC_ALONE)
+        hold_actor(self.model.policy, self.num_timesteps)
+
+
+def hold_actor(policy: Any, steps: int) -> None:
+    """Lets the actor of a cloned policy learn only when `CRITIC_ALONE` steps have been done."""
+    for part in (policy.mlp_extractor.policy_net, policy.action_net):
+        part.requires_grad_(steps > CRITIC_ALONE)
 
 
 def _distribution(policy: Any, lessons: Lessons, rows: torch.Tensor) -> Any:

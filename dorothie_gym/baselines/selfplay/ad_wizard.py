@@ -140,6 +140,18 @@ class AdWizardSeat(Seat[AdWizardMemory]):
             return action, memory
         return action, replace(memory, last=scalar(observation, "time"))
 
+    def choice_of(
+        self, action: AdWizardAction, observation: Mapping[str, Any], memory: AdWizardMemory
+    ) -> int:  # fmt: skip
+        """The trick of the same kind, with the same weather or sensor."""
+        if action.exception is ExceptionKind.WEATHER:
+            about = {k: share for k, (parameter, share) in _WEATHER.items() if parameter is action.weather}
+            return min(about, key=lambda k: abs(about[k] - action.share), default=Caper.NOTHING)
+        if action.exception is ExceptionKind.SENSOR_FAULT:
+            fault = next((k for k, sensor in _FAULTS.items() if sensor is action.sensor), Caper.NOTHING)
+            return fault if action.on else Caper.NOTHING
+        return next((k for k in Caper if _KINDS[k] == action.exception), Caper.NOTHING)
+
     def _action(self, caper: Caper, observation: Mapping[str, Any]) -> AdWizardAction:
         if caper in _WEATHER:
             parameter, share = _WEATHER[caper]

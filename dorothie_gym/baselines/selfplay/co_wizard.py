@@ -147,6 +147,27 @@ class CoWizardSeat(Seat[CoWizardMemory]):
             return CoWizardAction(), memory  # it just goes on
         return CoWizardAction(physical=self._physical(choice, observation)), memory
 
+    def choice_of(self, action: CoWizardAction, observation: Mapping[str, Any], memory: CoWizardMemory) -> int:
+        """What was driven, else the goal that was noted, else what was said, as far as it has a number."""
+        physical, mental, speech = action.physical, action.mental, action.speech
+        if physical is not None:
+            return self._driven(physical, observation)
+        if mental is not None and mental.action is MentalAction.GOAL_UPDATE and memory.named in mental.goals:
+            return OtherAction.NOTE_GOAL
+        if speech is None:
+            return NavigationAction.NOTHING
+        same = (choice for choice, known in _SPEECH.items() if known.act.move is speech.act.move)
+        return next((k for k in same if _SPEECH[k].act.slots <= speech.act.slots), int(NavigationAction.NOTHING))
+
+    def _driven(self, physical: Physical, observation: Mapping[str, Any]) -> int:
+        """The number of a physical action; of turns that into the exit which fits best."""
+        if physical.action is PhysicalAction.J_TURN:
+            exits = self._exits(observation)
+            misfits = {k: abs(float(wrap_degrees(row[ExitColumn.ANGLE] - physical.angle))) for k, row in exits.items()}
+            return FIRST_TURN + min(misfits, key=misfits.__getitem__) if misfits else int(NavigationAction.NOTHING)
+        alike = (choice for choice in range(1, FIRST_TURN) if self._physical(choice, observation) == physical)
+        return next(alike, int(NavigationAction.NOTHING))
+
     def _plans_turn(self, choice: int, observation: Mapping[str, Any]) -> bool:
         """Whether a choice is the turn that the car is about to take."""
         if int(observation["motion"]) == Motion.STOPPED:

@@ -53,7 +53,7 @@ class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
         town: str = "brookside",
         storyboard: str | None = None,
         traffic: str = "light",
-        max_seconds: float = 300.0,
+        max_seconds: float = 600.0,
         progress: float = 0.02,
         scripted: Collection[Role] = (),
     ) -> None:

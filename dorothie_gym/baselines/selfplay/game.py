@@ -70,6 +70,8 @@ class Game:
             Learner(name, settings.learner(settings.seed + k), self.table, own, None if log is None else log / name)
             for k, (name, own) in enumerate(shares.items())
         ]
+        for learner in self.learners:
+            learner.cloned = settings.warm_start is not None
         self.past = Past()
         against = self.learners[-1]
         self._opponent = make_network(settings.learner(), against.size, against.actions)

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from stable_baselines3.common.logger import Logger, configure
 from stable_baselines3.common.vec_env import DummyVecEnv
 
+from dorothie_gym.baselines.rl.cloning import Cloned, Lessons, clone, hold_actor
 from dorothie_gym.baselines.rl.settings import TrainingSettings
 from dorothie_gym.baselines.rl.weights import make_model
 from dorothie_gym.baselines.selfplay.seat import Mask, Vector
-from dorothie_gym.baselines.selfplay.seats import Table
+from dorothie_gym.baselines.selfplay.seats import Table, pad_masks, pad_vectors
 
 Rows = NDArray[np.int64]
 
@@ -55,6 +56,7 @@ class Learner:
         size: numbers that the network takes in.
         actions: of the network.
         model: of sb3-contrib.
+        cloned: whether it began with what others did; then its actor waits for its critic.
     """
 
     def __init__(
@@ -77,6 +79,7 @@ class Learner:
         self.actions = table.padded_actions if self.padded else table.actions[self.roles[0]]
         self.model = make_network(settings, self.size, self.actions, len(self.players))
         self.model.set_logger(Logger(None, []) if log is None else configure(str(log), ["tensorboard"]))
+        self.cloned = False
         self._vectors: Vector
         self._masks: Mask
         self._chosen: tuple[torch.Tensor, torch.Tensor, torch.Tensor]
@@ -135,11 +138,30 @@ class Learner:
             total: see `steps`.
         """
         model = self.model
+        if self.cloned:
+            hold_actor(model.policy, steps)
         model.rollout_buffer.compute_returns_and_advantage(self.values(rows), starts[self.players[:, 0]])
         model.num_timesteps = steps
         model._update_current_progress_remaining(steps, total)
         model.train()
         model.rollout_buffer.reset()
+
+    def clone(self, shown: Mapping[int, Lessons], held_out: Mapping[int, Lessons], seed: int) -> Cloned:
+        """Learns what others did in its roles: lessons by role, some to learn from and some that are held out."""
+        return clone(self.model, self._merged(shown), self._merged(held_out), seed)
+
+    def _merged(self, lessons: Mapping[int, Lessons]) -> Lessons:
+        if not self.padded:
+            return lessons[self.roles[0]]
+        own = [lessons[role] for role in self.roles]
+        vectors = [
+            pad_vectors(part.observations.numpy(), role, self.size) for role, part in zip(self.roles, own, strict=True)
+        ]
+        masks = [pad_masks(part.masks.numpy(), self.actions) for part in own]
+        return Lessons(
+            torch.from_numpy(np.concatenate(vectors)), torch.from_numpy(np.concatenate(masks)),
+            torch.cat([part.actions for part in own]),
+        )  # fmt: skip
 
     def _own(self, rows: Vector) -> Vector:
         parts = [self._table.vectors(rows[envs], role, padded=self.padded) for role, envs in self._envs.items()]

@@ -11,7 +11,7 @@ import numpy as np
 
 from dorothie_gym.baselines.selfplay.heard import Remark, listen
 from dorothie_gym.baselines.selfplay.seat import Mask, Seat, one_hot
-from dorothie_gym.dialogue import Direction, load_lexicon
+from dorothie_gym.dialogue import Direction, load_lexicon, understand
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role
 from dorothie_gym.policies.journey import Journey
 from dorothie_gym.policies.scenery import read_landmarks, read_subgoals, scalar
@@ -57,6 +57,18 @@ _ANSWERS: Mapping[Phrase, Speech] = {
     Phrase.YES: Speech(act=DialogueAct.of(DialogueMove.REPLY_Y), text="Yes."),
     Phrase.NO: Speech(act=DialogueAct.of(DialogueMove.REPLY_N), text="No."),
 }
+_REPLIES = {DialogueMove.REPLY_Y: Phrase.YES, DialogueMove.REPLY_N: Phrase.NO}
+_PHRASES: Mapping[tuple[ActionValue, Direction | None], Phrase] = {
+    (ActionValue.J_TURN, Direction.LEFT): Phrase.TURN_LEFT,
+    (ActionValue.J_TURN, Direction.RIGHT): Phrase.TURN_RIGHT,
+    (ActionValue.J_TURN, Direction.STRAIGHT): Phrase.STRAIGHT_ON,
+    (ActionValue.LANE_SWITCH, Direction.LEFT): Phrase.SWITCH_LEFT,
+    (ActionValue.LANE_SWITCH, Direction.RIGHT): Phrase.SWITCH_RIGHT,
+    (ActionValue.U_TURN, None): Phrase.TURN_ROUND,
+    (ActionValue.STOP, None): Phrase.STOP,
+    (ActionValue.START, None): Phrase.GO_ON,
+}
+"""What an act that carries an action is among the phrases, with the direction of its words where that matters."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,6 +144,23 @@ class ParticipantSeat(Seat[ParticipantMemory]):
     ) -> tuple[ParticipantAction, ParticipantMemory]:  # fmt: skip
         """Says a phrase."""
         return ParticipantAction(speech=_speech(Phrase(choice), memory.errand)), memory
+
+    def choice_of(
+        self, action: ParticipantAction, observation: Mapping[str, Any], memory: ParticipantMemory
+    ) -> int:  # fmt: skip
+        """The phrase that says the same, by act and direction; the name of the place counts where it is the next."""
+        speech = action.speech
+        if speech is None:
+            return Phrase.NOTHING
+        if speech.act.move in _REPLIES:
+            return _REPLIES[speech.act.move]
+        actions = [value for value in speech.act.ordered if isinstance(value, ActionValue)]
+        direction = understand(speech.text).direction
+        for value in actions:
+            if phrase := _PHRASES.get((value, direction)) or _PHRASES.get((value, None)):
+                return phrase
+        named = memory.errand is not None and memory.errand.name in speech.act.slots
+        return Phrase.NAME_GOAL if named else Phrase.NOTHING
 
     def _errand(self, observation: Mapping[str, Any], place: Place, errand: Errand | None) -> Errand | None:
         subgoals = read_subgoals(observation)

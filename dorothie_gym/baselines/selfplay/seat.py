@@ -92,6 +92,10 @@ class Seat(ABC, Generic[Memory]):
     def act(self, choice: int, observation: Mapping[str, Any], memory: Memory) -> tuple[RoleAction, Memory]:
         """The action of a number, and what the role remembers when it has acted."""
 
+    @abstractmethod
+    def choice_of(self, action: Any, observation: Mapping[str, Any], memory: Memory) -> int:
+        """The number that comes closest to what somebody did there, an action of the role; 0 where none is like it."""
+
     def vector(self, observation: Mapping[str, Any], memory: Memory) -> Vector:
         """What the network takes in (size,), each in -1..1; `memory` is that of `notice`."""
         now = scalar(observation, "time")

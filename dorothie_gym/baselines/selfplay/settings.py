@@ -41,13 +41,14 @@ class SelfPlaySettings:
         episodes: of each of an evaluation's two parts.
         network: widths of the hidden layers.
         parameters: of MaskablePPO, as sb3-contrib names them; see `rl.settings.FINAL_RATE`.
+        warm_start: folder of a corpus; what its roles did is learned first. None for nothing.
     """
 
     shared: bool = False
     town: str = "brookside"
     storyboard: str | None = None
     traffic: str = "light"
-    max_seconds: float = 300.0
+    max_seconds: float = 600.0
     progress: float = 0.02
     coached_environments: int = 0
     past_environments: int = 0
@@ -59,6 +60,7 @@ class SelfPlaySettings:
     episodes: int = 20
     network: tuple[int, ...] = (128, 128)
     parameters: Mapping[str, Any] = field(default_factory=dict)
+    warm_start: str | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "network", tuple(self.network))

@@ -15,13 +15,15 @@ import torch
 from numpy.typing import NDArray
 
 from dorothie_gym.baselines.rl.evaluating import SEEDS_FROM, Act, Outcome, evaluate_policy
-from dorothie_gym.baselines.rl.training import CURVE, PROGRESS, check_same
+from dorothie_gym.baselines.rl.training import CLONED, CURVE, PROGRESS, check_same
 from dorothie_gym.baselines.rl.weights import DESCRIPTION, WeightsError, read_description, restore, save_model
+from dorothie_gym.baselines.selfplay.cloning import read_lessons
 from dorothie_gym.baselines.selfplay.curve import draw_curve
 from dorothie_gym.baselines.selfplay.game import AD_WIZARD, Game, Maker
 from dorothie_gym.baselines.selfplay.learner import draw
 from dorothie_gym.baselines.selfplay.settings import SELFPLAY, SelfPlaySettings
 from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.sessions import Fold
 
 OPPONENTS = ("scripted", "learned")
 """Ad-Wizards that the team is evaluated against."""
@@ -106,6 +108,7 @@ class SelfPlay:
         Raises:
             SettingsError: the folder has a run with other settings, or nothing can be trained with these.
             ProcessError: Ray is not installed, or there is no cluster at the address.
+            SessionError: the corpus of the warm start cannot be read or played again.
             WeightsError: the run in the folder is damaged.
         """
         self.settings, self.folder = settings, folder
@@ -121,12 +124,14 @@ class SelfPlay:
         torch.set_num_threads(1)  # small networks: more threads only wait for one another
         log = folder / "tensorboard" if find_spec("tensorboard") is not None else None
         self.game = Game(settings, log, ray)
-        if begun:
-            try:
+        try:
+            if begun:
                 self._take_up()
-            except Exception:
-                self.game.close()
-                raise
+            elif settings.warm_start is not None:
+                self._learn_from(Path(settings.warm_start))
+        except Exception:
+            self.game.close()
+            raise
 
     def go(self) -> Run:
         """Trains.
@@ -145,6 +150,15 @@ class SelfPlay:
             self.game.close()
         return Run(folder=self.folder, rows=tuple(self.rows), steps=self.steps, seconds=self.seconds, finished=finished)
 
+    def _learn_from(self, corpus: Path) -> None:
+        """Begins with what the roles of a corpus did; the first row of the progress is what that is worth."""
+        since, seed = time.perf_counter(), self.settings.seed
+        shown, held_out = (read_lessons(corpus, fold) for fold in (Fold.TRAIN, Fold.VAL))
+        cloned = {learner.name: asdict(learner.clone(shown, held_out, seed)) for learner in self.game.learners}
+        (self.folder / CLONED).write_text(json.dumps(cloned, indent=1) + "\n", encoding="utf-8")
+        self.seconds = time.perf_counter() - since
+        self._keep(0, self.seconds, self._tally, self._evaluate(0, self.seconds, self._tally))
+
     def _go_on(self) -> None:
         """Trains for a stretch; evaluates where it is time."""
         settings, game, steps = self.settings, self.game, self.steps
@@ -161,14 +175,18 @@ class SelfPlay:
         row = self._evaluate(steps, seconds, tally) if steps >= due else None
         # from here on nothing takes time: Ctrl-C finds all of the stretch done, or none
         game.past.keep(game.actor(AD_WIZARD).model)
+        self._keep(steps, seconds, tally, row)
+
+    def _keep(self, steps: int, seconds: float, tally: NDArray[np.float64], row: Row | None) -> None:
+        """Writes everything as it is after so many steps."""
         self.steps, self.seconds, self._tally = steps, seconds, tally
         if row is not None:
             self.rows.append(row)
             self._tally = _tally([])
         self._save()
         if row is not None:
-            draw_curve([row.as_json() for row in self.rows], _title(settings), self.folder / CURVE)
-            self._watch(steps, settings.steps, row)
+            draw_curve([row.as_json() for row in self.rows], _title(self.settings), self.folder / CURVE)
+            self._watch(steps, self.settings.steps, row)
 
     def _evaluate(self, steps: int, seconds: float, tally: NDArray[np.float64]) -> Row:
         """Plays the evaluation's sessions."""

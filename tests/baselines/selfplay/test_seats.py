@@ -10,10 +10,11 @@ from dorothie_gym.baselines.rl import SettingsError  # noqa: E402
 from dorothie_gym.baselines.selfplay.ad_wizard import AdWizardSeat, Caper  # noqa: E402
 from dorothie_gym.baselines.selfplay.co_wizard import CoWizardSeat, OtherAction  # noqa: E402
 from dorothie_gym.baselines.selfplay.env import SelfPlayEnv  # noqa: E402
-from dorothie_gym.baselines.selfplay.participant import ParticipantSeat, Phrase  # noqa: E402
+from dorothie_gym.baselines.selfplay.participant import ParticipantMemory, ParticipantSeat, Phrase  # noqa: E402
 from dorothie_gym.dialogue import Direction  # noqa: E402
 from dorothie_gym.navigation import NavigationAction  # noqa: E402
-from dorothie_gym.ontology import AGENT_ROLES, ActionValue, DialogueMove, Role  # noqa: E402
+from dorothie_gym.ontology import AGENT_ROLES, ActionValue, DialogueAct, DialogueMove, Role  # noqa: E402
+from dorothie_gym.spaces import ParticipantAction, Speech  # noqa: E402
 
 NOTHING = np.zeros(3, dtype=np.int64)
 
@@ -115,6 +116,42 @@ def test_a_scripted_ad_wizard_can_play_instead() -> None:
     *_, truncated, info = env.step(NOTHING)
     assert truncated and info["is_success"] is False
     assert env.duo.summary()["exceptions"] > 0
+
+
+def test_what_was_done_at_a_seat_is_read_back(env: SelfPlayEnv) -> None:
+    rng = np.random.default_rng(2)
+    read = [set[int](), set[int](), set[int]()]
+    row, _ = env.reset(seed=2)
+    for _ in range(119):
+        choices = np.zeros(3, dtype=np.int64)
+        for k, (role, seat) in enumerate(zip(AGENT_ROLES, env._seats, strict=True)):
+            choices[k] = rng.choice(np.flatnonzero(env.table.masks(row[None], k, padded=False)[0]))
+            seen, memory = env._seen[role], env._memories[k]
+            done, _ = seat.act(int(choices[k]), seen, memory)
+            found = seat.choice_of(done, seen, memory)
+            assert found == choices[k] or done == type(done)()  # a turn that is planned already is asked for by nothing
+            read[k].add(found)
+        row, *_ = env.step(choices)
+    assert [len(numbers) for numbers in read] > [11, 12, 3]
+
+
+@pytest.mark.parametrize(
+    ("act", "text", "phrase"),
+    [
+        (
+            DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.J_TURN),
+            "could you take a right at the lights",
+            Phrase.TURN_RIGHT,
+        ),
+        (DialogueAct.of(DialogueMove.REPLY_W, ActionValue.J_TURN), "Left, I think.", Phrase.TURN_LEFT),
+        (DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.U_TURN), "we have to turn around", Phrase.TURN_ROUND),
+        (DialogueAct.of(DialogueMove.REPLY_N), "Not at all.", Phrase.NO),
+        (DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE), "a bit slower", Phrase.NOTHING),
+    ],
+)
+def test_what_people_say_has_a_phrase_or_none(env: SelfPlayEnv, act: DialogueAct, text: str, phrase: Phrase) -> None:
+    said = ParticipantAction(speech=Speech(act=act, text=text))
+    assert ParticipantSeat(env.duo.town, env.duo.limits).choice_of(said, {}, ParticipantMemory()) is phrase
 
 
 def test_scripted_roles_finish_their_errands_whatever_is_chosen_for_them() -> None:

@@ -1,0 +1,76 @@
+"""What those who played the sessions of a corpus did, as a learner at each seat would have seen and done it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from dorothie_gym.baselines.rl.cloning import NOTHING, Lessons, sessions_of
+from dorothie_gym.baselines.selfplay.seat import Mask, Vector
+from dorothie_gym.baselines.selfplay.seats import make_seat
+from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.policies.scenery import scalar
+from dorothie_gym.rollout import watch_session
+from dorothie_gym.sessions import Session, SessionError
+from dorothie_gym.spaces import AdWizardAction, CoWizardAction, ParticipantAction, SpaceLimits
+from dorothie_gym.world.town import Town
+
+Lesson: TypeAlias = tuple[Vector, Mask, int]
+"""What a seat took in, what made sense, and the number of what was done."""
+
+_ACTIONS: Mapping[Role, Any] = {action.role: action for action in (ParticipantAction, CoWizardAction, AdWizardAction)}
+
+
+def read_lessons(corpus: Path, fold: str) -> dict[int, Lessons]:
+    """Plays the sessions of a fold again, and watches all roles.
+
+    Args:
+        corpus: its folder.
+        fold: of `Fold`.
+
+    Returns:
+        What there is to learn for each role, by its place in `AGENT_ROLES`.
+
+    Raises:
+        SessionError: the corpus cannot be read or played again, or has nothing in the fold.
+    """
+    found: dict[int, list[Lesson]] = {k: [] for k in range(len(AGENT_ROLES))}
+    for session, town in sessions_of(corpus, fold):
+        for role, lessons in lessons_of(session, town).items():
+            found[role] += lessons
+    if not all(found.values()):
+        raise SessionError(f"{corpus}: fold {fold!r} has no decision to learn from")
+    return {role: Lessons.of(lessons) for role, lessons in found.items()}
+
+
+def lessons_of(session: Session, town: Town) -> dict[int, list[Lesson]]:
+    """The decisions of a session, by the role's place in `AGENT_ROLES`.
+
+    What could not have been done at the seat is left out. Words that join an utterance in the air count where that
+    begins, if it begins with nothing that the seat can say.
+    """
+    limits = SpaceLimits.for_town(town)
+    seats = [make_seat(role, town, limits) for role in AGENT_ROLES]
+    memories = [seat.begin() for seat in seats]
+    found: dict[int, list[Lesson]] = {k: [] for k in range(len(seats))}
+    begun = [-1] * len(seats)  # where the utterance that is in the air begins
+    for seen, done in watch_session(session, town):
+        for k, (role, seat) in enumerate(zip(AGENT_ROLES, seats, strict=True)):
+            observation, action = seen[role], _ACTIONS[role].decode(done[role], limits)
+            memory = memories[k] = seat.notice(observation, memories[k])
+            choice, mask = seat.choice_of(action, observation, memory), seat.mask(observation, memory)
+            if mask[choice]:
+                if _speaks(action) and scalar(observation, "speaking") <= 0.0:
+                    begun[k] = len(found[k])
+                found[k].append((seat.vector(observation, memory), mask, choice))
+                memories[k] = seat.act(choice, observation, memory)[1]
+            elif _speaks(action) and begun[k] >= 0:
+                vector, before, first = found[k][begun[k]]
+                if first == NOTHING and before[choice]:
+                    found[k][begun[k]] = (vector, before, choice)
+    return found
+
+
+def _speaks(action: Any) -> bool:
+    return getattr(action, "speech", None) is not None
