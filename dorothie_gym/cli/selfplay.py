@@ -13,7 +13,8 @@ from dorothie_gym.cli.training import facts_of, options_of, processes, rate_line
 from dorothie_gym.ontology import AGENT_ROLES
 
 if TYPE_CHECKING:
-    from dorothie_gym.baselines.selfplay.training import Row, Run
+    from dorothie_gym.baselines.rl import Run
+    from dorothie_gym.baselines.selfplay.training import Row
 
 
 def train_selfplay(
@@ -39,8 +40,8 @@ def train_selfplay(
             settings = selfplay_settings(given, **changes)
             if changes["workers"] is None and ray is None:
                 settings = replace(settings, workers=processes(settings.environments))
-            with training_progress(settings.steps, _line, quiet=as_json) as watch:
-                run = SelfPlay(settings, out, watch, ray).go()
+            with training_progress(settings.steps, _line, quiet=as_json) as (watch, tell):
+                run = SelfPlay(settings, out, watch, ray, tell).go()
         except (SettingsError, WeightsError, SessionError) as error:
             fail(str(error))
         except ProcessError as error:
@@ -63,7 +64,7 @@ def _line(row: Row) -> str:
     )
 
 
-def _show(run: Run) -> None:
+def _show(run: Run[Row]) -> None:
     from dorothie_gym.baselines.rl.training import CURVE
 
     console = stdout()

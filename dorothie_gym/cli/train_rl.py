@@ -15,6 +15,7 @@ from dorothie_gym.cli.training import facts_of, options_of, processes, rate_line
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.rl import Run, TrainingSettings
+    from dorothie_gym.baselines.rl.training import Row
 
 DRIVING = "dorothie_gym/Navigation-v0"
 
@@ -85,8 +86,8 @@ def train_rl(
             settings = tuned_settings(algorithm, env or DRIVING, env_settings=given, **changes)
             if workers is None and ray is None:
                 settings = replace(settings, workers=processes(settings.environments))
-            with training_progress(settings.steps, _line, quiet=as_json) as watch:
-                run = Training(settings, out, watch, ray).go()
+            with training_progress(settings.steps, _line, quiet=as_json) as (watch, tell):
+                run = Training(settings, out, watch, ray, tell).go()
         except (SettingsError, WeightsError, SessionError) as error:
             fail(str(error))
         except ProcessError as error:
@@ -124,21 +125,25 @@ def _line(row: Any) -> str:
     )
 
 
-def _show(run: Run, settings: TrainingSettings) -> None:
-    from dorothie_gym.baselines.rl.training import BEST, CURVE
+def _show(run: Run[Row], settings: TrainingSettings) -> None:
+    from dorothie_gym.baselines.rl.training import BEST, CURVE, best_of
     from dorothie_gym.baselines.rl.weights import DESCRIPTION
 
     console = stdout()
     console.print(rate_line(f"{settings.algorithm} on {settings.env}", run), markup=False, soft_wrap=True)
-    if run.best is not None:
-        console.print(f"Best: {_line(run.best).strip()}", markup=False, soft_wrap=True)
+    best = best_of(run.rows)
+    if best is not None:
+        console.print(f"Best: {_line(best).strip()}", markup=False, soft_wrap=True)
         console.print(f"Curve: {run.folder / CURVE}", markup=False, soft_wrap=True)
         console.print(f"Best model: {run.folder / BEST / DESCRIPTION}", markup=False, soft_wrap=True)
     console.print(f"Model: {run.folder / DESCRIPTION}", markup=False, soft_wrap=True)
 
 
-def _facts(run: Run, settings: TrainingSettings) -> dict[str, Any]:
-    return {**facts_of(run, settings), "best": None if run.best is None else run.best.as_json()}
+def _facts(run: Run[Row], settings: TrainingSettings) -> dict[str, Any]:
+    from dorothie_gym.baselines.rl.training import best_of
+
+    best = best_of(run.rows)
+    return {**facts_of(run, settings), "best": None if best is None else best.as_json()}
 
 
 def _command(settings: TrainingSettings, out: Path, ray: str | None) -> str:

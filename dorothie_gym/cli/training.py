@@ -22,16 +22,23 @@ def processes(environments: int) -> int:
     return min(processors, environments) if processors > 1 else 0
 
 
+Watch = Callable[[int, int, Any], None]
+Tell = Callable[[str, int, int], None]
+
+
 @contextmanager
 def training_progress(
     total: int, line: Callable[[Any], str], *, quiet: bool
-) -> Iterator[Callable[[int, int, Any], None]]:
+) -> Iterator[tuple[Watch, Tell]]:  # fmt: skip
     """A bar while standard error is a terminal, and a line for each evaluation.
 
     Args:
         total: steps there will be.
         line: tells of an evaluation.
         quiet: whether nothing is told.
+
+    Yields:
+        What is told of the steps of training, and what is told of what comes before them.
     """
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -41,11 +48,14 @@ def training_progress(
         bar = progress.add_task("Steps", total=total)
 
         def watch(done: int, steps: int, row: Any) -> None:
-            progress.update(bar, completed=done, total=steps)
+            progress.update(bar, description="Steps", completed=done, total=steps)
             if row is not None and not quiet:
                 progress.console.print(line(row), markup=False, soft_wrap=True)
 
-        yield watch
+        def tell(what: str, done: int, all_of_it: int) -> None:
+            progress.update(bar, description=what, completed=done, total=all_of_it)
+
+        yield watch, tell
 
 
 def facts_of(run: Any, settings: Any) -> dict[str, Any]:

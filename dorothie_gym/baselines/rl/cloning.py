@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,9 @@ LEARNING_RATE, BATCH = 1e-3, 64
 MOST_EPOCHS, PATIENCE = 60, 5
 """It ends after so many passes, or when the held-out sessions have got no likelier for so many [passes]."""
 
+
+Tell = Callable[[str, int, int], None]
+"""Is told what is being done, how much of it is done, and how much there is."""
 
 CRITIC_ALONE = 20_000
 """So many steps the critic learns what a cloned actor is worth before that changes: else it would be led astray."""
@@ -81,27 +84,37 @@ class Cloned:
     deeds: float
 
 
-def read_lessons(corpus: Path, fold: str, config: NavigationConfig | None = None) -> Lessons:
+def silent(what: str, done: int, total: int) -> None:
+    """Tells nobody."""
+
+
+def read_lessons(
+    corpus: Path, fold: str, config: NavigationConfig | None = None, tell: Tell = silent
+) -> Lessons:  # fmt: skip
     """Plays the sessions of a fold again, and watches.
 
     Args:
         corpus: its folder.
         fold: of `Fold`.
         config: with which the driver is to learn afterwards.
+        tell: is told how far it is.
 
     Raises:
         SessionError: the corpus cannot be read or played again, or has nothing in the fold.
     """
-    found = [lesson for session, town in sessions_of(corpus, fold) for lesson in lessons_of(session, town, config)]
+    played = sessions_of(corpus, fold, tell)
+    found = [lesson for session, town in played for lesson in lessons_of(session, town, config)]
     if not found:
         raise SessionError(f"{corpus}: fold {fold!r} has no decision to learn from")
     return Lessons.of(found)
 
 
-def sessions_of(corpus: Path, fold: str) -> Iterator[tuple[Session, Town]]:
+def sessions_of(corpus: Path, fold: str, tell: Tell = silent) -> Iterator[tuple[Session, Town]]:
     """Yields the sessions of a fold, with their towns; raises `SessionError` where one cannot be played again."""
     towns: dict[str, Town] = {}
-    for entry in Corpus.load(corpus).filter(fold=fold).entries:
+    entries = Corpus.load(corpus).filter(fold=fold).entries
+    for k, entry in enumerate(entries):
+        tell(f"Sessions of {fold}", k, len(entries))
         session = entry.load()
         name = session.header.town
         town = towns.get(name) or find_town(name, entry.maps)
@@ -122,7 +135,7 @@ def lessons_of(session: Session, town: Town, config: NavigationConfig | None = N
     return [lesson for lesson in watched if lesson is not None]
 
 
-def clone(model: Any, shown: Lessons, held_out: Lessons, seed: int) -> Cloned:
+def clone(model: Any, shown: Lessons, held_out: Lessons, seed: int, tell: Tell = silent) -> Cloned:
     """Makes what was done likely; of all passes, that is kept after which the held-out decisions are likeliest.
 
     Args:
@@ -130,6 +143,7 @@ def clone(model: Any, shown: Lessons, held_out: Lessons, seed: int) -> Cloned:
         shown: what it learns from.
         held_out: decisions of other sessions.
         seed: of the order.
+        tell: is told how far it is.
     """
     policy, generator = model.policy, torch.Generator().manual_seed(seed)
     optimiser = torch.optim.Adam(policy.parameters(), lr=LEARNING_RATE)
@@ -137,6 +151,7 @@ def clone(model: Any, shown: Lessons, held_out: Lessons, seed: int) -> Cloned:
     best, weights, epoch = 0, _weights(policy), 0
     policy.set_training_mode(True)
     while epoch < MOST_EPOCHS and epoch - best < PATIENCE:
+        tell("Passes, at most", epoch, MOST_EPOCHS)
         epoch += 1
         for rows in torch.split(torch.randperm(len(shown), generator=generator), BATCH):
             optimiser.zero_grad()

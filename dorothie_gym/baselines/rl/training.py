@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
-from dorothie_gym.baselines.rl.cloning import Cloned, CriticFirst, clone, read_lessons
+from dorothie_gym.baselines.rl.cloning import Cloned, CriticFirst, Tell, clone, read_lessons, silent
 from dorothie_gym.baselines.rl.curve import draw_curve
 from dorothie_gym.baselines.rl.environments import Maker, make_vector
 from dorothie_gym.baselines.rl.evaluating import SEEDS_FROM, Outcome, act_with, evaluate_policy
@@ -33,7 +33,8 @@ LIVE = ("steps", "evaluate_every", "episodes", "workers")
 LOGGED_STEPS, LOGGED_EPISODES = 1024, 4
 """TensorBoard is told of training about as often: after so many steps, or so many episodes."""
 
-Watch = Callable[[int, int, "Row | None"], None]
+Evaluation = TypeVar("Evaluation")
+Watch = Callable[[int, int, "Evaluation | None"], None]
 """Is told the steps done, those there will be, and the last evaluation."""
 
 
@@ -51,35 +52,36 @@ class Row:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class Run(Generic[Evaluation]):
     """What came of a run.
 
     Attributes:
         folder: where all is.
         rows: evaluations, in order.
-        steps: done so far, with those of earlier calls.
-        seconds: of training so far, evaluations left out [s].
+        steps: done and saved, with those of earlier calls.
+        seconds: of training that they took, evaluations left out [s].
         finished: whether all steps were done.
     """
 
     folder: Path
-    rows: tuple[Row, ...]
+    rows: tuple[Evaluation, ...]
     steps: int
     seconds: float
     finished: bool
 
-    @property
-    def best(self) -> Row | None:
-        """The evaluation with most successes; of equal ones that with the highest reward."""
-        return max(self.rows, key=lambda row: (row.outcome.success, row.outcome.reward), default=None)
+
+def best_of(rows: Sequence[Row]) -> Row | None:
+    """The evaluation with most successes; of equal ones that with the highest reward."""
+    return max(rows, key=lambda row: (row.outcome.success, row.outcome.reward), default=None)
 
 
 class Training:
     """A run; `go` trains until all steps are done or Ctrl-C is pressed."""
 
     def __init__(
-        self, settings: TrainingSettings, folder: Path, watch: Watch | None = None, ray: str | None = None
-    ) -> None:
+        self, settings: TrainingSettings, folder: Path, watch: Watch[Row] | None = None, ray: str | None = None,
+        tell: Tell = silent,
+    ) -> None:  # fmt: skip
         """Prepares a run, or takes up one that is in the folder.
 
         Args:
@@ -87,6 +89,7 @@ class Training:
             folder: where all is written.
             watch: is told how far it is.
             ray: address of a Ray cluster that steps the environments; None: this machine does.
+            tell: is told how far a warm start is.
 
         Raises:
             SettingsError: the folder has a run with other settings, or nothing can be trained with these.
@@ -95,7 +98,7 @@ class Training:
             WeightsError: the run in the folder is damaged.
         """
         self.settings, self.folder = settings, folder
-        self._watch = watch or (lambda done, total, row: None)
+        self._watch, self._tell = watch or (lambda done, total, row: None), tell
         self.rows: list[Row] = []
         self.seconds = 0.0
         self.cloned: Cloned | None = None
@@ -118,7 +121,7 @@ class Training:
             self._vector.close()
             raise
 
-    def go(self) -> Run:
+    def go(self) -> Run[Row]:
         """Trains.
 
         Returns:
@@ -152,8 +155,8 @@ class Training:
         config = NavigationConfig(
             max_seconds=self.settings.env_settings.get("max_seconds", NavigationConfig.max_seconds)
         )
-        shown, held_out = (read_lessons(corpus, fold, config) for fold in (Fold.TRAIN, Fold.VAL))
-        self.cloned = clone(self.model, shown, held_out, self.settings.seed)
+        shown, held_out = (read_lessons(corpus, fold, config, self._tell) for fold in (Fold.TRAIN, Fold.VAL))
+        self.cloned = clone(self.model, shown, held_out, self.settings.seed, self._tell)
         self.seconds += time.perf_counter() - since
         (self.folder / CLONED).write_text(json.dumps(asdict(self.cloned), indent=1) + "\n", encoding="utf-8")
 
@@ -163,13 +166,12 @@ class Training:
         act = act_with(self.model, masked=settings.masked)
         outcome = evaluate_policy(Maker(settings.env, settings.env_settings), act, settings.episodes, SEEDS_FROM)
         row = Row(steps=int(self.model.num_timesteps), seconds=round(self.seconds, 2), outcome=outcome)
-        best = Run(folder=self.folder, rows=tuple(self.rows), steps=0, seconds=0.0, finished=False).best
         self.rows.append(row)
         for name in ("success", "reward", "length"):
             self.model.logger.record(f"eval/{name}", getattr(outcome, name))
         self.model.logger.dump(row.steps)
         save_model(self.model, settings, self.folder, self.seconds)
-        if best is None or (outcome.success, outcome.reward) > (best.outcome.success, best.outcome.reward):
+        if best_of(self.rows) is row:
             save_model(self.model, settings, self.folder / BEST, self.seconds)
         with (self.folder / PROGRESS).open("a", encoding="utf-8") as file:
             file.write(json.dumps(row.as_json()) + "\n")

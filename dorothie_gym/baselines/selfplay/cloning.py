@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from dorothie_gym.baselines.rl.cloning import NOTHING, Lessons, sessions_of
+from dorothie_gym.baselines.rl.cloning import NOTHING, Lessons, Tell, sessions_of, silent
 from dorothie_gym.baselines.selfplay.seat import Mask, Vector
 from dorothie_gym.baselines.selfplay.seats import make_seat
 from dorothie_gym.ontology import AGENT_ROLES, Role
@@ -22,12 +22,13 @@ Lesson: TypeAlias = tuple[Vector, Mask, int]
 _ACTIONS: Mapping[Role, Any] = {action.role: action for action in (ParticipantAction, CoWizardAction, AdWizardAction)}
 
 
-def read_lessons(corpus: Path, fold: str) -> dict[int, Lessons]:
+def read_lessons(corpus: Path, fold: str, tell: Tell = silent) -> dict[int, Lessons]:
     """Plays the sessions of a fold again, and watches all roles.
 
     Args:
         corpus: its folder.
         fold: of `Fold`.
+        tell: is told how far it is.
 
     Returns:
         What there is to learn for each role, by its place in `AGENT_ROLES`.
@@ -36,7 +37,7 @@ def read_lessons(corpus: Path, fold: str) -> dict[int, Lessons]:
         SessionError: the corpus cannot be read or played again, or has nothing in the fold.
     """
     found: dict[int, list[Lesson]] = {k: [] for k in range(len(AGENT_ROLES))}
-    for session, town in sessions_of(corpus, fold):
+    for session, town in sessions_of(corpus, fold, tell):
         for role, lessons in lessons_of(session, town).items():
             found[role] += lessons
     if not all(found.values()):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.logger import Logger, configure
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from dorothie_gym.baselines.rl.cloning import Cloned, Lessons, clone, hold_actor
+from dorothie_gym.baselines.rl.cloning import Cloned, Lessons, Tell, clone, hold_actor
 from dorothie_gym.baselines.rl.settings import TrainingSettings
 from dorothie_gym.baselines.rl.weights import make_model
 from dorothie_gym.baselines.selfplay.seat import Mask, Vector
@@ -146,9 +146,9 @@ class Learner:
         model.train()
         model.rollout_buffer.reset()
 
-    def clone(self, shown: Mapping[int, Lessons], held_out: Mapping[int, Lessons], seed: int) -> Cloned:
+    def clone(self, shown: Mapping[int, Lessons], held_out: Mapping[int, Lessons], seed: int, tell: Tell) -> Cloned:
         """Learns what others did in its roles: lessons by role, some to learn from and some that are held out."""
-        return clone(self.model, self._merged(shown), self._merged(held_out), seed)
+        return clone(self.model, self._merged(shown), self._merged(held_out), seed, tell)
 
     def _merged(self, lessons: Mapping[int, Lessons]) -> Lessons:
         if not self.padded:

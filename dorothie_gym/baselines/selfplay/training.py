@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,8 +14,9 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from dorothie_gym.baselines.rl.cloning import Tell, silent
 from dorothie_gym.baselines.rl.evaluating import SEEDS_FROM, Act, Outcome, evaluate_policy
-from dorothie_gym.baselines.rl.training import CLONED, CURVE, PROGRESS, check_same
+from dorothie_gym.baselines.rl.training import CLONED, CURVE, PROGRESS, Run, Watch, check_same
 from dorothie_gym.baselines.rl.weights import DESCRIPTION, WeightsError, read_description, restore, save_model
 from dorothie_gym.baselines.selfplay.cloning import read_lessons
 from dorothie_gym.baselines.selfplay.curve import draw_curve
@@ -30,9 +31,6 @@ OPPONENTS = ("scripted", "learned")
 
 STRETCH = 16
 """After so many rollouts all is saved, and sessions begin anew; what follows depends on nothing but what was saved."""
-
-Watch = Callable[[int, int, "Row | None"], None]
-"""Is told the steps done, those there will be, and the last evaluation."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,25 +63,6 @@ class Row:
         return cls(steps=found["steps"], seconds=found["seconds"], returns=found["returns"], **outcomes)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Run:
-    """What came of a run.
-
-    Attributes:
-        folder: where all is.
-        rows: evaluations, in order.
-        steps: done and saved, with those of earlier calls.
-        seconds: of training that they took, evaluations left out [s].
-        finished: whether all steps were done.
-    """
-
-    folder: Path
-    rows: tuple[Row, ...]
-    steps: int
-    seconds: float
-    finished: bool
-
-
 class SelfPlay:
     """A run; `go` trains until all steps are done or Ctrl-C is pressed.
 
@@ -95,8 +74,9 @@ class SelfPlay:
     """
 
     def __init__(
-        self, settings: SelfPlaySettings, folder: Path, watch: Watch | None = None, ray: str | None = None
-    ) -> None:
+        self, settings: SelfPlaySettings, folder: Path, watch: Watch[Row] | None = None, ray: str | None = None,
+        tell: Tell = silent,
+    ) -> None:  # fmt: skip
         """Prepares a run, or takes up one that is in the folder.
 
         Args:
@@ -104,6 +84,7 @@ class SelfPlay:
             folder: where all is written.
             watch: is told how far it is.
             ray: address of a Ray cluster that steps the environments; None: this machine does.
+            tell: is told how far a warm start is.
 
         Raises:
             SettingsError: the folder has a run with other settings, or nothing can be trained with these.
@@ -112,7 +93,7 @@ class SelfPlay:
             WeightsError: the run in the folder is damaged.
         """
         self.settings, self.folder = settings, folder
-        self._watch = watch or (lambda done, total, row: None)
+        self._watch, self._tell = watch or (lambda done, total, row: None), tell
         self.rows: list[Row] = []
         self.seconds, self.steps = 0.0, 0
         self._tally = _tally([])  # of the sessions of training since the last row
@@ -133,7 +114,7 @@ class SelfPlay:
             self.game.close()
             raise
 
-    def go(self) -> Run:
+    def go(self) -> Run[Row]:
         """Trains.
 
         Returns:
@@ -152,9 +133,12 @@ class SelfPlay:
 
     def _learn_from(self, corpus: Path) -> None:
         """Begins with what the roles of a corpus did; the first row of the progress is what that is worth."""
-        since, seed = time.perf_counter(), self.settings.seed
-        shown, held_out = (read_lessons(corpus, fold) for fold in (Fold.TRAIN, Fold.VAL))
-        cloned = {learner.name: asdict(learner.clone(shown, held_out, seed)) for learner in self.game.learners}
+        since = time.perf_counter()
+        shown, held_out = (read_lessons(corpus, fold, self._tell) for fold in (Fold.TRAIN, Fold.VAL))
+        cloned = {
+            learner.name: asdict(learner.clone(shown, held_out, self.settings.seed, self._tell))
+            for learner in self.game.learners
+        }
         (self.folder / CLONED).write_text(json.dumps(cloned, indent=1) + "\n", encoding="utf-8")
         self.seconds = time.perf_counter() - since
         self._keep(0, self.seconds, self._tally, self._evaluate(0, self.seconds, self._tally))

@@ -78,6 +78,12 @@ def test_the_actor_waits_for_its_critic(corpus: Path, tmp_path: Path) -> None:
             assert bool((value == old[name]).all()) is acts, name
 
 
+def test_how_far_the_reading_of_a_corpus_is_can_be_followed(corpus: Path) -> None:
+    told: list[tuple[str, int, int]] = []
+    read_lessons(corpus, "train", lambda *so_far: told.append(so_far))
+    assert told == [("Sessions of train", k, 3) for k in range(3)]
+
+
 def test_a_corpus_without_sessions_is_told(tmp_path: Path) -> None:
     with pytest.raises(SessionError, match="no session"):
         read_lessons(tmp_path, "train")
