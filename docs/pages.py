@@ -8,6 +8,7 @@ python docs/pages.py curves ppo=DIR,DIR maskable_ppo=DIR,DIR   # draws runs of `
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import sys
 import tempfile
@@ -34,7 +35,7 @@ from dorothie_gym.sessions.statistics import (
 from dorothie_gym.sessions.statistics.handling import kind_of
 from dorothie_gym.sessions.transcript import markdown
 from dorothie_gym.world.graphics.charts import SHEET, SOFT, empty_figure, hexadecimal
-from dorothie_gym.world.graphics.palette import CAR, NOTE, PROP
+from dorothie_gym.world.graphics.palette import CAR, INK_SOFT, LIGHT_GREEN, NOTE, PROP
 
 DOCS = Path(__file__).parent
 TRANSCRIPTS, DATA_SHEET, CURVES = DOCS / "transcripts.md", DOCS / "data-sheet.md", DOCS / "navigation_curve.png"
@@ -190,12 +191,12 @@ def _phenomena(corpus: Corpus) -> Iterator[tuple[str, ...]]:
 
 def curves(runs: dict[str, list[Path]]) -> str:
     """Draws success over steps, a thin line for each run and a thick one for their mean; returns it as a table."""
-    colours = [hexadecimal(colour) for colour in (CAR, PROP, NOTE)]
+    colours = [hexadecimal(colour) for colour in (CAR, PROP, NOTE, INK_SOFT, LIGHT_GREEN)]
     rows, episodes = [], 0
     with empty_figure(7.0, 4.0) as figure:
         figure.set_layout_engine("constrained")
         axes = figure.add_subplot(facecolor=SHEET)
-        for colour, (name, folders) in zip(colours, runs.items(), strict=False):
+        for colour, (name, folders) in zip(itertools.cycle(colours), runs.items(), strict=False):
             told = [[json.loads(line) for line in (each / "progress.jsonl").open(encoding="utf-8")] for each in folders]
             shared = list(zip(*told, strict=False))  # as far as all of them got
             steps = [now[0]["steps"] / 1e3 for now in shared]
