@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Mapping
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dorothie_gym.envs.prospect import Prospect
 from dorothie_gym.navigation.ways import SECTORS, Ways
 from dorothie_gym.ontology import PhysicalAction
-from dorothie_gym.spaces import Motion, Observation, Physical
+from dorothie_gym.spaces import Motion, Physical
 from dorothie_gym.world.car.driver import MAX_CRUISE, MIN_CRUISE
 from dorothie_gym.world.town import LinkType
 from dorothie_gym.world.world import World
@@ -80,7 +80,7 @@ _UNDER_WAY = {
 """Manoeuvres, and what `LocalPlanner.manoeuvre` is while they are prepared or driven."""
 
 
-def physical_of(action: NavigationAction, seen: Observation, ways: Ways) -> Physical | None:
+def physical_of(action: NavigationAction, seen: Mapping[str, Any], ways: Ways) -> Physical | None:
     """What the Co-Wizard does for an action; None for nothing.
 
     What is being prepared just goes on when it is asked for again: drivers may ask for what they want as long as they
@@ -103,7 +103,7 @@ def physical_of(action: NavigationAction, seen: Observation, ways: Ways) -> Phys
     return Physical(action=PhysicalAction.J_TURN, angle=SECTORS[sector] if angle is None else angle)
 
 
-def prepares(action: NavigationAction, seen: Observation, ways: Ways) -> bool:
+def prepares(action: NavigationAction, seen: Mapping[str, Any], ways: Ways) -> bool:
     """Whether an action is what the car is about to do anyway."""
     if int(seen["motion"]) == Motion.STOPPED:
         return False
@@ -114,7 +114,7 @@ def prepares(action: NavigationAction, seen: Observation, ways: Ways) -> bool:
     return manoeuvre == (int(seen["manoeuvre"]), int(seen["manoeuvre_angle"][0]))
 
 
-def _angle_of(sector: int, seen: Observation, ways: Ways) -> int | None:
+def _angle_of(sector: int, seen: Mapping[str, Any], ways: Ways) -> int | None:
     """Angle of the turn into a sector at the next choice of ways [degrees]; None where no way leads there."""
     choice = ways.choice_ahead(seen)
     way = ways.after(choice)[sector] if choice is not None else None
@@ -138,7 +138,7 @@ class Controls:
         options = self._prospect.options()
         return (options.lane, options.distance) if options.exits else None
 
-    def mask(self, seen: Observation) -> NDArray[np.int8]:
+    def mask(self, seen: Mapping[str, Any]) -> NDArray[np.int8]:
         """Which actions the car follows now (18,): 1 for those; `seen` is what the Co-Wizard observes."""
         world, planner = self._world, self._world.planner
         speed, cruise = float(world.car.speed), world.driver.cruise

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from dorothie_gym.policies.co_wizard import ScriptedCoWizard, attend, respond
 from dorothie_gym.policies.co_wizard.driving import distance_ahead
 from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View
 from dorothie_gym.policies.journey import lanes_beside
-from dorothie_gym.spaces import CoWizardAction, Motion, Observation, Physical
+from dorothie_gym.spaces import CoWizardAction, Motion, Physical
 from dorothie_gym.world.town import Town
 from dorothie_gym.world.town.model import wrap_degrees
 
@@ -54,7 +55,7 @@ class Apprentice:
         self._watched = Watched(mind=mind, speed=mind.speed)
         self._stopped_by_itself = False
 
-    def watch(self, seen: Observation, done: CoWizardAction) -> Lesson | None:
+    def watch(self, seen: Mapping[str, Any], done: CoWizardAction) -> Lesson | None:
         """Watches a decision.
 
         Args:
@@ -87,7 +88,7 @@ def _has_to_stop(mind: CoWizardMind, view: View) -> bool:
     return mind.halted or (left is not None and left < NEAR_GOAL)
 
 
-def action_of(physical: Physical | None, seen: Observation, ways: Ways) -> NavigationAction:
+def action_of(physical: Physical | None, seen: Mapping[str, Any], ways: Ways) -> NavigationAction:
     """The action that comes to the same; what the player sets as it is asked for, speed and lights, is nothing.
 
     Args:
@@ -107,7 +108,7 @@ def action_of(physical: Physical | None, seen: Observation, ways: Ways) -> Navig
     return NavigationAction.NOTHING if prepares(action, seen, ways) else action
 
 
-def _turn(angle: int, seen: Observation, ways: Ways) -> NavigationAction:
+def _turn(angle: int, seen: Mapping[str, Any], ways: Ways) -> NavigationAction:
     """The turn into the sector of the exit that fits an angle best [degrees]."""
     choice = ways.choice_ahead(seen)
     if choice is None:

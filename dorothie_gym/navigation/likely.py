@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.navigation.actions import ACTIONS, FIRST_TURN, NavigationAction, prepares
 from dorothie_gym.navigation.ways import Ways
 from dorothie_gym.ontology import PhysicalAction
-from dorothie_gym.spaces import ExitColumn, Motion, Observation
+from dorothie_gym.spaces import ExitColumn, Motion
 from dorothie_gym.world.car.clearance import BRAKING, HALF_LENGTH
 from dorothie_gym.world.car.driver import MAX_CRUISE, MIN_CRUISE
 from dorothie_gym.world.car.lanes import LEAD, MIN_SWITCH
@@ -30,7 +33,7 @@ class LikelyActions:
         self._town, self._ways = town, ways
         self._oncoming = oncoming_lanes(town)
 
-    def mask(self, seen: Observation) -> NDArray[np.bool_]:
+    def mask(self, seen: Mapping[str, Any]) -> NDArray[np.bool_]:
         """Which actions the car follows now (18,)."""
         town, held = self._town, int(seen["motion"]) == Motion.STOPPED
         lane, station, speed = town.lanes[int(seen["lane"])], float(seen["station"][0]), float(seen["speed"][0])
@@ -60,7 +63,7 @@ class LikelyActions:
             mask[FIRST_TURN:] = [way is not None for way in self._ways.after(choice)]
         return mask
 
-    def _is_committed(self, seen: Observation, speed: float) -> bool:
+    def _is_committed(self, seen: Mapping[str, Any], speed: float) -> bool:
         """Whether the car cannot stop any more before the junction at which it is about to turn."""
         first = seen["exits"][0]
         if int(seen["manoeuvre"]) != PhysicalAction.J_TURN or not first[ExitColumn.PRESENT]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
@@ -25,7 +25,7 @@ from dorothie_gym.ontology import (
     WeatherParameter,
 )
 from dorothie_gym.policies.scenery import street_of
-from dorothie_gym.spaces import ExitColumn, Motion, ObjectColumn, Observation
+from dorothie_gym.spaces import ExitColumn, Motion, ObjectColumn
 from dorothie_gym.world.car.driver import MAX_CRUISE
 from dorothie_gym.world.town import LinkType, Town
 from dorothie_gym.world.town.lights import LightColour
@@ -118,7 +118,7 @@ class Heard:
     driven: float = 0.0
     goal: Place | None = None
 
-    def driven_on(self, before: Observation, now: Observation) -> Heard:
+    def driven_on(self, before: Mapping[str, Any], now: Mapping[str, Any]) -> Heard:
         """The same after a decision; how far the car has come in it follows from its speeds before and after it."""
         seconds = float(now["time"][0] - before["time"][0])
         return replace(self, driven=self.driven + seconds * float(before["speed"][0] + now["speed"][0]) / 2.0)
@@ -136,7 +136,7 @@ class Viewpoint:
         self._oncoming = oncoming_lanes(town)
         self._way_left = WayLeft(town)
 
-    def observe(self, seen: Observation, heard: Heard, blocked: tuple[Place, ...]) -> Vector:
+    def observe(self, seen: Mapping[str, Any], heard: Heard, blocked: tuple[Place, ...]) -> Vector:
         """The observation.
 
         Args:
@@ -165,7 +165,7 @@ class Viewpoint:
         observation = np.array(values, dtype=np.float32)
         return np.minimum(np.maximum(observation, -1.0, out=observation), 1.0, out=observation)
 
-    def _car(self, seen: Observation, lane: int) -> list[float]:
+    def _car(self, seen: Mapping[str, Any], lane: int) -> list[float]:
         town = self._town
         manoeuvre, covariance = int(seen["manoeuvre"]), seen["pose_covariance"]
         hazard = bool(seen["hazard"])
@@ -186,7 +186,7 @@ class Viewpoint:
         ]
 
     def _junction(
-        self, seen: Observation, heard: Heard, ways: tuple[Way | None, ...], choice: int | None
+        self, seen: Mapping[str, Any], heard: Heard, ways: tuple[Way | None, ...], choice: int | None
     ) -> list[float]:  # fmt: skip
         if choice is None:
             return [0.0] * (2 + 3 * len(SECTORS))
@@ -210,7 +210,7 @@ class Viewpoint:
         left = self._town.lanes[lane].length - station
         return [left / FAR, *_one_hot(_COLOURS.index(colour), len(_COLOURS))]
 
-    def _goal(self, seen: Observation, heard: Heard, lane: int, station: float) -> list[float]:
+    def _goal(self, seen: Mapping[str, Any], heard: Heard, lane: int, station: float) -> list[float]:
         if heard.goal is None:
             return [0.0] * 6
         x, y = self._town.lanes[heard.goal[0]].position(heard.goal[1])
@@ -270,7 +270,7 @@ def _said(heard: Heard, time: float) -> list[float]:
     ]
 
 
-def _objects(seen: Observation) -> list[float]:
+def _objects(seen: Mapping[str, Any]) -> list[float]:
     values: list[float] = []
     for row in seen["objects"][:OBJECTS].tolist():
         kind = int(row[ObjectColumn.KIND])

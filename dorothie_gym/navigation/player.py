@@ -19,7 +19,7 @@ from dorothie_gym.ontology import PhysicalAction, Role
 from dorothie_gym.policies import Policy
 from dorothie_gym.policies.co_wizard import CoWizardMind, ScriptedCoWizard, Style, attend, respond
 from dorothie_gym.policies.co_wizard.mind import View
-from dorothie_gym.spaces import ActionDict, Motion, Observation, Physical, SpaceLimits
+from dorothie_gym.spaces import ActionDict, Motion, Physical, SpaceLimits
 from dorothie_gym.world.town import Town
 
 Choose: TypeAlias = Callable[[Vector, NDArray[np.bool_]], int]
@@ -48,7 +48,7 @@ class Watched:
 
     mind: CoWizardMind
     briefing: Briefing = field(default_factory=Briefing)
-    seen: Observation | None = None
+    seen: Mapping[str, Any] | None = None
     decided_at: float = -1.0
     speed: int
 
@@ -64,7 +64,7 @@ class Seat:
         self.ways = Ways(town)
         self._viewpoint, self._likely = Viewpoint(town, self.ways, max_seconds), LikelyActions(town, self.ways)
 
-    def note(self, watched: Watched, mind: CoWizardMind, view: View, seen: Observation) -> Watched:
+    def note(self, watched: Watched, mind: CoWizardMind, view: View, seen: Mapping[str, Any]) -> Watched:
         """What is known after another decision; `mind` has listened already."""
         briefing = watched.briefing
         if watched.seen is not None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from dorothie_gym.policies.journey import is_choice, lanes_beside, next_choice
-from dorothie_gym.spaces import ExitColumn, Observation
+from dorothie_gym.spaces import ExitColumn
 from dorothie_gym.world.town import Exit, Town
 from dorothie_gym.world.town.model import wrap_degrees
 
@@ -55,7 +57,7 @@ class Ways:
             found = self._found[lane] = self._find(lane)
         return found
 
-    def choice_ahead(self, seen: Observation) -> int | None:
+    def choice_ahead(self, seen: Mapping[str, Any]) -> int | None:
         """The lane at whose end the Co-Wizard has to choose a way; None where it comes to no junction with a choice.
 
         Its turn options tell it, wherever the Co-Wizard believes to be; only where several lanes have the same ones,

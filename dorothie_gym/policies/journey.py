@@ -49,7 +49,9 @@ LIGHT_SIGHT = 60.0
 LAG = 0.56
 """Time that the brakes seem to take until they bite, measured at 3 to 11 m/s [s]."""
 
-_CANONICAL = {Direction.LEFT: 90.0, Direction.RIGHT: -90.0, Direction.STRAIGHT: 0.0, Direction.BACK: 180.0}
+CANONICAL = {Direction.LEFT: 90.0, Direction.RIGHT: -90.0, Direction.STRAIGHT: 0.0, Direction.BACK: 180.0}
+"""The angle that a direction means at a junction like a cross [degrees, positive left]."""
+
 _DIRECTIONS = {
     LinkType.LEFT: Direction.LEFT,
     LinkType.RIGHT: Direction.RIGHT,
@@ -193,7 +195,7 @@ def find_exit(
         if direction is None:
             exits = []
         if onto or exits:
-            canonical = _CANONICAL[direction] if direction is not None else 0.0
+            canonical = CANONICAL[direction] if direction is not None else 0.0
             return min(onto or exits, key=lambda way: (abs(wrap_degrees(way.angle - canonical)), way.connector))
     return None
 

@@ -88,6 +88,7 @@ class AdWizardSeat(Seat[AdWizardMemory]):
 
     role = Role.AD_WIZARD
     speakers = (Role.PARTICIPANT, Role.CO_WIZARD)
+    fields = ("hidden", "landmarks", "motion", "props", "sensors", "speed", "subgoals", "time", "waypoints", "weather")
     actions = len(Caper)
     own_size: ClassVar[int] = 2
 

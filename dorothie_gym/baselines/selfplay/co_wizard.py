@@ -1,20 +1,24 @@
-"""The Co-Wizard's seat: it drives as in `Navigation-v0`, notes the goal that was named, and can ask."""
+"""The Co-Wizard's seat: it sees and drives as in `Navigation-v0`, notes the goal that was named, and can ask."""
 
 from __future__ import annotations
 
 import enum
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dorothie_gym.baselines.selfplay.heard import Remark, listen
 from dorothie_gym.baselines.selfplay.seat import Mask, Seat
-from dorothie_gym.navigation.actions import ACTIONS, FIRST_TURN, LEFT, PLAIN, RIGHT, NavigationAction
-from dorothie_gym.navigation.ways import SECTORS, nearest_sector
+from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.navigation.actions import ACTIONS, NavigationAction, physical_of, prepares
+from dorothie_gym.navigation.apprentice import action_of
+from dorothie_gym.navigation.instructor import Instruction
+from dorothie_gym.navigation.likely import LikelyActions
+from dorothie_gym.navigation.observations import FIELDS, Heard, Viewpoint
+from dorothie_gym.navigation.ways import Ways, nearest_sector
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueAct,
@@ -24,14 +28,12 @@ from dorothie_gym.ontology import (
     PhysicalAction,
     Role,
 )
+from dorothie_gym.policies.journey import CANONICAL
 from dorothie_gym.policies.scenery import read_landmarks, scalar
-from dorothie_gym.spaces import CoWizardAction, ExitColumn, Mental, Motion, Physical, Speech
-from dorothie_gym.world.car.driver import MAX_CRUISE, MIN_CRUISE
-from dorothie_gym.world.town import LinkType
+from dorothie_gym.spaces import CoWizardAction, ExitColumn, Mental, Physical, SpaceLimits, Speech
+from dorothie_gym.world.town import Town
 from dorothie_gym.world.town.model import wrap_degrees
-
-ACROSS, FAR, CLOSE = 500.0, 100.0, 10.0
-"""Ways are shares of these [m]."""
+from dorothie_gym.world.town.routing import Place
 
 
 class OtherAction(enum.IntEnum):
@@ -51,87 +53,80 @@ _SPEECH: Mapping[int, Speech] = {
     ),
     OtherAction.ASK_WAY: Speech(act=DialogueAct.of(DialogueMove.QUERY_W, ActionValue.QUERIED), text="Which way now?"),
 }
-_SIDES = {
-    NavigationAction.SWITCH_LEFT: (LinkType.LANE_CHANGE_LEFT, LEFT),
-    NavigationAction.SWITCH_RIGHT: (LinkType.LANE_CHANGE_RIGHT, RIGHT),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
 class CoWizardMemory:
-    """What the Co-Wizard remembers: the participant's last remark, the place named last, and the one noted."""
+    """What the Co-Wizard remembers: the participant's last remark, the place named last, and the one noted.
+
+    `told` is the same as a driver of `Navigation-v0` has it; `seen` is what was observed at the decision before.
+    """
 
     heard: Remark | None = None
     named: LandmarkName | None = None
     noted: LandmarkName | None = None
+    told: Heard = field(default_factory=Heard)
+    seen: Mapping[str, Any] | None = None
 
 
 class CoWizardSeat(Seat[CoWizardMemory]):
-    """See `NavigationAction` for how it drives, `OtherAction` for the rest."""
+    """See `NavigationAction` for how it drives, `OtherAction` for the rest, and `FIELDS` for what it sees."""
 
     role = Role.CO_WIZARD
     speakers = (Role.PARTICIPANT,)
+    fields = ("speaking",)
     actions = len(ACTIONS) + len(OtherAction)
-    own_size: ClassVar[int] = 2 * len(SECTORS) + 1 + 6 + len(Motion) + len(PhysicalAction) + 1
+    own_size: ClassVar[int] = sum(FIELDS.values()) + 2
+
+    def __init__(self, town: Town, limits: SpaceLimits) -> None:
+        super().__init__(town, limits)
+        self._ways = Ways(town)
+        self._likely = LikelyActions(town, self._ways)
+        self._viewpoint = Viewpoint(town, self._ways, EnvConfig.max_seconds)
 
     def begin(self) -> CoWizardMemory:
         """Nothing has been heard."""
         return CoWizardMemory()
 
     def notice(self, observation: Mapping[str, Any], memory: CoWizardMemory) -> CoWizardMemory:
-        """Listens."""
-        heard = listen(observation, Role.PARTICIPANT, memory.heard)
-        named = memory.named if heard is None or heard is memory.heard else heard.landmark or memory.named
-        return replace(memory, heard=heard, named=named)
+        """Listens: what was said is an instruction, and a place that was named is the goal, where the map has it."""
+        told = memory.told if memory.seen is None else memory.told.driven_on(memory.seen, observation)
+        heard, named = listen(observation, Role.PARTICIPANT, memory.heard), memory.named
+        if heard is not None and heard is not memory.heard:
+            told = replace(told, told=self._instruction(observation, heard), driven=0.0)
+            if heard.landmark is not None:
+                named, told = heard.landmark, replace(told, goal=self._place(observation, heard.landmark))
+        return replace(memory, heard=heard, named=named, told=told, seen=observation)
 
     def remarks(self, memory: CoWizardMemory) -> tuple[Remark | None, ...]:
         """The participant's."""
         return (memory.heard,)
 
     def own(self, observation: Mapping[str, Any], memory: CoWizardMemory) -> list[float]:
-        """The ways on by sectors, how far the junction is, the goal that was noted, and what the car is about."""
-        exits = self._exits(observation)
-        planned = _turn_planned(observation)
-        values = [0.0] * (2 * len(SECTORS))
-        for sector, row in exits.items():
-            values[2 * sector] = 1.0
-            values[2 * sector + 1] = float(planned == int(row[ExitColumn.ANGLE]))
-        distance = min((float(row[ExitColumn.DISTANCE]) for row in exits.values()), default=FAR)
-        motion = [float(int(observation["motion"]) == kind) for kind in Motion]
-        manoeuvre = [float(int(observation["manoeuvre"]) == k) for k in range(len(PhysicalAction) + 1)]
-        return [*values, min(distance / FAR, 1.0), *self._goal(observation, memory), *motion, *manoeuvre]
+        """What a driver of `Navigation-v0` observes; whether a goal is noted, and whether it is the one named last."""
+        view: list[float] = self._viewpoint.observe(observation, memory.told, ()).tolist()
+        noted = memory.noted is not None
+        return [*view, float(noted), float(noted and memory.noted is memory.named)]
 
     def mask(self, observation: Mapping[str, Any], memory: CoWizardMemory) -> Mask:
-        """What would change nothing is left out, as is what the map has no room for; turns may be asked for again."""
-        lane = self.town.lanes[int(observation["lane"])]
-        stopped = int(observation["motion"]) == Motion.STOPPED
-        manoeuvre, cruise = int(observation["manoeuvre"]), scalar(observation, "cruise_speed")
+        """What the car would follow, as far as the Co-Wizard can tell; what would change nothing is left out."""
         mask = np.zeros(self.actions, dtype=np.bool_)
-        mask[[NavigationAction.NOTHING, NavigationAction.LIGHTS]] = True
-        mask[NavigationAction.STOP], mask[NavigationAction.START] = not stopped, stopped
-        mask[NavigationAction.LANE_FOLLOW] = stopped or manoeuvre != 0
-        mask[NavigationAction.FASTER], mask[NavigationAction.SLOWER] = cruise < MAX_CRUISE, cruise > MIN_CRUISE
-        if not lane.in_junction:
-            under_way = manoeuvre, round(scalar(observation, "manoeuvre_angle"))
-            for action, (side, angle) in _SIDES.items():
-                beside = self.town.neighbour(lane.id, side) is not None
-                mask[action] = beside and under_way != (PhysicalAction.LANE_SWITCH, angle)
-            mask[NavigationAction.U_TURN] = manoeuvre != PhysicalAction.U_TURN
-        mask[[FIRST_TURN + sector for sector in self._exits(observation)]] = True
+        mask[: len(ACTIONS)] = self._likely.mask(observation)
         mask[OtherAction.NOTE_GOAL] = memory.named is not None and memory.named is not memory.noted
         mask[list(_SPEECH)] = scalar(observation, "speaking") <= 0.0
         return mask
 
     def allowed(self, observation: Mapping[str, Any], masks: Mapping[str, Any]) -> Mask:
-        """What the car would carry out."""
+        """What the car would carry out, or is about to do anyway."""
         allowed = np.ones(self.actions, dtype=np.bool_)
-        for choice in range(1, len(ACTIONS)):
-            if self._plans_turn(choice, observation):
+        for action in ACTIONS[1:]:
+            if prepares(action, observation, self._ways):
                 continue
-            physical = self._physical(choice, observation)
-            allowed[choice] = physical is not None and bool(masks["physical"][physical.action])
-            if physical is not None and physical.action in (PhysicalAction.J_TURN, PhysicalAction.LANE_SWITCH):
-                allowed[choice] &= bool(masks["angle"][physical.angle + 180])
+            physical = physical_of(action, observation, self._ways)
+            assert physical is not None
+            allowed[action] = bool(masks["physical"][physical.action])
+            if physical.action in (PhysicalAction.J_TURN, PhysicalAction.LANE_SWITCH):
+                allowed[action] &= bool(masks["angle"][physical.angle + 180])
         return allowed
 
     def act(
@@ -143,9 +138,7 @@ class CoWizardSeat(Seat[CoWizardMemory]):
             return CoWizardAction(mental=note), replace(memory, noted=memory.named)
         if choice in _SPEECH:
             return CoWizardAction(speech=_SPEECH[choice]), memory
-        if self._plans_turn(choice, observation):
-            return CoWizardAction(), memory  # it just goes on
-        return CoWizardAction(physical=self._physical(choice, observation)), memory
+        return CoWizardAction(physical=physical_of(NavigationAction(choice), observation, self._ways)), memory
 
     def choice_of(self, action: CoWizardAction, observation: Mapping[str, Any], memory: CoWizardMemory) -> int:
         """What was driven, else the goal that was noted, else what was said, as far as it has a number."""
@@ -160,63 +153,29 @@ class CoWizardSeat(Seat[CoWizardMemory]):
         return next((k for k in same if _SPEECH[k].act.slots <= speech.act.slots), int(NavigationAction.NOTHING))
 
     def _driven(self, physical: Physical, observation: Mapping[str, Any]) -> int:
-        """The number of a physical action; of turns that into the exit which fits best."""
-        if physical.action is PhysicalAction.J_TURN:
-            exits = self._exits(observation)
-            misfits = {k: abs(float(wrap_degrees(row[ExitColumn.ANGLE] - physical.angle))) for k, row in exits.items()}
-            return FIRST_TURN + min(misfits, key=misfits.__getitem__) if misfits else int(NavigationAction.NOTHING)
-        alike = (choice for choice in range(1, FIRST_TURN) if self._physical(choice, observation) == physical)
-        return next(alike, int(NavigationAction.NOTHING))
+        if physical.action is PhysicalAction.SPEED_CHANGE:
+            return NavigationAction.FASTER if physical.up else NavigationAction.SLOWER
+        if physical.action is PhysicalAction.LIGHT_CHANGE:
+            return NavigationAction.LIGHTS
+        return action_of(physical, observation, self._ways)
 
-    def _plans_turn(self, choice: int, observation: Mapping[str, Any]) -> bool:
-        """Whether a choice is the turn that the car is about to take."""
-        if int(observation["motion"]) == Motion.STOPPED:
-            return False
-        planned, row = _turn_planned(observation), self._exits(observation).get(choice - FIRST_TURN)
-        return planned is not None and row is not None and int(row[ExitColumn.ANGLE]) == planned
+    def _instruction(self, observation: Mapping[str, Any], heard: Remark) -> Instruction:
+        """What was said as a driver of `Navigation-v0` hears it; turns are those at the next choice of ways."""
+        exits = observation["exits"][observation["exits"][:, ExitColumn.PRESENT] > 0.0]
+        turns = ActionValue.J_TURN in heard.act.slots
+        distance = float(exits[0, ExitColumn.DISTANCE]) if turns and len(exits) else 0.0
+        sector = None if heard.direction is None else self._sector(observation, CANONICAL[heard.direction])
+        return Instruction(act=heard.act, sector=sector, distance=distance, time=heard.time)
 
-    def _physical(self, choice: int, observation: Mapping[str, Any]) -> Physical | None:
-        if choice == NavigationAction.LIGHTS:
-            return Physical(action=PhysicalAction.LIGHT_CHANGE, up=not int(observation["lights"]))
-        if FIRST_TURN <= choice < len(ACTIONS):
-            row = self._exits(observation).get(choice - FIRST_TURN)
-            return None if row is None else Physical(action=PhysicalAction.J_TURN, angle=int(row[ExitColumn.ANGLE]))
-        return PLAIN.get(choice)
+    def _sector(self, observation: Mapping[str, Any], angle: float) -> int:
+        """The sector of the way on that comes closest to an angle [degrees]."""
+        choice = self._ways.choice_ahead(observation)
+        ways = () if choice is None else self._ways.after(choice)
+        misfits = {k: abs(float(wrap_degrees(way.angle - angle))) for k, way in enumerate(ways) if way is not None}
+        return min(misfits, key=misfits.__getitem__) if misfits else nearest_sector(angle)
 
-    def _exits(self, observation: Mapping[str, Any]) -> dict[int, NDArray[np.float64]]:
-        """The exit of each sector that has one: of several the one closest to its middle."""
-        found: dict[int, NDArray[np.float64]] = {}
-        for row in observation["exits"]:
-            if not row[ExitColumn.PRESENT]:
-                break
-            sector = nearest_sector(float(row[ExitColumn.ANGLE]))
-            if sector not in found or _misfit(row, sector) < _misfit(found[sector], sector):
-                found[sector] = row
-        return found
-
-    def _goal(self, observation: Mapping[str, Any], memory: CoWizardMemory) -> list[float]:
-        """Whether a goal is noted and on the map; how far ahead and to the right; how far on this lane, if it is."""
-        x, y, heading = observation["pose"].tolist()
-        marks = [mark for mark in read_landmarks(observation, self.town) if mark.name is memory.noted]
-        if not marks:
-            return [float(memory.noted is not None), 0.0, 0.0, 0.0, 0.0, 0.0]
-        mark = min(marks, key=lambda mark: math.hypot(mark.x - x, mark.y - y))
-        east, south = mark.x - x, mark.y - y
-        ahead, right = (
-            east * math.cos(heading) + south * math.sin(heading),
-            south * math.cos(heading) - east * math.sin(heading),
-        )
-        on_lane = mark.lane == int(observation["lane"])
-        left = mark.station - scalar(observation, "station") if on_lane else FAR
-        return [1.0, 1.0, ahead / ACROSS, right / ACROSS, left / FAR, max(min(left / CLOSE, 1.0), -1.0)]
-
-
-def _misfit(row: NDArray[np.float64], sector: int) -> float:
-    return abs(float(wrap_degrees(row[ExitColumn.ANGLE] - SECTORS[sector])))
-
-
-def _turn_planned(observation: Mapping[str, Any]) -> int | None:
-    """Angle of the turn that the car is about to take [degrees]."""
-    if int(observation["manoeuvre"]) != PhysicalAction.J_TURN:
-        return None
-    return round(scalar(observation, "manoeuvre_angle"))
+    def _place(self, observation: Mapping[str, Any], name: LandmarkName) -> Place | None:
+        """Where one stops for the nearest landmark of a name that is on the map."""
+        x, y, _ = observation["pose"].tolist()
+        marks = [mark for mark in read_landmarks(observation, self.town) if mark.name is name]
+        return min(marks, key=lambda mark: math.hypot(mark.x - x, mark.y - y)).place if marks else None

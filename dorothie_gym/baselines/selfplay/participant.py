@@ -94,6 +94,7 @@ class ParticipantSeat(Seat[ParticipantMemory]):
 
     role = Role.PARTICIPANT
     speakers = (Role.CO_WIZARD,)
+    fields = ("lights", "speaking", "speed", "subgoals", "time")
     actions = len(Phrase)
     own_size: ClassVar[int] = 4 + 2 + len(Direction) + 1 + len(_ENTRIES)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar, Final, Generic, TypeAlias, TypeVar
 
 import numpy as np
@@ -28,15 +28,12 @@ FAR = 1000.0
 _PLACES: Final = {"landmarks": 1, "objects": 1, "guesses": 1, "props": 1, "waypoints": 0}
 """Tables with places, and the column of x; that of y is the next."""
 
-_LEFT_OUT: Final = ("lane", "street_names", "path_lanes")
-"""Fields whose numbers are names of things: nothing to add up or to multiply."""
-
 
 class Seat(ABC, Generic[Memory]):
     """What a role perceives and can do in a town, as a vector in and a number out.
 
-    The vector has the numbers of the role's observation (`FlatObservations`) with places in the car's own frame (ahead
-    and to the right), squashed; then the last remarks that it heard; then what the role makes of the map. Seats are
+    The vector has numbers of the role's observation (`FlatObservations`) with places in the car's own frame (ahead
+    and to the right), squashed; then the last remarks that it heard; then what the role makes of it all. Seats are
     stateless: what a role remembers is handed over and back.
 
     Attributes:
@@ -49,19 +46,17 @@ class Seat(ABC, Generic[Memory]):
     speakers: ClassVar[tuple[Role, ...]]
     """Whom the role hears."""
 
+    fields: ClassVar[tuple[str, ...]]
+    """Fields of the observation whose numbers are taken in as they are."""
+
     actions: ClassVar[int]
     own_size: ClassVar[int]
     """Numbers that `own` returns."""
 
     def __init__(self, town: Town, limits: SpaceLimits) -> None:
         self.town, self.limits = town, limits
-        known = {
-            name: part
-            for name, part in observation_space(self.role, limits, observe_acts=False).spaces.items()
-            if name not in _LEFT_OUT
-        }
-        self._fields = tuple(known)
-        self._flat = FlatObservations(spaces.Dict(known))
+        whole = observation_space(self.role, limits, observe_acts=False).spaces
+        self._flat = FlatObservations(spaces.Dict({name: whole[name] for name in self.fields}))
         self.size = len(self._flat.low) + HEARD_SIZE * len(self.speakers) + self.own_size
 
     @abstractmethod
@@ -78,7 +73,7 @@ class Seat(ABC, Generic[Memory]):
 
     @abstractmethod
     def own(self, observation: Mapping[str, Any], memory: Memory) -> list[float]:
-        """What the role makes of the map (own_size,), each in -1..1."""
+        """What the role makes of it (own_size,), each in -1..1."""
 
     @abstractmethod
     def mask(self, observation: Mapping[str, Any], memory: Memory) -> Mask:
@@ -99,7 +94,7 @@ class Seat(ABC, Generic[Memory]):
     def vector(self, observation: Mapping[str, Any], memory: Memory) -> Vector:
         """What the network takes in (size,), each in -1..1; `memory` is that of `notice`."""
         now = scalar(observation, "time")
-        flat = self._flat.vector(in_own_frame({name: observation[name] for name in self._fields}))
+        flat = self._flat.vector(in_own_frame(observation, self.fields))
         heard = [
             np.zeros(HEARD_SIZE, dtype=np.float32) if remark is None else remark.vector(now)
             for remark in self.remarks(memory)
@@ -109,11 +104,11 @@ class Seat(ABC, Generic[Memory]):
         return whole
 
 
-def in_own_frame(observation: Mapping[str, Any]) -> dict[str, Any]:
-    """An observation with the places of its tables as metres ahead of the car and to its right; unused rows stay 0."""
+def in_own_frame(observation: Mapping[str, Any], fields: Iterable[str]) -> dict[str, Any]:
+    """Fields with the places of their tables as metres ahead of the car and to its right; unused rows stay 0."""
     x, y, heading = observation["pose"].tolist()
     sine, cosine = math.sin(heading), math.cos(heading)
-    turned = dict(observation)
+    turned = {name: observation[name] for name in fields}
     for name, column in _PLACES.items():
         if name not in turned:
             continue
