@@ -52,11 +52,11 @@ class SelfPlaySettings:
     progress: float = 0.02
     coached_environments: int = 0
     past_environments: int = 0
-    steps: int = 2_000_000
+    steps: int = 600_000
     environments: int = 16
     workers: int = 0
     seed: int = 0
-    evaluate_every: int = 200_000
+    evaluate_every: int = 100_000
     episodes: int = 20
     network: tuple[int, ...] = (128, 128)
     parameters: Mapping[str, Any] = field(default_factory=dict)
