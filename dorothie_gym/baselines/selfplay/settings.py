@@ -30,8 +30,8 @@ class SelfPlaySettings:
         shared: whether one network plays all roles; otherwise each has its own.
         town, storyboard, traffic, max_seconds, progress: see `SelfPlayEnv`.
         coached_environments: in so many, in turn Co-Wizard and participant learn with the others scripted. Who only
-            plays with one another has to find a language first, and finds none that others understand (Lowe et al.
-            2020, "On the interaction between supervision and self-play in emergent communication").
+            plays with one another has to find a language first, and it need not be ours (Lowe et al. 2020, "On the
+            interaction between supervision and self-play in emergent communication").
         past_environments: in so many environments the Ad-Wizard is one of earlier times, which does not learn.
         steps: decisions of all environments together.
         environments: how many play at once.
