@@ -35,9 +35,9 @@ class NavigationEnv(DriveEnv[np.int64]):
 
     ## Action Space
     `Discrete(18)`: see `NavigationAction`. `info["action_mask"]` tells which the car would follow (int8, for
-    `action_space.sample(mask)`), and so does `action_masks()`, which sb3-contrib asks for. A turn, lane switch or U-turn
-    that is being prepared just goes on when it is asked for again. An action that cannot be carried out is refused and
-    told in `info["refused"]`.
+    `action_space.sample(mask)`), and so does `action_masks()`, which sb3-contrib asks for. A turn, lane switch or
+    U-turn that is being prepared just goes on when it is asked for again. An action that cannot be carried out is
+    refused and told in `info["refused"]`.
 
     ## Rewards
     The sum of the terms in `info["reward_terms"]`, see `NavigationWeights`: progress, subgoals, success, collisions,
