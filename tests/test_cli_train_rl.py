@@ -63,6 +63,20 @@ def test_three_roles_learn_and_play(tmp_path: Path) -> None:
     assert json.loads(played.stdout)["errored"] == 0
 
 
+@pytest.mark.parametrize(("algorithm", "package"), [("ppo", "rl"), ("selfplay", "selfplay")])
+def test_ctrl_c_while_a_corpus_is_read_is_told(
+    algorithm: str, package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(f"dorothie_gym.baselines.{package}.cloning.sessions_of", interrupted)
+    result = CliRunner().invoke(
+        app, ["train-rl", algorithm, "--out", str(tmp_path), "--warm-start", str(tmp_path), "--workers", "0"]
+    )
+    assert result.exit_code == 130 and f"what {tmp_path} has is as it was" in result.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [

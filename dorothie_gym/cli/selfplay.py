@@ -40,7 +40,7 @@ def train_selfplay(
             settings = selfplay_settings(given, **changes)
             if changes["workers"] is None and ray is None:
                 settings = replace(settings, workers=processes(settings.environments))
-            with training_progress(settings.steps, _line, quiet=as_json) as (watch, tell):
+            with training_progress(settings.steps, out, _line, quiet=as_json) as (watch, tell):
                 run = SelfPlay(settings, out, watch, ray, tell).go()
         except (SettingsError, WeightsError, SessionError) as error:
             fail(str(error))

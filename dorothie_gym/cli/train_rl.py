@@ -86,7 +86,7 @@ def train_rl(
             settings = tuned_settings(algorithm, env or DRIVING, env_settings=given, **changes)
             if workers is None and ray is None:
                 settings = replace(settings, workers=processes(settings.environments))
-            with training_progress(settings.steps, _line, quiet=as_json) as (watch, tell):
+            with training_progress(settings.steps, out, _line, quiet=as_json) as (watch, tell):
                 run = Training(settings, out, watch, ray, tell).go()
         except (SettingsError, WeightsError, SessionError) as error:
             fail(str(error))

@@ -28,12 +28,13 @@ Tell = Callable[[str, int, int], None]
 
 @contextmanager
 def training_progress(
-    total: int, line: Callable[[Any], str], *, quiet: bool
+    total: int, out: Path, line: Callable[[Any], str], *, quiet: bool
 ) -> Iterator[tuple[Watch, Tell]]:  # fmt: skip
-    """A bar while standard error is a terminal, and a line for each evaluation.
+    """A bar while standard error is a terminal, and a line for each evaluation; Ctrl-C before the first step is told.
 
     Args:
         total: steps there will be.
+        out: folder of the run.
         line: tells of an evaluation.
         quiet: whether nothing is told.
 
@@ -55,7 +56,13 @@ def training_progress(
         def tell(what: str, done: int, all_of_it: int) -> None:
             progress.update(bar, description=what, completed=done, total=all_of_it)
 
-        yield watch, tell
+        try:
+            yield watch, tell
+        except KeyboardInterrupt:  # a run that is under way catches it, and saves
+            progress.stop()
+            message = f"Interrupted before the run went on; what {out} has is as it was. The same command begins again."
+            console.print(message, markup=False, soft_wrap=True)
+            raise typer.Exit(INTERRUPTED) from None
 
 
 def facts_of(run: Any, settings: Any) -> dict[str, Any]:
