@@ -203,7 +203,8 @@ def curves(runs: dict[str, list[Path]]) -> str:
             for run in told:
                 axes.plot([row["steps"] / 1e3 for row in run], [row["success"] for row in run], color=colour, lw=0.8)
             means = [sum(row["success"] for row in now) / len(now) for now in shared]
-            axes.plot(steps, means, color=colour, lw=2.4, marker="o", ms=3, label=f"{name}, {len(told)} seed{'s' * (len(told) > 1)}")
+            seeds = "1 seed" if len(told) == 1 else f"{len(told)} seeds"
+            axes.plot(steps, means, color=colour, lw=2.4, marker="o", ms=3, label=f"{name}, {seeds}")
             episodes = told[0][0]["episodes"]
             rows += [(name, f"{at:.0f}", *(f"{100 * row['success']:.0f} % ({row['seconds']:.0f} s)" for row in now))
                      for at, now in zip(steps, shared, strict=True)]  # fmt: skip
