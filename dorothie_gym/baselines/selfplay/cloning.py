@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from dorothie_gym.baselines.rl.cloning import NOTHING, Lessons, Tell, sessions_of, silent
 from dorothie_gym.baselines.selfplay.seat import Mask, Vector
 from dorothie_gym.baselines.selfplay.seats import make_seat
-from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.policies.scenery import scalar
 from dorothie_gym.rollout import watch_session
 from dorothie_gym.sessions import Session, SessionError
-from dorothie_gym.spaces import AdWizardAction, CoWizardAction, ParticipantAction, SpaceLimits
+from dorothie_gym.spaces import ActionDecoder, AdWizardAction, RoleAction, SpaceLimits
 from dorothie_gym.world.town import Town
 
 Lesson: TypeAlias = tuple[Vector, Mask, int]
 """What a seat took in, what made sense, and the number of what was done."""
-
-_ACTIONS: Mapping[Role, Any] = {action.role: action for action in (ParticipantAction, CoWizardAction, AdWizardAction)}
 
 
 def read_lessons(corpus: Path, fold: str, tell: Tell = silent) -> dict[int, Lessons]:
@@ -53,12 +50,13 @@ def lessons_of(session: Session, town: Town) -> dict[int, list[Lesson]]:
     """
     limits = SpaceLimits.for_town(town)
     seats = [make_seat(role, town, limits) for role in AGENT_ROLES]
+    decoders = [ActionDecoder(role, limits) for role in AGENT_ROLES]
     memories = [seat.begin() for seat in seats]
     found: dict[int, list[Lesson]] = {k: [] for k in range(len(seats))}
     begun = [-1] * len(seats)  # where the utterance that is in the air begins
     for seen, done in watch_session(session, town):
         for k, (role, seat) in enumerate(zip(AGENT_ROLES, seats, strict=True)):
-            observation, action = seen[role], _ACTIONS[role].decode(done[role], limits)
+            observation, action = seen[role], decoders[k](done[role])
             memory = memories[k] = seat.notice(observation, memories[k])
             choice, mask = seat.choice_of(action, observation, memory), seat.mask(observation, memory)
             if mask[choice]:
@@ -73,5 +71,5 @@ def lessons_of(session: Session, town: Town) -> dict[int, list[Lesson]]:
     return found
 
 
-def _speaks(action: Any) -> bool:
-    return getattr(action, "speech", None) is not None
+def _speaks(action: RoleAction) -> bool:
+    return not isinstance(action, AdWizardAction) and action.speech is not None

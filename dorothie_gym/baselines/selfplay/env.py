@@ -70,7 +70,7 @@ class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
         self.scripted = scripted
         self._policies = {role: make_policy("scripted", role, limits) for role in AGENT_ROLES}
         self._seats = [make_seat(role, self.duo.town, limits) for role in AGENT_ROLES]
-        self.table = Table.of(limits, self.duo.town)
+        self.table = Table.of(limits)
         self.observation_space = spaces.Box(-1.0, 1.0, (self.table.width,), dtype=np.float32)
         self.action_space = spaces.MultiDiscrete(list(self.table.actions))
         self._way_left = WayLeft(self.duo.town)

@@ -14,7 +14,7 @@ from dorothie_gym.baselines.rl.settings import TrainingSettings
 from dorothie_gym.baselines.rl.weights import DESCRIPTION, WeightsError, read_description, restore
 from dorothie_gym.baselines.selfplay.learner import draw, make_network
 from dorothie_gym.baselines.selfplay.seat import Seat
-from dorothie_gym.baselines.selfplay.seats import make_seat, pad_masks, pad_vectors
+from dorothie_gym.baselines.selfplay.seats import Table, make_seat, pad_masks, pad_vectors
 from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy
@@ -79,7 +79,7 @@ def read_policy(path: Path, role: Role, limits: SpaceLimits) -> LearnedPolicy:
         limits: sizes of the spaces.
 
     Raises:
-        ValueError: the files are missing or damaged, or of another role.
+        ValueError: the files are missing or damaged, of another role, or of another version.
     """
     folder = path.parent if path.is_file() else path
     found = read_description(folder)
@@ -93,6 +93,12 @@ def read_policy(path: Path, role: Role, limits: SpaceLimits) -> LearnedPolicy:
         raise WeightsError(f"{folder / DESCRIPTION}: is no model of self-play ({error!r})") from None
     if learned is not role:
         raise WeightsError(f"{folder}: plays {learned}, not {role}")
+    table, place = Table.of(limits), AGENT_ROLES.index(role)
+    if (size, actions) != (table.sizes[place], table.actions[place]):
+        raise WeightsError(
+            f"{folder / DESCRIPTION}: takes in {size} numbers and has {actions} actions, {role} has "
+            f"{table.sizes[place]} and {table.actions[place]}: the model is of another version of dorothie_gym"
+        )
     torch.set_num_threads(1)  # small networks: more threads only wait for one another
     model = make_network(settings, *(padded or (size, actions)))
     restore(model, folder)

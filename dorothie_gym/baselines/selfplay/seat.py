@@ -55,9 +55,18 @@ class Seat(ABC, Generic[Memory]):
 
     def __init__(self, town: Town, limits: SpaceLimits) -> None:
         self.town, self.limits = town, limits
-        whole = observation_space(self.role, limits, observe_acts=False).spaces
-        self._flat = FlatObservations(spaces.Dict({name: whole[name] for name in self.fields}))
-        self.size = len(self._flat.low) + HEARD_SIZE * len(self.speakers) + self.own_size
+        self._flat = self._flat_for(limits)
+        self.size = self.size_for(limits)
+
+    @classmethod
+    def size_for(cls, limits: SpaceLimits) -> int:
+        """Numbers of the vector, in whatever town."""
+        return len(cls._flat_for(limits).low) + HEARD_SIZE * len(cls.speakers) + cls.own_size
+
+    @classmethod
+    def _flat_for(cls, limits: SpaceLimits) -> FlatObservations:
+        whole = observation_space(cls.role, limits, observe_acts=False).spaces
+        return FlatObservations(spaces.Dict({name: whole[name] for name in cls.fields}))
 
     @abstractmethod
     def begin(self) -> Memory:

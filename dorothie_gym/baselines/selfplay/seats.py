@@ -38,10 +38,10 @@ class Table:
     actions: tuple[int, ...]
 
     @classmethod
-    def of(cls, limits: SpaceLimits, town: Town) -> Table:
-        """The table for sizes of spaces; the town does not matter to it."""
-        seats = [make_seat(role, town, limits) for role in AGENT_ROLES]
-        return cls(tuple(seat.size for seat in seats), tuple(seat.actions for seat in seats))
+    def of(cls, limits: SpaceLimits) -> Table:
+        """The table for sizes of spaces."""
+        seats = [_SEATS[role] for role in AGENT_ROLES]
+        return cls(tuple(seat.size_for(limits) for seat in seats), tuple(seat.actions for seat in seats))
 
     @property
     def width(self) -> int:

@@ -57,6 +57,12 @@ def test_a_policy_takes_in_what_was_taken_in_while_learning(folder: Path) -> Non
 def test_models_of_another_role_are_told(folder: Path) -> None:
     with pytest.raises(ValueError, match="plays participant, not co_wizard"):
         read_policy(folder / "participant", Role.CO_WIZARD, DuoWizardEnv().limits)
+    description = folder / "ad_wizard" / "model.json"
+    description.write_text(
+        description.read_text(encoding="utf-8").replace('"size": 484', '"size": 488'), encoding="utf-8"
+    )
+    with pytest.raises(ValueError, match="takes in 488 numbers .* another version"):
+        read_policy(folder / "ad_wizard", Role.AD_WIZARD, DuoWizardEnv().limits)
     (folder / "participant" / "model.json").write_text('{"format": 1, "kind": "selfplay"}', encoding="utf-8")
     with pytest.raises(ValueError, match="no model of self-play"):
         read_policy(folder / "participant", Role.PARTICIPANT, DuoWizardEnv().limits)
