@@ -15,11 +15,14 @@ import pettingzoo
 if TYPE_CHECKING:
     from dorothie_gym.envs.config import EnvConfig, RewardWeights
     from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+    from dorothie_gym.envs.navigation_config import NavigationWeights
+    from dorothie_gym.envs.navigation_continuous_v0 import NavigationContinuousEnv
+    from dorothie_gym.envs.navigation_v0 import NavigationEnv
     from dorothie_gym.envs.scenario import Scenario, draw_scenario
     from dorothie_gym.evaluation.teacher_forced import NfDEnv, RfNEnv, UfNEnv
-    from dorothie_gym.navigation import NavigationAction, NavigationContinuousEnv, NavigationEnv, NavigationWeights
     from dorothie_gym.ontology import Role
     from dorothie_gym.policies import Policy, make_policy
+    from dorothie_gym.policies.navigation import NavigationAction
     from dorothie_gym.sessions import Session, load_sessions
     from dorothie_gym.spaces import SpaceLimits, noop
     from dorothie_gym.tasks import load_template, template_names
@@ -40,10 +43,10 @@ _HOME = {
     "FlattenAction": "wrappers.flatten",
     "FlattenObservation": "wrappers.flatten",
     "IdenticalSpaces": "wrappers.identical_spaces",
-    "NavigationAction": "navigation",
-    "NavigationContinuousEnv": "navigation",
-    "NavigationEnv": "navigation",
-    "NavigationWeights": "navigation",
+    "NavigationAction": "policies.navigation",
+    "NavigationContinuousEnv": "envs.navigation_continuous_v0",
+    "NavigationEnv": "envs.navigation_v0",
+    "NavigationWeights": "envs.navigation_config",
     "NfDEnv": "evaluation.teacher_forced",
     "Policy": "policies",
     "RecordSession": "wrappers.record_session",
@@ -130,10 +133,10 @@ def _register() -> None:
         )
     for task in ("UfN", "RfN", "NfD"):
         gymnasium.register(f"dorothie_gym/{task}-v0", f"dorothie_gym.evaluation.teacher_forced:{task}Env")
-    gymnasium.register("dorothie_gym/Navigation-v0", "dorothie_gym.navigation.navigation_v0:NavigationEnv")
+    gymnasium.register("dorothie_gym/Navigation-v0", "dorothie_gym.envs.navigation_v0:NavigationEnv")
     gymnasium.register(
         "dorothie_gym/Navigation-continuous-v0",
-        "dorothie_gym.navigation.navigation_continuous_v0:NavigationContinuousEnv",
+        "dorothie_gym.envs.navigation_continuous_v0:NavigationContinuousEnv",
     )
     gymnasium.register(
         "dorothie_gym/Town-v0",

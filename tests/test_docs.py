@@ -19,7 +19,7 @@ from dorothie_gym.evaluation.closed_loop import METRICS, RecoverySeconds
 from dorothie_gym.evaluation.features import Batch
 from dorothie_gym.evaluation.prediction_files import file_schema
 from dorothie_gym.ontology import WeatherParameter
-from dorothie_gym.policies import casting
+from dorothie_gym.policies import policy_loader
 from dorothie_gym.sessions import Task
 from dorothie_gym.tasks import bind, load_template
 from dorothie_gym.world.town import describe, load_town
@@ -167,7 +167,7 @@ def test_every_page_is_in_the_navigation() -> None:
 def test_the_examples_of_the_closed_loop_page_run(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(casting, "_LOADERS", {})
+    monkeypatch.setattr(policy_loader, "_LOADERS", {})
     text = (DOCS / "closed-loop.md").read_text(encoding="utf-8")
     names: dict[str, Any] = {}
     for block in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL):

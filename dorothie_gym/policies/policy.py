@@ -1,15 +1,15 @@
-"""What a policy is: a stateless object; what it remembers is handed to it and handed back, so that replay is exact."""
+"""Contract of a policy: a stateless object whose memory is passed in and handed back, so that replay is exact."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from copy import deepcopy
-from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
-from dorothie_gym.ontology import Role
-from dorothie_gym.spaces import ActionDict, SpaceLimits, action_space, noop
+import numpy as np
+
+from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.spaces import ActionDict, SpaceLimits
 from dorothie_gym.world.town import Town
 
 State = TypeVar("State")
@@ -50,46 +50,11 @@ class Policy(ABC, Generic[State]):
         """
 
 
-@dataclass(frozen=True, kw_only=True)
-class Draws:
-    """A position in a stream of chance: the seed, and how many decisions have been taken."""
-
-    seed: int
-    count: int = 0
-
-    def next(self) -> Draws:
-        """The position after one more decision."""
-        return replace(self, count=self.count + 1)
+_POLICIES = 2
+"""Branch of a session's seed; the environment draws from others."""
 
 
-class SilentPolicy(Policy[None]):
-    """Says and does nothing."""
-
-    def initial_state(self, seed: int, town: Town) -> None:
-        """There is nothing to remember."""
-
-    def step(self, observation: Mapping[str, Any], state: None) -> tuple[ActionDict, None]:
-        """Returns the action that does nothing."""
-        return noop(self.role, self.limits), None
-
-
-class RandomPolicy(Policy[Draws]):
-    """Samples the action space; utterances are left to the environment to word."""
-
-    def __init__(self, role: Role, limits: SpaceLimits | None = None) -> None:
-        """Takes a copy of the role's action space, to seed it."""
-        super().__init__(role, limits)
-        self._space = deepcopy(action_space(role, self.limits))
-
-    def initial_state(self, seed: int, town: Town) -> Draws:
-        """The beginning of the stream."""
-        return Draws(seed=seed)
-
-    def step(self, observation: Mapping[str, Any], state: Draws) -> tuple[ActionDict, Draws]:
-        """Returns a sample that follows from the seed and the number of the decision."""
-        self._space.seed(state.seed * 1_000_003 + state.count & 0x7FFFFFFF)
-        action: ActionDict = self._space.sample()
-        for field in ("utterance", "message"):
-            if field in action:
-                action[field] = ""
-        return action, state.next()
+def policy_seed(seed: int, role: Role) -> int:
+    """Returns the seed of a role's policy in the session of a seed: 32 bits, other ones for each role."""
+    branch = np.random.SeedSequence([seed, _POLICIES, AGENT_ROLES.index(role)])
+    return int(branch.generate_state(1)[0])

@@ -70,7 +70,7 @@ def remark(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Voice:
+class SpeechState:
     """A speaker's intentions; frozen, so every change gives a new one.
 
     Attributes:
@@ -104,23 +104,23 @@ class Voice:
         """Whether the last words were over no longer than `within` ago [s], or are still being said."""
         return now - self.last_end < within
 
-    def plan(self, *remarks: Remark) -> Voice:
+    def plan(self, *remarks: Remark) -> SpeechState:
         """The same with remarks added at the end."""
         return replace(self, queue=(*self.queue, *remarks))
 
-    def plan_first(self, *remarks: Remark) -> Voice:
+    def plan_first(self, *remarks: Remark) -> SpeechState:
         """The same with remarks added in front: an answer comes before what one wanted to say anyway."""
         return replace(self, queue=(*remarks, *self.queue))
 
-    def cleared(self) -> Voice:
+    def cleared(self) -> SpeechState:
         """The same with nothing left to say."""
         return replace(self, queue=())
 
-    def hold(self, until: float) -> Voice:
+    def hold(self, until: float) -> SpeechState:
         """The same, silent until a time [s] at least."""
         return replace(self, quiet_until=max(self.quiet_until, until))
 
-    def heard_other(self, now: float, acts: Sequence[DialogueAct] = ()) -> Voice:
+    def heard_other(self, now: float, acts: Sequence[DialogueAct] = ()) -> SpeechState:
         """The same after the other has said `acts`: one need not wait for an answer any more."""
         values = frozenset(value for act in acts for value in act.slots)
         move = acts[-1].move if acts else self.other
@@ -128,7 +128,7 @@ class Voice:
 
     def speak(
         self, now: float, speaking: float, rng: np.random.Generator, scene: WordingContext | None = None
-    ) -> tuple[Speech | None, Voice]:
+    ) -> tuple[Speech | None, SpeechState]:
         """Takes the next remark if it is its turn.
 
         Remarks that are joined to it are worded with it, so that one leads over to the next.

@@ -11,7 +11,7 @@ from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.recorder import SessionRecorder
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy
-from dorothie_gym.policies.seeds import policy_seed
+from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.sessions import SessionWriter
 
 

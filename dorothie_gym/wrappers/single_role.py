@@ -15,7 +15,7 @@ from dorothie_gym.envs.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
-from dorothie_gym.policies.seeds import policy_seed
+from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.spaces import ActionDict, Observation, noop
 from dorothie_gym.tasks import StoryboardTemplate
 from dorothie_gym.world.town import Town

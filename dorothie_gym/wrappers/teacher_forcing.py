@@ -14,7 +14,7 @@ from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.snapshot import LightStates, actors_around
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
-from dorothie_gym.policies.seeds import policy_seed
+from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.sessions import (
     Event,
     Point,

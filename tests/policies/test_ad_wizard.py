@@ -3,7 +3,7 @@ import pytest
 
 from dorothie_gym.ontology import ExceptionKind, LandmarkName
 from dorothie_gym.policies import ScriptedAdWizard, Trick
-from dorothie_gym.policies.ad_wizard.messages import context
+from dorothie_gym.policies.ad_wizard import context
 from dorothie_gym.spaces import AdWizardAction, SpaceLimits
 from dorothie_gym.world.town import load_town
 from tests.policies.walk import play

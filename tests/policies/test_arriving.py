@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role, Slot
-from dorothie_gym.policies.co_wizard.listening import NUDGE
-from dorothie_gym.policies.journey import Journey
+from dorothie_gym.policies.co_wizard.understanding_update import NUDGE
 from dorothie_gym.policies.participant.arriving import WITHIN
 from dorothie_gym.policies.participant.guidance import RUN_UP, guide
 from dorothie_gym.policies.participant.replies import listen
+from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.world.town.routing import Entry
 from tests.policies.said import with_words
 from tests.policies.test_repairs import Human
@@ -35,7 +35,7 @@ class Guide(Human):
             "lane": np.int64(lane), "station": np.array([station]),
             "pose": np.array([*where.position(station), where.heading_at(station)]),
         }  # fmt: skip
-        self.mind.journey = Journey.plan(self.env.town, (lane, station), self.mind.goal.place)
+        self.mind.journey = RouteProgress.plan(self.env.town, (lane, station), self.mind.goal.place)
         self.mind.standing_since = None if speed else 40.0
 
     def says(self) -> list[ActionValue]:

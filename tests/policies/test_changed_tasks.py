@@ -5,13 +5,13 @@ import pytest
 
 from dorothie_gym.ontology import DialogueMove, GoalStatus
 from dorothie_gym.policies.participant.goals import announcement, choose_target, note_tasks, route_length
-from dorothie_gym.policies.participant.mind import View
+from dorothie_gym.policies.participant.view import ParticipantView
 from tests.policies.test_repairs import Human
 
 M = DialogueMove
 
 
-def with_tasks(human: Human, **changes) -> View:
+def with_tasks(human: Human, **changes) -> ParticipantView:
     """What it sees when one of the tasks, `index`, has changed."""
     index = changes.pop("index")
     tasks = tuple(

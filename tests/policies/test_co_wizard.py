@@ -17,7 +17,7 @@ from dorothie_gym.ontology import (
     Slot,
 )
 from dorothie_gym.policies import ScriptedCoWizard
-from dorothie_gym.policies.co_wizard.mind import Wish
+from dorothie_gym.policies.co_wizard.state import Wish
 from dorothie_gym.spaces import NO_MOVE, CoWizardAction, Motion, ParticipantAction, Speech, noop
 
 

@@ -4,8 +4,8 @@ import pytest
 
 from dorothie_gym.dialogue import Wording
 from dorothie_gym.ontology import DialogueAct, DialogueMove, GoalStatus, LandmarkName, Slot, StreetName
-from dorothie_gym.policies.co_wizard.mind import CoWizardMind
-from dorothie_gym.policies.journey import first_new_street
+from dorothie_gym.policies.co_wizard.state import CoWizardState
+from dorothie_gym.policies.route_progress import first_new_street
 from dorothie_gym.spaces import Speech
 from dorothie_gym.world.town.routing import router
 from tests.policies.test_co_wizard import Talk
@@ -35,7 +35,7 @@ def said_about(talk: Talk, move: DialogueMove, name: LandmarkName) -> bool:
     return any(a.speech and a.speech.act.move is move and name in a.speech.act.slots for a in talk.actions)
 
 
-def statuses(mind: CoWizardMind) -> dict[LandmarkName, GoalStatus]:
+def statuses(mind: CoWizardState) -> dict[LandmarkName, GoalStatus]:
     return dict(mind.statuses)
 
 

@@ -5,16 +5,16 @@ from dorothie_gym.envs.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import ActionValue, Role, Slot
 from dorothie_gym.policies import ScriptedParticipant
-from dorothie_gym.policies.participant.mind import Style
+from dorothie_gym.policies.participant.config import ParticipantStyle
 from dorothie_gym.spaces import ParticipantAction
 from dorothie_gym.world.town.lights import LightColour
 from tests.policies.walk import play
 
-BY_GOALS = Style(guides=0.0, names_goal=1.0, names_street=0.5, hurries=1.0, patience=10.0, chat=1e4)
-BY_STEPS = Style(guides=1.0, names_goal=0.0, names_street=0.0, hurries=1.0, patience=10.0, chat=1e4)
+BY_GOALS = ParticipantStyle(guides=0.0, names_goal=1.0, names_street=0.5, hurries=1.0, patience=10.0, chat=1e4)
+BY_STEPS = ParticipantStyle(guides=1.0, names_goal=0.0, names_street=0.0, hurries=1.0, patience=10.0, chat=1e4)
 
 
-def first_words(style: Style) -> str:
+def first_words(style: ParticipantStyle) -> str:
     played = play(4, decisions=16, policies={"participant": ScriptedParticipant(style=style)})
     said = [e for e in played.events if e.type == "DialogueMove" and e.source is Role.PARTICIPANT]
     return str(said[0].data["slots"])

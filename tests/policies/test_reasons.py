@@ -7,7 +7,7 @@ from dorothie_gym.dialogue import understand
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, ObjectClass, PhysicalAction, Slot
 from dorothie_gym.policies.co_wizard.answers import answer_open
 from dorothie_gym.policies.co_wizard.driving import LONGEST_RED, drive, rest, see_green
-from dorothie_gym.policies.co_wizard.mind import View
+from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.spaces import Motion
 from dorothie_gym.world.town.lights import LightColour
 from tests.policies.test_co_wizard import Talk
@@ -24,11 +24,11 @@ def on_the_way() -> Talk:
     return talk
 
 
-def view_of(talk: Talk, **changes) -> View:
-    return View.read({**talk.observations["co_wizard"], **changes}, talk.env.town)
+def view_of(talk: Talk, **changes) -> CoWizardView:
+    return CoWizardView.read({**talk.observations["co_wizard"], **changes}, talk.env.town)
 
 
-def answer(talk: Talk, view: View, *values) -> DialogueAct:
+def answer(talk: Talk, view: CoWizardView, *values) -> DialogueAct:
     act = DialogueAct.of(M.QUERY_W, *values)
     answer_open(talk.state, view, act, understand(""), np.random.default_rng(0))
     return talk.state.voice.queue[0].act

@@ -7,14 +7,15 @@ from dorothie_gym.dialogue import Direction, Wording
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, Role
 from dorothie_gym.policies import ScriptedParticipant
-from dorothie_gym.policies.participant.mind import Style, View
+from dorothie_gym.policies.participant.config import ParticipantStyle
 from dorothie_gym.policies.participant.repairs import misunderstood, not_caught
 from dorothie_gym.policies.participant.replies import listen
+from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.speech import remark
 from tests.policies.said import heard, with_words
 
 M = DialogueMove
-CALM = Style(guides=0.0, names_goal=1.0, names_street=0.0, hurries=1.0, patience=60.0, chat=1e4, puzzled=1.0)
+CALM = ParticipantStyle(guides=0.0, names_goal=1.0, names_street=0.0, hurries=1.0, patience=60.0, chat=1e4, puzzled=1.0)
 
 
 class Human:
@@ -32,8 +33,8 @@ class Human:
         self.rng = np.random.default_rng(0)
 
     @property
-    def view(self) -> View:
-        return View.read(self.observation, self.env.town)
+    def view(self) -> ParticipantView:
+        return ParticipantView.read(self.observation, self.env.town)
 
     def another_place(self) -> LandmarkName:
         assert self.mind.goal is not None
@@ -43,7 +44,7 @@ class Human:
         said = heard(self.observation, Role.CO_WIZARD, move, *values, wording=wording)
         listen(self.mind, self.view_of(said), self.rng)
 
-    def view_of(self, said) -> View:
+    def view_of(self, said) -> ParticipantView:
         return replace(self.view, raw=with_words(self.observation, Role.CO_WIZARD, said.words.text, *said.acts))
 
     def moves(self) -> list[DialogueMove]:

@@ -2,13 +2,13 @@ import numpy as np
 
 from dorothie_gym.dialogue import draw_style
 from dorothie_gym.ontology import DialogueMove, LandmarkName, Role
-from dorothie_gym.policies.speech import ANSWER_TIME, Voice, remark
+from dorothie_gym.policies.speech import ANSWER_TIME, SpeechState, remark
 
 RNG = np.random.default_rng(0)
 
 
-def voice() -> Voice:
-    return Voice(role=Role.PARTICIPANT)
+def voice() -> SpeechState:
+    return SpeechState(role=Role.PARTICIPANT)
 
 
 def test_a_question_is_followed_by_silence_for_an_answer():
@@ -65,6 +65,6 @@ def test_a_speaker_of_some_style_does_not_talk_like_another():
     said = set()
     for seed in range(12):
         style = draw_style(Role.PARTICIPANT, np.random.default_rng(seed))
-        speakers = [Voice(role=Role.PARTICIPANT, style=style).plan(plan) for plan in plans]
+        speakers = [SpeechState(role=Role.PARTICIPANT, style=style).plan(plan) for plan in plans]
         said.add(tuple(speaker.speak(0.0, 0.0, np.random.default_rng(3))[0] for speaker in speakers))
     assert len(said) > 6

@@ -7,8 +7,8 @@ from typing import Final
 
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.ontology import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, PhysicalAction
-from dorothie_gym.policies.co_wizard.mind import View
-from dorothie_gym.policies.journey import (
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.route_progress import (
     BRAKING,
     SAME_WAY,
     SWITCH_ROOM,
@@ -39,7 +39,7 @@ class Deed:
     direction: Direction | None = None
 
 
-def deed_of(action: PhysicalAction, angle: float, view: View, town: Town) -> Deed | None:
+def deed_of(action: PhysicalAction, angle: float, view: CoWizardView, town: Town) -> Deed | None:
     """Returns what the car does for a navigation action, or None if it cannot be carried out.
 
     Args:
@@ -66,7 +66,7 @@ def deed_of(action: PhysicalAction, angle: float, view: View, town: Town) -> Dee
     return None
 
 
-def _follow(view: View) -> Deed | None:
+def _follow(view: CoWizardView) -> Deed | None:
     """The car follows its lane by itself, unless it stands, or prepares something else."""
     if view.motion is Motion.WAITING or _at_end(view):
         return None
@@ -74,13 +74,13 @@ def _follow(view: View) -> Deed | None:
     return Deed(physical=None if idle else Physical(action=PhysicalAction.LANE_FOLLOW))
 
 
-def _at_end(view: View) -> bool:
+def _at_end(view: CoWizardView) -> bool:
     """Whether the car stands before a junction that it could only wait at: no turn is planned."""
     near = view.choice is not None and view.choice.distance < AT_END
     return near and view.standing and view.manoeuvre is None
 
 
-def _turn(angle: float, view: View, town: Town) -> Deed | None:
+def _turn(angle: float, view: CoWizardView, town: Town) -> Deed | None:
     if view.choice is None or view.manoeuvring:
         return None
     way = _nearest_exit(angle, view.choice, town)
@@ -101,7 +101,7 @@ def _nearest_exit(angle: float, choice: Choice, town: Town) -> Exit:
     return own if misfit(own)[0] <= SAME_WAY else min([own, *beside], key=misfit)
 
 
-def _turn_round(view: View, town: Town) -> Deed | None:
+def _turn_round(view: CoWizardView, town: Town) -> Deed | None:
     lane = town.lanes[view.lane]
     if view.manoeuvre is PhysicalAction.U_TURN and view.motion is not Motion.STOPPED:
         return Deed(physical=None, direction=Direction.BACK)
@@ -113,7 +113,7 @@ def _turn_round(view: View, town: Town) -> Deed | None:
     return Deed(physical=Physical(action=PhysicalAction.U_TURN), direction=Direction.BACK)
 
 
-def _switch(left: bool, view: View, town: Town) -> Deed | None:
+def _switch(left: bool, view: CoWizardView, town: Town) -> Deed | None:
     lane = town.lanes[view.lane]
     side = LinkType.LANE_CHANGE_LEFT if left else LinkType.LANE_CHANGE_RIGHT
     room = lane.length - view.station > SWITCH_ROOM

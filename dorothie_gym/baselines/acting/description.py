@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final, Self
 
-from dorothie_gym.policies.casting import DESCRIPTION
+from dorothie_gym.policies.policy_loader import DESCRIPTION
 from dorothie_gym.sessions.encoding import write_atomically
 
 KIND: Final = "benchmark"

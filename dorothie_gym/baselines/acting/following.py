@@ -9,7 +9,7 @@ from typing import Final, Self
 from dorothie_gym.baselines.acting.history import History
 from dorothie_gym.dialogue import Span, speech_seconds
 from dorothie_gym.ontology import PhysicalAction, Role
-from dorothie_gym.policies.co_wizard.mind import View
+from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.sessions import FRAME_RATE
 from dorothie_gym.spaces import Motion, Physical, Speech
 from dorothie_gym.world.town import Town
@@ -34,9 +34,9 @@ class Following:
     air: tuple[Span, ...] = ()
     began: float = 0.0
     tried: Physical | None = None
-    before: View | None = None
+    before: CoWizardView | None = None
 
-    def acted(self, speech: Speech | None, physical: Physical | None, view: View, most_spans: int) -> Self:
+    def acted(self, speech: Speech | None, physical: Physical | None, view: CoWizardView, most_spans: int) -> Self:
         """Returns this with the decision that was taken at a view.
 
         Args:
@@ -51,7 +51,7 @@ class Following:
             air = (*air, Span(speech.text, speech.act))
         return replace(self, air=air, began=began, tried=physical, before=view)
 
-    def observed(self, view: View, town: Town, heard: tuple[Span, ...]) -> Self:
+    def observed(self, view: CoWizardView, town: Town, heard: tuple[Span, ...]) -> Self:
         """Returns this with what the next observation tells.
 
         Args:
@@ -72,7 +72,7 @@ class Following:
         return replace(self, history=history, air=() if over else self.air, tried=None, before=None)
 
 
-def carried_out(tried: Physical, before: View, after: View) -> bool:
+def carried_out(tried: Physical, before: CoWizardView, after: CoWizardView) -> bool:
     """Whether an action seems to have been carried out.
 
     Args:

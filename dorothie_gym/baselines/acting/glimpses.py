@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.envs.snapshot import LightStates
 from dorothie_gym.ontology import LandmarkName, ObjectClass, StreetName
-from dorothie_gym.policies.co_wizard.mind import View
+from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.sessions import (
     ACTOR_DTYPE,
     FRAME_RATE,
@@ -67,7 +67,7 @@ class Glimpse:
     weather: Rows
 
     @classmethod
-    def of(cls, view: View, town: Town) -> Self:
+    def of(cls, view: CoWizardView, town: Town) -> Self:
         """Returns what a view shows."""
         x, y, heading = view.raw["pose"].tolist()
         return cls(

@@ -12,7 +12,7 @@ from typing import Any, Final, Self
 from dorothie_gym.baselines.acting.glimpses import Glimpse, header_of, scene_of, way_of
 from dorothie_gym.dialogue import Span
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, ArgumentKind, Role, Slot
-from dorothie_gym.policies.co_wizard.mind import View
+from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.sessions import FRAME_RATE, Event, EventType, Session, SessionHeader
 from dorothie_gym.spaces import Physical
 from dorothie_gym.world.town import Town
@@ -65,7 +65,7 @@ class History:
         moves = (event.data["slots"] for event in reversed(self.events) if event.type is EventType.DIALOGUE_MOVE)
         return next((slots[Slot.LANDMARK.label][-1] for slots in moves if Slot.LANDMARK.label in slots), None)
 
-    def seen(self, view: View, town: Town) -> Self:
+    def seen(self, view: CoWizardView, town: Town) -> Self:
         """Returns the history with what an observation shows."""
         new = Glimpse.of(view, town)
         since = new.frame - self.kept * FRAME_RATE

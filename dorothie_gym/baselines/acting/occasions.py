@@ -8,8 +8,8 @@ from typing import Final, Self
 
 from dorothie_gym.ontology import ObjectClass, PhysicalAction
 from dorothie_gym.policies.co_wizard.driving import DECISION, PASSED
-from dorothie_gym.policies.co_wizard.mind import View
-from dorothie_gym.policies.journey import stopping_distance
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.route_progress import stopping_distance
 from dorothie_gym.spaces import Motion
 
 BEFORE_JUNCTION: Final = 40.0
@@ -53,7 +53,7 @@ class Watch:
     at_place: bool = False
     owed: bool = False
 
-    def look(self, view: View, heard: bool, place: float | None = None) -> tuple[Occasion, Self]:
+    def look(self, view: CoWizardView, heard: bool, place: float | None = None) -> tuple[Occasion, Self]:
         """Returns what is to be decided, and the watch for the next observation.
 
         Args:
@@ -77,7 +77,7 @@ class Watch:
         drove = view.time if drives else self.drove
         return Occasion(speaks=speaks, drives=drives), replace(watch, drove=drove, owed=wanted and not drives)
 
-    def _lacks_turn(self, view: View) -> bool:
+    def _lacks_turn(self, view: CoWizardView) -> bool:
         """Whether the car comes to a junction, or has waited there long, and no turn is planned."""
         assert view.choice is not None
         if view.motion is Motion.STOPPED or view.manoeuvring or view.manoeuvre is PhysicalAction.J_TURN:
@@ -85,7 +85,7 @@ class Watch:
         waits = view.motion is Motion.WAITING and view.time - self.waited >= AGAIN
         return view.choice.lane != self.junction or waits
 
-    def _hazard(self, view: View) -> float:
+    def _hazard(self, view: CoWizardView) -> float:
         if view.hazard is not ObjectClass.UNLABELED:
             return min(self.hazard, view.time)
         lasts = view.motion is Motion.STOPPED and view.time - self.drove < REST

@@ -25,11 +25,11 @@ from dorothie_gym.ontology import (
     PhysicalAction,
     Role,
 )
-from dorothie_gym.policies.co_wizard.mind import View
-from dorothie_gym.policies.journey import way_ahead
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.observation_parser import IN_VIEW
 from dorothie_gym.policies.policy import Policy
-from dorothie_gym.policies.scenery import IN_VIEW
-from dorothie_gym.policies.speech import Voice, remark
+from dorothie_gym.policies.route_progress import way_ahead
+from dorothie_gym.policies.speech import SpeechState, remark
 from dorothie_gym.sessions import Task
 from dorothie_gym.sessions.tenths import EACH
 from dorothie_gym.spaces import ActionDict, CoWizardAction, Motion, Physical, SpaceLimits, heard_acts
@@ -58,7 +58,7 @@ class CoWizardState:
 
     seed: int
     town: Town
-    voice: Voice
+    voice: SpeechState
     count: int = 0
     following: Following | None = None
     watch: Watch = field(default_factory=Watch)
@@ -85,12 +85,12 @@ class BenchmarkCoWizard(Policy[CoWizardState]):
     def initial_state(self, seed: int, town: Town) -> CoWizardState:
         """A Co-Wizard before its first observation."""
         style = draw_style(Role.CO_WIZARD, np.random.default_rng((seed, 0)))
-        return CoWizardState(seed=seed, town=town, voice=Voice(role=Role.CO_WIZARD, style=style))
+        return CoWizardState(seed=seed, town=town, voice=SpeechState(role=Role.CO_WIZARD, style=style))
 
     def step(self, observation: Mapping[str, Any], state: CoWizardState) -> tuple[ActionDict, CoWizardState]:
         """Listens; where there is an occasion, lets the model decide; says what is to be said."""
         town, count = state.town, state.count + 1
-        view = View.read(observation, town)
+        view = CoWizardView.read(observation, town)
         before = state.following or Following(history=History.begin(observation, town))
         acts = heard_acts(observation, Role.PARTICIPANT)
         heard = spans_of(str(observation[f"{Role.PARTICIPANT}_text"]), acts, _last_move(state.voice))
@@ -111,11 +111,11 @@ class BenchmarkCoWizard(Policy[CoWizardState]):
         return action, replace(state, voice=voice, count=count, following=following, watch=watch)
 
 
-def _last_move(voice: Voice) -> DialogueMove | None:
+def _last_move(voice: SpeechState) -> DialogueMove | None:
     return voice.last.act.move if voice.last is not None else None
 
 
-def _way_to_place(history: History, view: View, town: Town) -> float | None:
+def _way_to_place(history: History, view: CoWizardView, town: Town) -> float | None:
     """How far the place that was named last is along the way [m]; None where it is not near, or not on the map."""
     name = history.landmark
     named = next((landmark for landmark in view.landmarks if landmark.name.label == name), None)
@@ -132,14 +132,14 @@ def _understood(model: TownModel, history: History, heard: tuple[Span, ...]) -> 
     return known
 
 
-def _answer(model: TownModel, history: History, voice: Voice, deed: Deed) -> Voice:
+def _answer(model: TownModel, history: History, voice: SpeechState, deed: Deed) -> SpeechState:
     """What is said next: an act as the model tells, worded by the grammar."""
     act = _act(model.answer(history.said(Role.CO_WIZARD, (_UNSAID,), history.frame + EACH), Task.RFN))
     told = deed.direction if any(value in _TOLD_WAYS for value in act.slots) else None
     return voice.plan(remark(act.move, *act.ordered, wording=Wording(direction=told)))
 
 
-def _drive(model: TownModel, history: History, view: View, town: Town, waits: bool) -> Deed:
+def _drive(model: TownModel, history: History, view: CoWizardView, town: Town, waits: bool) -> Deed:
     """What is done next: the likeliest action of those that can be carried out.
 
     Args:

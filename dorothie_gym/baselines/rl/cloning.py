@@ -12,9 +12,10 @@ import torch
 from numpy.typing import NDArray
 from stable_baselines3.common.callbacks import BaseCallback
 
-from dorothie_gym.navigation import NavigationAction, NavigationConfig
-from dorothie_gym.navigation.apprentice import Apprentice, Lesson
 from dorothie_gym.ontology import Role
+from dorothie_gym.policies.navigation import NavigationAction
+from dorothie_gym.policies.navigation.demonstrations import Demonstration, DemonstrationRecorder
+from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS
 from dorothie_gym.rollout import watch_session
 from dorothie_gym.sessions import Corpus, Session, SessionError
 from dorothie_gym.sessions.sdn.maps import find_town
@@ -89,21 +90,21 @@ def silent(what: str, done: int, total: int) -> None:
 
 
 def read_lessons(
-    corpus: Path, fold: str, config: NavigationConfig | None = None, tell: Tell = silent
+    corpus: Path, fold: str, max_seconds: float = MAX_SECONDS, tell: Tell = silent
 ) -> Lessons:  # fmt: skip
     """Plays the sessions of a fold again, and watches.
 
     Args:
         corpus: its folder.
         fold: of `Fold`.
-        config: with which the driver is to learn afterwards.
+        max_seconds: time limit of the environment that the driver is trained in [s].
         tell: is told how far it is.
 
     Raises:
         SessionError: the corpus cannot be read or played again, or has nothing in the fold.
     """
     played = sessions_of(corpus, fold, tell)
-    found = [lesson for session, town in played for lesson in lessons_of(session, town, config)]
+    found = [lesson for session, town in played for lesson in lessons_of(session, town, max_seconds)]
     if not found:
         raise SessionError(f"{corpus}: fold {fold!r} has no decision to learn from")
     return Lessons.of(found)
@@ -124,12 +125,12 @@ def sessions_of(corpus: Path, fold: str, tell: Tell = silent) -> Iterator[tuple[
         yield session, town
 
 
-def lessons_of(session: Session, town: Town, config: NavigationConfig | None = None) -> list[Lesson]:
+def lessons_of(session: Session, town: Town, max_seconds: float = MAX_SECONDS) -> list[Demonstration]:
     """What there is to learn from a session."""
-    apprentice, limits = Apprentice(town, config), SpaceLimits.for_town(town)
+    apprentice, limits = DemonstrationRecorder(town, max_seconds), SpaceLimits.for_town(town)
     role = str(Role.CO_WIZARD)
     watched = (
-        apprentice.watch(seen[role], CoWizardAction.decode(done[role], limits))
+        apprentice.record(seen[role], CoWizardAction.decode(done[role], limits))
         for seen, done in watch_session(session, town)
     )
     return [lesson for lesson in watched if lesson is not None]

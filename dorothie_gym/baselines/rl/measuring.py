@@ -15,8 +15,8 @@ from dorothie_gym.baselines.rl.environments import make_vector
 from dorothie_gym.baselines.rl.settings import SettingsError, TrainingSettings, tuned_settings
 from dorothie_gym.baselines.rl.weights import make_model
 from dorothie_gym.bench.timing import Progress, cores, machine, quiet, rounded
-from dorothie_gym.navigation.drive import Drive
-from dorothie_gym.navigation.instructor import Instructor
+from dorothie_gym.envs.driving_session import DrivingSession
+from dorothie_gym.policies.navigation.instructor import Instructor
 
 TARGET = 1000.0
 """Environment steps a second end to end that training is to reach on two cores."""
@@ -85,7 +85,7 @@ def _run(settings: TrainingSettings, steps: int) -> dict[str, float]:
     vector = make_vector(settings)
     try:
         with _timed(vector, "step_wait") as step, _timed(Instructor, "instruct") as told:
-            with _timed(Drive, "interfere") as played:
+            with _timed(DrivingSession, "interfere") as played:
                 model = make_model(settings, vector)
                 model.learn(1, log_interval=None)  # the first rollout compiles and warms up
                 for seconds in (step, told, played):

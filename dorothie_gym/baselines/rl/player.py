@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from dorothie_gym.baselines.rl.settings import NAVIGATION, SettingsError
 from dorothie_gym.baselines.rl.weights import load_model
-from dorothie_gym.navigation import NavigationConfig, NavigationPlayer
-from dorothie_gym.navigation.observations import Vector
+from dorothie_gym.policies.navigation import NavigationPolicy
+from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vector
 from dorothie_gym.spaces import SpaceLimits
 
 
-def make_player(path: Path, limits: SpaceLimits) -> NavigationPlayer:
+def make_player(path: Path, limits: SpaceLimits) -> NavigationPolicy:
     """A Co-Wizard who drives as a model does when it does not explore.
 
     Args:
@@ -29,8 +29,8 @@ def make_player(path: Path, limits: SpaceLimits) -> NavigationPlayer:
     model, settings = load_model(path)
     if settings.env != NAVIGATION:
         raise SettingsError(f"{path}: learned in {settings.env}; only drivers of {NAVIGATION} can play the co_wizard")
-    seconds = settings.env_settings.get("max_seconds", NavigationConfig.max_seconds)
-    return NavigationPlayer(Chooser(model, masked=settings.masked), limits, NavigationConfig(max_seconds=seconds))
+    seconds = settings.env_settings.get("max_seconds", MAX_SECONDS)
+    return NavigationPolicy(Chooser(model, masked=settings.masked), limits, max_seconds=seconds)
 
 
 class Chooser:

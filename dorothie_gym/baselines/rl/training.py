@@ -20,7 +20,7 @@ from dorothie_gym.baselines.rl.environments import Maker, make_vector
 from dorothie_gym.baselines.rl.evaluating import SEEDS_FROM, Outcome, act_with, evaluate_policy
 from dorothie_gym.baselines.rl.settings import SettingsError, TrainingSettings
 from dorothie_gym.baselines.rl.weights import DESCRIPTION, make_model, read_description, restore, save_model
-from dorothie_gym.navigation import NavigationConfig
+from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS
 from dorothie_gym.sessions import Fold
 
 PROGRESS, CURVE, BEST, CLONED = "progress.jsonl", "curve.png", "best", "cloned.json"
@@ -152,10 +152,8 @@ class Training:
     def _learn_from(self, corpus: Path) -> None:
         """Begins with what the Co-Wizards of a corpus did."""
         since = time.perf_counter()
-        config = NavigationConfig(
-            max_seconds=self.settings.env_settings.get("max_seconds", NavigationConfig.max_seconds)
-        )
-        shown, held_out = (read_lessons(corpus, fold, config, self._tell) for fold in (Fold.TRAIN, Fold.VAL))
+        max_seconds = self.settings.env_settings.get("max_seconds", MAX_SECONDS)
+        shown, held_out = (read_lessons(corpus, fold, max_seconds, self._tell) for fold in (Fold.TRAIN, Fold.VAL))
         self.cloned = clone(self.model, shown, held_out, self.settings.seed, self._tell)
         self.seconds += time.perf_counter() - since
         (self.folder / CLONED).write_text(json.dumps(asdict(self.cloned), indent=1) + "\n", encoding="utf-8")

@@ -13,9 +13,8 @@ import numpy as np
 from dorothie_gym.baselines.selfplay.heard import Remark, listen
 from dorothie_gym.baselines.selfplay.seat import Mask, Seat
 from dorothie_gym.ontology import ExceptionKind, PropKind, Role, Sensor, WeatherParameter
-from dorothie_gym.policies.ad_wizard.messages import context
-from dorothie_gym.policies.ad_wizard.policy import FIRST, SPACING
-from dorothie_gym.policies.scenery import SeenSubgoal, place_on_path, read_landmarks, read_subgoals, scalar
+from dorothie_gym.policies.ad_wizard import FIRST, SPACING, context
+from dorothie_gym.policies.observation_parser import SeenSubgoal, place_on_path, read_landmarks, read_subgoals, scalar
 from dorothie_gym.spaces import AdWizardAction, Place, PropColumn
 
 NEAR, FARTHER = 60.0, 100.0

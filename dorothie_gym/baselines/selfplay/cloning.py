@@ -9,7 +9,7 @@ from dorothie_gym.baselines.rl.cloning import NOTHING, Lessons, Tell, sessions_o
 from dorothie_gym.baselines.selfplay.seat import Mask, Vector
 from dorothie_gym.baselines.selfplay.seats import make_seat
 from dorothie_gym.ontology import AGENT_ROLES
-from dorothie_gym.policies.scenery import scalar
+from dorothie_gym.policies.observation_parser import scalar
 from dorothie_gym.rollout import watch_session
 from dorothie_gym.sessions import Session, SessionError
 from dorothie_gym.spaces import ActionDecoder, AdWizardAction, RoleAction, SpaceLimits

@@ -13,12 +13,6 @@ import numpy as np
 from dorothie_gym.baselines.selfplay.heard import Remark, listen
 from dorothie_gym.baselines.selfplay.seat import Mask, Seat
 from dorothie_gym.envs.config import EnvConfig
-from dorothie_gym.navigation.actions import ACTIONS, NavigationAction, physical_of, prepares
-from dorothie_gym.navigation.apprentice import action_of
-from dorothie_gym.navigation.instructor import Instruction
-from dorothie_gym.navigation.likely import LikelyActions
-from dorothie_gym.navigation.observations import FIELDS, Heard, Viewpoint
-from dorothie_gym.navigation.ways import Ways, nearest_sector
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueAct,
@@ -28,8 +22,14 @@ from dorothie_gym.ontology import (
     PhysicalAction,
     Role,
 )
-from dorothie_gym.policies.journey import CANONICAL
-from dorothie_gym.policies.scenery import read_landmarks, scalar
+from dorothie_gym.policies.navigation.action_mask import EstimatedActionMask
+from dorothie_gym.policies.navigation.actions import ACTIONS, NavigationAction, physical_of, prepares
+from dorothie_gym.policies.navigation.demonstrations import action_of
+from dorothie_gym.policies.navigation.instructor import NavigationInstruction
+from dorothie_gym.policies.navigation.junction_exits import JunctionExits, nearest_sector
+from dorothie_gym.policies.navigation.observation_vector import FIELDS, HeardInstruction, NavigationEncoder
+from dorothie_gym.policies.observation_parser import read_landmarks, scalar
+from dorothie_gym.policies.route_progress import CANONICAL
 from dorothie_gym.spaces import CoWizardAction, ExitColumn, Mental, Physical, SpaceLimits, Speech
 from dorothie_gym.world.town import Town
 from dorothie_gym.world.town.model import wrap_degrees
@@ -65,7 +65,7 @@ class CoWizardMemory:
     heard: Remark | None = None
     named: LandmarkName | None = None
     noted: LandmarkName | None = None
-    told: Heard = field(default_factory=Heard)
+    told: HeardInstruction = field(default_factory=HeardInstruction)
     seen: Mapping[str, Any] | None = None
 
 
@@ -80,9 +80,9 @@ class CoWizardSeat(Seat[CoWizardMemory]):
 
     def __init__(self, town: Town, limits: SpaceLimits) -> None:
         super().__init__(town, limits)
-        self._ways = Ways(town)
-        self._likely = LikelyActions(town, self._ways)
-        self._viewpoint = Viewpoint(town, self._ways, EnvConfig.max_seconds)
+        self._ways = JunctionExits(town)
+        self._likely = EstimatedActionMask(town, self._ways)
+        self._viewpoint = NavigationEncoder(town, self._ways, EnvConfig.max_seconds)
 
     def begin(self) -> CoWizardMemory:
         """Nothing has been heard."""
@@ -159,13 +159,13 @@ class CoWizardSeat(Seat[CoWizardMemory]):
             return NavigationAction.LIGHTS
         return action_of(physical, observation, self._ways)
 
-    def _instruction(self, observation: Mapping[str, Any], heard: Remark) -> Instruction:
+    def _instruction(self, observation: Mapping[str, Any], heard: Remark) -> NavigationInstruction:
         """What was said as a driver of `Navigation-v0` hears it; turns are those at the next choice of ways."""
         exits = observation["exits"][observation["exits"][:, ExitColumn.PRESENT] > 0.0]
         turns = ActionValue.J_TURN in heard.act.slots
         distance = float(exits[0, ExitColumn.DISTANCE]) if turns and len(exits) else 0.0
         sector = None if heard.direction is None else self._sector(observation, CANONICAL[heard.direction])
-        return Instruction(act=heard.act, sector=sector, distance=distance, time=heard.time)
+        return NavigationInstruction(act=heard.act, sector=sector, distance=distance, time=heard.time)
 
     def _sector(self, observation: Mapping[str, Any], angle: float) -> int:
         """The sector of the way on that comes closest to an angle [degrees]."""

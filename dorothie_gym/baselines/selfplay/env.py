@@ -15,11 +15,11 @@ from dorothie_gym.baselines.rl.settings import SettingsError
 from dorothie_gym.baselines.selfplay.seats import Table, make_seat
 from dorothie_gym.envs.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.navigation.config import TRAFFIC
-from dorothie_gym.navigation.route import WayLeft
+from dorothie_gym.envs.navigation_config import TRAFFIC
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
-from dorothie_gym.policies.seeds import policy_seed
+from dorothie_gym.policies.navigation.cost_to_go import CostToGo
+from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.spaces import ActionDict
 from dorothie_gym.tasks import StoryboardError
 from dorothie_gym.world.config import WorldConfig
@@ -73,7 +73,7 @@ class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
         self.table = Table.of(limits)
         self.observation_space = spaces.Box(-1.0, 1.0, (self.table.width,), dtype=np.float32)
         self.action_space = spaces.MultiDiscrete(list(self.table.actions))
-        self._way_left = WayLeft(self.duo.town)
+        self._way_left = CostToGo(self.duo.town)
         self._memories: list[Any] = []
         self._seen: Mapping[str, Any] = {}
         self._plans: dict[Role, Any] = {}

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.ontology import LABELS, DialogueAct, DialogueMove, LandmarkName, Role
-from dorothie_gym.policies.hearing import heard_utterance
-from dorothie_gym.policies.scenery import scalar
+from dorothie_gym.policies.observation_parser import scalar
+from dorothie_gym.policies.utterance_input import heard_utterance
 
 RECENT = 20.0
 """The age of what was said is a share of this [s]."""

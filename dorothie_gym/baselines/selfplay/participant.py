@@ -13,8 +13,8 @@ from dorothie_gym.baselines.selfplay.heard import Remark, listen
 from dorothie_gym.baselines.selfplay.seat import Mask, Seat, one_hot
 from dorothie_gym.dialogue import Direction, load_lexicon, understand
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role
-from dorothie_gym.policies.journey import Journey
-from dorothie_gym.policies.scenery import read_landmarks, read_subgoals, scalar
+from dorothie_gym.policies.observation_parser import read_landmarks, read_subgoals, scalar
+from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.spaces import ParticipantAction, Speech
 from dorothie_gym.world.town.routing import Entry, Place
 
@@ -78,7 +78,7 @@ class Errand:
     subgoal: int
     goal: int
     name: LandmarkName
-    journey: Journey
+    journey: RouteProgress
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,11 +173,11 @@ class ParticipantSeat(Seat[ParticipantMemory]):
         for subgoal in subgoals:
             mark = landmarks.get(subgoal.landmark)
             if subgoal.open and subgoal.allowed and mark is not None:
-                journey = Journey.plan(self.town, place, mark.place)
+                journey = RouteProgress.plan(self.town, place, mark.place)
                 return Errand(subgoal=subgoal.index, goal=mark.row, name=mark.name, journey=journey)
         return None
 
-    def _followed(self, journey: Journey, place: Place) -> Journey:
+    def _followed(self, journey: RouteProgress, place: Place) -> RouteProgress:
         journey = journey.followed(self.town, *place)
         return journey.replanned(self.town, place) if journey.lost(place[1]) else journey
 

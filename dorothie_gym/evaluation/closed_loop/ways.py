@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.evaluation.closed_loop.task import TaskRecord
-from dorothie_gym.navigation.route import WayLeft
+from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 from dorothie_gym.sessions import NO_LANE, Session
 from dorothie_gym.world.town import Town
 from dorothie_gym.world.town.routing import Place, router
@@ -26,7 +26,7 @@ class TaskWay:
 
     def __init__(self, town: Town, task: TaskRecord, blocked: Sequence[Place] = ()) -> None:
         self._town, self._task, self._blocked = town, task, tuple(blocked)
-        self._left: dict[int, WayLeft] = {}
+        self._left: dict[int, CostToGo] = {}
         self._rest: dict[tuple[int, frozenset[int]], float] = {}
 
     def shortest(self, start: Place) -> float:
@@ -61,7 +61,7 @@ class TaskWay:
 
     def _cost(self, start: Place, goal: int) -> float:
         if goal not in self._left:
-            self._left[goal] = WayLeft(self._town)
+            self._left[goal] = CostToGo(self._town)
             self._left[goal].aim(self._task.places[goal], self._blocked)
         return self._left[goal].from_place(*start)
 

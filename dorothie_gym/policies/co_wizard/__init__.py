@@ -1,6 +1,7 @@
-"""The scripted Co-Wizard: understands what it is told, plans on what it knows, asks when it does not, and drives."""
+"""Scripted Co-Wizard: understands instructions, plans on its beliefs, asks when information is missing, and drives."""
 
-from dorothie_gym.policies.co_wizard.mind import CoWizardMind, Style
-from dorothie_gym.policies.co_wizard.policy import Attention, ScriptedCoWizard, attend, respond
+from dorothie_gym.policies.co_wizard.config import CoWizardStyle
+from dorothie_gym.policies.co_wizard.policy import PendingDecision, ScriptedCoWizard, attend, respond
+from dorothie_gym.policies.co_wizard.state import CoWizardState
 
-__all__ = ["Attention", "CoWizardMind", "ScriptedCoWizard", "Style", "attend", "respond"]
+__all__ = ["CoWizardState", "CoWizardStyle", "PendingDecision", "ScriptedCoWizard", "attend", "respond"]

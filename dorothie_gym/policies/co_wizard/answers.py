@@ -18,12 +18,13 @@ from dorothie_gym.ontology import (
     SlotValue,
     StreetName,
 )
-from dorothie_gym.policies.co_wizard.conditions import dim_topic
+from dorothie_gym.policies.co_wizard.acknowledgement import musing
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
-from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View
-from dorothie_gym.policies.co_wizard.uptake import musing
-from dorothie_gym.policies.journey import direction_of
-from dorothie_gym.policies.scenery import street_of
+from dorothie_gym.policies.co_wizard.initiative import dim_topic
+from dorothie_gym.policies.co_wizard.state import CoWizardState
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.observation_parser import street_of
+from dorothie_gym.policies.route_progress import direction_of
 from dorothie_gym.policies.speech import Remark, remark
 
 LONG_REST = 60.0
@@ -36,7 +37,9 @@ CLOSE = 120.0
 """A goal within this distance is close [m]."""
 
 
-def answer_yes_no(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+def answer_yes_no(
+    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard, rng: np.random.Generator
+) -> None:
     """Answers a question that wants a yes or a no."""
     objects, landmarks, actions = act.values(Slot.OBJECT), act.values(Slot.LANDMARK), act.values(Slot.ACTION)
     if ActionValue.LIGHT_CHANGE in actions:
@@ -67,7 +70,7 @@ def answer_yes_no(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard
     mind.voice = mind.voice.plan(answer, *more)
 
 
-def _why_not_seen(view: View, rng: np.random.Generator) -> tuple[Remark, ...]:
+def _why_not_seen(view: CoWizardView, rng: np.random.Generator) -> tuple[Remark, ...]:
     """What keeps it from seeing something, if anything does."""
     bad = dim_topic(view)
     if bad is None or rng.random() < 0.3:
@@ -75,7 +78,7 @@ def _why_not_seen(view: View, rng: np.random.Generator) -> tuple[Remark, ...]:
     return (remark(DialogueMove.EXPLAIN, wording=Wording(topic=bad), joined=True),)
 
 
-def _doing(mind: CoWizardMind, view: View) -> ActionValue:
+def _doing(mind: CoWizardState, view: CoWizardView) -> ActionValue:
     if view.standing:
         return ActionValue.STOP
     return {
@@ -85,7 +88,9 @@ def _doing(mind: CoWizardMind, view: View) -> ActionValue:
     }.get(view.manoeuvre or PhysicalAction.LANE_FOLLOW, ActionValue.LANE_FOLLOW)
 
 
-def answer_open(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+def answer_open(
+    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard, rng: np.random.Generator
+) -> None:
     """Answers an open question."""
     actions, landmarks = act.values(Slot.ACTION), act.values(Slot.LANDMARK)
     if ActionValue.STOP in actions:
@@ -106,7 +111,7 @@ def answer_open(mind: CoWizardMind, view: View, act: DialogueAct, words: Heard, 
         _where(mind, view)
 
 
-def _why_standing(mind: CoWizardMind, view: View) -> None:
+def _why_standing(mind: CoWizardState, view: CoWizardView) -> None:
     reason = view.hazard if view.hazard is not ObjectClass.UNLABELED else mind.rest_for
     standing = view.time - (mind.standing_since if mind.standing_since is not None else view.time)
     if reason is not ObjectClass.UNLABELED and (view.hazard is reason or standing < LONG_REST):
@@ -121,7 +126,7 @@ def _why_standing(mind: CoWizardMind, view: View) -> None:
         mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_U))
 
 
-def _why_round(mind: CoWizardMind) -> None:
+def _why_round(mind: CoWizardState) -> None:
     if mind.detour_at is not None or mind.blocked:
         mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, ObjectClass.STATIC))
     elif mind.goal is not None and mind.exact:
@@ -130,12 +135,12 @@ def _why_round(mind: CoWizardMind) -> None:
         mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, wording=Wording(topic="told")))
 
 
-def _what_it_sees(mind: CoWizardMind, view: View) -> None:
+def _what_it_sees(mind: CoWizardState, view: CoWizardView) -> None:
     things = tuple(dict.fromkeys(thing.kind for thing in view.objects))[:2] or (ObjectClass.ROAD,)
     mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, *things, wording=Wording(topic="seen")))
 
 
-def _which_way(mind: CoWizardMind, view: View) -> None:
+def _which_way(mind: CoWizardState, view: CoWizardView) -> None:
     turns = _turns(mind, view)
     if mind.directive is None and turns:
         for k, (told, side) in enumerate(turns):
@@ -160,7 +165,7 @@ def _which_way(mind: CoWizardMind, view: View) -> None:
     mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_W, *values, wording=wording))
 
 
-def _turns(mind: CoWizardMind, view: View) -> list[tuple[list[SlotValue], Direction]]:
+def _turns(mind: CoWizardState, view: CoWizardView) -> list[tuple[list[SlotValue], Direction]]:
     """The next turns of the plan that lead elsewhere than straight on, at most two."""
     if mind.journey is None or mind.journey.turns_round_first(mind.town, view.station):
         return []
@@ -173,7 +178,7 @@ def _turns(mind: CoWizardMind, view: View) -> list[tuple[list[SlotValue], Direct
     return found[:2]
 
 
-def _where(mind: CoWizardMind, view: View) -> None:
+def _where(mind: CoWizardState, view: CoWizardView) -> None:
     street = street_of(view.raw, mind.town, view.lane)
     if street is StreetName.UNKNOWN:
         mind.voice = mind.voice.plan(remark(DialogueMove.REPLY_U))

@@ -7,14 +7,15 @@ from collections.abc import Callable
 import numpy as np
 
 from dorothie_gym.ontology import LandmarkName, ObjectClass, PhysicalAction
-from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View, Wish
-from dorothie_gym.policies.journey import (
+from dorothie_gym.policies.co_wizard.state import CoWizardState, Wish
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.route_progress import (
     BRAKING,
     SAME_WAY,
     SWITCH_ROOM,
     U_TURN_SPEED_SQUARED,
     Choice,
-    Crossing,
+    RouteJunction,
     find_exit,
     lanes_ahead,
     lanes_beside,
@@ -71,7 +72,7 @@ LONGEST_RED = 45.0
 """Who has stopped for a red light goes on after this time at the latest [s]."""
 
 
-def drive(mind: CoWizardMind, view: View) -> Physical | None:
+def drive(mind: CoWizardState, view: CoWizardView) -> Physical | None:
     """Chooses the physical action of this decision; None leaves the car to what it is doing."""
     for consider in _CONCERNS:
         action = consider(mind, view)
@@ -80,14 +81,14 @@ def drive(mind: CoWizardMind, view: View) -> Physical | None:
     return None
 
 
-def _stand(mind: CoWizardMind, view: View) -> Physical | None:
+def _stand(mind: CoWizardState, view: CoWizardView) -> Physical | None:
     if not mind.halted or view.motion is Motion.STOPPED or view.time - mind.stop_sent_at < PATIENCE:
         return None
     mind.stop_sent_at = view.time
     return Physical(action=PhysicalAction.STOP)
 
 
-def _stop_at_place(mind: CoWizardMind, view: View) -> Physical | None:
+def _stop_at_place(mind: CoWizardState, view: CoWizardView) -> Physical | None:
     """Stops at a place on the lane that is close ahead: the goal, or a few metres further."""
     if mind.halted:
         return None
@@ -109,12 +110,12 @@ def _stop_at_place(mind: CoWizardMind, view: View) -> Physical | None:
     return Physical(action=PhysicalAction.STOP)
 
 
-def distance_ahead(mind: CoWizardMind, view: View, place: Place) -> float | None:
+def distance_ahead(mind: CoWizardState, view: CoWizardView, place: Place) -> float | None:
     """How far a place is along the lanes that the car takes by default [m]; None if it is not on them in `SIGHT`."""
     return way_ahead(mind.town, view.here, place, SIGHT)
 
 
-def place_ahead(mind: CoWizardMind, view: View, distance: float) -> Place:
+def place_ahead(mind: CoWizardState, view: CoWizardView, distance: float) -> Place:
     """The place some way ahead by default; the end of the last lane if a junction comes before [m]."""
     left = view.station + distance
     lanes = lanes_ahead(mind.town, view.lane, view.station, distance)
@@ -125,7 +126,7 @@ def place_ahead(mind: CoWizardMind, view: View, distance: float) -> Place:
     return lanes[-1], min(left, mind.town.lanes[lanes[-1]].length)
 
 
-def _wish(mind: CoWizardMind, view: View) -> Physical | None:
+def _wish(mind: CoWizardState, view: CoWizardView) -> Physical | None:
     if mind.wish is None:
         return None
     if mind.wish is Wish.U_TURN:
@@ -137,7 +138,7 @@ def _wish(mind: CoWizardMind, view: View) -> Physical | None:
     return _switch(mind, view, side)
 
 
-def turn_round(mind: CoWizardMind, view: View) -> Physical | None:
+def turn_round(mind: CoWizardState, view: CoWizardView) -> Physical | None:
     """Turns round as soon as it can be done, moving to the leftmost lane before."""
     lane = mind.town.lanes[view.lane]
     if lane.in_junction or view.manoeuvring or view.time - mind.commanded_at < PATIENCE:
@@ -151,7 +152,7 @@ def turn_round(mind: CoWizardMind, view: View) -> Physical | None:
     return Physical(action=PhysicalAction.U_TURN)
 
 
-def _switch(mind: CoWizardMind, view: View, side: LinkType) -> Physical | None:
+def _switch(mind: CoWizardState, view: CoWizardView, side: LinkType) -> Physical | None:
     lane = mind.town.lanes[view.lane]
     # one that is refused is given again at once: there is seldom much room
     ready = not view.manoeuvring and view.time - mind.commanded_at >= DECISION and not lane.in_junction
@@ -164,7 +165,7 @@ def _switch(mind: CoWizardMind, view: View, side: LinkType) -> Physical | None:
     return Physical(action=PhysicalAction.LANE_SWITCH, angle=90 if side is LinkType.LANE_CHANGE_LEFT else -90)
 
 
-def _manoeuvre(mind: CoWizardMind, view: View) -> Physical | None:
+def _manoeuvre(mind: CoWizardState, view: CoWizardView) -> Physical | None:
     """The lane change or U-turn that the own plan has next."""
     if mind.journey is None or mind.halted or mind.directive is not None or view.manoeuvring:
         return None
@@ -187,7 +188,7 @@ def _manoeuvre(mind: CoWizardMind, view: View) -> Physical | None:
     return _switch(mind, view, LinkType.LANE_CHANGE_LEFT if entry is Entry.CHANGE_LEFT else LinkType.LANE_CHANGE_RIGHT)
 
 
-def _needs_switch(mind: CoWizardMind, view: View, crossing: Crossing | None) -> bool:
+def _needs_switch(mind: CoWizardState, view: CoWizardView, crossing: RouteJunction | None) -> bool:
     """Whether a lane change has to be commanded: a turn that no exit of the own lane offers brings its own along."""
     assert mind.journey is not None
     if crossing is None or mind.journey.changes_before(crossing) or view.choice is None:
@@ -197,7 +198,7 @@ def _needs_switch(mind: CoWizardMind, view: View, crossing: Crossing | None) -> 
     return any(abs(wrap_degrees(way.angle - crossing.exit.angle)) <= SAME_WAY for way in view.choice.exits)
 
 
-def wanted_exit(mind: CoWizardMind, view: View) -> Exit | None:
+def wanted_exit(mind: CoWizardState, view: CoWizardView) -> Exit | None:
     """The exit to take at the next junction with a choice: as asked for, else by the plan; None if neither tells."""
     choice = view.choice
     if choice is None:
@@ -222,7 +223,7 @@ def wanted_exit(mind: CoWizardMind, view: View) -> Exit | None:
     return None
 
 
-def _straight_on(mind: CoWizardMind, choice: Choice) -> Exit | None:
+def _straight_on(mind: CoWizardState, choice: Choice) -> Exit | None:
     """The way on for a car that is being guided, has not asked, and has not been told otherwise in time."""
     guided = mind.goal is not None and not mind.pausing and not mind.creeping and mind.asked != choice.lane
     if not guided or choice.distance > UNLESS_TOLD:
@@ -230,7 +231,7 @@ def _straight_on(mind: CoWizardMind, choice: Choice) -> Exit | None:
     return next((way for way in choice.exits if way.type is LinkType.STRAIGHT), None)
 
 
-def _turn(mind: CoWizardMind, view: View) -> Physical | None:
+def _turn(mind: CoWizardState, view: CoWizardView) -> Physical | None:
     if mind.halted or view.choice is None or mind.nudge is not None:
         return None
     way = wanted_exit(mind, view)
@@ -246,7 +247,7 @@ def _turn(mind: CoWizardMind, view: View) -> Physical | None:
     return Physical(action=PhysicalAction.J_TURN, angle=way.angle)
 
 
-def rest(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
+def rest(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
     """Decides, once for each time that something holds up the car for long, whether to stop for good meanwhile."""
     if view.motion is not Motion.HAZARD or mind.standing_since is None:
         mind.rested = mind.rested and view.motion is Motion.STOPPED
@@ -259,7 +260,7 @@ def rest(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
         mind.rest_until, mind.rest_for = view.time + (LONGEST_RED if red else REST), view.hazard
 
 
-def see_green(mind: CoWizardMind, view: View) -> None:
+def see_green(mind: CoWizardState, view: CoWizardView) -> None:
     """Ends the stop before a traffic light that is red no more."""
     if mind.rest_for is not ObjectClass.TRAFFIC_LIGHT or view.time >= mind.rest_until:
         return
@@ -267,14 +268,14 @@ def see_green(mind: CoWizardMind, view: View) -> None:
         mind.rest_until = view.time
 
 
-def _rest(mind: CoWizardMind, view: View) -> Physical | None:
+def _rest(mind: CoWizardState, view: CoWizardView) -> Physical | None:
     """Stops for good while something is in the way that it has said to stop for."""
     if view.time >= mind.rest_until or mind.halted or view.motion is not Motion.HAZARD or view.manoeuvring:
         return None
     return Physical(action=PhysicalAction.STOP)
 
 
-def _pause(mind: CoWizardMind, view: View) -> Physical | None:
+def _pause(mind: CoWizardState, view: CoWizardView) -> Physical | None:
     """Stops before a junction at which it has asked for the way, until it knows one."""
     knows = mind.journey is not None or mind.directive is not None or mind.wish is not None or mind.nudge is not None
     if knows or mind.creeping or view.choice is None:
@@ -291,7 +292,7 @@ def _pause(mind: CoWizardMind, view: View) -> Physical | None:
     return Physical(action=PhysicalAction.STOP)
 
 
-def _go(mind: CoWizardMind, view: View) -> Physical | None:
+def _go(mind: CoWizardState, view: CoWizardView) -> Physical | None:
     if mind.halted or mind.pausing or view.motion is not Motion.STOPPED or view.time < mind.rest_until:
         return None
     if mind.town.lanes[view.lane].in_junction or view.manoeuvre is not None:
@@ -299,7 +300,7 @@ def _go(mind: CoWizardMind, view: View) -> Physical | None:
     return Physical(action=PhysicalAction.LANE_FOLLOW)
 
 
-def _turns_soon(mind: CoWizardMind, view: View) -> bool:
+def _turns_soon(mind: CoWizardState, view: CoWizardView) -> bool:
     """Whether a turn to a side comes up that a driver of this style slows down for by himself."""
     if not mind.style.eases or view.choice is None or view.choice.distance > EASE_WITHIN:
         return False
@@ -307,7 +308,7 @@ def _turns_soon(mind: CoWizardMind, view: View) -> bool:
     return way is not None and way.type in (LinkType.LEFT, LinkType.RIGHT)
 
 
-def _close(mind: CoWizardMind, view: View) -> bool:
+def _close(mind: CoWizardState, view: CoWizardView) -> bool:
     """Whether the goal is so near that who drives gently, or has driven past it before, comes up to it slowly."""
     if mind.journey is None or not mind.exact:
         return False
@@ -317,7 +318,7 @@ def _close(mind: CoWizardMind, view: View) -> bool:
     return mind.style.gentle and left < GENTLE_WITHIN and mind.journey.next_crossing(mind.town, view.station) is None
 
 
-def _comfort(mind: CoWizardMind, view: View) -> Physical | None:
+def _comfort(mind: CoWizardState, view: CoWizardView) -> Physical | None:
     if mind.speed < mind.usual and view.time > mind.slow_until and not mind.creeping:
         mind.speed = mind.usual
     wanted = min(mind.speed, GENTLE) if _close(mind, view) or _turns_soon(mind, view) else mind.speed
@@ -328,7 +329,7 @@ def _comfort(mind: CoWizardMind, view: View) -> Physical | None:
     return None
 
 
-_CONCERNS: tuple[Callable[[CoWizardMind, View], Physical | None], ...] = (
+_CONCERNS: tuple[Callable[[CoWizardState, CoWizardView], Physical | None], ...] = (
     _stop_at_place,
     _stand,
     _wish,
@@ -341,7 +342,7 @@ _CONCERNS: tuple[Callable[[CoWizardMind, View], Physical | None], ...] = (
 )
 
 
-def creep(mind: CoWizardMind, view: View) -> None:
+def creep(mind: CoWizardState, view: CoWizardView) -> None:
     """Carries the guess of a place along that must be close, so that the car comes up to it slowly."""
     if not mind.creeping or mind.exact or mind.halted or view.manoeuvre is PhysicalAction.U_TURN:
         return

@@ -16,11 +16,12 @@ from dorothie_gym.ontology import (
     SlotValue,
     StreetName,
 )
+from dorothie_gym.policies.co_wizard.acknowledgement import musing
 from dorothie_gym.policies.co_wizard.driving import place_ahead
-from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View
-from dorothie_gym.policies.co_wizard.uptake import musing
-from dorothie_gym.policies.journey import Journey, streets_named
-from dorothie_gym.policies.scenery import SeenLandmark
+from dorothie_gym.policies.co_wizard.state import CoWizardState
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.observation_parser import SeenLandmark
+from dorothie_gym.policies.route_progress import RouteProgress, streets_named
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.spaces import Mental
 from dorothie_gym.spaces import Place as MapPlace
@@ -41,7 +42,9 @@ LOOKED = 8.0
 _COMMON = (LandmarkName.HOUSE, LandmarkName.PERSON)
 
 
-def known(mind: CoWizardMind, view: View, name: LandmarkName, streets: Sequence[StreetName]) -> SeenLandmark | None:
+def known(
+    mind: CoWizardState, view: CoWizardView, name: LandmarkName, streets: Sequence[StreetName]
+) -> SeenLandmark | None:
     """The landmark of that name on the map, on one of the streets if any is named; None if there is none."""
     found = [mark for mark in view.landmarks if mark.name is name and mark.place not in mind.not_there]
     fitting = [mark for mark in found if mark.street in streets]
@@ -51,7 +54,7 @@ def known(mind: CoWizardMind, view: View, name: LandmarkName, streets: Sequence[
     return found[0] if found and (not streets or name not in _COMMON) else None
 
 
-def aim(mind: CoWizardMind, view: View, mark: SeenLandmark) -> None:
+def aim(mind: CoWizardState, view: CoWizardView, mark: SeenLandmark) -> None:
     """Makes a place on the map the goal and plans the way."""
     mind.goal, mind.place, mind.exact = mark.name, mark.place, True
     mind.directive, mind.wish, mind.nudge = None, None, None
@@ -62,16 +65,16 @@ def aim(mind: CoWizardMind, view: View, mark: SeenLandmark) -> None:
     plan_way(mind, view)
 
 
-def plan_way(mind: CoWizardMind, view: View) -> None:
+def plan_way(mind: CoWizardState, view: CoWizardView) -> None:
     """Plans a way to the goal, if its place is on the map."""
     if mind.place is None or not mind.exact:
         mind.journey = None
         return
-    mind.journey = Journey.plan(mind.town, view.here, mind.place, mind.blocked + mind.avoided)
+    mind.journey = RouteProgress.plan(mind.town, view.here, mind.place, mind.blocked + mind.avoided)
     note_plan(mind)
 
 
-def note_plan(mind: CoWizardMind) -> None:
+def note_plan(mind: CoWizardState) -> None:
     """Notes the junctions of the plan if they are not those noted last."""
     route = mind.journey.route if mind.journey is not None else None
     junctions = route.junctions(mind.town) if route is not None else ()
@@ -83,8 +86,8 @@ def note_plan(mind: CoWizardMind) -> None:
 
 
 def hear_goal(
-    mind: CoWizardMind,
-    view: View,
+    mind: CoWizardState,
+    view: CoWizardView,
     name: LandmarkName,
     streets: Sequence[StreetName],
     rng: np.random.Generator,
@@ -130,7 +133,7 @@ def hear_goal(
 
 
 def _unknown(
-    mind: CoWizardMind, view: View, name: LandmarkName, streets: Sequence[StreetName], rng: np.random.Generator
+    mind: CoWizardState, view: CoWizardView, name: LandmarkName, streets: Sequence[StreetName], rng: np.random.Generator
 ) -> None:
     """The place is not on the map: says so, and goes where it is told to."""
     again = mind.goal is name and not mind.exact
@@ -154,7 +157,7 @@ def _unknown(
         mind.voice = mind.voice.plan(no_map)
 
 
-def hear_later(mind: CoWizardMind, view: View, name: LandmarkName, rng: np.random.Generator) -> None:
+def hear_later(mind: CoWizardState, view: CoWizardView, name: LandmarkName, rng: np.random.Generator) -> None:
     """A place is to be gone to later: remembers it, asks when, or proposes to go there first if that is nearer."""
     mind.note_status(name, GoalStatus.PENDING)
     mark = known(mind, view, name, ())
@@ -177,7 +180,7 @@ def hear_later(mind: CoWizardMind, view: View, name: LandmarkName, rng: np.rando
         mind.voice = mind.voice.plan(remark(move, name, GoalStatus.PENDING))
 
 
-def accept_offer(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
+def accept_offer(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
     """Goes first to the place that it has proposed; the one under way is for later."""
     name, mind.offer = mind.offer, None
     mark = known(mind, view, name, ()) if name is not None else None
@@ -189,7 +192,7 @@ def accept_offer(mind: CoWizardMind, view: View, rng: np.random.Generator) -> No
     mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, mark.name, wording=Wording(topic="taken")))
 
 
-def hear_stop_ahead(mind: CoWizardMind, view: View, name: LandmarkName | None, distance: float) -> None:
+def hear_stop_ahead(mind: CoWizardState, view: CoWizardView, name: LandmarkName | None, distance: float) -> None:
     """It is told to stop some way ahead, perhaps by a place: comes up to it slowly."""
     if name is not None:
         mark = known(mind, view, name, ())
@@ -206,7 +209,7 @@ def hear_stop_ahead(mind: CoWizardMind, view: View, name: LandmarkName | None, d
 
 
 def hear_description(
-    mind: CoWizardMind, view: View, streets: Sequence[StreetName], landmarks: Sequence[LandmarkName],
+    mind: CoWizardState, view: CoWizardView, streets: Sequence[StreetName], landmarks: Sequence[LandmarkName],
     rng: np.random.Generator,
 ) -> None:  # fmt: skip
     """It is told where a place is: notes a guess if a place close to it is on the map, and says that it has heard."""
@@ -216,7 +219,7 @@ def hear_description(
         if place is not None and view.time - mind.steered_at > STEERED:
             guess = Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=mind.goal, place=_map_place(*place))
             mind.note(guess)
-            mind.journey = Journey.plan(mind.town, view.here, place, mind.blocked)
+            mind.journey = RouteProgress.plan(mind.town, view.here, place, mind.blocked)
             mind.directive = mind.wish = None
             note_plan(mind)
     if mind.goal is not None and not mind.exact and not mind.arrived:
@@ -228,7 +231,7 @@ def hear_description(
 
 
 def _described(
-    mind: CoWizardMind, view: View, streets: Sequence[StreetName], landmarks: Sequence[LandmarkName]
+    mind: CoWizardState, view: CoWizardView, streets: Sequence[StreetName], landmarks: Sequence[LandmarkName]
 ) -> Place | None:
     """Where to look for a place: by the landmark it is close to, else where its street is reached first."""
     near = next((mark for name in landmarks if (mark := known(mind, view, name, ())) is not None), None)
@@ -247,7 +250,7 @@ def _described(
     return nearest, mind.town.lanes[nearest].length / 2
 
 
-def search_on(mind: CoWizardMind, view: View) -> None:
+def search_on(mind: CoWizardState, view: CoWizardView) -> None:
     """Gives the guess of a place up when it has come there: from now on it has to be guided."""
     if mind.journey is not None and not mind.exact and mind.journey.left(view.station) < LOOKED:
         mind.journey = None
@@ -257,7 +260,7 @@ def _map_place(lane: int, station: float) -> MapPlace:
     return MapPlace(lane=lane, metres=round(station))
 
 
-def give_up(mind: CoWizardMind, name: LandmarkName | None) -> None:
+def give_up(mind: CoWizardState, name: LandmarkName | None) -> None:
     """A task is off; if it was the one under way, the car waits to be told what comes next."""
     if name is not None:
         mind.note_status(name, GoalStatus.ABANDONED)
@@ -265,7 +268,7 @@ def give_up(mind: CoWizardMind, name: LandmarkName | None) -> None:
         leave_goal(mind)
 
 
-def complete(mind: CoWizardMind, name: LandmarkName | None) -> None:
+def complete(mind: CoWizardState, name: LandmarkName | None) -> None:
     """A task is done."""
     done = name if name is not None else mind.goal
     if done is not None:
@@ -277,7 +280,7 @@ def complete(mind: CoWizardMind, name: LandmarkName | None) -> None:
     mind.voice = mind.voice.cleared()
 
 
-def doubt(mind: CoWizardMind) -> None:
+def doubt(mind: CoWizardState) -> None:
     """The place it took for the goal is not the one meant: it has to be guided."""
     if mind.exact and mind.place is not None:
         if mind.goal in _COMMON:
@@ -286,7 +289,7 @@ def doubt(mind: CoWizardMind) -> None:
     mind.arrived = False
 
 
-def leave_goal(mind: CoWizardMind) -> None:
+def leave_goal(mind: CoWizardState) -> None:
     """There is no goal any more."""
     mind.goal, mind.place, mind.exact, mind.journey = None, None, False, None
     mind.directive, mind.nudge, mind.wish = None, None, None

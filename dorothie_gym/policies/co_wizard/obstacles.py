@@ -9,9 +9,10 @@ import numpy as np
 from dorothie_gym.dialogue import Wording
 from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, SlotValue
 from dorothie_gym.policies.co_wizard.goals import plan_way
-from dorothie_gym.policies.co_wizard.mind import CoWizardMind, View
-from dorothie_gym.policies.journey import first_new_street, lanes_ahead
-from dorothie_gym.policies.scenery import SeenObject, place_on_lanes
+from dorothie_gym.policies.co_wizard.state import CoWizardState
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.observation_parser import SeenObject, place_on_lanes
+from dorothie_gym.policies.route_progress import first_new_street, lanes_ahead
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.spaces import Motion
 
@@ -28,7 +29,7 @@ WAIT = 6.0
 """So long an answer about a way round is waited for [s]."""
 
 
-def watch_road(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
+def watch_road(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
     """Looks for obstacles on the path, tells of a new one, and goes round it."""
     if mind.detour_at is not None and view.time - mind.detour_at > WAIT:
         detour(mind, view, rng)
@@ -60,7 +61,7 @@ def watch_road(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None
     mind.halted = True
 
 
-def _way_round(mind: CoWizardMind, view: View, rng: np.random.Generator) -> tuple[SlotValue, ...]:
+def _way_round(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> tuple[SlotValue, ...]:
     """What it proposes: a street, turning round, or just some other way."""
     assert mind.journey is not None
     way = mind.journey.replanned(mind.town, view.here, mind.blocked)
@@ -70,7 +71,7 @@ def _way_round(mind: CoWizardMind, view: View, rng: np.random.Generator) -> tupl
     return (ActionValue.U_TURN,) if way.turns_round_first(mind.town, view.station) and rng.random() < 0.5 else ()
 
 
-def _on_path(view: View) -> SeenObject | None:
+def _on_path(view: CoWizardView) -> SeenObject | None:
     """The nearest obstacle on the planned waypoints."""
     for thing in view.objects:
         if thing.kind is not ObjectClass.STATIC or thing.distance > SIGHT:
@@ -92,7 +93,7 @@ def _gap(waypoints: np.ndarray, thing: SeenObject) -> float:
     return float(np.hypot(*(offset - np.clip(share, 0.0, 1.0)[:, None] * step).T).min())
 
 
-def detour(mind: CoWizardMind, view: View, rng: np.random.Generator) -> None:
+def detour(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
     """Takes another way, and says which."""
     mind.detour_at, mind.halted = None, False
     plan_way(mind, view)

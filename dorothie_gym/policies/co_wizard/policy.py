@@ -11,14 +11,16 @@ import numpy as np
 
 from dorothie_gym.dialogue import draw_style
 from dorothie_gym.ontology import ObjectClass, Role
+from dorothie_gym.policies.co_wizard.config import CoWizardStyle
 from dorothie_gym.policies.co_wizard.driving import creep, drive, rest, see_green
 from dorothie_gym.policies.co_wizard.goals import note_plan, search_on
-from dorothie_gym.policies.co_wizard.listening import listen
-from dorothie_gym.policies.co_wizard.mind import CoWizardMind, Style, View
+from dorothie_gym.policies.co_wizard.initiative import scene_of, speak_up, tell_action
 from dorothie_gym.policies.co_wizard.obstacles import watch_road
-from dorothie_gym.policies.co_wizard.talking import scene_of, speak_up, tell_action
+from dorothie_gym.policies.co_wizard.state import CoWizardState
+from dorothie_gym.policies.co_wizard.understanding_update import listen
+from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import Policy
-from dorothie_gym.policies.speech import Voice
+from dorothie_gym.policies.speech import SpeechState
 from dorothie_gym.spaces import ActionDict, CoWizardAction, Mental, Motion, Physical, SpaceLimits
 from dorothie_gym.world.town import Town
 
@@ -35,14 +37,14 @@ AFTER_RED = 15.0
 """A manoeuvre that was asked for is not given up before this time after a red light [s]."""
 
 
-class ScriptedCoWizard(Policy[CoWizardMind]):
+class ScriptedCoWizard(Policy[CoWizardState]):
     """A car's mind that is told where to go: it believes, plans, drives, asks, confirms and explains.
 
     It knows the map without hidden places. Places it knows it drives to by its own plan; to others it is guided by
     words. What it believes it notes by mental actions.
     """
 
-    def __init__(self, limits: SpaceLimits | None = None, style: Style | None = None) -> None:
+    def __init__(self, limits: SpaceLimits | None = None, style: CoWizardStyle | None = None) -> None:
         """Prepares the policy.
 
         Args:
@@ -52,14 +54,14 @@ class ScriptedCoWizard(Policy[CoWizardMind]):
         super().__init__(Role.CO_WIZARD, limits)
         self._style = style
 
-    def initial_state(self, seed: int, town: Town) -> CoWizardMind:
+    def initial_state(self, seed: int, town: Town) -> CoWizardState:
         """A Co-Wizard that has not been told anything yet."""
         rng = np.random.default_rng((seed, 0))
-        style = Style.draw(rng) if self._style is None else self._style
-        voice = Voice(role=Role.CO_WIZARD, style=draw_style(Role.CO_WIZARD, rng))
-        return CoWizardMind(seed=seed, town=town, style=style, voice=voice, speed=style.pace, usual=style.pace)
+        style = CoWizardStyle.draw(rng) if self._style is None else self._style
+        voice = SpeechState(role=Role.CO_WIZARD, style=draw_style(Role.CO_WIZARD, rng))
+        return CoWizardState(seed=seed, town=town, style=style, voice=voice, speed=style.pace, usual=style.pace)
 
-    def step(self, observation: Mapping[str, Any], state: CoWizardMind) -> tuple[ActionDict, CoWizardMind]:
+    def step(self, observation: Mapping[str, Any], state: CoWizardState) -> tuple[ActionDict, CoWizardState]:
         """Listens, looks, drives, and says something or nothing."""
         attention = attend(observation, state)
         mind, view = attention.mind, attention.view
@@ -68,15 +70,15 @@ class ScriptedCoWizard(Policy[CoWizardMind]):
         return respond(attention, drive(mind, view)).encode(self.limits), mind
 
 
-class Attention(NamedTuple):
+class PendingDecision(NamedTuple):
     """A decision in progress: the mind, which is brought up to date, what is seen, and chance."""
 
-    mind: CoWizardMind
-    view: View
+    mind: CoWizardState
+    view: CoWizardView
     rng: np.random.Generator
 
 
-def attend(observation: Mapping[str, Any], state: CoWizardMind) -> Attention:
+def attend(observation: Mapping[str, Any], state: CoWizardState) -> PendingDecision:
     """Listens and looks: the first part of a decision, before anything is done or said.
 
     Args:
@@ -86,16 +88,16 @@ def attend(observation: Mapping[str, Any], state: CoWizardMind) -> Attention:
     mind = copy(state)
     mind.count += 1
     rng = np.random.default_rng((mind.seed, mind.count))
-    view = View.read(observation, mind.town)
+    view = CoWizardView.read(observation, mind.town)
     _notice(mind, view)
     listen(mind, view, rng)
     watch_road(mind, view, rng)
     search_on(mind, view)
     creep(mind, view)
-    return Attention(mind, view, rng)
+    return PendingDecision(mind, view, rng)
 
 
-def respond(attention: Attention, physical: Physical | None) -> CoWizardAction:
+def respond(attention: PendingDecision, physical: Physical | None) -> CoWizardAction:
     """Says something or nothing, and notes what is believed: the last part of a decision.
 
     Args:
@@ -110,7 +112,7 @@ def respond(attention: Attention, physical: Physical | None) -> CoWizardAction:
     return CoWizardAction(speech=speech, physical=physical, mental=_next_note(mind))
 
 
-def _notice(mind: CoWizardMind, view: View) -> None:
+def _notice(mind: CoWizardState, view: CoWizardView) -> None:
     """Brings plan and directive up to where the car is."""
     if not view.standing:
         mind.standing_since = None
@@ -127,7 +129,7 @@ def _notice(mind: CoWizardMind, view: View) -> None:
         _plan_anew(mind, view, before)
 
 
-def _plan_anew(mind: CoWizardMind, view: View, before: float) -> None:
+def _plan_anew(mind: CoWizardState, view: CoWizardView, before: float) -> None:
     """Plans another way; who has missed the goal again and again does not come to it as before."""
     assert mind.journey is not None
     former = mind.journey
@@ -141,7 +143,7 @@ def _plan_anew(mind: CoWizardMind, view: View, before: float) -> None:
     note_plan(mind)
 
 
-def _pass_junction(mind: CoWizardMind, view: View) -> None:
+def _pass_junction(mind: CoWizardState, view: CoWizardView) -> None:
     """Drops a directive when its junction has been passed, or counts down to it."""
     directive = mind.directive
     if directive is None or view.choice is None or view.manoeuvring:
@@ -155,7 +157,7 @@ def _pass_junction(mind: CoWizardMind, view: View) -> None:
         mind.directive = replace(directive, skip=max(directive.skip - passed, 0), junction=view.junction)
 
 
-def _next_note(mind: CoWizardMind) -> Mental | None:
+def _next_note(mind: CoWizardState) -> Mental | None:
     if not mind.notes:
         return None
     first, mind.notes = mind.notes[0], mind.notes[1:]

@@ -9,8 +9,9 @@ import numpy as np
 from dorothie_gym.dialogue import SpeakerStyle, Wording, speech_seconds, word_act
 from dorothie_gym.dialogue.phrases import Register
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role
-from dorothie_gym.policies.journey import stopping_distance
-from dorothie_gym.policies.participant.mind import ParticipantMind, View
+from dorothie_gym.policies.participant.state import ParticipantState
+from dorothie_gym.policies.participant.view import ParticipantView
+from dorothie_gym.policies.route_progress import stopping_distance
 from dorothie_gym.policies.speech import Remark, remark
 
 DECISION = 0.5
@@ -56,7 +57,7 @@ WITHIN = 1.9
 """A car that stands this close to the place has arrived [m]."""
 
 
-def approach(mind: ParticipantMind, view: View, rng: np.random.Generator) -> bool:
+def approach(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> bool:
     """Talks the car up to the place when nothing but the last stretch is left; tells whether that is so."""
     journey = mind.journey
     assert journey is not None
@@ -93,7 +94,7 @@ _STOP = DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.STOP)
 _SHOUTING = SpeakerStyle(register=Register.BLUNT, chattiness=0.0, indirectness=0.0)
 
 
-def about_to_arrive(mind: ParticipantMind, view: View) -> bool:
+def about_to_arrive(mind: ParticipantState, view: ParticipantView) -> bool:
     """Whether nothing but the last stretch to the place is left."""
     journey = mind.journey
     if journey is None or journey.left(view.station) > LAST_STRETCH:
@@ -101,7 +102,7 @@ def about_to_arrive(mind: ParticipantMind, view: View) -> bool:
     return journey.next_crossing(mind.town, view.station) is None and journey.next_manoeuvre(view.station) is None
 
 
-def _time_to_stop(mind: ParticipantMind, view: View, left: float) -> bool:
+def _time_to_stop(mind: ParticipantState, view: ParticipantView, left: float) -> bool:
     """Whether the words, begun now, stop the car closer to the place than if begun at the next decision."""
     if mind.announced and left > SLOW_WITHIN:
         return False  # it is about to slow down
@@ -109,7 +110,7 @@ def _time_to_stop(mind: ParticipantMind, view: View, left: float) -> bool:
     return room <= (TOO_SHORT if mind.misses else 0.0) or room < -after
 
 
-def _room_to_stop(mind: ParticipantMind, view: View, left: float, text: str) -> tuple[float, float]:
+def _room_to_stop(mind: ParticipantState, view: ParticipantView, left: float, text: str) -> tuple[float, float]:
     """How far before the place the car stands if told so now, and at the next decision [m]; negative: behind it."""
     delay = math.ceil(speech_seconds(text) / DECISION - 1e-6) * DECISION
     gain = min(max((view.speed - mind.speed_before) / DECISION, -2.0), 2.0)
@@ -124,7 +125,7 @@ def _room_to_stop(mind: ParticipantMind, view: View, left: float, text: str) -> 
     return rooms[0], rooms[1]
 
 
-def _from_standing(mind: ParticipantMind, view: View, left: float) -> bool:
+def _from_standing(mind: ParticipantState, view: ParticipantView, left: float) -> bool:
     if mind.standing_since is None or left > 45.0:
         return False
     waited = view.time - max(mind.standing_since, mind.nudged_at, mind.voice.last_end, mind.heard_at)
@@ -133,7 +134,7 @@ def _from_standing(mind: ParticipantMind, view: View, left: float) -> bool:
     return True
 
 
-def inch_on(mind: ParticipantMind, view: View) -> Remark:
+def inch_on(mind: ParticipantState, view: ParticipantView) -> Remark:
     """What to say to a car that stands a little before the place."""
     assert mind.journey is not None
     mind.nudged_at = view.time

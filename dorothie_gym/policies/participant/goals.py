@@ -1,4 +1,4 @@
-"""Which task comes next, and what is said about tasks: told, changed, given up, done."""
+"""Choice of the next task, and remarks about tasks: announced, changed, dropped, done, described."""
 
 from __future__ import annotations
 
@@ -8,10 +8,19 @@ from dataclasses import replace
 import numpy as np
 
 from dorothie_gym.dialogue import Wording
-from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, LandmarkName, SlotValue
-from dorothie_gym.policies.journey import Journey
-from dorothie_gym.policies.participant.mind import ParticipantMind, View
-from dorothie_gym.policies.scenery import SeenLandmark, SeenSubgoal
+from dorothie_gym.ontology import (
+    ActionValue,
+    DialogueMove,
+    GoalStatus,
+    LandmarkName,
+    ObjectClass,
+    SlotValue,
+    StreetName,
+)
+from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
+from dorothie_gym.policies.participant.state import ParticipantState
+from dorothie_gym.policies.participant.view import ParticipantView
+from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.policies.speech import Remark, remark
 from dorothie_gym.world.town.routing import router
 
@@ -40,7 +49,7 @@ UNANSWERED = 8.0
 """After this time without a word from the car it is asked whether it has understood [s]."""
 
 
-def note_tasks(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+def note_tasks(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     """Compares the tasks with those seen last and says what is new."""
     before, mind.subgoals = mind.subgoals, view.subgoals
     for old, new in zip(before, view.subgoals, strict=False):
@@ -54,7 +63,7 @@ def note_tasks(mind: ParticipantMind, view: View, rng: np.random.Generator) -> N
             _changed(mind, view, old, new, rng)
 
 
-def _done(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.random.Generator) -> None:
+def _done(mind: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, rng: np.random.Generator) -> None:
     landmark = view.landmark(subgoal.landmark)
     named = landmark is not None and rng.random() < 0.4
     values: tuple[SlotValue, ...] = (landmark.name,) if landmark is not None and named else ()
@@ -68,7 +77,7 @@ def _done(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.rando
         mind.next_at = -math.inf if mind.goes_on else view.time + PAUSE
 
 
-def _added(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.random.Generator) -> None:
+def _added(mind: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, rng: np.random.Generator) -> None:
     landmark = view.landmark(subgoal.landmark)
     if landmark is None:
         return
@@ -86,14 +95,14 @@ def _added(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.rand
         mind.voice = mind.voice.plan(news)
 
 
-def _has_to_wait(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, landmark: SeenLandmark) -> bool:
+def _has_to_wait(mind: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark) -> bool:
     """Whether the task under way, which the car knows of, now has to wait for the new one."""
     if mind.target is None or mind.goal is None or not mind.told or mind.goal.name is landmark.name:
         return False
     return subgoal.allowed and not next(task.allowed for task in view.subgoals if task.index == mind.target)
 
 
-def _is_on_the_way(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, landmark: SeenLandmark) -> bool:
+def _is_on_the_way(mind: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark) -> bool:
     """Whether a new task may be done now, and is nearer than the one under way, which the car knows of."""
     if mind.goal is None or mind.journey is None or not mind.told or not subgoal.allowed:
         return False
@@ -102,13 +111,13 @@ def _is_on_the_way(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, land
     return route_length(mind, view, landmark) < mind.journey.left(view.station)
 
 
-def route_length(mind: ParticipantMind, view: View, landmark: SeenLandmark) -> float:
+def route_length(mind: ParticipantState, view: ParticipantView, landmark: SeenLandmark) -> float:
     """How far it is to a landmark from here [m]; infinity where there is no way."""
     route = router(mind.town).route(view.place, landmark.place, mind.blocked)
     return route.length if route is not None else math.inf
 
 
-def _go_first(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, landmark: SeenLandmark) -> None:
+def _go_first(mind: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark) -> None:
     """Interrupts the task under way for one that has just come up."""
     former = mind.goal
     assert former is not None
@@ -122,7 +131,7 @@ def _go_first(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, landmark:
     )
 
 
-def switch_target(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, landmark: SeenLandmark) -> None:
+def switch_target(mind: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark) -> None:
     """Puts the task under way off for another one, of which the car knows."""
     if mind.target is not None:
         mind.put_off |= {mind.target}
@@ -131,7 +140,7 @@ def switch_target(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, landm
     mind.told, mind.told_at, mind.guiding = True, view.time, False
 
 
-def go_on(mind: ParticipantMind, view: View) -> None:
+def go_on(mind: ParticipantState, view: ParticipantView) -> None:
     """Tells the car to go on that has been told to wait."""
     if view.time < mind.go_at or not mind.voice.idle:
         return
@@ -140,7 +149,7 @@ def go_on(mind: ParticipantMind, view: View) -> None:
         mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.START))
 
 
-def _dropped(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.random.Generator) -> None:
+def _dropped(mind: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, rng: np.random.Generator) -> None:
     landmark = view.landmark(subgoal.landmark)
     if landmark is None:
         return
@@ -153,7 +162,9 @@ def _dropped(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, rng: np.ra
     mind.voice = mind.voice.plan(remark(move, landmark.name, GoalStatus.ABANDONED))
 
 
-def _changed(mind: ParticipantMind, view: View, old: SeenSubgoal, new: SeenSubgoal, rng: np.random.Generator) -> None:
+def _changed(
+    mind: ParticipantState, view: ParticipantView, old: SeenSubgoal, new: SeenSubgoal, rng: np.random.Generator
+) -> None:
     former, landmark = view.landmark(old.landmark), view.landmark(new.landmark)
     if former is None or landmark is None:
         return
@@ -184,7 +195,7 @@ def _changed(mind: ParticipantMind, view: View, old: SeenSubgoal, new: SeenSubgo
         )
 
 
-def forget_target(mind: ParticipantMind) -> None:
+def forget_target(mind: ParticipantState) -> None:
     """Leaves the present target."""
     mind.target, mind.goal, mind.journey = None, None, None
     mind.told, mind.described, mind.guiding, mind.best = False, False, False, math.inf
@@ -194,7 +205,7 @@ def forget_target(mind: ParticipantMind) -> None:
     mind.stopped_at = mind.nudged_at = -math.inf
 
 
-def choose_target(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+def choose_target(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     """Takes the nearest task that counts now, if there is none in hand."""
     if mind.target is not None:
         current = view.subgoals[mind.target]
@@ -212,12 +223,12 @@ def choose_target(mind: ParticipantMind, view: View, rng: np.random.Generator) -
         mind.guiding = bool(rng.random() < mind.style.guides)
 
 
-def _aim_at(mind: ParticipantMind, view: View, subgoal: SeenSubgoal, landmark: SeenLandmark) -> None:
+def _aim_at(mind: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark) -> None:
     mind.target, mind.goal = subgoal.index, landmark
-    mind.journey = Journey.plan(mind.town, view.place, landmark.place, mind.blocked)
+    mind.journey = RouteProgress.plan(mind.town, view.place, landmark.place, mind.blocked)
 
 
-def announcement(mind: ParticipantMind, view: View, rng: np.random.Generator) -> Remark:
+def announcement(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> Remark:
     """The target as an instruction, with its street where that helps."""
     assert mind.goal is not None
     values: list[SlotValue] = [mind.goal.name]
@@ -232,14 +243,14 @@ def announcement(mind: ParticipantMind, view: View, rng: np.random.Generator) ->
     return remark(DialogueMove.INSTRUCT, *values, wording=Wording(topic=topic))
 
 
-def reason_topic(mind: ParticipantMind) -> str | None:
+def reason_topic(mind: ParticipantState) -> str | None:
     """What a reason to go to the target is about: an errand in a shop, or whom one visits."""
     if mind.goal is None:
         return None
     return "visit" if mind.goal.name in (LandmarkName.HOUSE, LandmarkName.PERSON) else "errand"
 
 
-def _announce(mind: ParticipantMind, view: View, goes_on: bool, rng: np.random.Generator) -> None:
+def _announce(mind: ParticipantState, view: ParticipantView, goes_on: bool, rng: np.random.Generator) -> None:
     """Names the target, perhaps with a reason for it, and what is to be done later."""
     words = replace(announcement(mind, view, rng), joined=goes_on)
     draw = rng.random()
@@ -260,7 +271,7 @@ def _announce(mind: ParticipantMind, view: View, goes_on: bool, rng: np.random.G
         mind.voice = mind.voice.plan(remark(DialogueMove.ALIGN, joined=True))
 
 
-def tell_target(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+def tell_target(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     """Tells the car of the target when its turn has come, and again if it does not answer."""
     goes_on, mind.goes_on = mind.goes_on, False
     if mind.goal is None or not (mind.voice.idle or goes_on):
@@ -281,3 +292,53 @@ def tell_target(mind: ParticipantMind, view: View, rng: np.random.Generator) -> 
             mind.voice = mind.voice.plan(remark(DialogueMove.ALIGN))
         else:
             mind.voice = mind.voice.plan(announcement(mind, view, rng))
+
+
+GUIDES_AT_ONCE = 0.12
+"""Chance that the way to a place that the car does not know is told from where it has been described."""
+
+TELLS_LOOKS = 0.5
+"""Chance that a place is described by what stands there, too."""
+
+_FAMOUS = frozenset(LandmarkName) - {
+    LandmarkName.HOUSE,
+    LandmarkName.PERSON,
+    LandmarkName.UNKNOWN,
+    LandmarkName.QUERIED,
+}
+
+_FEATURES = (
+    ObjectClass.BUILDING, ObjectClass.FENCE, ObjectClass.WALL, ObjectClass.POLE, ObjectClass.VEGETATION,
+    ObjectClass.TRAFFIC_SIGN, ObjectClass.SIDE_WALK, ObjectClass.TERRAIN, ObjectClass.GROUND, ObjectClass.WATER,
+    ObjectClass.BRIDGE, ObjectClass.GUARD_RAIL, ObjectClass.RAIL_TRACK, ObjectClass.OTHER, ObjectClass.ROAD_LINE,
+)  # fmt: skip
+"""What stands by houses and people."""
+
+
+def describe(mind: ParticipantState, view: ParticipantView, move: DialogueMove, rng: np.random.Generator) -> None:
+    """Says where the target is; at once, or when the car is close to it, the way is told turn by turn."""
+    assert mind.goal is not None
+    mind.guiding = bool(mind.goal.street is StreetName.UNKNOWN or mind.described or rng.random() < GUIDES_AT_ONCE)
+    mind.described = True
+    values: list[SlotValue] = [mind.goal.street] if mind.goal.street is not StreetName.UNKNOWN else []
+    near = _near(mind.goal, view)
+    if near is not None:
+        values.append(near.name)
+    looks = (_looks(mind.goal),) if rng.random() < TELLS_LOOKS else ()
+    mind.voice = mind.voice.plan_first(remark(move, *values, wording=Wording(topic="where")), *looks)
+
+
+def _looks(goal: SeenLandmark) -> Remark:
+    """By what a place is known when one is there: the same for the same place."""
+    thing = _FEATURES[int(abs(goal.x) * 7.0 + abs(goal.y) * 3.0) % len(_FEATURES)]
+    return remark(DialogueMove.EXPLAIN, thing, wording=Wording(topic="looks"), joined=True)
+
+
+def _near(goal: SeenLandmark, view: ParticipantView) -> SeenLandmark | None:
+    """A well-known place close to the target."""
+    found = [
+        (abs(other.x - goal.x) + abs(other.y - goal.y), other.row, other)
+        for other in view.landmarks
+        if other.name in _FAMOUS and other.name is not goal.name
+    ]
+    return min(found)[2] if found and min(found)[0] < 90.0 else None

@@ -9,18 +9,19 @@ import numpy as np
 
 from dorothie_gym.dialogue import Direction, Wording, speech_seconds, word_act
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, Slot, SlotValue, StreetName
-from dorothie_gym.policies.journey import (
+from dorothie_gym.policies.observation_parser import street_of
+from dorothie_gym.policies.participant.arriving import NEAR, READY, SLOW_SPEED, WITHIN, about_to_arrive, approach
+from dorothie_gym.policies.participant.state import ParticipantState
+from dorothie_gym.policies.participant.view import ParticipantView
+from dorothie_gym.policies.route_progress import (
     BRAKING,
     END_ROOM,
     U_TURN_SPEED_SQUARED,
     Choice,
-    Crossing,
+    RouteJunction,
     find_exit,
     next_choice,
 )
-from dorothie_gym.policies.participant.arriving import NEAR, READY, SLOW_SPEED, WITHIN, about_to_arrive, approach
-from dorothie_gym.policies.participant.mind import ParticipantMind, View
-from dorothie_gym.policies.scenery import street_of
 from dorothie_gym.policies.speech import Remark, remark
 from dorothie_gym.world.town.routing import Entry
 
@@ -61,7 +62,7 @@ CIRCLES = 3
 """After having the car turned round so often for a place, the participant leads it there some other way."""
 
 
-def follow_journey(mind: ParticipantMind, view: View) -> None:
+def follow_journey(mind: ParticipantState, view: ParticipantView) -> None:
     """Brings the way up to date, and plans anew where the car has left it."""
     if mind.journey is None or view.turning:
         return
@@ -89,7 +90,7 @@ def follow_journey(mind: ParticipantMind, view: View) -> None:
     mind.best = min(mind.best, mind.journey.left(view.station))
 
 
-def watch(mind: ParticipantMind, view: View) -> None:
+def watch(mind: ParticipantState, view: ParticipantView) -> None:
     """Takes over a car that goes far out of its way or does not get on by itself."""
     if mind.guiding or mind.journey is None or not mind.told:
         return
@@ -104,7 +105,7 @@ def watch(mind: ParticipantMind, view: View) -> None:
         mind.guiding = True
 
 
-def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+def guide(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     """Says what is to be done next, if it is time to."""
     if mind.journey is None or not mind.told or view.turning or mind.journey.astray:
         return
@@ -141,7 +142,7 @@ def guide(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
         mind.voice = mind.voice.plan(*_rounded_off(mind, words, again, rng))
 
 
-def _stop_circling(mind: ParticipantMind, view: View) -> None:
+def _stop_circling(mind: ParticipantState, view: ParticipantView) -> None:
     """Leads the car another way that it was turned round for, or told to change lanes on, again and again."""
     assert mind.journey is not None
     in_vain = sum(lane == view.lane for lane, _ in mind.changes) > 1
@@ -154,14 +155,14 @@ def _stop_circling(mind: ParticipantMind, view: View) -> None:
         mind.journey = mind.journey.replanned(mind.town, view.place, mind.blocked + mind.avoided)
 
 
-def _may_speak(mind: ParticipantMind, view: View) -> bool:
+def _may_speak(mind: ParticipantState, view: ParticipantView) -> bool:
     """Whether it is free to say a step: close to the place there is no time for anything else."""
     if mind.guiding and about_to_arrive(mind, view):
         mind.voice = mind.voice.cleared()
     return mind.voice.idle and view.speaking <= 0.0
 
 
-def _rounded_off(mind: ParticipantMind, words: Remark, again: bool, rng: np.random.Generator) -> tuple[Remark, ...]:
+def _rounded_off(mind: ParticipantState, words: Remark, again: bool, rng: np.random.Generator) -> tuple[Remark, ...]:
     """A step with what else is said in the same breath: a reason before it, or a question whether it was heard."""
     draw = rng.random()
     if words.act.values(Slot.ACTION) == (ActionValue.U_TURN,):
@@ -178,8 +179,8 @@ def _rounded_off(mind: ParticipantMind, words: Remark, again: bool, rng: np.rand
 
 
 def _left_to_ask(
-    mind: ParticipantMind,
-    view: View,
+    mind: ParticipantState,
+    view: ParticipantView,
     key: tuple[str, int, int],
     distance: float,
     goes_straight: bool,
@@ -196,7 +197,7 @@ def _left_to_ask(
     return distance > TOO_LATE or goes_straight
 
 
-def _ease(mind: ParticipantMind, view: View) -> bool:
+def _ease(mind: ParticipantState, view: ParticipantView) -> bool:
     """Has the car slow down for a place that is easily missed: one missed before, or one right behind a manoeuvre."""
     assert mind.journey is not None
     if mind.eased or mind.journey.left(view.station) > NEAR or view.speed < SLOW_SPEED:
@@ -209,7 +210,7 @@ def _ease(mind: ParticipantMind, view: View) -> bool:
     return True
 
 
-def _hidden_behind(mind: ParticipantMind, view: View) -> bool:
+def _hidden_behind(mind: ParticipantState, view: ParticipantView) -> bool:
     """Whether there is hardly time to stop the car between the next junction, or lane change, and the place."""
     assert mind.journey is not None
     left = mind.journey.left(view.station)
@@ -221,7 +222,7 @@ def _hidden_behind(mind: ParticipantMind, view: View) -> bool:
     return told and crossing.distance < CORNER and left - crossing.distance < RIGHT_BEHIND
 
 
-def _turning_distance(mind: ParticipantMind, view: View) -> float:
+def _turning_distance(mind: ParticipantState, view: ParticipantView) -> float:
     """How far ahead turning round is told, so that the car turns about where it is planned."""
     assert mind.journey is not None
     if not mind.journey.turns_round_on(view.lane):
@@ -230,7 +231,7 @@ def _turning_distance(mind: ParticipantMind, view: View) -> float:
     return 1.5 * view.speed + max(view.speed**2 - U_TURN_SPEED_SQUARED, 0.0) / (2 * BRAKING)
 
 
-def _takes_a_run_up(mind: ParticipantMind, view: View) -> bool:
+def _takes_a_run_up(mind: ParticipantState, view: ParticipantView) -> bool:
     """Whether to go on for now: a car that turned round here would be past the place before it could be stopped."""
     assert mind.journey is not None
     after = mind.journey.run_up()
@@ -248,7 +249,7 @@ def _takes_a_run_up(mind: ParticipantMind, view: View) -> bool:
     return True
 
 
-def _turns_better(mind: ParticipantMind, view: View, farther: float) -> bool:
+def _turns_better(mind: ParticipantState, view: ParticipantView, farther: float) -> bool:
     """Whether a car that drives on a bit [m] can turn round there, too, and has more road for it before the place."""
     assert mind.journey is not None
     later = mind.journey.replanned(mind.town, (view.lane, view.station + farther), mind.blocked + mind.avoided)
@@ -256,7 +257,7 @@ def _turns_better(mind: ParticipantMind, view: View, farther: float) -> bool:
     return now is not None and then is not None and later.turns_round_on(view.lane) and then[0] > now[0] + farther / 2
 
 
-def _send_on(mind: ParticipantMind, view: View) -> None:
+def _send_on(mind: ParticipantState, view: ParticipantView) -> None:
     """Has a car that stands drive on, to turn round later."""
     waited = view.time - max(mind.guided_at, mind.heard_at, mind.voice.last_end)
     if view.standing and waited > READY and view.time > mind.excused_until:
@@ -264,7 +265,7 @@ def _send_on(mind: ParticipantMind, view: View) -> None:
         mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW))
 
 
-def note_told(mind: ParticipantMind, view: View, key: tuple[str, int, int]) -> None:
+def note_told(mind: ParticipantState, view: ParticipantView, key: tuple[str, int, int]) -> None:
     """Remembers what the car has been told to do."""
     mind.repeats = mind.repeats + 1 if mind.guided == key else 0
     mind.rounds += key[0] == "round"
@@ -274,7 +275,7 @@ def note_told(mind: ParticipantMind, view: View, key: tuple[str, int, int]) -> N
 
 
 def next_step(
-    mind: ParticipantMind, view: View, move: DialogueMove, rng: np.random.Generator
+    mind: ParticipantState, view: ParticipantView, move: DialogueMove, rng: np.random.Generator
 ) -> tuple[tuple[str, int, int], float, Remark] | None:
     """What is to be done next: a key for it, how far ahead [m], and the words.
 
@@ -307,7 +308,7 @@ def next_step(
 
 
 def _turn(
-    mind: ParticipantMind, view: View, move: DialogueMove, crossing: Crossing, rng: np.random.Generator
+    mind: ParticipantState, view: ParticipantView, move: DialogueMove, crossing: RouteJunction, rng: np.random.Generator
 ) -> Remark:
     direction = crossing.direction
     action = ActionValue.J_TURN
@@ -323,7 +324,7 @@ def _turn(
     return remark(move, *values, wording=Wording(direction=direction, ordinal=ordinal))
 
 
-def _ambiguous(mind: ParticipantMind, view: View, crossing: Crossing) -> bool:
+def _ambiguous(mind: ParticipantState, view: ParticipantView, crossing: RouteJunction) -> bool:
     """Whether the direction alone means another exit."""
     choice = next_choice(mind.town, view.lane, view.station)
     own = choice is not None and choice.lane == crossing.lane

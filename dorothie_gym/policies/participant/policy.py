@@ -11,14 +11,16 @@ import numpy as np
 
 from dorothie_gym.dialogue import draw_style
 from dorothie_gym.ontology import Role
-from dorothie_gym.policies.journey import light_ahead
+from dorothie_gym.policies.participant.config import ParticipantStyle
 from dorothie_gym.policies.participant.goals import choose_target, go_on, note_tasks, tell_target
 from dorothie_gym.policies.participant.guidance import follow_journey, guide, watch
-from dorothie_gym.policies.participant.mind import ParticipantMind, Style, View
 from dorothie_gym.policies.participant.reactions import react, scene_of
 from dorothie_gym.policies.participant.replies import listen
+from dorothie_gym.policies.participant.state import ParticipantState
+from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import Policy
-from dorothie_gym.policies.speech import Voice
+from dorothie_gym.policies.route_progress import light_ahead
+from dorothie_gym.policies.speech import SpeechState
 from dorothie_gym.spaces import ActionDict, ParticipantAction, SpaceLimits
 from dorothie_gym.world.town import Town
 from dorothie_gym.world.town.lights import LightColour
@@ -33,14 +35,14 @@ START = 8.0
 """A car is given this long to start after a light has turned green, for others may be before it [s]."""
 
 
-class ScriptedParticipant(Policy[ParticipantMind]):
+class ScriptedParticipant(Policy[ParticipantState]):
     """A human who wants the storyboard's tasks done and knows where everything is.
 
     It names places or tells the way turn by turn (its style, drawn for each session), answers the car's questions,
     corrects wrong turns, reports what is done, and takes up changes of the task.
     """
 
-    def __init__(self, limits: SpaceLimits | None = None, style: Style | None = None) -> None:
+    def __init__(self, limits: SpaceLimits | None = None, style: ParticipantStyle | None = None) -> None:
         """Prepares the policy.
 
         Args:
@@ -50,20 +52,20 @@ class ScriptedParticipant(Policy[ParticipantMind]):
         super().__init__(Role.PARTICIPANT, limits)
         self._style = style
 
-    def initial_state(self, seed: int, town: Town) -> ParticipantMind:
+    def initial_state(self, seed: int, town: Town) -> ParticipantState:
         """A participant who has not said anything yet."""
         rng = np.random.default_rng((seed, 0))
-        style = Style.draw(rng) if self._style is None else self._style
+        style = ParticipantStyle.draw(rng) if self._style is None else self._style
         chat_at = float(rng.uniform(25.0, style.chat + 25.0))
-        voice = Voice(role=Role.PARTICIPANT, style=draw_style(Role.PARTICIPANT, rng))
-        return ParticipantMind(seed=seed, town=town, style=style, chat_at=chat_at, voice=voice)
+        voice = SpeechState(role=Role.PARTICIPANT, style=draw_style(Role.PARTICIPANT, rng))
+        return ParticipantState(seed=seed, town=town, style=style, chat_at=chat_at, voice=voice)
 
-    def step(self, observation: Mapping[str, Any], state: ParticipantMind) -> tuple[ActionDict, ParticipantMind]:
+    def step(self, observation: Mapping[str, Any], state: ParticipantState) -> tuple[ActionDict, ParticipantState]:
         """Listens, looks, and says something or nothing."""
         mind = copy(state)
         mind.count += 1
         rng = np.random.default_rng((mind.seed, mind.count))
-        view = View.read(observation, mind.town)
+        view = ParticipantView.read(observation, mind.town)
         if view.turning and mind.standing_since is not None and view.time - mind.standing_since > 4.0:
             view = replace(view, turning=False)  # it does not go on turning by itself
         if not view.standing:
@@ -86,7 +88,7 @@ class ScriptedParticipant(Policy[ParticipantMind]):
         return ParticipantAction(speech=speech).encode(self.limits), mind
 
 
-def _excuse_at_light(mind: ParticipantMind, view: View) -> None:
+def _excuse_at_light(mind: ParticipantState, view: ParticipantView) -> None:
     """Nobody wonders about a car that waits before a red light, nor right after it has turned green."""
     last_stretch = (
         mind.guiding

@@ -8,8 +8,9 @@ import numpy as np
 
 from dorothie_gym.dialogue import Wording, WordingContext
 from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, StreetName, WeatherParameter
-from dorothie_gym.policies.participant.mind import ParticipantMind, View
-from dorothie_gym.policies.scenery import nearest_landmark, place_on_lanes, street_of, weather
+from dorothie_gym.policies.observation_parser import nearest_landmark, place_on_lanes, street_of, weather
+from dorothie_gym.policies.participant.state import ParticipantState
+from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.speech import Remark, remark
 from dorothie_gym.world.town.routing import Place
 
@@ -38,7 +39,7 @@ SIGHT = 80.0
 """How far ahead an obstacle is noticed [m]."""
 
 
-def scene_of(mind: ParticipantMind, view: View) -> WordingContext:
+def scene_of(mind: ParticipantState, view: ParticipantView) -> WordingContext:
     """What is in view as the participant speaks: the street, a place close by, and whether something is wrong."""
     landmark = nearest_landmark(view.landmarks, *view.position)
     street = street_of(view.raw, mind.town, view.lane)
@@ -50,7 +51,7 @@ def scene_of(mind: ParticipantMind, view: View) -> WordingContext:
     )
 
 
-def react(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+def react(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     """Talks about what is going on outside, if there is nothing else to say."""
     note_blocked(mind, view)
     if not mind.voice.idle or view.speaking > 0.0 or not mind.told:
@@ -61,7 +62,7 @@ def react(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
             return
 
 
-def note_blocked(mind: ParticipantMind, view: View, near: bool = False) -> None:
+def note_blocked(mind: ParticipantState, view: ParticipantView, near: bool = False) -> None:
     """Remembers an obstacle on the way and plans round it.
 
     Args:
@@ -94,7 +95,7 @@ def note_blocked(mind: ParticipantMind, view: View, near: bool = False) -> None:
         )
 
 
-def _mind_weather(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+def _mind_weather(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     fog = weather(view.raw, WeatherParameter.FOG_DENSITY)
     rain = weather(view.raw, WeatherParameter.PRECIPITATION)
     bad = fog > THICK_FOG or rain > HEAVY_RAIN
@@ -129,7 +130,7 @@ _SEEN_OF_WEATHER = {
 }
 
 
-def _mind_light(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+def _mind_light(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     dark = weather(view.raw, WeatherParameter.SUN_ALTITUDE_ANGLE) < 0.0
     if not dark or bool(view.raw["lights"]) or view.time - mind.lights_at < 25.0:
         return
@@ -145,7 +146,7 @@ def _mind_light(mind: ParticipantMind, view: View, rng: np.random.Generator) -> 
     )
 
 
-def _ask_why(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+def _ask_why(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     if mind.standing_since is None or mind.guiding or view.time < mind.excused_until:
         return
     near = mind.journey is not None and mind.journey.left(view.station) < 45.0
@@ -155,7 +156,7 @@ def _ask_why(mind: ParticipantMind, view: View, rng: np.random.Generator) -> Non
         mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, ActionValue.STOP))
 
 
-def _wonder(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+def _wonder(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     """Asks, once for each time, why the car turns round, or stands so long, by itself."""
     if mind.guiding or view.time - mind.wondered_at < WONDERS_AGAIN or view.time - mind.heard_at < 4.0:
         return
@@ -168,7 +169,7 @@ def _wonder(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None
         mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, action))
 
 
-def _chat(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+def _chat(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     if view.time < mind.chat_at or view.standing or mind.journey is None or mind.goal is None:
         return
     crossing, manoeuvre = mind.journey.next_crossing(mind.town, view.station), mind.journey.next_manoeuvre(view.station)
@@ -191,7 +192,7 @@ _BY_THE_ROAD = (
 """What somebody may look for by the side of the road."""
 
 
-def _topics(mind: ParticipantMind, view: View, rng: np.random.Generator) -> list[tuple[Remark, ...]]:
+def _topics(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> list[tuple[Remark, ...]]:
     """What could be talked about now."""
     assert mind.goal is not None
     found: list[tuple[Remark, ...]] = [

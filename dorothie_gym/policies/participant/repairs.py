@@ -6,9 +6,10 @@ import numpy as np
 
 from dorothie_gym.dialogue import Heard, speech_seconds
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, Slot, SlotValue
-from dorothie_gym.policies.hearing import HeardUtterance
-from dorothie_gym.policies.participant.mind import ParticipantMind, View
+from dorothie_gym.policies.participant.state import ParticipantState
+from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.speech import Remark, remark
+from dorothie_gym.policies.utterance_input import HeardUtterance
 
 RECENT = 15.0
 """What the car repeats, it has been told no longer ago than this [s]."""
@@ -21,7 +22,7 @@ _TAKEN_UP = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueM
 _SIDEWAYS = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)
 
 
-def not_caught(mind: ParticipantMind, view: View, heard: HeardUtterance, rng: np.random.Generator) -> bool:
+def not_caught(mind: ParticipantState, view: ParticipantView, heard: HeardUtterance, rng: np.random.Generator) -> bool:
     """Whether the participant asks what the car has said: it was speaking itself meanwhile.
 
     Args:
@@ -45,7 +46,7 @@ def _names_something(act: DialogueAct) -> bool:
     return any(value.label not in ("Unknown", "Queried") for value in act.slots)
 
 
-def misunderstood(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard) -> Remark | None:
+def misunderstood(mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard) -> Remark | None:
     """What to say to a car that takes up something that it has not been told; None if it has understood.
 
     Args:
@@ -59,7 +60,7 @@ def misunderstood(mind: ParticipantMind, view: View, act: DialogueAct, words: He
     return _wrong_place(mind, act) or _wrong_side(mind, view, act, words)
 
 
-def _wrong_place(mind: ParticipantMind, act: DialogueAct) -> Remark | None:
+def _wrong_place(mind: ParticipantState, act: DialogueAct) -> Remark | None:
     """The place again, if another one was taken up."""
     assert mind.goal is not None
     named = {value for value in act.values(Slot.LANDMARK) if value.label not in ("Unknown", "Queried")}
@@ -75,7 +76,7 @@ def _wrong_place(mind: ParticipantMind, act: DialogueAct) -> Remark | None:
     return remark(DialogueMove.CLARIFY, *values)
 
 
-def _wrong_side(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard) -> Remark | None:
+def _wrong_side(mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard) -> Remark | None:
     """The turn again, if another direction was taken up."""
     if words.direction is None or view.time - mind.voice.last_end > RECENT or act.move is DialogueMove.EXPLAIN:
         return None

@@ -20,17 +20,17 @@ from dorothie_gym.ontology import (
     Slot,
     SlotValue,
 )
-from dorothie_gym.policies.hearing import heard_utterance
-from dorothie_gym.policies.journey import first_new_street
+from dorothie_gym.policies.observation_parser import SeenSubgoal
 from dorothie_gym.policies.participant.arriving import NEAR, about_to_arrive, inch_on
-from dorothie_gym.policies.participant.describing import describe
-from dorothie_gym.policies.participant.goals import announcement, reason_topic, route_length, switch_target
+from dorothie_gym.policies.participant.goals import announcement, describe, reason_topic, route_length, switch_target
 from dorothie_gym.policies.participant.guidance import next_step, note_told
-from dorothie_gym.policies.participant.mind import ParticipantMind, View
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.repairs import misunderstood, not_caught
-from dorothie_gym.policies.scenery import SeenSubgoal
+from dorothie_gym.policies.participant.state import ParticipantState
+from dorothie_gym.policies.participant.view import ParticipantView
+from dorothie_gym.policies.route_progress import first_new_street
 from dorothie_gym.policies.speech import LONGEST_BREATH, Remark, remark
+from dorothie_gym.policies.utterance_input import heard_utterance
 
 ELSEWHERE = 40.0
 """A car that stands farther than this from the target has not come to it [m]."""
@@ -63,7 +63,7 @@ _AFTER_A_NOD = frozenset({DialogueMove.EXPLAIN, DialogueMove.INSTRUCT})
 _AHEAD = frozenset({ActionValue.LANE_FOLLOW, ActionValue.J_TURN})
 
 
-def listen(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+def listen(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     """Takes in what the car has said since the last decision, and prepares answers."""
     heard = heard_utterance(view.raw, Role.CO_WIZARD)
     if heard is None:
@@ -87,7 +87,9 @@ def listen(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
         _nod(mind, view, rng, alone=heard.acts[0].move not in _UPTAKES)  # what takes up an instruction needs no nod
 
 
-def _check(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+def _check(
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+) -> None:
     landmarks, streets = act.values(Slot.LANDMARK), act.values(Slot.STREET)
     if mind.goal is not None and landmarks:
         right = landmarks == (mind.goal.name,) and streets in ((), (mind.goal.street,))
@@ -105,7 +107,9 @@ def _check(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rn
     mind.voice = mind.voice.plan_first(remark(DialogueMove.CONFIRM), *_more(mind, rng))
 
 
-def _fits(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> bool:
+def _fits(
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+) -> bool:
     """Whether an action that the car names is what is to be done next, or what it has just been told to do."""
     step = next_step(mind, view, DialogueMove.INSTRUCT, rng)
     actions = set(act.values(Slot.ACTION))
@@ -120,7 +124,7 @@ def _fits(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng
     return bool(actions & meant) and (wanted is None or words.direction is wanted)
 
 
-def _more(mind: ParticipantMind, rng: np.random.Generator) -> tuple[Remark, ...]:
+def _more(mind: ParticipantState, rng: np.random.Generator) -> tuple[Remark, ...]:
     """What is added to a yes now and then."""
     if rng.random() >= mind.style.reasons:
         return ()
@@ -128,7 +132,7 @@ def _more(mind: ParticipantMind, rng: np.random.Generator) -> tuple[Remark, ...]
     return (remark(DialogueMove.EXPLAIN, joined=True, wording=Wording(topic=topic)),)
 
 
-def _refuse_with_step(mind: ParticipantMind, view: View, rng: np.random.Generator) -> None:
+def _refuse_with_step(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     step = next_step(mind, view, DialogueMove.INSTRUCT, rng)
     refusal = remark(DialogueMove.REPLY_N)
     if step is None or view.time - mind.stopped_at < JUST_TOLD or (step[0][0] == "on" and step[1] < NEAR):
@@ -140,7 +144,9 @@ def _refuse_with_step(mind: ParticipantMind, view: View, rng: np.random.Generato
     mind.voice = mind.voice.plan_first(refusal, replace(words, joined=True))
 
 
-def _yes_or_no(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+def _yes_or_no(
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+) -> None:
     objects, landmarks = act.values(Slot.OBJECT), act.values(Slot.LANDMARK)
     offered = _offered(mind, view, landmarks)
     if offered is not None:
@@ -169,7 +175,7 @@ def _yes_or_no(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard
         mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y), *_more(mind, rng))
 
 
-def _offered(mind: ParticipantMind, view: View, landmarks: tuple[SlotValue, ...]) -> SeenSubgoal | None:
+def _offered(mind: ParticipantState, view: ParticipantView, landmarks: tuple[SlotValue, ...]) -> SeenSubgoal | None:
     """The task, other than the one under way, that the car proposes to do first."""
     if mind.goal is None or mind.goal.name in landmarks:
         return None
@@ -180,7 +186,7 @@ def _offered(mind: ParticipantMind, view: View, landmarks: tuple[SlotValue, ...]
     return None
 
 
-def _judge_offer(mind: ParticipantMind, view: View, offered: SeenSubgoal) -> None:
+def _judge_offer(mind: ParticipantState, view: ParticipantView, offered: SeenSubgoal) -> None:
     """Lets the car go to the place that it proposes if that is nearer, else insists on the one under way."""
     assert mind.goal is not None
     landmark = view.landmark(offered.landmark)
@@ -193,7 +199,7 @@ def _judge_offer(mind: ParticipantMind, view: View, offered: SeenSubgoal) -> Non
     mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_N), first)
 
 
-def _judge_street(mind: ParticipantMind, view: View, act: DialogueAct) -> None:
+def _judge_street(mind: ParticipantState, view: ParticipantView, act: DialogueAct) -> None:
     """Agrees to a way round that is the participant's own, or insists on that."""
     own = first_new_street(view.raw, mind.town, view.lane, mind.journey)
     if own is None or own in act.values(Slot.STREET):
@@ -204,7 +210,7 @@ def _judge_street(mind: ParticipantMind, view: View, act: DialogueAct) -> None:
 
 
 def _judge_proposal(
-    mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
 ) -> None:
     """Says yes to the right way, and no with the right one to another."""
     if not _fits(mind, view, act, words, rng):
@@ -217,7 +223,9 @@ def _judge_proposal(
     mind.voice = mind.voice.plan_first(*first, remark(DialogueMove.REPLY_Y), *_more(mind, rng))
 
 
-def _open_question(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+def _open_question(
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+) -> None:
     landmarks, actions = act.values(Slot.LANDMARK), act.values(Slot.ACTION)
     if mind.goal is None:
         mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_U))
@@ -240,7 +248,7 @@ def _open_question(mind: ParticipantMind, view: View, act: DialogueAct, words: H
         describe(mind, view, DialogueMove.REPLY_W, rng)
 
 
-def _say_target(mind: ParticipantMind, view: View, rng: np.random.Generator, *more: Remark) -> None:
+def _say_target(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator, *more: Remark) -> None:
     """To "where to?": the place that comes next."""
     mind.told, mind.told_at = True, view.time
     named = [value for value in announcement(mind, view, rng).act.slots if value.slot in (Slot.LANDMARK, Slot.STREET)]
@@ -248,7 +256,7 @@ def _say_target(mind: ParticipantMind, view: View, rng: np.random.Generator, *mo
     mind.voice = mind.voice.cleared().plan(answer, *more)
 
 
-def _say_order(mind: ParticipantMind, rng: np.random.Generator) -> None:
+def _say_order(mind: ParticipantState, rng: np.random.Generator) -> None:
     """To "before or after?": what is under way is finished first."""
     assert mind.goal is not None
     mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_W, wording=Wording(topic="after")))
@@ -257,14 +265,14 @@ def _say_order(mind: ParticipantMind, rng: np.random.Generator) -> None:
         mind.voice = replace(mind.voice, queue=(mind.voice.queue[0], first, *mind.voice.queue[1:]))
 
 
-def _just_named(mind: ParticipantMind, view: View) -> bool:
+def _just_named(mind: ParticipantState, view: ParticipantView) -> bool:
     """Whether the car has been told of the place a moment ago and cannot have taken it up yet."""
     if mind.goal is None or not mind.voice.has_just_spoken(view.time, JUST_TOLD):
         return False
     return any(mind.goal.name in item.act.values(Slot.LANDMARK) for item in mind.voice.said[-LONGEST_BREATH:])
 
 
-def _say_way(mind: ParticipantMind, view: View, move: DialogueMove, rng: np.random.Generator) -> None:
+def _say_way(mind: ParticipantState, view: ParticipantView, move: DialogueMove, rng: np.random.Generator) -> None:
     step = next_step(mind, view, move, rng)
     if step is None:
         return
@@ -278,25 +286,27 @@ def _say_way(mind: ParticipantMind, view: View, move: DialogueMove, rng: np.rand
     mind.voice = mind.voice.cleared().plan(words, *more)
 
 
-def _elsewhere(mind: ParticipantMind, view: View) -> bool:
+def _elsewhere(mind: ParticipantState, view: ParticipantView) -> bool:
     """Whether the car stands, and not at the target."""
     return view.standing and mind.journey is not None and mind.journey.left(view.station) > ELSEWHERE
 
 
-def _just_short(mind: ParticipantMind, view: View) -> bool:
+def _just_short(mind: ParticipantState, view: ParticipantView) -> bool:
     """Whether the car stands just before the target, to which it is guided."""
     near = mind.guiding and view.standing and mind.journey is not None and about_to_arrive(mind, view)
     return near and mind.journey is not None and mind.journey.left(view.station) > 0.0
 
 
-def _not_here(mind: ParticipantMind, view: View) -> None:
+def _not_here(mind: ParticipantState, view: ParticipantView) -> None:
     """The car takes another place for the target."""
     assert mind.goal is not None
     mind.guiding = True
     mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_N, mind.goal.name))
 
 
-def _explanation(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+def _explanation(
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+) -> None:
     landmarks, statuses = act.values(Slot.LANDMARK), act.values(Slot.STATUS)
     if _put_right(mind, view, act, words):
         return
@@ -312,7 +322,7 @@ def _explanation(mind: ParticipantMind, view: View, act: DialogueAct, words: Hea
             note_blocked(mind, view, near=True)
 
 
-def _nod(mind: ParticipantMind, view: View, rng: np.random.Generator, *, alone: bool) -> None:
+def _nod(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator, *, alone: bool) -> None:
     """Shows that it has heard: before what it says anyway, else now and then `alone`, in a word of its own."""
     waiting = mind.voice.queue
     if waiting and not waiting[0].urgent and not waiting[0].text:
@@ -326,7 +336,7 @@ def _nod(mind: ParticipantMind, view: View, rng: np.random.Generator, *, alone: 
         mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE), *_more(mind, rng))
 
 
-def _put_right(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard) -> bool:
+def _put_right(mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard) -> bool:
     """Says again what the car has taken for something else; tells whether it had to."""
     again = misunderstood(mind, view, act, words)
     if again is None:
@@ -337,7 +347,9 @@ def _put_right(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard
     return True
 
 
-def _confusion(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+def _confusion(
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+) -> None:
     last = mind.voice.last
     if mind.guiding and mind.guided is not None:
         _say_way(mind, view, DialogueMove.CLARIFY, rng)
@@ -347,7 +359,9 @@ def _confusion(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard
         mind.voice = mind.voice.plan_first(remark(DialogueMove.CLARIFY, *last.act.slots, wording=last.wording))
 
 
-def _uptake(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+def _uptake(
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+) -> None:
     """A car that repeats the place knows it, and finds the way itself; one that names another has to be put right."""
     if _put_right(mind, view, act, words):
         return
@@ -355,11 +369,15 @@ def _uptake(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, r
         mind.guiding = False
 
 
-def _alignment(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+def _alignment(
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+) -> None:
     mind.voice = mind.voice.plan_first(remark(DialogueMove.ACKNOWLEDGE, wording=Wording(topic="align")))
 
 
-def _request(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+def _request(
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+) -> None:
     """A car that wants to be guided is; one that names a place, or a turn, only repeats what it was told."""
     if act.values(Slot.LANDMARK):
         _uptake(mind, view, act, words, rng)
@@ -368,7 +386,9 @@ def _request(mind: ParticipantMind, view: View, act: DialogueAct, words: Heard, 
         _say_way(mind, view, DialogueMove.INSTRUCT, rng)
 
 
-_ANSWERS: dict[DialogueMove, Callable[[ParticipantMind, View, DialogueAct, Heard, np.random.Generator], None]] = {
+_ANSWERS: dict[
+    DialogueMove, Callable[[ParticipantState, ParticipantView, DialogueAct, Heard, np.random.Generator], None]
+] = {
     DialogueMove.CHECK: _check,
     DialogueMove.QUERY_YN: _yes_or_no,
     DialogueMove.QUERY_W: _open_question,

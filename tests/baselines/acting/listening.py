@@ -13,7 +13,7 @@ from dorothie_gym.envs.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
-from dorothie_gym.policies.co_wizard.mind import View
+from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.rollout import play_session
 from dorothie_gym.sessions import Session
 from dorothie_gym.spaces import ActionDict, CoWizardAction, heard_acts
@@ -41,7 +41,7 @@ class Listening(Policy[Any]):
 
     def step(self, observation: Mapping[str, Any], state: Any) -> tuple[ActionDict, Any]:
         action, state = self._policy.step(observation, state)
-        view = View.read(observation, self.town)
+        view = CoWizardView.read(observation, self.town)
         heard = spans_of(str(observation["participant_text"]), heard_acts(observation, Role.PARTICIPANT))
         taken = CoWizardAction.decode(action, self.limits)
 

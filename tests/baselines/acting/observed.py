@@ -8,7 +8,7 @@ from typing import Any
 
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import Role
-from dorothie_gym.policies.co_wizard.mind import View
+from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.world.town import Town, load_town
 
 
@@ -18,12 +18,12 @@ def town() -> Town:
 
 
 @cache
-def _first() -> View:
+def _first() -> CoWizardView:
     env = DuoWizardEnv(town())
     observations, _ = env.reset(seed=3)
-    return View.read(observations[str(Role.CO_WIZARD)], town())
+    return CoWizardView.read(observations[str(Role.CO_WIZARD)], town())
 
 
-def view(**changes: Any) -> View:
+def view(**changes: Any) -> CoWizardView:
     """What the Co-Wizard of a session sees at first, with other values in some fields."""
     return replace(_first(), **changes)

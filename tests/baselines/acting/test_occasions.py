@@ -6,7 +6,7 @@ from typing import Any
 
 from dorothie_gym.baselines.acting.occasions import Occasion, Watch
 from dorothie_gym.ontology import ObjectClass, PhysicalAction
-from dorothie_gym.policies.journey import Choice
+from dorothie_gym.policies.route_progress import Choice
 from dorothie_gym.spaces import Motion
 from tests.baselines.acting.observed import town, view
 

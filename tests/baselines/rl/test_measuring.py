@@ -11,7 +11,7 @@ from dorothie_gym.baselines.rl import SettingsError  # noqa: E402
 from dorothie_gym.baselines.rl.measuring import SHARES, measure  # noqa: E402
 from dorothie_gym.bench.report import rl_report  # noqa: E402
 from dorothie_gym.cli.app import app  # noqa: E402
-from dorothie_gym.navigation.instructor import Instructor  # noqa: E402
+from dorothie_gym.policies.navigation.instructor import Instructor  # noqa: E402
 
 
 def test_shares_of_the_time_add_up() -> None:

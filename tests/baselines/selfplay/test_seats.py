@@ -12,8 +12,8 @@ from dorothie_gym.baselines.selfplay.co_wizard import CoWizardSeat, OtherAction 
 from dorothie_gym.baselines.selfplay.env import SelfPlayEnv  # noqa: E402
 from dorothie_gym.baselines.selfplay.participant import ParticipantMemory, ParticipantSeat, Phrase  # noqa: E402
 from dorothie_gym.dialogue import Direction  # noqa: E402
-from dorothie_gym.navigation import NavigationAction  # noqa: E402
 from dorothie_gym.ontology import AGENT_ROLES, ActionValue, DialogueAct, DialogueMove, Role  # noqa: E402
+from dorothie_gym.policies.navigation import NavigationAction  # noqa: E402
 from dorothie_gym.spaces import ParticipantAction, Speech  # noqa: E402
 
 NOTHING = np.zeros(3, dtype=np.int64)

@@ -1,0 +1,349 @@
+"""Session in which only driving is left to the agent, and the base class of the navigation environments."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, ClassVar, TypeAlias, TypeVar
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.envs.navigation_config import NavigationConfig
+from dorothie_gym.envs.prospect import Prospect
+from dorothie_gym.envs.scenario import Scenario, draw_scenario
+from dorothie_gym.envs.stage import STANDING, Stage
+from dorothie_gym.ontology import LandmarkName, MentalAction, Role
+from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
+from dorothie_gym.policies.navigation.actions import ACTIONS, FIRST_TURN, UNDER_WAY, NavigationAction, prepares
+from dorothie_gym.policies.navigation.instructor import Instructor
+from dorothie_gym.policies.navigation.junction_exits import JunctionExits
+from dorothie_gym.policies.navigation.observation_vector import HeardInstruction, NavigationEncoder, Vector
+from dorothie_gym.policies.observation_parser import read_landmarks
+from dorothie_gym.policies.policy import policy_seed
+from dorothie_gym.spaces import (
+    ActionDecoder,
+    AdWizardAction,
+    CoWizardAction,
+    Mental,
+    Observation,
+    ParticipantAction,
+    RoleAction,
+    SpaceLimits,
+)
+from dorothie_gym.spaces import Place as Mark
+from dorothie_gym.tasks import StoryboardTemplate, load_template
+from dorothie_gym.world.car.driver import MAX_CRUISE, MIN_CRUISE
+from dorothie_gym.world.network.network import TownNetwork
+from dorothie_gym.world.reports import INFRACTION_KINDS, WorldEventKind
+from dorothie_gym.world.town import LinkType, Town, load_town
+from dorothie_gym.world.town.routing import Place
+from dorothie_gym.world.world import World
+
+NEARER = 1.0
+"""Only a way left that is shorter by this counts as having come nearer [m]."""
+
+OFF_ROAD = 15.0
+"""A car that is farther from its path than this has left the road for good [m]."""
+
+_RULES = tuple(kind.value for kind in INFRACTION_KINDS if kind is not WorldEventKind.COLLISION)
+_SILENCE, _INTACT = ParticipantAction(), AdWizardAction()
+
+
+class DrivingSession:
+    """A session in progress.
+
+    Attributes:
+        stage: the session.
+        ways: ways on at the town's junctions.
+        instructor: who tells the way.
+        heard: what the Co-Wizard remembers of it.
+        seen: what all roles observe now.
+        reward: of the last decision.
+        terms: the same by terms.
+        terminated: whether the destination was reached, or the participant gave up.
+        truncated: whether time is up.
+    """
+
+    def __init__(self, stage: Stage, config: NavigationConfig, ways: JunctionExits) -> None:
+        self.stage, self.ways, self._config = stage, ways, config
+        town = stage.world.town
+        self.instructor = Instructor(town, ways, config.guidance)  # type: ignore[arg-type]
+        self._viewpoint = NavigationEncoder(town, ways, config.max_seconds)
+        self._decoder = ActionDecoder(Role.AD_WIZARD, stage.limits)
+        self._adversary = ScriptedAdWizard(stage.limits, rate=config.exceptions) if config.exceptions > 0.0 else None
+        seed = policy_seed(stage.scenario.seed, Role.AD_WIZARD)
+        self._plans = self._adversary.initial_state(seed, town) if self._adversary is not None else None
+        self.heard, self._notes = HeardInstruction(), list[Mental]()
+        self._aim: tuple[Place | None, tuple[Place, ...]] = (None, ())  # what `_nearest` is measured to
+        self.seen: Mapping[str, Observation] = stage.observations()
+        marks = read_landmarks(self.seen[Role.CO_WIZARD], town)  # those on its map, for the whole session
+        self._known = frozenset(mark.place for mark in marks)
+        self._rules_broken, self._collisions = self._count_infractions(), 0
+        self._nearest, self._nearest_at = math.inf, 0.0
+        self.reward, self.terms = 0.0, dict.fromkeys(vars(config.weights), 0.0)
+        self.terminated = self.truncated = False
+        self.reason: str | None = None
+        self._listen()
+        self._left = self._way_left()
+
+    @classmethod
+    def begin(
+        cls, town: Town, network: TownNetwork, template: StoryboardTemplate | None, config: NavigationConfig,
+        seed: int, scenario: Scenario | None = None,
+    ) -> DrivingSession:  # fmt: skip
+        """A new session.
+
+        Args:
+            town: the map.
+            network: its lanes.
+            template: of the storyboard; None draws one.
+            config: settings.
+            seed: of the scenario.
+            scenario: played in lieu of one that is drawn.
+
+        Raises:
+            ValueError: `scenario` is none.
+        """
+        if scenario is None:
+            scenario = draw_scenario(town, template, seed)
+        elif not isinstance(scenario, Scenario):
+            raise ValueError(f"option 'scenario' is a {type(scenario).__name__}; it must be a Scenario")
+        limits = SpaceLimits.for_town(town)
+        return cls(Stage(town, network, scenario, config.session, limits), config, JunctionExits(town))
+
+    # --- a decision -------------------------------------------------------------------------------------------------
+
+    def play(self, action: CoWizardAction) -> None:
+        """Plays one decision; the Co-Wizard's next note goes with its action."""
+        if self.terminated or self.truncated:
+            from gymnasium.error import ResetNeeded
+
+            raise ResetNeeded("the session is over: call reset() first")
+        if self._notes:
+            action = replace(action, mental=self._notes.pop(0))
+        reached = self._count_reached()
+        self.stage.play({Role.PARTICIPANT: _SILENCE, Role.CO_WIZARD: action, Role.AD_WIZARD: self.interfere()})
+        before, self.seen = self.seen, self.stage.observations()
+        self.heard = self.heard.driven_on(before[Role.CO_WIZARD], self.seen[Role.CO_WIZARD])
+        progress = self._progress()
+        self._listen()
+        self._left = self._way_left()
+        self._note_patience()
+        self._end()
+        self._reward(progress, self._count_reached() - reached, action.physical is not None)
+
+    def observe(self) -> Vector:
+        """What the driver observes."""
+        return self._viewpoint.observe(self.seen[Role.CO_WIZARD], self.heard, self.instructor.blocked)
+
+    def info(self) -> dict[str, Any]:
+        """What else the driver is told; everything in it is the taker's own."""
+        info: dict[str, Any] = {
+            "reward_terms": dict(self.terms),
+            "refused": list(self.stage.refused[Role.CO_WIZARD]),
+            "infractions": dict(self.stage.infractions),
+        }
+        if self.terminated or self.truncated:
+            info["is_success"], info["reason"] = self.stage.success, self.reason
+            info["subgoals"] = {"live": len(self.stage.task.live), "reached": self._count_reached()}
+        return info
+
+    # --- the others -------------------------------------------------------------------------------------------------
+
+    def interfere(self) -> RoleAction:
+        """What the Ad-Wizard does now."""
+        if self._adversary is None or self._plans is None:
+            return _INTACT
+        action, self._plans = self._adversary.step(self.seen[Role.AD_WIZARD], self._plans)
+        return self._decoder(action)
+
+    def _listen(self) -> None:
+        """Lets the instructor speak, and notes what that says about the goal."""
+        planner = self.stage.world.planner
+        waits = planner.held and float(self.stage.world.car.speed) <= STANDING
+        turning = max(planner.manoeuvre_end - planner.s, 0.1) if planner.in_manoeuvre else 0.0
+        goal = self.instructor.goal
+        said = self.instructor.instruct(self.seen[Role.PARTICIPANT], self._known, waits=waits, turning=turning)
+        if self.instructor.goal is not goal:
+            self.heard = replace(self.heard, goal=None)
+            self._notes = [Mental(action=MentalAction.GOAL_UPDATE)]
+        if said is None:
+            return
+        self.heard = replace(self.heard, told=said, driven=0.0)
+        name = said.landmark
+        if name is not None:
+            self._note_goal(name, said.distance, by_name=said.action is None)
+
+    def _note_goal(self, name: LandmarkName, distance: float, *, by_name: bool) -> None:
+        """The Co-Wizard heads for a place: one that is on its map, or one so far ahead as was said."""
+        goal = self.instructor.goal
+        assert goal is not None
+        self._notes = [Mental(action=MentalAction.GOAL_UPDATE, goals=(name,))]
+        if by_name:
+            self.heard = replace(self.heard, goal=goal.place)
+        elif goal.place not in self._known:
+            path, s = self.stage.world.planner.path, self.stage.world.planner.s
+            k = path.index_at(min(s + distance, path.length))
+            lane, station = int(path.lanes[k]), float(path.stations[k])
+            mark = Mark(lane=lane, metres=int(station))
+            self._notes.append(Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=name, place=mark))
+
+    # --- what comes of it -------------------------------------------------------------------------------------------
+
+    def _way_left(self) -> float:
+        planner = self.stage.world.planner
+        return self.instructor.way_left.from_place(planner.lane, planner.station)
+
+    def _progress(self) -> float:
+        """By how much the way to the goal has got shorter [m]; to be asked before there is another goal."""
+        left = self._way_left()
+        return self._left - left if math.isfinite(left) and math.isfinite(self._left) else 0.0
+
+    def _note_patience(self) -> None:
+        now = self.stage.world.time
+        way = self.instructor.way_left
+        aim = way.goal, way.blocked
+        if aim != self._aim or self._left < self._nearest - NEARER:
+            self._aim, self._nearest, self._nearest_at = aim, self._left, now
+
+    def _end(self) -> None:
+        stage, now = self.stage, self.stage.world.time
+        arrived = stage.task.done
+        left_road = abs(stage.world.planner.offset) > OFF_ROAD
+        gave_up = now - self._nearest_at >= self._config.patience - 1e-9
+        self.terminated = arrived or left_road or gave_up
+        self.truncated = not self.terminated and now >= self._config.max_seconds - 1e-9
+        if self.terminated or self.truncated:
+            reasons = {"arrived": arrived, "left the road": left_road, "gave up": gave_up, "out of time": True}
+            self.reason = next(reason for reason, holds in reasons.items() if holds)
+            stage.end(self.reason)
+
+    def _reward(self, progress: float, reached: int, physical: bool) -> None:
+        weights, stage = self._config.weights, self.stage
+        rules, collisions = self._count_infractions(), stage.world.collisions
+        self.terms = {
+            "progress": weights.progress * progress,
+            "subgoal": weights.subgoal * reached,
+            "success": weights.success * stage.success,
+            "collision": weights.collision * (collisions - self._collisions),
+            "infraction": weights.infraction * (rules - self._rules_broken),
+            "gave_up": weights.gave_up * (self.terminated and self.reason != "arrived"),
+            "time": weights.time / self._config.decision_frequency,
+            "action": weights.action * (physical and not stage.refused[Role.CO_WIZARD]),
+            "refusal": weights.refusal * len(stage.refused[Role.CO_WIZARD]),
+        }
+        self._rules_broken, self._collisions = rules, collisions
+        self.reward = float(sum(self.terms.values()))
+
+    def _count_reached(self) -> int:
+        return sum(self.stage.task.reached(i) for i in self.stage.task.live)
+
+    def _count_infractions(self) -> int:
+        infractions = self.stage.infractions
+        return sum(infractions[name] for name in _RULES)
+
+
+Info: TypeAlias = dict[str, Any]
+Action = TypeVar("Action")
+
+
+class DrivingEnv(gym.Env[Vector, Action]):
+    """A drive in a town; subclasses say what is observed and what can be done."""
+
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 2,
+    }
+
+    def __init__(
+        self, town: str | Path | Town, storyboard: str | Path | StoryboardTemplate | None, config: NavigationConfig,
+        render_mode: str | None,
+    ) -> None:  # fmt: skip
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(
+                f"render_mode is {render_mode!r}; it must be None or one of {self.metadata['render_modes']}"
+            )
+        self.config, self.render_mode = config, render_mode
+        self.town = town if isinstance(town, Town) else load_town(town)
+        self.template = load_template(storyboard) if isinstance(storyboard, str | Path) else storyboard
+        self._network = TownNetwork(self.town)
+        self._drive: DrivingSession | None = None
+        self._painter: Any = None
+
+    @property
+    def drive(self) -> DrivingSession:
+        """The session being played; raises `gymnasium.error.ResetNeeded` before the first reset."""
+        if self._drive is None:
+            raise gym.error.ResetNeeded("no session is being played: call reset() first")
+        return self._drive
+
+    def begin(self, seed: int | None, options: Mapping[str, Any] | None) -> DrivingSession:
+        """Begins a session, see `reset`."""
+        super().reset(seed=seed)
+        session = seed if seed is not None else int(self.np_random.integers(2**31))
+        scenario = (options or {}).get("scenario")
+        self._drive = DrivingSession.begin(self.town, self._network, self.template, self.config, session, scenario)
+        if self.render_mode == "human":
+            self.render()
+        return self._drive
+
+    def render(self) -> NDArray[Any] | None:
+        """Draws the aerial view: an array (800, 1280, 3), or in a window in human mode (then returns None)."""
+        if self.render_mode is None:
+            raise RuntimeError("render() needs render_mode='rgb_array' or 'human' when the environment is made")
+        from dorothie_gym.envs.painter import Painter
+
+        if self._painter is None:
+            self._painter = Painter(human=self.render_mode == "human")
+        frame: NDArray[Any] | None = self._painter.paint(self.drive.stage)
+        return frame
+
+    def close(self) -> None:
+        """Closes the window, if there is one."""
+        if self._painter is not None:
+            self._painter.close()
+            self._painter = None
+
+
+class NavigationMask:
+    """Tells which actions would be carried out, for the car of a session.
+
+    Attributes:
+        ways: ways on at the town's junctions.
+    """
+
+    def __init__(self, world: World, ways: JunctionExits) -> None:
+        self._world, self.ways = world, ways
+        self._prospect = Prospect(world)
+
+    @property
+    def choice(self) -> tuple[int, float] | None:
+        """The lane at whose end the car has to choose a way, and how far it is [m]; None if the path comes to none."""
+        options = self._prospect.options()
+        return (options.lane, options.distance) if options.exits else None
+
+    def mask(self, seen: Mapping[str, Any]) -> NDArray[np.int8]:
+        """Which actions the car follows now (18,): 1 for those; `seen` is what the Co-Wizard observes."""
+        world, planner = self._world, self._world.planner
+        speed, cruise = float(world.car.speed), world.driver.cruise
+        mask = np.zeros(len(ACTIONS), dtype=np.int8)
+        mask[NavigationAction.NOTHING] = mask[NavigationAction.LIGHTS] = 1
+        mask[NavigationAction.STOP], mask[NavigationAction.START] = not planner.held, planner.held
+        mask[NavigationAction.FASTER], mask[NavigationAction.SLOWER] = cruise < MAX_CRUISE, cruise > MIN_CRUISE
+        committed = planner.is_committed(speed)
+        if not (planner.in_manoeuvre or world.town.lanes[planner.lane].in_junction):
+            mask[NavigationAction.SWITCH_LEFT] = planner.may_switch(LinkType.LANE_CHANGE_LEFT, speed)
+            mask[NavigationAction.SWITCH_RIGHT] = planner.may_switch(LinkType.LANE_CHANGE_RIGHT, speed)
+            mask[NavigationAction.U_TURN] = planner.may_turn_round(speed)
+            leaves = planner.held or planner.manoeuvre[0] is not None
+            mask[NavigationAction.LANE_FOLLOW] = leaves and not committed
+        for action in UNDER_WAY:
+            mask[action] |= prepares(action, seen, self.ways)
+        choice = None if committed else self.choice
+        if choice is not None:
+            mask[FIRST_TURN:] = [way is not None for way in self.ways.after(choice[0])]
+        return mask

@@ -1,0 +1,152 @@
+"""`Navigation-continuous-v0`: the car's pedals and steering wheel, for reinforcement learning."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from dorothie_gym.envs.continuous_observation import CONTINUOUS_FIELDS, observe_continuous
+from dorothie_gym.envs.driving_session import DrivingEnv, DrivingSession, Info, NavigationMask
+from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
+from dorothie_gym.ontology import ActionValue, PhysicalAction, Role
+from dorothie_gym.policies.navigation.actions import LEFT, RIGHT
+from dorothie_gym.policies.navigation.instructor import NavigationInstruction
+from dorothie_gym.policies.navigation.junction_exits import SECTORS
+from dorothie_gym.policies.navigation.observation_vector import Vector
+from dorothie_gym.spaces import CoWizardAction, Physical
+from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.world.car.control import Control
+from dorothie_gym.world.town import Town
+
+LOST = 4.0
+"""A car that is farther from its path than this is shown a path from the lane that it is on [m]."""
+
+END = 2.0
+"""So is one that has come this close to the end of its path [m]."""
+
+LATE = 5.0
+"""A manoeuvre that should have begun this long ago is not prepared any more [m]."""
+
+_MANOEUVRES = {
+    ActionValue.J_TURN: PhysicalAction.J_TURN,
+    ActionValue.LANE_SWITCH: PhysicalAction.LANE_SWITCH,
+    ActionValue.U_TURN: PhysicalAction.U_TURN,
+}
+
+
+class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
+    """The same drive with throttle, steering wheel and brake.
+
+    ## Description
+    As `NavigationEnv`, guided by turns, but nothing drives the car except the agent: it follows the path, keeps to
+    the limits, stops for lights, people and vehicles, and at the goals. What is told becomes the path ahead: turns,
+    lane switches and U-turns are laid for the driver.
+
+    ## Observation Space
+    `Box(-1, 1, (n,), float32)`, see `dorothie_gym.envs.continuous_observation.CONTINUOUS_FIELDS`.
+
+    ## Action Space
+    `Box(-1, 1, (3,), float32)`: throttle, steer (positive right) and brake; a throttle or brake below 0 is none.
+
+    ## Rewards
+    As `NavigationEnv`.
+
+    ## Episode End
+    As `NavigationEnv`; it also terminates when the car is 15 m off the road (`info["reason"]` is "left the road").
+
+    ## Arguments
+    As `NavigationEnv` without `guidance`, and `decision_frequency` [Hz], which divides 30.
+
+    ## Version History
+    - v0: first version.
+    """
+
+    def __init__(
+        self,
+        town: str | Path | Town = "brookside",
+        storyboard: str | Path | StoryboardTemplate | None = None,
+        *,
+        traffic: str = "light",
+        exceptions: float = 0.0,
+        reward: str | NavigationWeights = "dense",
+        max_seconds: float = 600.0,
+        patience: float = 60.0,
+        decision_frequency: float = 10.0,
+        render_mode: str | None = None,
+    ) -> None:
+        config = NavigationConfig(
+            traffic=traffic, exceptions=exceptions, weights=weights_of(reward), max_seconds=max_seconds,
+            patience=patience, decision_frequency=decision_frequency,
+        )  # fmt: skip
+        super().__init__(town, storyboard, config, render_mode)
+        self.action_space = spaces.Box(-1.0, 1.0, (3,), dtype=np.float32)
+        self.observation_space = spaces.Box(-1.0, 1.0, (sum(CONTINUOUS_FIELDS.values()),), dtype=np.float32)
+        self._controls: NavigationMask | None = None
+
+    def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[Vector, Info]:
+        """Begins a session; see `NavigationEnv.reset`."""
+        drive = self.begin(seed, options)
+        self._controls = NavigationMask(drive.stage.world, drive.ways)
+        drive.stage.world.driver.manual = Control(throttle=0.0, steer=0.0, brake=0.0)
+        return self._observe(drive), drive.info()
+
+    def step(self, action: NDArray[np.float32]) -> tuple[Vector, float, bool, bool, Info]:
+        """Plays one decision.
+
+        Raises:
+            ValueError: the action is not three numbers.
+            gymnasium.error.ResetNeeded: no session is being played, or it is over.
+        """
+        values = np.asarray(action, dtype=np.float64)
+        if values.shape != (3,) or not np.isfinite(values).all():
+            raise ValueError(f"action is {action}; it must be three numbers: throttle, steer, brake")
+        throttle, steer, brake = np.clip(values, (0.0, -1.0, 0.0), 1.0).tolist()
+        drive = self.drive
+        drive.stage.world.driver.manual = Control(throttle=throttle, steer=steer, brake=brake)
+        drive.play(CoWizardAction(physical=self._prepare(drive)))
+        self._keep_path(drive)
+        if self.render_mode == "human":
+            self.render()
+        return self._observe(drive), drive.reward, drive.terminated, drive.truncated, drive.info()
+
+    def _observe(self, drive: DrivingSession) -> Vector:
+        return observe_continuous(drive.stage.world, drive.seen[Role.CO_WIZARD], drive.heard, self.config.max_seconds)
+
+    def _prepare(self, drive: DrivingSession) -> Physical | None:
+        """The manoeuvre that was told, if it is not yet laid into the path."""
+        told, planner = drive.heard.told, drive.stage.world.planner
+        if told is None or told.action not in _MANOEUVRES or planner.in_manoeuvre:
+            return None
+        action = _MANOEUVRES[told.action]
+        left = told.distance - drive.heard.driven
+        if left < -LATE or planner.manoeuvre[0] is action is not PhysicalAction.J_TURN:
+            return None
+        if action is PhysicalAction.U_TURN:
+            may = planner.may_turn_round(float(drive.stage.world.car.speed))
+            return Physical(action=action) if may else None
+        angle = self._angle(told)
+        if angle is None or (action is PhysicalAction.J_TURN and planner.turn_ahead == angle):
+            return None
+        return Physical(action=action, angle=angle)
+
+    def _angle(self, told: NavigationInstruction) -> int | None:
+        """The angle of the turn or lane switch that was told [degrees, positive left]; None where there is none."""
+        assert self._controls is not None
+        if told.sector is None:
+            return None
+        if told.action is ActionValue.LANE_SWITCH:
+            return LEFT if SECTORS[told.sector] > 0 else RIGHT
+        choice = self._controls.choice
+        way = self._controls.ways.after(choice[0])[told.sector] if choice is not None else None
+        return None if way is None else way.angle
+
+    def _keep_path(self, drive: DrivingSession) -> None:
+        """Shows a path again to a car that has left its own, or come to its end."""
+        planner = drive.stage.world.planner
+        if abs(planner.offset) > LOST or (planner.room < END and not planner.waits_at_end):
+            drive.stage.world.find_path()

@@ -1,0 +1,130 @@
+"""`Navigation-v0`: the Co-Wizard's driving alone, for reinforcement learning."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from dorothie_gym.envs.driving_session import DrivingEnv, Info, NavigationMask
+from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
+from dorothie_gym.ontology import Role
+from dorothie_gym.policies.navigation.actions import ACTIONS, NavigationAction, physical_of
+from dorothie_gym.policies.navigation.instructor import Guidance
+from dorothie_gym.policies.navigation.observation_vector import Vector, navigation_space
+from dorothie_gym.spaces import CoWizardAction
+from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.world.town import Town
+
+
+class NavigationEnv(DrivingEnv[np.int64]):
+    """The Co-Wizard drives; a participant tells the way, and the Ad-Wizard may interfere.
+
+    ## Description
+    A session of `DuoWizardEnv` with its town, storyboard, traffic and weather, in which nothing is left to the agent
+    but the Co-Wizard's physical actions. The participant is a built-in instructor who says, as a dialogue act with its
+    slots, where to go; the scripted Ad-Wizard plays the exceptions. The Co-Wizard's notes (mental actions) are kept
+    for it: it heads for the goal that was named, so that the car slows down near it.
+
+    ## Observation Space
+    `Box(-1, 1, (n,), float32)`: see `dorothie_gym.policies.navigation.FIELDS`, and `layout()` for where each field is.
+    Everything follows from the Co-Wizard's observation, the map, and what was said.
+
+    ## Action Space
+    `Discrete(18)`: see `NavigationAction`. `info["action_mask"]` tells which the car would follow (int8, for
+    `action_space.sample(mask)`), and so does `action_masks()`, which sb3-contrib asks for. A turn, lane switch or
+    U-turn that is being prepared just goes on when it is asked for again. An action that cannot be carried out is
+    refused and told in `info["refused"]`.
+
+    ## Rewards
+    The sum of the terms in `info["reward_terms"]`, see `NavigationWeights`: progress, subgoals, success, collisions,
+    infractions, time, refusals.
+
+    ## Episode End
+    Terminates when the destination, the last subgoal, is reached (the car stands within 2 m of its waypoint), or when
+    the participant gives up: the car has come no nearer to its goal for `patience` seconds. Truncates after
+    `max_seconds`. Then `info["is_success"]` tells whether every subgoal was reached and nothing was hit, and
+    `info["reason"]` is "arrived", "gave up" or "out of time".
+
+    ## Arguments
+    - `town`: name of a town, path of an `.xodr` or `.yaml` file, or a `Town`.
+    - `storyboard`: name of a template, path of a `.json` file, or a `StoryboardTemplate`; None draws one each reset.
+    - `guidance`: "turns" (before each junction) or "goals" (by name, where the place is on the Co-Wizard's map).
+    - `traffic`: "none", "light", "medium" or "heavy".
+    - `exceptions`: of a session on average, 0 to 4.
+    - `reward`: "dense", "sparse" or `NavigationWeights`.
+    - `max_seconds`, `patience`: see above [s].
+    - `render_mode`: None, `"rgb_array"` or `"human"`.
+
+    `reset(seed=...)` has the scenario that `DuoWizardEnv` has for this seed; `reset(options={"scenario": Scenario})`
+    plays a given one.
+
+    ## Version History
+    - v0: first version.
+    """
+
+    def __init__(
+        self,
+        town: str | Path | Town = "brookside",
+        storyboard: str | Path | StoryboardTemplate | None = None,
+        *,
+        guidance: Guidance | str = Guidance.TURNS,
+        traffic: str = "light",
+        exceptions: float = 0.0,
+        reward: str | NavigationWeights = "dense",
+        max_seconds: float = 600.0,
+        patience: float = 60.0,
+        render_mode: str | None = None,
+    ) -> None:
+        config = NavigationConfig(
+            guidance=guidance, traffic=traffic, exceptions=exceptions, weights=weights_of(reward),
+            max_seconds=max_seconds, patience=patience,
+        )  # fmt: skip
+        super().__init__(town, storyboard, config, render_mode)
+        self.action_space = spaces.Discrete(len(ACTIONS))
+        self.observation_space = navigation_space()
+        self._controls: NavigationMask | None = None
+        self._mask = np.zeros(len(ACTIONS), dtype=np.int8)
+
+    def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[Vector, Info]:
+        """Begins a session.
+
+        Args:
+            seed: of the session; without one it is drawn.
+            options: `scenario` plays a given `Scenario`; other options are ignored.
+        """
+        drive = self.begin(seed, options)
+        self._controls = NavigationMask(drive.stage.world, drive.ways)
+        return self._observe(), self._info()
+
+    def step(self, action: np.int64 | int) -> tuple[Vector, float, bool, bool, Info]:
+        """Plays one decision.
+
+        Raises:
+            ValueError: the action is none of `NavigationAction`.
+            gymnasium.error.ResetNeeded: no session is being played, or it is over.
+        """
+        drive = self.drive
+        if not 0 <= int(action) < len(ACTIONS):
+            raise ValueError(f"action is {action}; it must be in 0..{len(ACTIONS) - 1}, see NavigationAction")
+        physical = physical_of(NavigationAction(int(action)), drive.seen[Role.CO_WIZARD], drive.ways)
+        drive.play(CoWizardAction(physical=physical))
+        if self.render_mode == "human":
+            self.render()
+        return self._observe(), drive.reward, drive.terminated, drive.truncated, self._info()
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Which actions would be carried out now (18,); sb3-contrib's algorithms ask for it."""
+        return self._mask.astype(np.bool_)
+
+    def _observe(self) -> Vector:
+        assert self._controls is not None
+        self._mask = self._controls.mask(self.drive.seen[Role.CO_WIZARD])
+        return self.drive.observe()
+
+    def _info(self) -> Info:
+        return {"action_mask": self._mask.copy(), **self.drive.info()}

@@ -1,0 +1,124 @@
+"""Observation of the Co-Wizard, read into typed fields."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from dorothie_gym.ontology import (
+    ObjectClass,
+    PhysicalAction,
+)
+from dorothie_gym.policies.observation_parser import SeenLandmark, SeenObject, read_landmarks, read_objects, scalar
+from dorothie_gym.policies.route_progress import Choice, is_choice, next_choice
+from dorothie_gym.spaces import ExitColumn, Motion
+from dorothie_gym.world.town import Town
+from dorothie_gym.world.town.routing import Place
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoWizardView:
+    """An observation of the Co-Wizard, read; `lane` and `station` are corrected by the turn options."""
+
+    raw: Mapping[str, Any]
+    time: float
+    speed: float
+    lane: int
+    station: float
+    speaking: float
+    motion: Motion
+    hazard: ObjectClass
+    manoeuvre: PhysicalAction | None
+    angle: float
+    cruise: float
+    lights: bool
+    choice: Choice | None
+    landmarks: tuple[SeenLandmark, ...]
+    objects: tuple[SeenObject, ...]
+    waypoints: np.ndarray
+
+    @classmethod
+    def read(cls, observation: Mapping[str, Any], town: Town) -> CoWizardView:
+        """Reads what every decision needs."""
+        manoeuvre = int(observation["manoeuvre"])
+        waypoints = observation["waypoints"]
+        view = cls(
+            raw=observation,
+            time=scalar(observation, "time"),
+            speed=scalar(observation, "speed"),
+            lane=int(observation["lane"]),
+            station=scalar(observation, "station"),
+            speaking=scalar(observation, "speaking"),
+            motion=Motion(int(observation["motion"])),
+            hazard=ObjectClass(int(observation["hazard"])),
+            manoeuvre=PhysicalAction(manoeuvre) if manoeuvre else None,
+            angle=scalar(observation, "manoeuvre_angle"),
+            cruise=scalar(observation, "cruise_speed"),
+            lights=bool(observation["lights"]),
+            choice=None,
+            landmarks=read_landmarks(observation, town),
+            objects=read_objects(observation),
+            waypoints=waypoints[np.any(waypoints != 0.0, axis=1)],
+        )
+        return _located(view, town)
+
+    @property
+    def position(self) -> tuple[float, float]:
+        """Where it believes the car to be [m]."""
+        x, y = self.raw["pose"][:2]
+        return float(x), float(y)
+
+    @property
+    def here(self) -> Place:
+        """Where the car is."""
+        return self.lane, self.station
+
+    @property
+    def standing(self) -> bool:
+        """Whether the car stands."""
+        return self.speed < 0.3
+
+    @property
+    def junction(self) -> int:
+        """The next junction with a choice, -1 if there is none."""
+        return self.choice.junction if self.choice is not None else -1
+
+    @property
+    def manoeuvring(self) -> bool:
+        """Whether the car is switching lanes or turning round."""
+        return self.manoeuvre in (PhysicalAction.LANE_SWITCH, PhysicalAction.U_TURN)
+
+
+def _located(view: CoWizardView, town: Town) -> CoWizardView:
+    """The view with its place corrected: the turn options ahead are known even where the position has drifted."""
+    believed = next_choice(town, view.lane, view.station)
+    rows = [row for row in view.raw["exits"] if row[ExitColumn.PRESENT]]
+    if not rows:
+        return replace(view, choice=believed)
+    exits = tuple(sorted(int(row[ExitColumn.LANE]) for row in rows))
+    distance = float(rows[0][ExitColumn.DISTANCE])
+    candidates = _lanes_by_exits(town).get(exits, ())
+    if believed is not None and (believed.lane in candidates or not candidates):
+        return replace(view, choice=replace(believed, distance=distance))
+    if not candidates:
+        return replace(view, choice=believed)
+    lane = candidates[0]
+    choice = Choice(lane=lane, distance=distance, exits=town.exits(lane))
+    station = town.lanes[lane].length - distance
+    if station < 0.0:
+        return replace(view, choice=choice)
+    return replace(view, choice=choice, lane=lane, station=station)
+
+
+@lru_cache(maxsize=16)
+def _lanes_by_exits(town: Town) -> Mapping[tuple[int, ...], tuple[int, ...]]:
+    """For the lanes that the exits of a junction lead to, the lanes that have those exits."""
+    found: dict[tuple[int, ...], list[int]] = {}
+    for lane in town.lanes:
+        if is_choice(town, lane.id):
+            found.setdefault(tuple(sorted(way.lane for way in town.exits(lane.id))), []).append(lane.id)
+    return {exits: tuple(lanes) for exits, lanes in found.items()}

@@ -1,0 +1,298 @@
+"""What the driver observes: one short vector of numbers within -1 and 1, made of what the Co-Wizard may know."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any, TypeAlias
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from dorothie_gym.ontology import (
+    ActionValue,
+    DialogueMove,
+    LandmarkName,
+    ObjectClass,
+    PhysicalAction,
+    StreetName,
+    WeatherParameter,
+)
+from dorothie_gym.policies.navigation.cost_to_go import CostToGo
+from dorothie_gym.policies.navigation.instructor import NavigationInstruction
+from dorothie_gym.policies.navigation.junction_exits import SECTORS, JunctionExits, SectorExit
+from dorothie_gym.policies.observation_parser import street_of
+from dorothie_gym.spaces import ExitColumn, Motion, ObjectColumn
+from dorothie_gym.world.car.driver import MAX_CRUISE
+from dorothie_gym.world.town import LinkType, Town
+from dorothie_gym.world.town.lights import LightColour
+from dorothie_gym.world.town.oncoming import oncoming_lanes
+from dorothie_gym.world.town.routing import Place
+
+Vector: TypeAlias = NDArray[np.float32]
+
+MAX_SECONDS = 600.0
+"""Default time limit of a navigation session [s]."""
+
+DECISION_FREQUENCY = 2.0
+"""Default number of driving decisions per second [Hz]."""
+
+OBJECTS = 6
+"""Bodies that are shown, the nearest first."""
+
+KINDS = (ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC)
+"""Classes of bodies that are told apart; all others count as the first."""
+
+FAST = 25.0
+"""Speeds are shares of this [m/s]: 90 km/h."""
+
+FAR = 100.0
+"""Distances of junctions, instructions and hazards are shares of this [m]."""
+
+CLOSE = 10.0
+"""Distances that have to be met to the metre are told as shares of this once more [m]."""
+
+DETOUR = 200.0
+"""How much longer a way is than another is a share of this [m]."""
+
+ACROSS = 500.0
+"""Places on the map are told as shares of this [m]."""
+
+RECENT = 10.0
+"""The age of an instruction is a share of this [s]."""
+
+_WEATHER = tuple((parameter.low, parameter.high - parameter.low) for parameter in WeatherParameter)
+_MANOEUVRES = (PhysicalAction.LANE_SWITCH, PhysicalAction.U_TURN, PhysicalAction.J_TURN)
+_COLOURS = tuple(LightColour)
+
+FIELDS: Mapping[str, int] = MappingProxyType(
+    {
+        "speed": 1,  # of FAST
+        "cruise": 1,  # cruise speed, share of 90 km/h
+        "motion": len(Motion),  # one-hot, see `Motion`
+        "manoeuvre": len(_MANOEUVRES),  # one-hot: lane switch, U-turn, turn that is planned or under way
+        "hazard": 2,  # whether the car brakes or stands for something, and how far that is, of FAR
+        "lights": 1,  # whether the head lights are on
+        "lane": 4,  # whether it is in a junction, has a lane to the left, to the right; speed limit, of FAST
+        "uncertainty": 2,  # standard deviations of the estimated place [10 m] and heading [0.1 rad]
+        "junction": 2,  # whether there is a choice ahead, and how far, of FAR
+        "exits": 3 * len(SECTORS),  # by sector: whether a way leads there; it is planned; its street was named
+        "traffic_light": 1 + len(_COLOURS),  # at the end of this lane: how far, of FAR; one-hot green, yellow, red
+        "said": 1 + len(DialogueMove),  # whether anything was said, one-hot move of it
+        "said_action": len(ActionValue),  # one-hot: the action that was asked for
+        "said_sector": len(SECTORS),  # one-hot: which way
+        "said_landmark": len(LandmarkName),  # one-hot: the place that was named
+        "said_distance": 2,  # what is left of the distance that was said, of FAR and of CLOSE; below 0 it is passed
+        "said_age": 1,  # time since, of RECENT
+        "goal": 3,  # whether its place is known; how far ahead and to the right it lies, of ACROSS
+        "goal_distance": 3,  # way left to it, of ACROSS; on its own lane: how far ahead, of FAR and of CLOSE
+        "detours": 3 + len(SECTORS),  # longer by U-turn, switch left, switch right, and each exit; of DETOUR
+        "objects": OBJECTS * (3 + len(KINDS)),  # distance [50 m], sine and cosine of bearing, one-hot class; 0: none
+        "weather": len(_WEATHER),  # each as a share of its range
+        "time": 1,  # share of the time there is
+    }
+)
+"""Fields of the observation and their sizes, in order. Shares are clipped to -1..1; what is unknown is 0."""
+
+
+def layout(fields: Mapping[str, int] = FIELDS) -> dict[str, slice]:
+    """Where in the observation each field is: by default those of `NavigationEnv`, in order and with their sizes."""
+    ends = np.cumsum(list(fields.values())).tolist()
+    return {name: slice(end - size, end) for (name, size), end in zip(fields.items(), ends, strict=True)}
+
+
+def navigation_space() -> spaces.Space[Vector]:
+    """The observation space: a vector of all `FIELDS`."""
+    space: spaces.Space[Vector] = spaces.Box(-1.0, 1.0, (sum(FIELDS.values()),), dtype=np.float32)
+    return space
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeardInstruction:
+    """What the Co-Wizard remembers of what was said.
+
+    Attributes:
+        told: the last instruction, or None.
+        driven: how far the car has come since [m].
+        goal: place of the goal that was named and is on the Co-Wizard's map, or None.
+    """
+
+    told: NavigationInstruction | None = None
+    driven: float = 0.0
+    goal: Place | None = None
+
+    def driven_on(self, before: Mapping[str, Any], now: Mapping[str, Any]) -> HeardInstruction:
+        """The same after a decision; how far the car has come in it follows from its speeds before and after it."""
+        seconds = float(now["time"][0] - before["time"][0])
+        return replace(self, driven=self.driven + seconds * float(before["speed"][0] + now["speed"][0]) / 2.0)
+
+
+class NavigationEncoder:
+    """Makes observations for a driver in a town, be it in `NavigationEnv` or in `DuoWizardEnv`.
+
+    Everything follows from the Co-Wizard's observation in `DuoWizardEnv`, from the map, and from what was said: what
+    the Co-Wizard does not know is nowhere in it.
+    """
+
+    def __init__(self, town: Town, ways: JunctionExits, max_seconds: float) -> None:
+        self._town, self._ways, self._max_seconds = town, ways, max_seconds
+        self._oncoming = oncoming_lanes(town)
+        self._way_left = CostToGo(town)
+
+    def observe(self, seen: Mapping[str, Any], heard: HeardInstruction, blocked: tuple[Place, ...]) -> Vector:
+        """The observation.
+
+        Args:
+            seen: what the Co-Wizard observes.
+            heard: what it remembers.
+            blocked: roadblocks that it knows of.
+
+        Returns:
+            Numbers (n,) of `navigation_space`.
+        """
+        lane, station = int(seen["lane"]), float(seen["station"][0])
+        choice = self._ways.choice_ahead(seen)
+        ways = self._ways.after(choice) if choice is not None else (None,) * len(SECTORS)
+        self._way_left.aim(heard.goal, blocked if heard.goal is not None else ())
+        values = [
+            *self._car(seen, lane),
+            *self._junction(seen, heard, ways, choice),
+            *self._light(lane, station, float(seen["time"][0])),
+            *_said(heard, float(seen["time"][0])),
+            *self._goal(seen, heard, lane, station),
+            *self._detours(heard, ways, lane, station),
+            *_objects(seen),
+            *((float(value) - low) / span for value, (low, span) in zip(seen["weather"], _WEATHER, strict=True)),
+            float(seen["time"][0]) / self._max_seconds,
+        ]
+        observation = np.array(values, dtype=np.float32)
+        return np.minimum(np.maximum(observation, -1.0, out=observation), 1.0, out=observation)
+
+    def _car(self, seen: Mapping[str, Any], lane: int) -> list[float]:
+        town = self._town
+        manoeuvre, covariance = int(seen["manoeuvre"]), seen["pose_covariance"]
+        hazard = bool(seen["hazard"])
+        return [
+            float(seen["speed"][0]) / FAST,
+            float(seen["cruise_speed"][0]) / MAX_CRUISE,
+            *_one_hot(int(seen["motion"]), len(Motion)),
+            *(float(manoeuvre == action.value) for action in _MANOEUVRES),
+            float(hazard),
+            float(seen["hazard_distance"][0]) / FAR if hazard else 0.0,
+            float(seen["lights"]),
+            float(town.lanes[lane].in_junction),
+            float(town.neighbour(lane, LinkType.LANE_CHANGE_LEFT) is not None),
+            float(town.neighbour(lane, LinkType.LANE_CHANGE_RIGHT) is not None),
+            town.lanes[lane].speed_limit / FAST,
+            math.sqrt(float(covariance[0, 0] + covariance[1, 1])) / 10.0,
+            math.sqrt(float(covariance[2, 2])) / 0.1,
+        ]
+
+    def _junction(
+        self, seen: Mapping[str, Any], heard: HeardInstruction, ways: tuple[SectorExit | None, ...], choice: int | None
+    ) -> list[float]:  # fmt: skip
+        if choice is None:
+            return [0.0] * (2 + 3 * len(SECTORS))
+        distance = float(seen["exits"][0, ExitColumn.DISTANCE])
+        turning = int(seen["manoeuvre"]) == PhysicalAction.J_TURN
+        angle = int(seen["manoeuvre_angle"][0])
+        street = heard.told.street if heard.told is not None else None
+        values = [1.0, distance / FAR]
+        for way in ways:
+            if way is None:
+                values += (0.0, 0.0, 0.0)
+                continue
+            named = street is not None and street_of(seen, self._town, way.lane) is street
+            values += (1.0, float(turning and way.angle == angle), float(named and street is not StreetName.UNKNOWN))
+        return values
+
+    def _light(self, lane: int, station: float, time: float) -> list[float]:
+        colour = self._town.light(lane, time)
+        if colour is None:
+            return [0.0] * (1 + len(_COLOURS))
+        left = self._town.lanes[lane].length - station
+        return [left / FAR, *_one_hot(_COLOURS.index(colour), len(_COLOURS))]
+
+    def _goal(self, seen: Mapping[str, Any], heard: HeardInstruction, lane: int, station: float) -> list[float]:
+        if heard.goal is None:
+            return [0.0] * 6
+        x, y = self._town.lanes[heard.goal[0]].position(heard.goal[1])
+        here_x, here_y, heading = (float(value) for value in seen["pose"])
+        dx, dy = float(x) - here_x, float(y) - here_y
+        sine, cosine = math.sin(heading), math.cos(heading)
+        left = self._way_left.from_place(lane, station)
+        ahead = heard.goal[1] - station if lane == heard.goal[0] else math.inf
+        return [
+            1.0,
+            (dx * cosine + dy * sine) / ACROSS,
+            (dy * cosine - dx * sine) / ACROSS,
+            min(left / ACROSS, 1.0),
+            min(ahead / FAR, 1.0),
+            min(ahead / CLOSE, 1.0),
+        ]
+
+    def _detours(
+        self, heard: HeardInstruction, ways: tuple[SectorExit | None, ...], lane: int, station: float
+    ) -> list[float]:
+        """How much longer the way to the goal gets by what may be done, where the goal is known."""
+        if heard.goal is None:
+            return [0.0] * (3 + len(SECTORS))
+        town, left = self._town, self._way_left.from_place
+        stay = left(lane, station)
+        oncoming = self._oncoming.at(lane, station)
+        others = [math.inf if oncoming is None else left(oncoming.lane, oncoming.station)]
+        for side in (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT):
+            beside = town.neighbour(lane, side)
+            position = town.lanes[lane].position(station)
+            others.append(math.inf if beside is None else left(beside, float(town.lanes[beside].project(position)[0])))
+        costs = [math.inf if way is None else left(way.lane, 0.0) for way in ways]
+        best = min(costs)
+        return [*(_longer(other, stay) for other in others), *(_longer(cost, best) for cost in costs)]
+
+
+def _longer(way: float, than: float) -> float:
+    """How much longer a way is than another, of `DETOUR`, from -1 to 1; 1 where there is none."""
+    if not math.isfinite(way):
+        return 1.0
+    return max(min((way - than) / DETOUR, 1.0), -1.0) if math.isfinite(than) else -1.0
+
+
+def _said(heard: HeardInstruction, time: float) -> list[float]:
+    told = heard.told
+    if told is None:
+        count = ("said", "said_action", "said_sector", "said_landmark", "said_distance", "said_age")
+        return [0.0] * sum(FIELDS[name] for name in count)
+    left = told.distance - heard.driven
+    return [
+        1.0,
+        *_one_hot(int(told.act.move), len(DialogueMove)),
+        *_one_hot(-1 if told.action is None else told.action.value, len(ActionValue)),
+        *_one_hot(-1 if told.sector is None else told.sector, len(SECTORS)),
+        *_one_hot(-1 if told.landmark is None else told.landmark.value, len(LandmarkName)),
+        left / FAR,
+        left / CLOSE,
+        (time - told.time) / RECENT,
+    ]
+
+
+def _objects(seen: Mapping[str, Any]) -> list[float]:
+    values: list[float] = []
+    for row in seen["objects"][:OBJECTS].tolist():
+        kind = int(row[ObjectColumn.KIND])
+        if kind == 0:
+            break
+        bearing = row[ObjectColumn.BEARING]
+        place = next((k for k, known in enumerate(KINDS) if known.value == kind), 0)
+        values += (row[ObjectColumn.DISTANCE] / 50.0, math.sin(bearing), math.cos(bearing))
+        values += _one_hot(place, len(KINDS))
+    return values + [0.0] * (FIELDS["objects"] - len(values))
+
+
+def _one_hot(at: int, size: int) -> list[float]:
+    values = [0.0] * size
+    if at >= 0:
+        values[at] = 1.0
+    return values

@@ -1,0 +1,88 @@
+"""Observation of the participant, read into typed fields."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from dorothie_gym.ontology import LandmarkName
+from dorothie_gym.policies.observation_parser import (
+    SeenLandmark,
+    SeenObject,
+    SeenSubgoal,
+    read_landmarks,
+    read_objects,
+    read_subgoals,
+    scalar,
+)
+from dorothie_gym.world.town import Town
+from dorothie_gym.world.town.routing import Place
+
+STANDING = 0.3
+"""Below this speed the car stands [m/s]."""
+
+TURNED = 0.8
+"""Below this cosine of the angle between car and lane the car is in the middle of turning round."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParticipantView:
+    """An observation of the participant, read; `turning` tells that the car stands across its lane."""
+
+    raw: Mapping[str, Any]
+    time: float
+    speed: float
+    lane: int
+    station: float
+    speaking: float
+    landmarks: tuple[SeenLandmark, ...]
+    subgoals: tuple[SeenSubgoal, ...]
+    objects: tuple[SeenObject, ...]
+    turning: bool
+
+    @classmethod
+    def read(cls, observation: Mapping[str, Any], town: Town) -> ParticipantView:
+        """Reads what every decision needs."""
+        lane, station = int(observation["lane"]), scalar(observation, "station")
+        across = float(observation["pose"][2]) - town.lanes[lane].heading_at(station)
+        return cls(
+            raw=observation,
+            time=scalar(observation, "time"),
+            speed=scalar(observation, "speed"),
+            lane=lane,
+            station=station,
+            speaking=scalar(observation, "speaking"),
+            landmarks=read_landmarks(observation, town),
+            subgoals=read_subgoals(observation),
+            objects=read_objects(observation),
+            turning=math.cos(across) < TURNED,
+        )
+
+    @property
+    def position(self) -> tuple[float, float]:
+        """Where the car is [m]."""
+        x, y = self.raw["pose"][:2]
+        return float(x), float(y)
+
+    @property
+    def place(self) -> Place:
+        """Where the car is."""
+        return self.lane, self.station
+
+    @property
+    def standing(self) -> bool:
+        """Whether the car stands."""
+        return self.speed < STANDING
+
+    def landmark(self, row: int) -> SeenLandmark | None:
+        """The landmark of a row."""
+        return next((landmark for landmark in self.landmarks if landmark.row == row), None)
+
+    def unique(self, landmark: SeenLandmark) -> bool:
+        """Whether no other landmark bears the same name."""
+        return sum(other.name is landmark.name for other in self.landmarks) == 1 and landmark.name not in (
+            LandmarkName.HOUSE,
+            LandmarkName.PERSON,
+        )

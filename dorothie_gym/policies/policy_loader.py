@@ -1,0 +1,185 @@
+"""Policies by name, and trained policies from files."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final, TypeAlias
+
+from dorothie_gym.ontology import Role
+from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
+from dorothie_gym.policies.co_wizard import ScriptedCoWizard
+from dorothie_gym.policies.participant import ScriptedParticipant
+from dorothie_gym.policies.policy import Policy
+from dorothie_gym.policies.trivial import LaneFollowPolicy, RandomPolicy, SilentPolicy
+from dorothie_gym.spaces import SpaceLimits
+
+POLICY_NAMES = ("scripted", "silent", "random")
+"""Names that `make_policy` knows for every role."""
+
+LANE_FOLLOW = "lane-follow"
+"""Name of the policy that drives and never talks, which the Co-Wizard has."""
+
+
+def policy_names(role: Role) -> tuple[str, ...]:
+    """Returns the names that `make_policy` knows for a role."""
+    return (*POLICY_NAMES, LANE_FOLLOW) if role is Role.CO_WIZARD else POLICY_NAMES
+
+
+def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Policy[Any]:
+    """Makes a policy.
+
+    Args:
+        name: "scripted", "silent" (does nothing) or "random" (samples the action space); for the Co-Wizard
+            "lane-follow", too (drives on, never talks).
+        role: whom it acts for.
+        limits: sizes of the spaces it acts in.
+
+    Raises:
+        ValueError: if there is no policy of that name, or the role takes no actions.
+    """
+    if role not in (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD):
+        raise ValueError(f"role is {role}; policies act for participant, co_wizard and ad_wizard")
+    if name == "silent":
+        return SilentPolicy(role, limits)
+    if name == "random":
+        return RandomPolicy(role, limits)
+    if name not in policy_names(role):
+        raise ValueError(f"there is no policy {name!r}; the policies are {', '.join(policy_names(role))}")
+    if name == LANE_FOLLOW:
+        return LaneFollowPolicy(limits)
+    if role is Role.PARTICIPANT:
+        return ScriptedParticipant(limits)
+    return ScriptedCoWizard(limits) if role is Role.CO_WIZARD else ScriptedAdWizard(limits)
+
+
+Loader: TypeAlias = Callable[[Path, Role, SpaceLimits], Policy[Any]]
+"""Reads a policy from a file or folder; a function of a module, so that other processes find it."""
+
+DESCRIPTION: Final = "model.json"
+"""A folder is taken for a policy if it holds this file."""
+
+_COSTS: Final = ("steps", "seconds")
+
+_LOADERS: Final[dict[str, Loader]] = {}
+
+
+class CastError(ValueError):
+    """A player cannot be had; the message tells why and what to give."""
+
+
+def register_loader(kind: str, loader: Loader) -> None:
+    """Makes files of a kind playable.
+
+    Args:
+        kind: ending of the files (".safetensors"), or what the field "kind" of their JSON says ("ppo").
+        loader: reads them; it raises `ValueError` where it cannot.
+
+    Raises:
+        ValueError: another loader has the kind.
+    """
+    if _LOADERS.setdefault(kind, loader) is not loader:
+        raise ValueError(f"files of the kind {kind!r} have a loader already: {_LOADERS[kind].__qualname__}")
+
+
+def loadable_kinds() -> tuple[str, ...]:
+    """Returns the kinds of files that can be played now, sorted."""
+    return tuple(sorted(_LOADERS))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Player:
+    """Plays a role.
+
+    Attributes:
+        name: of the policy, or the path that was given.
+        path: of the file or folder that it was learned into; None for a policy by name.
+        loader: reads it.
+        sha256: of the file, or of the folder's files of the model ("model.*"); what a rollout was played with.
+        training: what the learning took, as far as the JSON of the file tells: `steps` and `seconds`.
+    """
+
+    name: str
+    path: Path | None = None
+    loader: Loader | None = None
+    sha256: str | None = None
+    training: Mapping[str, float] = field(default_factory=dict)
+
+    def make(self, role: Role, limits: SpaceLimits) -> Policy[Any]:
+        """Makes the policy.
+
+        Raises:
+            ValueError: there is none of the name for the role, or the file cannot be read.
+        """
+        if self.path is None or self.loader is None:
+            return make_policy(self.name, role, limits)
+        return self.loader(self.path, role, limits)
+
+
+SCRIPTED: Final = Player(name="scripted")
+ALL_SCRIPTED: Final[Mapping[Role, Player]] = MappingProxyType(
+    {Role.PARTICIPANT: SCRIPTED, Role.CO_WIZARD: SCRIPTED, Role.AD_WIZARD: SCRIPTED}
+)
+"""The scripted three."""
+
+
+def find_player(given: str, role: Role) -> Player:
+    """Returns who is meant by a name or the path of a file.
+
+    Args:
+        given: name of a policy, or path of a file or folder; a name has precedence ("./scripted" is a path).
+        role: whom it is to play.
+
+    Raises:
+        CastError: there is no such policy for the role, no such file, or none that can be played.
+    """
+    if given in policy_names(role):
+        return Player(name=given)
+    path = Path(given)
+    if not path.exists():
+        raise CastError(
+            f"{role}: there is no policy {given!r}, nor a file of that name; "
+            f"the policies are {', '.join(policy_names(role))}"
+        )
+    description = _description(path)
+    kinds = _kinds_of(path, description)
+    loader = next((_LOADERS[kind] for kind in kinds if kind in _LOADERS), None)
+    if loader is None:
+        known = ", ".join(loadable_kinds()) or "none: is dorothie-gym[baselines] installed?"
+        raise CastError(f"{role}: {given} is of the kind {' or '.join(kinds)}, which cannot be played (known: {known})")
+    training = {name: value for name in _COSTS if isinstance(value := description.get(name), int | float)}
+    return Player(name=given, path=path, loader=loader, sha256=_sha256(path), training=training)
+
+
+def _description(path: Path) -> Mapping[str, Any]:
+    """The JSON of a file, or of a folder's description; empty where there is none."""
+    file = path / DESCRIPTION if path.is_dir() else path
+    if file.suffix != ".json" or not file.is_file():
+        return {}
+    try:
+        page = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise CastError(f"{file}: cannot be read ({error}); give the file of a policy") from None
+    return page if isinstance(page, dict) else {}
+
+
+def _kinds_of(path: Path, description: Mapping[str, Any]) -> tuple[str, ...]:
+    """What a file may be called: the kind that its JSON tells, or its ending."""
+    told = (str(description["kind"]),) if "kind" in description else ()
+    if not path.is_dir():
+        return (*told, path.suffix or "file without an ending")
+    return (*told, ".json") if (path / DESCRIPTION).is_file() else ("folder without " + DESCRIPTION,)
+
+
+def _sha256(path: Path) -> str:
+    digest = hashlib.sha256()
+    files = sorted(path.glob(Path(DESCRIPTION).stem + ".*")) if path.is_dir() else [path]
+    for each in files:
+        digest.update(each.name.encode() + b"\0")
+        with each.open("rb") as content:
+            digest.update(hashlib.file_digest(content, "sha256").digest())
+    return digest.hexdigest()

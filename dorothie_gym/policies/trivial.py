@@ -1,0 +1,100 @@
+"""Policies without dialogue: silent, random and lane following."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from dorothie_gym.ontology import PhysicalAction, Role
+from dorothie_gym.policies.policy import Policy
+from dorothie_gym.spaces import (
+    ActionDict,
+    CoWizardAction,
+    ExitColumn,
+    Motion,
+    Physical,
+    SpaceLimits,
+    action_space,
+    noop,
+)
+from dorothie_gym.world.town import Town
+
+
+@dataclass(frozen=True, kw_only=True)
+class Draws:
+    """A position in a stream of chance: the seed, and how many decisions have been taken."""
+
+    seed: int
+    count: int = 0
+
+    def next(self) -> Draws:
+        """The position after one more decision."""
+        return replace(self, count=self.count + 1)
+
+
+class SilentPolicy(Policy[None]):
+    """Says and does nothing."""
+
+    def initial_state(self, seed: int, town: Town) -> None:
+        """There is nothing to remember."""
+
+    def step(self, observation: Mapping[str, Any], state: None) -> tuple[ActionDict, None]:
+        """Returns the action that does nothing."""
+        return noop(self.role, self.limits), None
+
+
+class RandomPolicy(Policy[Draws]):
+    """Samples the action space; utterances are left to the environment to word."""
+
+    def __init__(self, role: Role, limits: SpaceLimits | None = None) -> None:
+        """Takes a copy of the role's action space, to seed it."""
+        super().__init__(role, limits)
+        self._space = deepcopy(action_space(role, self.limits))
+
+    def initial_state(self, seed: int, town: Town) -> Draws:
+        """The beginning of the stream."""
+        return Draws(seed=seed)
+
+    def step(self, observation: Mapping[str, Any], state: Draws) -> tuple[ActionDict, Draws]:
+        """Returns a sample that follows from the seed and the number of the decision."""
+        self._space.seed(state.seed * 1_000_003 + state.count & 0x7FFFFFFF)
+        action: ActionDict = self._space.sample()
+        for field in ("utterance", "message"):
+            if field in action:
+                action[field] = ""
+        return action, state.next()
+
+
+class LaneFollowPolicy(Policy[None]):
+    """Follows its lane, goes as straight on as it can where it has to choose, and turns round at a dead end.
+
+    It does only what the car asks for: it acts where the car stands by Stop or waits at the end of its lane.
+    """
+
+    def __init__(self, limits: SpaceLimits | None = None) -> None:
+        """Prepares the policy; the sizes of the spaces default to those of `SpaceLimits`."""
+        super().__init__(Role.CO_WIZARD, limits)
+
+    def initial_state(self, seed: int, town: Town) -> None:
+        """There is nothing to remember."""
+
+    def step(self, observation: Mapping[str, Any], state: None) -> tuple[ActionDict, None]:
+        """Returns the action that keeps the car going."""
+        return CoWizardAction(physical=_drive_on(observation)).encode(self.limits), None
+
+
+def _drive_on(observation: Mapping[str, Any]) -> Physical | None:
+    motion = Motion(int(observation["motion"]))
+    if motion is Motion.STOPPED:
+        return Physical(action=PhysicalAction.START)
+    if motion is not Motion.WAITING:
+        return None
+    exits = observation["exits"]
+    angles = exits[exits[:, ExitColumn.PRESENT] > 0.0][:, ExitColumn.ANGLE]
+    if len(angles) == 0:
+        return Physical(action=PhysicalAction.U_TURN)
+    return Physical(action=PhysicalAction.J_TURN, angle=int(angles[np.argmin(np.abs(angles))]))

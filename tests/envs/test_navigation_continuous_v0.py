@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dorothie_gym.envs.continuous_observation import CONTINUOUS_FIELDS
+from dorothie_gym.envs.navigation_continuous_v0 import NavigationContinuousEnv
+from dorothie_gym.policies.navigation import layout
+from tests.envs.navigation_drivers import pursue
+
+FIELD = layout(CONTINUOUS_FIELDS)
+
+
+@pytest.fixture(scope="module")
+def env() -> NavigationContinuousEnv:
+    return NavigationContinuousEnv(traffic="none")
+
+
+@pytest.mark.parametrize("seed", [0, 6])
+def test_a_driver_who_follows_the_path_and_stops_where_told_succeeds(env: NavigationContinuousEnv, seed: int) -> None:
+    observation, _ = env.reset(seed=seed)
+    over = False
+    while not over:
+        observation, _, terminated, truncated, info = env.step(pursue(observation))
+        over = terminated or truncated
+    assert info["is_success"], info
+
+
+def test_nothing_drives_the_car_but_the_pedals(env: NavigationContinuousEnv) -> None:
+    observation, _ = env.reset(seed=1)
+    for _ in range(20):
+        observation, _, _, _, _ = env.step(np.array((-1.0, 0.0, -1.0), dtype=np.float32))
+    assert observation[FIELD["speed"]] == 0.0
+    for _ in range(20):
+        observation, _, _, _, _ = env.step(np.array((1.0, 0.0, -1.0), dtype=np.float32))
+    assert float(env.drive.stage.world.car.speed) == pytest.approx(6.0, abs=0.2)  # 3 m/s^2 for 2 s
+    assert observation[FIELD["controls"]][0] == 1.0
+    for _ in range(15):
+        observation, _, _, _, _ = env.step(np.array((0.0, 0.0, 1.0), dtype=np.float32))
+    assert observation[FIELD["speed"]] == 0.0
+
+
+def test_steering_to_the_right_leaves_the_path_to_the_right(env: NavigationContinuousEnv) -> None:
+    observation, _ = env.reset(seed=1)
+    for _ in range(12):
+        observation, _, _, _, _ = env.step(np.array((1.0, 0.15, 0.0), dtype=np.float32))
+    assert observation[FIELD["offset"]] > 0.05 and observation[FIELD["course"]][0] > 0.05
+    assert observation[FIELD["path"]].reshape(-1, 2)[3, 1] < 0.0  # the path is to the left
+
+
+def test_a_car_that_has_left_its_path_is_shown_another(env: NavigationContinuousEnv) -> None:
+    env.reset(seed=2)
+    planner = env.drive.stage.world.planner
+    paths = {id(planner.path)}
+    for k in range(300):
+        wheel = 0.12 if k % 40 < 20 else -0.12
+        observation, _, terminated, _, _ = env.step(np.array((0.3, wheel, -1.0), dtype=np.float32))
+        assert env.observation_space.contains(observation)
+        paths.add(id(planner.path))
+        if terminated:
+            break
+        assert abs(planner.offset) < 16.0
+    assert len(paths) > 1
+
+
+def test_a_car_that_leaves_the_road_for_good_ends_the_episode(env: NavigationContinuousEnv) -> None:
+    env.reset(seed=2)
+    for _ in range(400):
+        _, _, terminated, _, info = env.step(np.array((0.5, 0.0, -1.0), dtype=np.float32))
+        if terminated:
+            break
+    assert terminated and info["reason"] == "left the road" and not info["is_success"]
+    assert info["reward_terms"]["gave_up"] < 0.0 and info["infractions"]["off_road"] > 0
+
+
+def test_decisions_are_as_frequent_as_asked() -> None:
+    env = NavigationContinuousEnv(decision_frequency=5.0, traffic="none")
+    env.reset(seed=0)
+    for _ in range(5):
+        env.step(np.zeros(3, dtype=np.float32))
+    assert env.drive.stage.world.time == pytest.approx(1.0)
+    with pytest.raises(ValueError, match="decision_frequency"):
+        NavigationContinuousEnv(decision_frequency=7.0)
+
+
+@pytest.mark.parametrize("action", [np.zeros(2), np.array((0.0, np.nan, 0.0)), 3])
+def test_malformed_actions_are_told(env: NavigationContinuousEnv, action: object) -> None:
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="throttle, steer, brake"):
+        env.step(action)  # type: ignore[arg-type]

@@ -1,0 +1,259 @@
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from dorothie_gym.envs.navigation_config import NavigationWeights
+from dorothie_gym.envs.navigation_continuous_v0 import NavigationContinuousEnv
+from dorothie_gym.envs.navigation_v0 import NavigationEnv
+from dorothie_gym.envs.scenario import draw_scenario
+from dorothie_gym.ontology import DialogueMove
+from dorothie_gym.policies.navigation import FIELDS, NavigationAction, layout
+from tests.envs.navigation_drivers import drive, follow_lane, obey
+
+FIELD = layout()
+
+
+@pytest.fixture(scope="module")
+def env() -> NavigationEnv:
+    return NavigationEnv()
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_who_does_as_told_succeeds(env: NavigationEnv, seed: int) -> None:
+    info = drive(env, obey, seed)
+    assert info["is_success"], info
+    assert info["subgoals"]["reached"] == info["subgoals"]["live"]
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_goals_on_the_map_are_found_without_being_led(seed: int) -> None:
+    assert drive(NavigationEnv(guidance="goals"), obey, seed)["is_success"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("guidance", ["turns", "goals"])
+@pytest.mark.parametrize("town", ["brookside", "millbrook", "midtown", "northgate"])
+@pytest.mark.parametrize("exceptions", [0.0, 2.5])
+def test_obedient_drivers_succeed_in_all_towns(town: str, guidance: str, exceptions: float) -> None:
+    env = NavigationEnv(town, guidance=guidance, exceptions=exceptions)
+    assert np.mean([drive(env, obey, seed)["is_success"] for seed in range(100, 120)]) >= 0.9
+
+
+def test_a_car_that_only_follows_its_lane_is_given_up() -> None:
+    info = drive(NavigationEnv(patience=20.0), follow_lane, 0)
+    assert (info["is_success"], info["reason"]) == (False, "gave up")
+
+
+def test_time_runs_out() -> None:
+    env = NavigationEnv(max_seconds=12.0)
+    info = drive(env, follow_lane, 1)
+    assert info["reason"] == "out of time"
+    assert env.drive.stage.world.time == pytest.approx(12.0)
+    assert env.drive.truncated and not env.drive.terminated
+
+
+def play(env: NavigationEnv, seed: int, steps: int) -> list[tuple[Any, float]]:
+    """Plays at random."""
+    rng = np.random.default_rng(seed)
+    observation, info = env.reset(seed=seed)
+    played = [(observation, 0.0)]
+    for _ in range(steps):
+        action = rng.choice(np.flatnonzero(info["action_mask"]))
+        observation, reward, terminated, truncated, info = env.step(action)
+        played.append((observation, reward))
+        if terminated or truncated:
+            break
+    return played
+
+
+def test_equal_seeds_and_actions_make_equal_episodes(env: NavigationEnv) -> None:
+    first, second = play(env, 5, 60), play(NavigationEnv(), 5, 60)
+    for (one, reward), (two, other) in zip(first, second, strict=True):
+        np.testing.assert_array_equal(one, two)
+        assert reward == other
+
+
+@pytest.mark.parametrize("settings", [{}, {"guidance": "goals", "exceptions": 4.0, "traffic": "heavy"}])
+def test_what_the_mask_lets_through_is_not_refused(settings: dict[str, Any]) -> None:
+    env = NavigationEnv(**settings)
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        _, info = env.reset(seed=seed)
+        for _ in range(80):
+            action = NavigationAction(rng.choice(np.flatnonzero(info["action_mask"])))
+            _, _, terminated, truncated, info = env.step(action)
+            assert not info["refused"], action.name
+            if terminated or truncated:
+                break
+
+
+def test_a_turn_that_is_planned_may_be_asked_for_again(env: NavigationEnv) -> None:
+    env.reset(seed=0)
+    planner, again = env.drive.stage.world.planner, 0
+    for _ in range(60):
+        turns = np.flatnonzero(env.action_masks()[NavigationAction.turn(0) :])
+        planned = planner.turn_ahead
+        _, _, _, _, info = env.step(NavigationAction.turn(int(turns[0])) if len(turns) else NavigationAction.NOTHING)
+        if planned is not None and planned == planner.turn_ahead and len(turns):
+            assert info["refused"] == [] and info["reward_terms"]["action"] == 0.0
+            again += 1
+    assert again > 5
+
+
+def test_what_the_mask_holds_back_is_refused(env: NavigationEnv) -> None:
+    _, info = env.reset(seed=0)
+    assert not info["action_mask"][NavigationAction.START]
+    _, _, _, _, info = env.step(NavigationAction.START)
+    assert len(info["refused"]) == 1 and info["reward_terms"]["refusal"] < 0.0
+
+
+def test_the_reward_is_the_sum_of_its_terms(env: NavigationEnv) -> None:
+    rng = np.random.default_rng(0)
+    env.reset(seed=3)
+    for _ in range(30):
+        _, reward, _, _, info = env.step(rng.integers(18))
+        assert reward == pytest.approx(sum(info["reward_terms"].values()))
+        assert set(info["reward_terms"]) == set(asdict(NavigationWeights()))
+
+
+def test_progress_adds_up_to_the_way_that_was_left(env: NavigationEnv) -> None:
+    """It is a difference of potentials: no way of driving about earns more than driving there."""
+    env.reset(seed=0)
+    left, rng, total = env.drive.instructor.way_left, np.random.default_rng(1), 0.0
+    planner = env.drive.stage.world.planner
+    before = left.from_place(planner.lane, planner.station)
+    for _ in range(40):
+        _, _, _, _, info = env.step(rng.choice(np.flatnonzero(env.action_masks())))
+        assert not env.drive.instructor.blocked and not info["reward_terms"]["subgoal"]
+        total += info["reward_terms"]["progress"]
+    after = left.from_place(planner.lane, planner.station)
+    assert total == pytest.approx(NavigationWeights().progress * (before - after))
+
+
+def test_a_sparse_reward_comes_with_subgoals_only() -> None:
+    env = NavigationEnv(reward="sparse")
+    assert drive(env, follow_lane, 2)["return"] == 0.0
+    reached = drive(env, obey, 2)
+    assert reached["return"] == pytest.approx(reached["subgoals"]["reached"] + 2.0)
+
+
+def test_scenarios_are_those_of_all_environments(env: NavigationEnv) -> None:
+    env.reset(seed=17)
+    assert env.drive.stage.scenario == draw_scenario(env.town, None, 17)
+    scenario = draw_scenario(env.town, None, 18)
+    env.reset(seed=17, options={"scenario": scenario})
+    assert env.drive.stage.scenario == scenario
+    with pytest.raises(ValueError, match="scenario"):
+        env.reset(options={"scenario": 3})
+
+
+def test_turns_are_told_with_their_distance_before_the_junction(env: NavigationEnv) -> None:
+    observation, info = env.reset(seed=0)
+    told = []
+    for _ in range(200):
+        field = {name: observation[where] for name, where in FIELD.items()}
+        if field["said"][0]:
+            assert field["said"][1 + DialogueMove.INSTRUCT] == 1.0
+            if field["said_action"][4] and field["junction"][0]:
+                told.append(float(field["said_distance"][0] - field["junction"][1]))
+        observation, _, terminated, _, info = env.step(obey(observation, info["action_mask"]))
+        if terminated:
+            break
+    assert len(told) > 10
+    assert np.median(np.abs(told)) < 0.03  # of 100 m: what was said is how far it is
+
+
+def test_in_guidance_by_turns_the_goal_shows_nowhere(env: NavigationEnv) -> None:
+    observation, info = env.reset(seed=0)
+    for _ in range(60):
+        assert not observation[FIELD["goal"]].any() and not observation[FIELD["detours"]].any()
+        observation, _, _, _, info = env.step(obey(observation, info["action_mask"]))
+
+
+def test_places_that_are_not_on_the_map_do_not_show_when_named() -> None:
+    """The way to a hidden goal is told by turns, also where goals are named."""
+    env = NavigationEnv(guidance="goals")
+    seen = {True: 0, False: 0}
+    for seed in range(6):
+        observation, info = env.reset(seed=seed)
+        for _ in range(150):
+            goal = env.drive.instructor.goal
+            hidden = {mark.site for mark in env.drive.stage.scenario.storyboard.landmarks if mark.hidden}
+            place = {(mark.lane, mark.station): mark.site for mark in env.drive.stage.scenario.storyboard.landmarks}
+            if goal is not None:
+                is_hidden = place[goal.place] in hidden
+                seen[is_hidden] += 1
+                assert bool(observation[FIELD["goal"]][0]) != is_hidden
+            observation, _, terminated, _, info = env.step(obey(observation, info["action_mask"]))
+            if terminated:
+                break
+    assert min(seen.values()) > 20
+
+
+def test_exceptions_happen_when_asked_for() -> None:
+    env = NavigationEnv(exceptions=4.0)
+    drive(env, obey, 1)
+    assert env.drive.stage.counts["exceptions"] > 0
+
+
+def test_everything_handed_out_is_the_takers_own(env: NavigationEnv) -> None:
+    observation, info = env.reset(seed=0)
+    before = observation.copy()
+    info["action_mask"][:] = 0
+    info["reward_terms"].clear()
+    env.step(0)
+    np.testing.assert_array_equal(observation, before)
+    assert env.action_masks().any()
+
+
+def test_fields_fill_the_observation() -> None:
+    assert sum(FIELDS.values()) == NavigationEnv().observation_space.shape[0]  # type: ignore[index]
+    assert [where.stop - where.start for where in FIELD.values()] == list(FIELDS.values())
+
+
+@pytest.mark.parametrize(
+    ("settings", "named"),
+    [
+        ({"guidance": "signs"}, "guidance"), ({"traffic": "thick"}, "traffic"), ({"exceptions": 5.0}, "exceptions"),
+        ({"patience": 1.0}, "patience"), ({"max_seconds": 0.0}, "max_seconds"), ({"reward": "nice"}, "reward"),
+        ({"render_mode": "ascii"}, "render_mode"),
+    ],
+)  # fmt: skip
+def test_bad_settings_are_named(settings: dict[str, Any], named: str) -> None:
+    with pytest.raises(ValueError, match=named):
+        NavigationEnv(**settings)
+
+
+def test_steps_need_a_session() -> None:
+    env = NavigationEnv(max_seconds=1.0)
+    with pytest.raises(gym.error.ResetNeeded):
+        env.step(0)
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="0..17"):
+        env.step(18)
+    env.step(0)
+    env.step(0)
+    with pytest.raises(gym.error.ResetNeeded):
+        env.step(0)
+
+
+def test_many_play_at_once() -> None:
+    vector = gym.make_vec("dorothie_gym/Navigation-v0", num_envs=3, max_seconds=5.0)
+    observations, infos = vector.reset(seed=4)
+    assert observations.shape == (3, sum(FIELDS.values())) and infos["action_mask"].shape == (3, len(NavigationAction))
+    for _ in range(12):
+        observations, *_ = vector.step(np.zeros(3, dtype=np.int64))
+    single, _ = NavigationEnv(max_seconds=5.0).reset(seed=5)
+    np.testing.assert_array_equal(vector.reset(seed=4)[0][1], single)
+    vector.close()
+
+
+def test_stable_baselines_accepts_it_as_it_is() -> None:
+    checker = pytest.importorskip("stable_baselines3.common.env_checker", reason="needs the extra 'baselines'")
+    checker.check_env(NavigationEnv())
+    checker.check_env(NavigationContinuousEnv())

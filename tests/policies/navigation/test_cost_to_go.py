@@ -1,0 +1,55 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from dorothie_gym.policies.navigation.cost_to_go import CostToGo
+from dorothie_gym.world.town import load_town
+from dorothie_gym.world.town.routing import router
+
+
+@pytest.mark.parametrize("town", ["brookside", "midtown"])
+def test_way_left_is_the_cost_of_the_route(town: str) -> None:
+    model, rng = load_town(town), np.random.default_rng(0)
+    way = CostToGo(model)
+    lanes = [lane for lane in model.lanes if not lane.in_junction and lane.length > 25.0]
+    errors = []
+    for _ in range(60):
+        goal_lane, lane = (lanes[int(k)] for k in rng.integers(len(lanes), size=2))
+        goal = goal_lane.id, float(rng.uniform(5.0, goal_lane.length - 5.0))
+        start = lane.id, float(rng.uniform(0.0, lane.length - 12.0))
+        way.aim(goal)
+        route = router(model).route(start, goal)
+        assert route is not None
+        errors.append(abs(way.from_place(*start) - route.cost))
+    # a cell of some 10 m may hide whether a lane change or U-turn can still begin in it
+    assert np.median(errors) < 5.0 and np.mean(np.array(errors) < 35.0) > 0.9
+
+
+def test_it_falls_to_nothing_at_the_goal_and_rises_behind_it() -> None:
+    town = load_town("brookside")
+    lane = max((lane for lane in town.lanes if not lane.in_junction), key=lambda lane: lane.length)
+    goal = lane.length / 2
+    way = CostToGo(town)
+    way.aim((lane.id, goal))
+    before = [way.from_place(lane.id, station) for station in np.arange(1.0, goal, 1.0)]
+    assert np.all(np.diff(before) < 0.0) and before[-1] <= 1.0
+    assert way.from_place(lane.id, goal) == 0.0
+    assert way.from_place(lane.id, goal + 6.0) > 30.0
+
+
+def test_a_roadblock_makes_it_longer() -> None:
+    town = load_town("brookside")
+    lane = max((lane for lane in town.lanes if not lane.in_junction), key=lambda lane: lane.length)
+    way = CostToGo(town)
+    goal = (lane.id, lane.length - 5.0)
+    assert way.aim(goal) and not way.aim(goal)
+    free = way.from_place(lane.id, 2.0)
+    assert way.aim(goal, ((lane.id, lane.length / 2),))
+    assert way.from_place(lane.id, 2.0) > free + 20.0
+
+
+def test_without_a_goal_there_is_no_way() -> None:
+    assert math.isinf(CostToGo(load_town("brookside")).from_place(0, 0.0))

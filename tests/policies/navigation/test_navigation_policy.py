@@ -1,0 +1,145 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.envs.navigation_v0 import NavigationEnv
+from dorothie_gym.ontology import AGENT_ROLES, ActionValue, DialogueAct, DialogueMove, Role
+from dorothie_gym.policies import make_policy
+from dorothie_gym.policies.navigation import NavigationAction, NavigationPolicy, layout
+from dorothie_gym.policies.navigation.action_mask import EstimatedActionMask
+from dorothie_gym.policies.navigation.junction_exits import JunctionExits
+from dorothie_gym.policies.navigation.observation_vector import NavigationEncoder
+from dorothie_gym.policies.observation_parser import read_landmarks
+from dorothie_gym.rollout import play_session
+from dorothie_gym.spaces import ParticipantAction, Speech, noop
+from tests.envs.navigation_drivers import obey
+
+FIELD = layout()
+
+
+def cast(env: DuoWizardEnv, driver: Any) -> dict[Role, Any]:
+    others = {role: make_policy("scripted", role, env.limits) for role in AGENT_ROLES}
+    return {**others, Role.CO_WIZARD: NavigationPolicy(driver, env.limits)}
+
+
+@pytest.mark.parametrize(("seed", "observe_acts"), [(1, True), (4, True), (10, False)])
+def test_who_does_as_told_gets_errands_done_by_talk(seed: int, observe_acts: bool) -> None:
+    env = DuoWizardEnv("brookside", config=EnvConfig(observe_acts=observe_acts))
+    summary = play_session(env, cast(env, obey), seed=seed)
+    assert summary["success"], summary
+
+
+@pytest.mark.parametrize("guidance", ["turns", "goals"])
+def test_the_same_is_observed_as_while_learning(guidance: str) -> None:
+    """The same drive in both environments: what is told apart, all follows from the Co-Wizard's observation."""
+    learning = NavigationEnv(guidance=guidance, exceptions=4.0)
+    observation, info = learning.reset(seed=3)
+    drive = learning.drive
+    playing = DuoWizardEnv(learning.town, config=learning.config.session)
+    observations, _ = playing.reset(seed=3)
+    viewpoint = NavigationEncoder(learning.town, JunctionExits(learning.town), learning.config.max_seconds)
+    done: dict[Role, Any] = {}
+    play = drive.stage.play
+    drive.stage.play = lambda actions: (done.update(actions), play(actions))  # type: ignore[assignment,func-returns-value]
+    for _ in range(160):
+        seen = viewpoint.observe(observations["co_wizard"], drive.heard, drive.instructor.blocked)
+        np.testing.assert_array_equal(seen, observation)
+        observation, _, terminated, truncated, info = learning.step(obey(observation, info["action_mask"]))
+        observations, *_ = playing.step({str(role): action.encode(playing.limits) for role, action in done.items()})
+        assert not (terminated or truncated)
+
+
+class Ride:
+    """A participant's words, and what a driver observes after them."""
+
+    def __init__(self, seed: int = 0) -> None:
+        self.env = DuoWizardEnv("brookside", config=EnvConfig(words_per_second=20.0))
+        self.observations, _ = self.env.reset(seed=seed)
+        self.player = NavigationPolicy(self._drive, self.env.limits)
+        self.state = self.player.initial_state(0, self.env.town)
+        self.seen: Any = None
+
+    def _drive(self, observation: Any, mask: Any) -> int:
+        self.seen = observation
+        return NavigationAction.NOTHING
+
+    def go(self, decisions: int, act: DialogueAct | None = None, words: str = "") -> None:
+        for _ in range(decisions):
+            speech = None if act is None else Speech(act=act, text=words)
+            driven, self.state = self.player.step(self.observations["co_wizard"], self.state)
+            self.observations, *_ = self.env.step(
+                {
+                    "participant": ParticipantAction(speech=speech).encode(self.env.limits),
+                    "co_wizard": driven,
+                    "ad_wizard": noop(Role.AD_WIZARD, self.env.limits),
+                }
+            )
+            act = None
+
+    def field(self, name: str) -> Any:
+        return self.seen[FIELD[name]]
+
+
+def instruct(*values: Any) -> DialogueAct:
+    return DialogueAct.of(DialogueMove.INSTRUCT, *values)
+
+
+def test_nobody_is_asked_to_drive_before_anything_is_said() -> None:
+    ride = Ride()
+    ride.go(4)
+    assert ride.seen is None
+
+
+def test_a_place_that_is_named_becomes_the_goal_with_its_ways() -> None:
+    ride = Ride()
+    mark = read_landmarks(ride.observations["co_wizard"], ride.env.town)[0]
+    ride.go(4, instruct(mark.name), f"go to the {mark.name.label}")
+    assert ride.field("said")[0] == 1.0 and ride.field("said_landmark").argmax() == mark.name.value
+    assert ride.field("goal")[0] == 1.0 and ride.field("goal_distance")[0] > 0.0
+    assert ride.env.stage.beliefs.goals == (mark.name,)
+
+
+def test_a_turn_that_is_told_has_the_sector_of_its_exit() -> None:
+    ride = Ride()
+    ride.go(3, instruct(ActionValue.J_TURN), "turn left")
+    turns = [k for k in range(8) if ride.field("said_sector")[k]]
+    assert ride.field("said_action").argmax() == ActionValue.J_TURN.value and len(turns) == 1
+    exits = ride.field("exits").reshape(8, 3)
+    assert exits[turns[0], 0] == 1.0
+    assert ride.field("said_distance")[0] <= ride.field("junction")[1] + 1e-6
+
+
+def test_a_car_that_is_told_to_stop_is_told_how_far_it_takes() -> None:
+    ride = Ride()
+    ride.go(12, instruct(ActionValue.LANE_FOLLOW), "keep going straight")
+    ride.go(3, instruct(ActionValue.STOP), "stop")
+    assert ride.field("said_action").argmax() == ActionValue.STOP.value
+    assert 0.0 < ride.field("said_distance")[0] * 100.0 < 30.0
+
+
+def test_speed_and_lights_are_set_as_they_are_asked_for() -> None:
+    ride = Ride()
+    ride.go(5, instruct(ActionValue.LIGHT_CHANGE), "turn on your lights")
+    assert ride.observations["co_wizard"]["lights"]
+    ride.go(6, instruct(ActionValue.SPEED_CHANGE), "slow down to 20")
+    assert float(ride.observations["co_wizard"]["cruise_speed"][0]) < 30.0
+
+
+def test_the_mask_is_nearly_that_of_the_environment() -> None:
+    env = NavigationEnv(guidance="goals", traffic="medium")
+    same = total = 0
+    for seed in range(4):
+        observation, info = env.reset(seed=seed)
+        likely = EstimatedActionMask(env.town, env.drive.ways)
+        for _ in range(80):
+            mask = likely.mask(env.drive.seen[Role.CO_WIZARD])
+            same, total = same + int((mask == info["action_mask"]).sum()), total + len(mask)
+            observation, _, over, cut, info = env.step(obey(observation, info["action_mask"]))
+            if over or cut:
+                break
+    assert same / total > 0.98

@@ -1,0 +1,81 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dorothie_gym.ontology import Role
+from dorothie_gym.policies import (
+    CastError,
+    LaneFollowPolicy,
+    Policy,
+    SilentPolicy,
+    find_player,
+    loadable_kinds,
+    policy_loader,
+    register_loader,
+)
+from dorothie_gym.spaces import SpaceLimits
+
+LIMITS = SpaceLimits()
+
+
+def load_silent(path: Path, role: Role, limits: SpaceLimits) -> Policy[Any]:
+    return SilentPolicy(role, limits)
+
+
+@pytest.fixture(autouse=True)
+def nobody_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(policy_loader, "_LOADERS", {})
+
+
+def test_player_by_name_makes_its_policy() -> None:
+    assert isinstance(find_player("lane-follow", Role.CO_WIZARD).make(Role.CO_WIZARD, LIMITS), LaneFollowPolicy)
+
+
+def test_name_of_another_role_is_told_with_those_there_are() -> None:
+    with pytest.raises(CastError, match="participant: there is no policy 'lane-follow'.*scripted, silent, random$"):
+        find_player("lane-follow", Role.PARTICIPANT)
+
+
+@pytest.mark.parametrize("as_folder", [False, True])
+def test_file_is_played_by_the_loader_of_its_kind(tmp_path: Path, as_folder: bool) -> None:
+    register_loader("quiet", load_silent)
+    (tmp_path / "model.json").write_text(json.dumps({"kind": "quiet"}))
+    player = find_player(str(tmp_path if as_folder else tmp_path / "model.json"), Role.CO_WIZARD)
+    assert isinstance(player.make(Role.CO_WIZARD, LIMITS), SilentPolicy)
+    assert loadable_kinds() == ("quiet",)
+
+
+def test_file_without_a_kind_goes_by_its_ending(tmp_path: Path) -> None:
+    register_loader(".weights", load_silent)
+    (tmp_path / "one.weights").write_bytes(b"1")
+    (tmp_path / "two.weights").write_bytes(b"2")
+    one, two = (find_player(str(tmp_path / f"{name}.weights"), Role.CO_WIZARD) for name in ("one", "two"))
+    assert one.sha256 != two.sha256
+
+
+def test_kind_that_nobody_reads_is_told(tmp_path: Path) -> None:
+    (tmp_path / "model.json").write_text(json.dumps({"kind": "quiet"}))
+    with pytest.raises(CastError, match=r"of the kind quiet or .json, which cannot be played \(known: none"):
+        find_player(str(tmp_path / "model.json"), Role.CO_WIZARD)
+    register_loader(".weights", load_silent)
+    with pytest.raises(CastError, match=r"known: .weights"):
+        find_player(str(tmp_path), Role.CO_WIZARD)
+
+
+def test_folder_without_a_description_and_torn_json_are_told(tmp_path: Path) -> None:
+    with pytest.raises(CastError, match="folder without model.json"):
+        find_player(str(tmp_path), Role.CO_WIZARD)
+    (tmp_path / "model.json").write_text('{"kind": ')
+    with pytest.raises(CastError, match="model.json: cannot be read"):
+        find_player(str(tmp_path), Role.CO_WIZARD)
+
+
+def test_two_loaders_for_one_kind_are_refused() -> None:
+    register_loader("quiet", load_silent)
+    register_loader("quiet", load_silent)
+    with pytest.raises(ValueError, match="have a loader already"):
+        register_loader("quiet", lambda path, role, limits: SilentPolicy(role, limits))

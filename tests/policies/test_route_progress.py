@@ -1,0 +1,96 @@
+from dorothie_gym.dialogue import Direction
+from dorothie_gym.policies.route_progress import (
+    RouteProgress,
+    find_exit,
+    is_choice,
+    light_ahead,
+    next_choice,
+    stopping_distance,
+)
+from dorothie_gym.world.town import LinkType, load_town
+from dorothie_gym.world.town.lights import LightColour
+
+TOWN = load_town("brookside")
+CHOICES = [lane.id for lane in TOWN.lanes if is_choice(TOWN, lane.id)]
+
+
+def test_next_choice_of_a_lane_that_ends_at_one_is_at_its_end():
+    lane = TOWN.lanes[CHOICES[0]]
+    choice = next_choice(TOWN, lane.id, 5.0)
+    assert choice is not None and choice.lane == lane.id
+    assert choice.distance == lane.length - 5.0
+
+
+def test_every_direction_of_a_junction_finds_its_exit():
+    for lane in CHOICES:
+        choice = next_choice(TOWN, lane, 0.0)
+        assert choice is not None
+        for way in choice.exits:
+            found = find_exit(TOWN, choice, Direction(str(way.type)))
+            assert found is not None and found.type is way.type
+
+
+def test_a_street_tells_exits_apart():
+    choice = next_choice(TOWN, CHOICES[0], 0.0)
+    assert choice is not None
+    for way in choice.exits:
+        street = frozenset({TOWN.lanes[way.lane].street})
+        found = find_exit(TOWN, choice, None, street)
+        assert found is not None and TOWN.lanes[found.lane].street in street
+
+
+def test_journey_counts_down_to_its_goal_and_notices_a_wrong_turn():
+    start, goal = TOWN.sites[0], TOWN.sites[-1]
+    journey = RouteProgress.plan(TOWN, (start.lane, start.station), (goal.lane, goal.station))
+    before = journey.left(start.station)
+    later = journey.followed(TOWN, start.lane, start.station + 5.0)
+    assert abs(before - later.left(start.station + 5.0) - 5.0) < 1e-6
+    off = next(lane.id for lane in TOWN.lanes if lane.id not in {leg.lane for leg in journey.legs})
+    assert journey.followed(TOWN, off, 1.0).astray == 1
+
+
+def test_journey_that_nothing_leads_past_ignores_what_blocks_it():
+    start, goal = TOWN.sites[0], TOWN.sites[-1]
+    everywhere = tuple((lane.id, s * lane.length) for lane in TOWN.lanes for s in (0.0, 0.25, 0.5, 0.75, 1.0))
+    journey = RouteProgress.plan(TOWN, (start.lane, start.station), (goal.lane, goal.station), everywhere)
+    assert journey.route is not None
+
+
+def test_goal_that_was_passed_is_astray():
+    goal = TOWN.sites[0]
+    journey = RouteProgress.plan(TOWN, (goal.lane, max(goal.station - 10.0, 0.0)), (goal.lane, goal.station))
+    assert journey.followed(TOWN, goal.lane, goal.station + 1.0).astray == 0
+    assert journey.followed(TOWN, goal.lane, goal.station + 6.0).astray == 1
+
+
+def test_stopping_distance_grows_with_speed():
+    assert 0.0 == stopping_distance(0.0) < stopping_distance(4.0) < stopping_distance(8.0)
+
+
+def test_only_a_traffic_light_in_sight_is_seen():
+    lane = next(lane for lane in TOWN.lanes if lane.length > 75.0 and TOWN.light(lane.id, 0.0) is not None)
+    colours = {light_ahead(TOWN, lane.id, lane.length - 5.0, float(time)) for time in range(120)}
+    assert colours == set(LightColour)
+    assert light_ahead(TOWN, lane.id, lane.length - 70.0, 0.0) is None
+    dark = next(lane for lane in TOWN.lanes if lane.id in CHOICES and TOWN.light(lane.id, 0.0) is None)
+    assert light_ahead(TOWN, dark.id, dark.length - 5.0, 0.0) is None
+
+
+def test_a_goal_right_behind_a_junction_needs_its_lane_before_it() -> None:
+    town = load_town("northgate")
+    tried = 0
+    for site in town.sites:
+        lane = town.lanes[site.lane]
+        before = [k for k in range(len(town.lanes)) if any(way.lane == lane.id for way in town.exits(k))]
+        for source in before:
+            beside = town.neighbour(source, LinkType.LANE_CHANGE_LEFT)
+            straight = beside is not None and any(abs(way.angle) < 20 for way in town.exits(beside))
+            if not straight or site.station > 20.0 or town.lanes[source].length < 55.0:
+                continue
+            assert beside is not None
+            journey = RouteProgress.plan(town, (beside, 1.0), (site.lane, site.station))
+            crossing = journey.next_crossing(town, 1.0)
+            if crossing is not None and crossing.lane == source and crossing.exit.lane == lane.id:
+                assert journey.needs_switch(town, beside, 1.0, crossing)
+                tried += 1
+    assert tried
