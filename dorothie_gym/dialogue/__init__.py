@@ -1,19 +1,24 @@
 """Talk: utterances and their timing, exchanges, wording of acts and understanding of words."""
 
-from dorothie_gym.dialogue.annotation import Annotator
-from dorothie_gym.dialogue.conversation import Conversation
-from dorothie_gym.dialogue.directions import Turn
+from dorothie_gym.dialogue.asr_channel import AsrChannel, Recogniser, word_error_rate
+from dorothie_gym.dialogue.conversation import (
+    SHORTEST_SPAN,
+    WORDS_PER_SECOND,
+    Conversation,
+    Span,
+    Utterance,
+    speech_seconds,
+)
+from dorothie_gym.dialogue.dialogue_act_classifier import act_of, guess_act, guess_spans
+from dorothie_gym.dialogue.directions import RouteTurn
 from dorothie_gym.dialogue.exchanges import EXPECTATIONS, PATIENCE, Exchange, ExchangeState, ExchangeTracker
-from dorothie_gym.dialogue.generation import MAX_CHARACTERS, word_act, word_acts
-from dorothie_gym.dialogue.guessing import act_of, guess_act, guess_spans
 from dorothie_gym.dialogue.lexicon import Lexicon, LexiconError, load_lexicon
-from dorothie_gym.dialogue.mishearing import Channel, word_error_rate
+from dorothie_gym.dialogue.nlg import MAX_CHARACTERS, word_act, word_acts
+from dorothie_gym.dialogue.nlu import ParsedText, understand
 from dorothie_gym.dialogue.phrases import Register
-from dorothie_gym.dialogue.recognising import Recogniser
-from dorothie_gym.dialogue.styles import SpeakerStyle, draw_style
-from dorothie_gym.dialogue.understanding import Heard, understand
-from dorothie_gym.dialogue.utterances import SHORTEST_SPAN, WORDS_PER_SECOND, Span, Utterance, speech_seconds
-from dorothie_gym.dialogue.wording import Direction, Wording, WordingContext
+from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext
+from dorothie_gym.dialogue.speaker_style import SpeakerStyle, draw_style
+from dorothie_gym.dialogue.transactions import Annotator
 
 __all__ = [
     "EXPECTATIONS",
@@ -22,20 +27,20 @@ __all__ = [
     "SHORTEST_SPAN",
     "WORDS_PER_SECOND",
     "Annotator",
-    "Channel",
+    "AsrChannel",
     "Conversation",
     "Direction",
     "Exchange",
     "ExchangeState",
     "ExchangeTracker",
-    "Heard",
+    "ParsedText",
     "Lexicon",
     "LexiconError",
     "Recogniser",
     "Register",
     "Span",
     "SpeakerStyle",
-    "Turn",
+    "RouteTurn",
     "Utterance",
     "Wording",
     "WordingContext",

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from dorothie_gym.dialogue.lexicon import LexiconError, read_data, strings
 from dorothie_gym.dialogue.numerals import read_ordinal
-from dorothie_gym.dialogue.wording import Direction
+from dorothie_gym.dialogue.realization_context import Direction
 
 _BACK = re.compile(
     r"\bu turn|\b(go|going|head|heading) back\b|\b(turn|turning|come|coming) (back|a?round)\b|\bthe other way\b"
@@ -25,7 +25,7 @@ _TURNING_WORDS = frozenset({"left", "right", "straight", "turn", "turning", "bac
 
 
 @dataclass(frozen=True, kw_only=True)
-class Turn:
+class RouteTurn:
     """One turn of a route told in words.
 
     Attributes:
@@ -95,21 +95,21 @@ def _right(before: str, after: str, following: str, place: int, lists: WordLists
     return "#ok" if after in lists.right_not_before and not turning else "right"
 
 
-def find_turns(words: Sequence[str], lists: WordLists) -> tuple[Turn, ...]:
+def find_turns(words: Sequence[str], lists: WordLists) -> tuple[RouteTurn, ...]:
     """Returns the turns that words (see `mask_directions`) tell, in order, each with the ordinal of its clause."""
     if _TURNING_WORDS.isdisjoint(words):
         return ()
-    turns: list[Turn] = []
+    turns: list[RouteTurn] = []
     waiting: int | None = None  # an ordinal said before its direction: "the second one, on the left"
     for clause in _clauses(words):
         ordinal = find_ordinal(clause, lists)
         directions = _directions(clause, lists)
         for number, direction in enumerate(directions):
-            turns.append(Turn(direction=direction, ordinal=(ordinal or waiting) if number == 0 else None))
+            turns.append(RouteTurn(direction=direction, ordinal=(ordinal or waiting) if number == 0 else None))
             waiting = None
         if not directions and ordinal is not None:
             if turns and turns[-1].ordinal is None:
-                turns[-1] = Turn(direction=turns[-1].direction, ordinal=ordinal)
+                turns[-1] = RouteTurn(direction=turns[-1].direction, ordinal=ordinal)
             else:
                 waiting = ordinal
     return tuple(turns)

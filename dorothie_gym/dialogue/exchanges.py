@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from dorothie_gym.dialogue.utterances import Utterance
+from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, SlotValue
 
 PATIENCE = 10.0

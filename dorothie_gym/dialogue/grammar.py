@@ -17,7 +17,7 @@ from dorothie_gym.dialogue.phrases import (
     parse_phrase,
     split_alternatives,
 )
-from dorothie_gym.dialogue.talk_files import Section, alternatives_of, parse_talk_files, read_talk_files
+from dorothie_gym.dialogue.talk_files import TalkSection, alternatives_of, parse_talk_files, read_talk_files
 from dorothie_gym.ontology import (
     SLOT_VALUES,
     ActionValue,
@@ -57,7 +57,7 @@ VOICES = (Role.PARTICIPANT, Role.CO_WIZARD)
 
 _NAMELESS = frozenset({"Unknown", "Unlabeled", "Queried"})
 _ACTIONS = {value.label: value for value in ActionValue}
-MANNERS = ("opener", "closer", "alarm")
+MARKER_KINDS = ("opener", "closer", "alarm")
 """Kinds of words around a sentence: in front, behind, and in front where something unexpected has happened."""
 
 
@@ -85,7 +85,7 @@ class Template:
 
 
 @dataclass(frozen=True)
-class Manner:
+class DiscourseMarker:
     """Words around sentences.
 
     Attributes:
@@ -113,7 +113,7 @@ class Grammar:
     templates: Mapping[DialogueMove, tuple[Template, ...]]
     actions: Mapping[ActionValue, Mapping[tuple[str, str], Phrase]]
     tails: Mapping[Slot, Mapping[DialogueMove | None, Phrase]]
-    manners: Mapping[tuple[str, Role, DialogueMove], Manner]
+    manners: Mapping[tuple[str, Role, DialogueMove], DiscourseMarker]
     joints: Mapping[tuple[DialogueMove, DialogueMove], Phrase]
     fillers: Phrase
 
@@ -147,7 +147,7 @@ class _Builder:
     templates: dict[DialogueMove, list[Template]] = field(default_factory=lambda: defaultdict(list))
     actions: dict[ActionValue, dict[tuple[str, str], Phrase]] = field(default_factory=lambda: defaultdict(dict))
     tails: dict[Slot, dict[DialogueMove | None, Phrase]] = field(default_factory=lambda: defaultdict(dict))
-    manners: dict[tuple[str, Role, DialogueMove], Manner] = field(default_factory=dict)
+    manners: dict[tuple[str, Role, DialogueMove], DiscourseMarker] = field(default_factory=dict)
     joints: dict[tuple[DialogueMove, DialogueMove], Phrase] = field(default_factory=dict)
     fillers: Phrase = Phrase("uh", frozenset(), frozenset())
 
@@ -163,7 +163,7 @@ class _Builder:
         templates = {move: tuple(self.templates[move]) for move in DialogueMove}
         return Grammar(templates, dict(self.actions), dict(self.tails), self.manners, self.joints, self.fillers)
 
-    def _take(self, section: Section) -> None:
+    def _take(self, section: TalkSection) -> None:
         kind, *words = section.words
         if kind in ("do", "doing", "cmd"):
             action = _ACTIONS.get(words[0] if words else "")
@@ -174,8 +174,8 @@ class _Builder:
         elif kind == "tail":
             slot, move = parse_slot(words[0]), parse_move(words[1]) if len(words) > 1 else None
             self.tails[slot][move] = self._phrase(section)
-        elif kind in MANNERS:
-            manner = Manner(self._phrase(section), float(section.keys.get("rate", 1)))
+        elif kind in MARKER_KINDS:
+            manner = DiscourseMarker(self._phrase(section), float(section.keys.get("rate", 1)))
             for word in words[1:] or [move.label for move in DialogueMove]:
                 self.manners[kind, parse_role(words[0]), parse_move(word)] = manner
         elif kind == "filler":
@@ -187,10 +187,10 @@ class _Builder:
         else:
             self._take_templates(section, parse_move(kind), words)
 
-    def _phrase(self, section: Section) -> Phrase:
+    def _phrase(self, section: TalkSection) -> Phrase:
         return choice(" ".join(section.words), alternatives_of(section, self.phrases))
 
-    def _take_templates(self, section: Section, move: DialogueMove, words: list[str]) -> None:
+    def _take_templates(self, section: TalkSection, move: DialogueMove, words: list[str]) -> None:
         keys = dict(section.keys)
         topic = keys.pop("topic", None)
         speaker = parse_role(words[0]) if words else None

@@ -42,7 +42,7 @@ class Register(enum.IntEnum):
 _REGISTERS = {"~": Register.SLANGY, "^": Register.POLITE, "!": Register.BLUNT}
 
 
-class Teller(Protocol):
+class PhraseSpeaker(Protocol):
     """What a phrase needs of its speaker to become words.
 
     Attributes:
@@ -64,7 +64,7 @@ class Teller(Protocol):
         ...
 
 
-Words = str | Callable[[Teller], str]
+Words = str | Callable[[PhraseSpeaker], str]
 """Fixed words, or a function that finds them."""
 
 
@@ -82,7 +82,7 @@ class Phrase:
     gaps: frozenset[str]
     maybe: frozenset[str]
 
-    def say(self, teller: Teller) -> str:
+    def say(self, teller: PhraseSpeaker) -> str:
         """Returns words for it; spaces may be doubled."""
         return self.words if isinstance(self.words, str) else self.words(teller)
 
@@ -120,7 +120,7 @@ def parse_phrase(where: str, text: str, phrases: Mapping[str, Phrase]) -> Phrase
     Raises:
         LexiconError: naming `where`, if the text is not in the language or names an unknown phrase.
     """
-    reader = _Reader(where, text, phrases)
+    reader = _PhraseParser(where, text, phrases)
     phrase = reader.sequence()
     reader.expect_end()
     return phrase
@@ -128,7 +128,7 @@ def parse_phrase(where: str, text: str, phrases: Mapping[str, Phrase]) -> Phrase
 
 def parse_alternatives(where: str, text: str, phrases: Mapping[str, Phrase]) -> list[Alternative]:
     """Compiles alternatives parted by "|"; arguments and errors as for `parse_phrase`."""
-    reader = _Reader(where, text, phrases)
+    reader = _PhraseParser(where, text, phrases)
     alternatives = reader.alternatives()
     reader.expect_end()
     return alternatives
@@ -178,7 +178,7 @@ def _choice_words(name: str, alternatives: Sequence[Alternative]) -> Words:
     options = tuple(tuple(alternatives[place].phrase.words for place in places) for places in manners)
     number = zlib.crc32(name.encode()) | 1
 
-    def say(teller: Teller) -> str:
+    def say(teller: PhraseSpeaker) -> str:
         mine = options[teller.manner]
         drawn, habit = teller.random(), teller.habit
         if drawn < habit:
@@ -190,7 +190,7 @@ def _choice_words(name: str, alternatives: Sequence[Alternative]) -> Words:
     return say
 
 
-class _Reader:
+class _PhraseParser:
     """Reads one line by recursive descent."""
 
     def __init__(self, where: str, text: str, phrases: Mapping[str, Phrase]) -> None:
@@ -287,7 +287,7 @@ def _gap(name: str) -> Phrase:
 
 
 def _optional(inner: Words) -> Words:
-    def say(teller: Teller) -> str:
+    def say(teller: PhraseSpeaker) -> str:
         if teller.random() >= teller.chattiness:
             return ""
         return inner if isinstance(inner, str) else inner(teller)
@@ -302,7 +302,7 @@ def _joined(parts: Sequence[Words]) -> Words:
         return parts[0]
     fixed = tuple(parts)
 
-    def say(teller: Teller) -> str:
+    def say(teller: PhraseSpeaker) -> str:
         return "".join([part if isinstance(part, str) else part(teller) for part in fixed])
 
     return say

@@ -19,7 +19,7 @@ _DEFINITION = re.compile(r"<(\w+)>\s*=\s*(.*)")
 
 
 @dataclass(frozen=True)
-class Line:
+class TalkLine:
     """A line of a section.
 
     Attributes:
@@ -32,7 +32,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Section:
+class TalkSection:
     """A section of a talk file.
 
     Attributes:
@@ -45,7 +45,7 @@ class Section:
     where: str
     words: tuple[str, ...]
     keys: dict[str, str]
-    lines: tuple[Line, ...]
+    lines: tuple[TalkLine, ...]
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class TalkFiles:
     """
 
     phrases: dict[str, Phrase]
-    sections: tuple[Section, ...]
+    sections: tuple[TalkSection, ...]
 
 
 def read_talk_files() -> dict[str, str]:
@@ -75,10 +75,10 @@ def parse_talk_files(texts: dict[str, str]) -> TalkFiles:
         LexiconError: naming file and line.
     """
     phrases: dict[str, Phrase] = {}
-    sections: list[Section] = []
+    sections: list[TalkSection] = []
     for name, text in texts.items():
-        head: Section | None = None
-        lines: list[Line] = []
+        head: TalkSection | None = None
+        lines: list[TalkLine] = []
         for line in _logical_lines(name, text):
             found = _DEFINITION.match(line.text)
             if found is not None:
@@ -94,13 +94,13 @@ def parse_talk_files(texts: dict[str, str]) -> TalkFiles:
     return TalkFiles(phrases, tuple(sections))
 
 
-def alternatives_of(section: Section, phrases: dict[str, Phrase]) -> list[Alternative]:
+def alternatives_of(section: TalkSection, phrases: dict[str, Phrase]) -> list[Alternative]:
     """Compiles the lines of a section; each may hold several alternatives parted by "|"."""
     return [item for line in section.lines for item in parse_alternatives(line.where, line.text, phrases)]
 
 
-def _logical_lines(name: str, text: str) -> Iterator[Line]:
-    pending: Line | None = None
+def _logical_lines(name: str, text: str) -> Iterator[TalkLine]:
+    pending: TalkLine | None = None
     for number, raw in enumerate(text.splitlines(), start=1):
         line = raw.partition("#")[0].strip()
         if not line:
@@ -108,11 +108,11 @@ def _logical_lines(name: str, text: str) -> Iterator[Line]:
         if line.startswith("|"):
             if pending is None:
                 raise LexiconError(f"{name}:{number}: there is no line to go on with: {line!r}")
-            pending = Line(pending.where, f"{pending.text} {line}")
+            pending = TalkLine(pending.where, f"{pending.text} {line}")
             continue
         if pending is not None:
             yield pending
-        pending = Line(f"{name}:{number}", line)
+        pending = TalkLine(f"{name}:{number}", line)
     if pending is not None:
         yield pending
 
@@ -123,17 +123,17 @@ def _define(where: str, name: str, text: str, phrases: dict[str, Phrase]) -> Non
     phrases[name] = choice(name, parse_alternatives(where, text, phrases))
 
 
-def _head(line: Line) -> Section:
+def _head(line: TalkLine) -> TalkSection:
     words = line.text.removeprefix("==").split()
     if not words:
         raise LexiconError(f"{line.where}: a section needs a head, for instance: == Instruct participant")
     keys = dict(word.split("=", 1) for word in words if "=" in word)
-    return Section(line.where, tuple(word for word in words if "=" not in word), keys, ())
+    return TalkSection(line.where, tuple(word for word in words if "=" not in word), keys, ())
 
 
-def _closed(head: Section | None, lines: Sequence[Line]) -> list[Section]:
+def _closed(head: TalkSection | None, lines: Sequence[TalkLine]) -> list[TalkSection]:
     if head is None:
         return []
     if not lines:
         raise LexiconError(f"{head.where}: the section has no lines")
-    return [Section(head.where, head.words, head.keys, tuple(lines))]
+    return [TalkSection(head.where, head.words, head.keys, tuple(lines))]

@@ -28,13 +28,13 @@ from dorothie_gym.spaces import (
     ActionDecoder,
     AdWizardAction,
     CoWizardAction,
+    LanePosition,
     Mental,
     Observation,
     ParticipantAction,
     RoleAction,
     SpaceLimits,
 )
-from dorothie_gym.spaces import Place as Mark
 from dorothie_gym.tasks import StoryboardTemplate, load_template
 from dorothie_gym.world.car.driver import MAX_CRUISE, MIN_CRUISE
 from dorothie_gym.world.network.network import TownNetwork
@@ -189,7 +189,7 @@ class DrivingSession:
             path, s = self.stage.world.planner.path, self.stage.world.planner.s
             k = path.index_at(min(s + distance, path.length))
             lane, station = int(path.lanes[k]), float(path.stations[k])
-            mark = Mark(lane=lane, metres=int(station))
+            mark = LanePosition(lane=lane, metres=int(station))
             self._notes.append(Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=name, place=mark))
 
     # --- what comes of it -------------------------------------------------------------------------------------------

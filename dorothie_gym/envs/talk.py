@@ -9,7 +9,7 @@ import numpy as np
 
 from dorothie_gym.dialogue import (
     Annotator,
-    Channel,
+    AsrChannel,
     Conversation,
     Recogniser,
     Span,
@@ -76,7 +76,7 @@ class Talk:
         self._annotator = Annotator(storyboard.landmarks[subgoal.landmark].name for subgoal in storyboard.subgoals)
         self._words, rng = np.random.default_rng(words), np.random.default_rng(styles)
         self._styles = {role: draw_style(role, rng) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
-        self._recogniser = Recogniser(Channel(rate=config.word_error_rate), np.random.default_rng(ears))
+        self._recogniser = Recogniser(AsrChannel(rate=config.word_error_rate), np.random.default_rng(ears))
 
     @property
     def exchanges(self) -> int:

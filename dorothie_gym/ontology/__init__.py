@@ -16,43 +16,31 @@ from dorothie_gym.ontology.actions import (
     MentalAction,
     PhysicalAction,
 )
-from dorothie_gym.ontology.acts import (
-    DialogueAct,
-)
 from dorothie_gym.ontology.decision_tree import (
     DECISION_TREE,
     MOVE_GROUPS,
     Answer,
     MoveGroup,
     Node,
-    Path,
     Question,
+    TreePath,
     groups_of,
     path_to,
     paths,
     walk,
 )
-from dorothie_gym.ontology.errors import (
-    OntologyError,
-)
-from dorothie_gym.ontology.exceptions import (
-    ExceptionKind,
-    Sensor,
-)
-from dorothie_gym.ontology.labels import (
+from dorothie_gym.ontology.dialogue_acts import (
     LABEL_INDEX,
     LABELS,
     SLOT_SPANS,
     VECTOR_SLOTS,
+    DialogueAct,
+    DialogueMove,
+    DialogueUnit,
+    UnitEnd,
     decode_slots,
     encode_slots,
     in_label_order,
-)
-from dorothie_gym.ontology.moves import (
-    DialogueMove,
-)
-from dorothie_gym.ontology.props import (
-    PropKind,
 )
 from dorothie_gym.ontology.roles import (
     AGENT_ROLES,
@@ -89,11 +77,13 @@ from dorothie_gym.ontology.spellings import (
     parse_street,
     parse_weather_parameter,
 )
-from dorothie_gym.ontology.units import (
-    DialogueUnit,
-    UnitEnd,
+from dorothie_gym.ontology.vocabulary import (
+    OntologyError,
 )
-from dorothie_gym.ontology.weather import (
+from dorothie_gym.ontology.world_exceptions import (
+    ExceptionKind,
+    PropKind,
+    Sensor,
     WeatherParameter,
 )
 
@@ -125,7 +115,7 @@ __all__ = [
     "Node",
     "ObjectClass",
     "OntologyError",
-    "Path",
+    "TreePath",
     "PhysicalAction",
     "PropKind",
     "Question",

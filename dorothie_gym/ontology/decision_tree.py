@@ -13,8 +13,8 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import TypeAlias
 
-from dorothie_gym.ontology.errors import OntologyError
-from dorothie_gym.ontology.moves import DialogueMove
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.vocabulary import OntologyError
 
 
 class MoveGroup(StrEnum):
@@ -84,7 +84,7 @@ class Question:
 
 
 Node: TypeAlias = Question | DialogueMove
-Path: TypeAlias = tuple[tuple[Question, Answer], ...]
+TreePath: TypeAlias = tuple[tuple[Question, Answer], ...]
 
 DECISION_TREE = Question(
     "What is the span for?",
@@ -188,7 +188,7 @@ def walk(answers: Iterable[str], tree: Question = DECISION_TREE) -> DialogueMove
     return node
 
 
-def paths(tree: Question = DECISION_TREE) -> Iterator[tuple[Path, DialogueMove]]:
+def paths(tree: Question = DECISION_TREE) -> Iterator[tuple[TreePath, DialogueMove]]:
     """Yields every way through `tree` as (question, answer) pairs and the move at its end, depth first."""
     for answer in tree.answers:
         step = (tree, answer)
@@ -199,7 +199,7 @@ def paths(tree: Question = DECISION_TREE) -> Iterator[tuple[Path, DialogueMove]]
             yield (step,), answer.next
 
 
-def path_to(move: DialogueMove) -> Path:
+def path_to(move: DialogueMove) -> TreePath:
     """Returns the (question, answer) pairs that lead from the root to `move`."""
     return _PATHS[move]
 
@@ -209,7 +209,7 @@ def groups_of(move: DialogueMove) -> tuple[MoveGroup, ...]:
     return tuple(question.group for question, _ in path_to(move) if question.group is not None)
 
 
-_PATHS: Mapping[DialogueMove, Path] = MappingProxyType({move: path for path, move in paths()})
+_PATHS: Mapping[DialogueMove, TreePath] = MappingProxyType({move: path for path, move in paths()})
 
 MOVE_GROUPS: Mapping[MoveGroup, tuple[DialogueMove, ...]] = MappingProxyType(
     {group: tuple(move for move in DialogueMove if group in groups_of(move)) for group in MoveGroup}

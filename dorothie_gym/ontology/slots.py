@@ -7,7 +7,7 @@ from enum import Enum
 from types import MappingProxyType
 from typing import ClassVar, Self, TypeAlias
 
-from dorothie_gym.ontology.labelled import LabelledInt
+from dorothie_gym.ontology.vocabulary import LabelledInt
 
 ARRIVAL_DISTANCE = 2.0
 """A subgoal is reached when the car stops within this distance of the landmark's waypoint [m]."""

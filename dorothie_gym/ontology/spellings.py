@@ -10,11 +10,7 @@ from types import MappingProxyType
 from typing import Protocol, TypeVar
 
 from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
-from dorothie_gym.ontology.acts import DialogueAct
-from dorothie_gym.ontology.errors import OntologyError
-from dorothie_gym.ontology.exceptions import ExceptionKind, Sensor
-from dorothie_gym.ontology.moves import DialogueMove
-from dorothie_gym.ontology.props import PropKind
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import (
     ActionValue,
@@ -25,8 +21,8 @@ from dorothie_gym.ontology.slots import (
     SlotValue,
     StreetName,
 )
-from dorothie_gym.ontology.vocabulary import Vocabulary, normalise
-from dorothie_gym.ontology.weather import WeatherParameter
+from dorothie_gym.ontology.vocabulary import OntologyError, Vocabulary, normalise
+from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
 
 
 class _Labelled(Protocol):

@@ -1,13 +1,63 @@
-"""Looking a spelling up in a closed vocabulary."""
+"""Closed vocabularies: labelled enums, look-up of spellings, and the error for unknown ones."""
 
 from __future__ import annotations
 
+import difflib
+import functools
 import unicodedata
 from collections.abc import Iterable, Mapping
+from enum import IntEnum
 from types import MappingProxyType
-from typing import Generic, TypeVar
+from typing import Generic, Self, TypeVar
 
-from dorothie_gym.ontology.errors import OntologyError
+LONGEST = 80
+"""So many letters of a text that is unknown are looked at and shown: texts come from files of others."""
+
+
+class OntologyError(ValueError):
+    """A text, number or combination that the closed vocabularies do not contain."""
+
+    @classmethod
+    def unknown(cls, text: object, vocabulary: str, known: Iterable[str]) -> OntologyError:
+        """Returns the error for `text`, naming the vocabulary and the nearest of the `known` spellings."""
+        spellings = tuple(known)
+        if not isinstance(text, str):
+            return cls(f"{vocabulary}: expected a text, got {_shown(repr(text))} of type {type(text).__name__}")
+        # cutoff 0: a far guess still shows the reader what the spellings of this vocabulary look like.
+        nearest = _nearest(text[:LONGEST].lower(), spellings)
+        hint = f"; the nearest known spelling is {nearest!r}" if nearest is not None else ""
+        return cls(f"{vocabulary}: {_shown(repr(text))} is unknown{hint}")
+
+
+@functools.lru_cache(maxsize=1024)
+def _nearest(text: str, spellings: tuple[str, ...]) -> str | None:
+    """Returns the spelling nearest to a text in lower case; kept, since a file has the same mistake many times."""
+    by_lower = {spelling.lower(): spelling for spelling in spellings}
+    nearest = difflib.get_close_matches(text, by_lower, n=1, cutoff=0.0)
+    return by_lower[nearest[0]] if nearest else None
+
+
+def _shown(text: str) -> str:
+    return text if len(text) <= LONGEST + 2 else f"{text[:LONGEST]}..."
+
+
+class LabelledInt(IntEnum):
+    """An integer enum whose members are written `NAME = id, "Label"`.
+
+    Attributes:
+        label: the spelling in files, tables and SDN.
+    """
+
+    label: str
+
+    # The default is never used by a member: it lets type checkers accept the look-up by number, `Enum(3)`.
+    def __new__(cls, value: int, label: str = "") -> Self:
+        """Makes a member from its number and its spelling."""
+        member = int.__new__(cls, value)
+        member._value_ = value
+        member.label = label
+        return member
+
 
 Member_co = TypeVar("Member_co", covariant=True)
 

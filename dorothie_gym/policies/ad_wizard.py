@@ -15,7 +15,7 @@ from dorothie_gym.dialogue import load_lexicon
 from dorothie_gym.ontology import ExceptionKind, LandmarkName, PropKind, Role, Sensor, WeatherParameter
 from dorothie_gym.policies.observation_parser import place_on_path, read_landmarks, read_subgoals, scalar
 from dorothie_gym.policies.policy import Policy
-from dorothie_gym.spaces import ActionDict, AdWizardAction, Place, PropColumn, SpaceLimits
+from dorothie_gym.spaces import ActionDict, AdWizardAction, LanePosition, PropColumn, SpaceLimits
 from dorothie_gym.world.town import Town
 
 
@@ -208,7 +208,7 @@ def _roadblock(
     return AdWizardAction(
         exception=ExceptionKind.PLACE_PROP,
         prop=PropKind.STREET_BARRIER,
-        place=Place(lane=lane, metres=round(station)),
+        place=LanePosition(lane=lane, metres=round(station)),
     )
 
 
@@ -260,7 +260,10 @@ def _crowd(
         return None
     kind = ExceptionKind.SPAWN_PEDESTRIANS if rng.random() < 0.6 else ExceptionKind.SPAWN_VEHICLES
     return AdWizardAction(
-        exception=kind, place=Place(lane=place[0], metres=round(place[1])), count=int(rng.integers(1, 4)), extent=25
+        exception=kind,
+        place=LanePosition(lane=place[0], metres=round(place[1])),
+        count=int(rng.integers(1, 4)),
+        extent=25,
     )
 
 

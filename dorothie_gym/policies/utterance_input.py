@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from dorothie_gym.dialogue import Heard, guess_spans, understand
+from dorothie_gym.dialogue import ParsedText, guess_spans, understand
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role
 from dorothie_gym.spaces import heard_acts
 
@@ -16,7 +16,7 @@ class HeardUtterance:
     """An utterance that is over: its acts in order, and its words with what they tell."""
 
     acts: tuple[DialogueAct, ...]
-    words: Heard
+    words: ParsedText
 
 
 def heard_utterance(

@@ -6,17 +6,17 @@ from dorothie_gym.spaces.actions import (
     ActionDict,
     AdWizardAction,
     CoWizardAction,
+    LanePosition,
     Mental,
     ParticipantAction,
     Physical,
-    Place,
     RoleAction,
     Speech,
     action_space,
     decode_action,
     noop,
 )
-from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.limits import SpaceLimits, plain_text
 from dorothie_gym.spaces.observations import (
     ExitColumn,
     GuessColumn,
@@ -29,7 +29,6 @@ from dorothie_gym.spaces.observations import (
     heard_acts,
     observation_space,
 )
-from dorothie_gym.spaces.text import plain_text
 
 __all__ = [
     "NO_MOVE",
@@ -46,7 +45,7 @@ __all__ = [
     "Observation",
     "ParticipantAction",
     "Physical",
-    "Place",
+    "LanePosition",
     "PropColumn",
     "RoleAction",
     "SpaceLimits",

@@ -30,6 +30,7 @@ from dorothie_gym.ontology import (
     decode_slots,
     encode_slots,
 )
+from dorothie_gym.spaces.action_reader import ActionFieldTable, ActionReader
 from dorothie_gym.spaces.limits import (
     MESSAGE_LENGTH,
     METRES,
@@ -38,7 +39,6 @@ from dorothie_gym.spaces.limits import (
     UTTERANCE_LENGTH,
     SpaceLimits,
 )
-from dorothie_gym.spaces.reading import FieldReader, FieldTable
 
 NO_MOVE = len(DialogueMove)
 """Value of `move` that says nothing."""
@@ -62,7 +62,7 @@ class Speech:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class LanePosition:
     """A place on the map: a lane and whole metres along it."""
 
     lane: int = 0
@@ -83,10 +83,10 @@ class ParticipantAction:
     @classmethod
     def decode(cls, action: Mapping[str, Any], limits: SpaceLimits) -> ParticipantAction:
         """Reads a dict; raises `ValueError` naming the field that is wrong."""
-        return cls.read(FieldReader(action, _fields(cls.role, limits)))
+        return cls.read(ActionReader(action, _fields(cls.role, limits)))
 
     @classmethod
-    def read(cls, reader: FieldReader) -> ParticipantAction:
+    def read(cls, reader: ActionReader) -> ParticipantAction:
         """The same from the fields."""
         speech = _read_speech(reader)
         return cls(speech=speech) if speech is not None else _SILENCE
@@ -110,7 +110,7 @@ class Mental:
     goals: tuple[LandmarkName, ...] = ()
     landmark: LandmarkName = LandmarkName.UNKNOWN
     status: GoalStatus = GoalStatus.UNKNOWN
-    place: Place = field(default_factory=Place)
+    place: LanePosition = field(default_factory=LanePosition)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,10 +147,10 @@ class CoWizardAction:
     @classmethod
     def decode(cls, action: Mapping[str, Any], limits: SpaceLimits) -> CoWizardAction:
         """Reads a dict; raises `ValueError` naming the field that is wrong."""
-        return cls.read(FieldReader(action, _fields(cls.role, limits)))
+        return cls.read(ActionReader(action, _fields(cls.role, limits)))
 
     @classmethod
-    def read(cls, reader: FieldReader) -> CoWizardAction:
+    def read(cls, reader: ActionReader) -> CoWizardAction:
         """The same from the fields."""
         physical, mental, angle, up, landmark, status, lane, metres = reader.integers(_CO_WIZARD_NUMBERS)
         plan, goals = reader.numbers("plan"), reader.flags("goals")
@@ -166,7 +166,7 @@ class CoWizardAction:
                 goals=tuple(LANDMARKS[i] for i, marked in enumerate(goals) if marked),
                 landmark=LANDMARKS[landmark],
                 status=STATUSES[status],
-                place=Place(lane=lane, metres=metres),
+                place=LanePosition(lane=lane, metres=metres),
             )
             if mental
             else None,
@@ -196,7 +196,7 @@ class AdWizardAction:
     share: float = 0.0
     prop: PropKind = PROPS[0]
     item: int = 0
-    place: Place = field(default_factory=Place)
+    place: LanePosition = field(default_factory=LanePosition)
     count: int = 0
     extent: int = 0
     sensor: Sensor = SENSORS[0]
@@ -222,10 +222,10 @@ class AdWizardAction:
     @classmethod
     def decode(cls, action: Mapping[str, Any], limits: SpaceLimits) -> AdWizardAction:
         """Reads a dict; raises `ValueError` naming the field that is wrong."""
-        return cls.read(FieldReader(action, _fields(cls.role, limits)))
+        return cls.read(ActionReader(action, _fields(cls.role, limits)))
 
     @classmethod
-    def read(cls, reader: FieldReader) -> AdWizardAction:
+    def read(cls, reader: ActionReader) -> AdWizardAction:
         """The same from the fields."""
         numbers, message = reader.integers(_AD_WIZARD_NUMBERS), reader.text("message")
         if not any(numbers) and not message:
@@ -237,7 +237,7 @@ class AdWizardAction:
             share=share / (PERCENT - 1),
             prop=PROPS[prop],
             item=item,
-            place=Place(lane=lane, metres=metres),
+            place=LanePosition(lane=lane, metres=metres),
             count=count,
             extent=extent,
             sensor=SENSORS[sensor],
@@ -274,7 +274,7 @@ class ActionDecoder:
         if type(action) is not dict and not isinstance(action, Mapping):
             raise ValueError(f"action of {self.role}: expected a dict, got {type(action).__name__}")
         try:
-            return self._read(FieldReader(action, self._fields))
+            return self._read(ActionReader(action, self._fields))
         except ValueError as error:
             raise ValueError(f"action of {self.role}: {error}") from None
 
@@ -352,16 +352,16 @@ def _encode_speech(speech: Speech | None) -> ActionDict:
     }
 
 
-def _encode_place(place: Place) -> ActionDict:
+def _encode_place(place: LanePosition) -> ActionDict:
     return {"lane": place.lane, "metres": place.metres}
 
 
 @lru_cache(maxsize=64)
-def _fields(role: Role, limits: SpaceLimits) -> FieldTable:
-    return FieldTable(action_space(role, limits))
+def _fields(role: Role, limits: SpaceLimits) -> ActionFieldTable:
+    return ActionFieldTable(action_space(role, limits))
 
 
-def _read_speech(reader: FieldReader) -> Speech | None:
+def _read_speech(reader: ActionReader) -> Speech | None:
     move, slots, text = reader.integer("move"), reader.flags("slots"), reader.text("utterance")
     return None if move == NO_MOVE else Speech(act=_act(move, slots), text=text)
 

@@ -1,8 +1,9 @@
-"""Sizes of the spaces: the same for every town, so that a policy trained in one can act in another."""
+"""Sizes of the observation and action spaces, and text that fits them."""
 
 from __future__ import annotations
 
 import string
+import unicodedata
 from dataclasses import dataclass
 
 from dorothie_gym.world.town import Town
@@ -56,3 +57,15 @@ class SpaceLimits:
             junctions=max(cls.junctions, len(town.junctions)),
             streets=max(cls.streets, len(town.streets)),
         )
+
+
+_PLAIN = str.maketrans({"‘": "'", "’": "'", "“": '"', "”": '"', "–": "-", "—": "-", "…": "..."})
+_KNOWN = frozenset(TEXT_CHARACTERS)
+
+
+def plain_text(text: str, length: int) -> str:
+    """The text in the characters of the text spaces, cut to a length: accents go, typographic marks become plain."""
+    if text.isascii() and text.isprintable():
+        return text[:length]
+    spelt = unicodedata.normalize("NFKD", text.translate(_PLAIN))
+    return "".join(c for c in spelt if c in _KNOWN)[:length]

@@ -1,23 +1,137 @@
-"""Binds a template to the places of a town."""
+"""Binding of a storyboard template to a town: kinds of landmarks, sites, and values for all names."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from dorothie_gym.ontology import LandmarkName
-from dorothie_gym.tasks.casting import cast
-from dorothie_gym.tasks.catalogue import catalogue
-from dorothie_gym.tasks.errors import StoryboardError
-from dorothie_gym.tasks.sites import spread_places
-from dorothie_gym.tasks.storyboard import Landmark, Place, Storyboard, Subgoal
-from dorothie_gym.tasks.templates import StoryboardTemplate, SubgoalTemplate, fill
+from dorothie_gym.tasks.catalogue import LandmarkKind, catalogue, categories, find_kind, kinds_in
+from dorothie_gym.tasks.storyboard import Landmark, LandmarkSite, Storyboard, StoryboardError, Subgoal
+from dorothie_gym.tasks.templates import StoryboardTemplate, SubgoalTemplate, Variable, fill, variable_of
+
+
+def cast(template: StoryboardTemplate, rng: np.random.Generator | None = None) -> dict[str, LandmarkName]:
+    """Chooses a kind of landmark for each name of a template.
+
+    Kinds that a town has once are given to one name only. House and Person may be given to several, but for a
+    wide category ("places") they are repeated only when every other kind that fits is taken.
+
+    Args:
+        template: the template; its destinations must refer to something.
+        rng: draws among the kinds that fit; without it, the first ones are taken (to see whether there are any).
+
+    Returns:
+        A kind for each landmark named outright (key: its label) and each variable (key: "$NAME").
+
+    Raises:
+        StoryboardError: a category or attribute that no landmark has, or more names than landmarks.
+    """
+    fixed = {
+        ref: kind.name
+        for ref in template.destinations()
+        if variable_of(ref) is None and (kind := find_kind(ref)) is not None
+    }
+    candidates = [_candidates(template, variable) for variable in template.variables]
+    chosen = _assign(candidates, tuple(fixed.values()), rng)
+    if chosen is None:
+        raise StoryboardError(template.name, "variables", _shortage(template, fixed))
+    names = (f"${variable.name}" for variable in template.variables)
+    return fixed | dict(zip(names, chosen, strict=True))
+
+
+def _candidates(template: StoryboardTemplate, variable: Variable) -> tuple[LandmarkKind, ...]:
+    kinds = kinds_in(variable.category)
+    if not kinds:
+        known = ", ".join(("places", *categories()))
+        reason = f"no landmark is of category {variable.category!r}; use one of {known}"
+        raise StoryboardError(template.name, f"variables.{variable.name}", reason)
+    dependents = [row for row in template.dependents if row.variable == variable.name]
+    for attribute, number in Counter(row.attribute for row in dependents).items():
+        field = f"dependents.{next(row.name for row in dependents if row.attribute == attribute)}"
+        having = tuple(kind for kind in kinds if attribute in kind.attributes)
+        if not having:
+            known = ", ".join(sorted({name for kind in kinds for name in kind.attributes})) or "none"
+            reason = f"no landmark of {variable.category!r} has the attribute {attribute!r}; it has: {known}"
+            raise StoryboardError(template.name, field, reason)
+        kinds = tuple(kind for kind in having if len(kind.attributes[attribute]) >= number)
+        if not kinds:
+            most = max(len(kind.attributes[attribute]) for kind in having)
+            reason = (
+                f"{number} different {variable.name}.{attribute} are asked for, but there are {most}; ask for fewer"
+            )
+            raise StoryboardError(template.name, field, reason)
+    return kinds
+
+
+def _assign(
+    candidates: Sequence[Sequence[LandmarkKind]],
+    taken: tuple[LandmarkName, ...],
+    rng: np.random.Generator | None,
+) -> tuple[LandmarkName, ...] | None:
+    """One kind for each row of candidates, by depth-first search; None if there is no way."""
+    if not candidates:
+        return ()
+    row = candidates[0]
+    order = [row[k] for k in (rng.permutation(len(row)) if rng is not None else range(len(row)))]
+    unused = [kind for kind in order if kind.name not in taken]
+    repeated = [kind for kind in order if kind.name in taken and kind.repeatable]
+    for kind in unused + repeated:
+        rest = _assign(candidates[1:], (*taken, kind.name), rng)
+        if rest is not None:
+            return (kind.name, *rest)
+    return None
+
+
+def _shortage(template: StoryboardTemplate, fixed: Mapping[str, LandmarkName]) -> str:
+    wanted = ", ".join(f"{variable.name} ({variable.category})" for variable in template.variables)
+    named = f" besides {', '.join(fixed)}" if fixed else ""
+    return f"there are not enough different landmarks for {wanted}{named}; ask for fewer or for wider categories"
+
+
+# A stop counts within 2 m of a waypoint (paper, appendix "Interface Components"); this leaves room for queues too.
+SPACING = 15.0
+"""Distance that two landmarks keep from one another where the town has the places for it [m]."""
+
+
+def spread_places(places: Sequence[LandmarkSite], count: int, rng: np.random.Generator) -> list[LandmarkSite]:
+    """Draws places, first those on lanes of their own that keep `SPACING`, then those that keep it, then the farthest.
+
+    Args:
+        places: places to draw from; at least `count`.
+        count: how many to draw.
+        rng: decides in which order the places are tried.
+
+    Returns:
+        Distinct places, best spread first.
+    """
+    shuffled = [places[k] for k in rng.permutation(len(places))]
+    chosen: list[LandmarkSite] = []
+    for fresh_lane in (True, False):
+        for place in tuple(shuffled):
+            lane_is_taken = fresh_lane and any(place.lane == other.lane for other in chosen)
+            if len(chosen) < count and not lane_is_taken and _gap(place, chosen) >= SPACING:
+                chosen.append(place)
+                shuffled.remove(place)
+    while len(chosen) < count:
+        farthest = max(range(len(shuffled)), key=lambda k: _gap(shuffled[k], chosen))
+        chosen.append(shuffled.pop(farthest))
+    return chosen
+
+
+def _gap(place: LandmarkSite, others: Sequence[LandmarkSite]) -> float:
+    """Distance to the closest of the others, between the landmarks or between their waypoints [m]."""
+    return min(
+        (min(math.dist(place.position, other.position), math.dist(place.waypoint, other.waypoint)) for other in others),
+        default=math.inf,
+    )
 
 
 def bind(
-    template: StoryboardTemplate, places: Sequence[Place], rng: np.random.Generator, *, name: str | None = None
+    template: StoryboardTemplate, places: Sequence[LandmarkSite], rng: np.random.Generator, *, name: str | None = None
 ) -> Storyboard:
     """Draws landmarks, values and places for a template.
 
@@ -80,7 +194,7 @@ def _place(
     names: Sequence[LandmarkName],
     first: Sequence[int],
     hidden: set[int],
-    places: Sequence[Place],
+    places: Sequence[LandmarkSite],
     rng: np.random.Generator,
 ) -> tuple[Landmark, ...]:
     """Puts landmarks at places, those whose indices are in `first` before the others."""

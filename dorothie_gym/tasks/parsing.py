@@ -1,18 +1,155 @@
-"""Reads storyboard templates from files and from the ones that come with the package."""
+"""Parser of storyboard templates."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import json
+import re
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from dorothie_gym.tasks.catalogue import find_kind
-from dorothie_gym.tasks.errors import StoryboardError
-from dorothie_gym.tasks.fields import FieldReader
-from dorothie_gym.tasks.lenient_json import read_json
+from dorothie_gym.tasks.storyboard import StoryboardError
 from dorothie_gym.tasks.templates import Dependent, StoryboardTemplate, SubgoalTemplate, Variable
 from dorothie_gym.tasks.validation import check
+
+# A string is matched as a whole, so that a comma inside it is left alone.
+_STRING_OR_LAST_COMMA = re.compile(r'"(?:\\.|[^"\\])*"|(?<=[^\s\[{,:])(\s*),(?=\s*[\]}])', re.DOTALL)
+
+
+def read_json(text: str, source: str) -> Any:
+    """Parses a text.
+
+    Args:
+        text: JSON, but for trailing commas and raw line breaks in strings.
+        source: what the text is called in errors.
+
+    Raises:
+        StoryboardError: not JSON even so (with line and column), or an object gives one field twice.
+    """
+
+    def one_of_each(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        fields: dict[str, Any] = {}
+        for key, value in pairs:
+            if key in fields:
+                raise StoryboardError(source, key, "this field is given twice in one object; keep one of them")
+            fields[key] = value
+        return fields
+
+    # The comma becomes a space, so that positions in errors stay those of the file.
+    strict = _STRING_OR_LAST_COMMA.sub(lambda match: match[0] if match[1] is None else f"{match[1]} ", text)
+    try:
+        return json.loads(strict, strict=False, object_pairs_hook=one_of_each)
+    except json.JSONDecodeError as error:
+        place = f"line {error.lineno}, column {error.colno}"
+        raise StoryboardError(source, place, f"not JSON: {error.msg}; correct the file there") from error
+    except RecursionError as error:
+        raise StoryboardError(source, "text", "not a template: brackets are nested too deeply") from error
+
+
+_NAME = re.compile(r"[A-Za-z_]\w*")
+
+
+@dataclass(frozen=True)
+class TemplateFields:
+    """One object of a template.
+
+    Attributes:
+        template: what the template is called in errors.
+        path: where the object stands, such as "subgoals[1]"; empty at the top.
+        values: the object.
+    """
+
+    template: str
+    path: str
+    values: dict[str, Any]
+
+    def fail(self, field: str, reason: str) -> NoReturn:
+        """Raises a `StoryboardError` about a field of this object."""
+        raise StoryboardError(self.template, f"{self.path}.{field}" if self.path else field, reason)
+
+    def check_known(self, known: Collection[str]) -> None:
+        """Raises if the object has a field that is not in `known`."""
+        for field in self.values:
+            if field not in known:
+                self.fail(field, f"unknown field; the fields are {', '.join(known)}")
+
+    def text(self, field: str) -> str:
+        """A text that must be there; line breaks and runs of blanks become one blank."""
+        text = self.optional_text(field)
+        if text is None:
+            self.fail(field, "is missing or empty; give a text")
+        return text
+
+    def optional_text(self, field: str) -> str | None:
+        """A text, or None where the field is absent or empty."""
+        value = self.values.get(field, "")
+        if not isinstance(value, str):
+            self.fail(field, f"must be a text, not {_describe(value)}")
+        return " ".join(value.split()) or None
+
+    def flag(self, field: str) -> bool:
+        """True or false; false where the field is absent."""
+        value = self.values.get(field, False)
+        if not isinstance(value, bool):
+            self.fail(field, f"must be true or false, not {_describe(value)}")
+        return value
+
+    def items(self, field: str) -> list[Any]:
+        """A list; empty where the field is absent."""
+        value = self.values.get(field, [])
+        if not isinstance(value, list):
+            self.fail(field, f"must be a list, not {_describe(value)}")
+        return value
+
+    def indices(self, field: str) -> tuple[int, ...]:
+        """A list of indices, each once, in ascending order."""
+        items = self.items(field)
+        for item in items:
+            if isinstance(item, bool) or not isinstance(item, int):
+                self.fail(field, f"must be a list of subgoal numbers (the first is 0), not of {_describe(item)}")
+        return tuple(sorted(set(items)))
+
+    def names(self, field: str) -> tuple[str, ...]:
+        """A list of variables' names, with or without the dollar sign."""
+        items = self.items(field)
+        for item in items:
+            if not isinstance(item, str):
+                self.fail(field, f"must be a list of variables' names, not of {_describe(item)}")
+        return tuple(item.removeprefix("$") for item in items)
+
+    def pairs(self, field: str, second: str) -> tuple[tuple[str, str], ...]:
+        """A list of [NAME, text]; `second` says in errors what the text is."""
+        found: list[tuple[str, str]] = []
+        for index, item in enumerate(self.items(field)):
+            where = f"{field}[{index}]"
+            if not (isinstance(item, list) and len(item) == 2 and all(isinstance(part, str) for part in item)):
+                self.fail(where, f'must be ["NAME", "{second}"], not {_describe(item)}')
+            name, text = item[0].removeprefix("$"), item[1].strip()
+            if not _NAME.fullmatch(name):
+                self.fail(where, f"{item[0]!r} is no name; use letters, digits and underscores")
+            if not text:
+                self.fail(where, f"{name} has an empty {second}; give one")
+            found.append((name, text))
+        return tuple(found)
+
+
+def _describe(value: Any) -> str:
+    if value is None:
+        return "null"
+    kinds = {
+        dict: "an object",
+        list: "a list",
+        str: "a text",
+        bool: "true or false",
+        int: "a number",
+        float: "a number",
+    }
+    shown = repr(value)
+    return f"{kinds[type(value)]} ({shown if len(shown) <= 40 else shown[:37] + '...'})"
+
 
 _SHIPPED = resources.files("dorothie_gym.tasks") / "data" / "storyboards"
 _TOP_FIELDS = ("story", "subgoals", "variables", "dependents", "hidden_from_wizard", "hidden_from_co_wizard")
@@ -73,7 +210,7 @@ def parse_template(text: str, name: str, *, source: str | None = None) -> Storyb
         StoryboardError: not JSON, or no valid template: names the field and the reason.
     """
     source = source or name
-    top = FieldReader(source, "", _object(source, "template", read_json(text, source)))
+    top = TemplateFields(source, "", _object(source, "template", read_json(text, source)))
     top.check_known(_TOP_FIELDS)
     variables = tuple(Variable(name=row, category=text) for row, text in top.pairs("variables", "category"))
     hidden = top.names("hidden_from_wizard") + top.names("hidden_from_co_wizard")
@@ -81,7 +218,7 @@ def parse_template(text: str, name: str, *, source: str | None = None) -> Storyb
         name=source,
         story=top.text("story"),
         subgoals=tuple(
-            _subgoal(FieldReader(source, path, _object(source, path, item)))
+            _subgoal(TemplateFields(source, path, _object(source, path, item)))
             for index, item in enumerate(top.items("subgoals"))
             for path in (f"subgoals[{index}]",)
         ),
@@ -99,14 +236,14 @@ def _object(source: str, field: str, value: Any) -> dict[str, Any]:
     return value
 
 
-def _dependent(top: FieldReader, name: str, expression: str) -> Dependent:
+def _dependent(top: TemplateFields, name: str, expression: str) -> Dependent:
     variable, dot, attribute = expression.removeprefix("$").partition(".")
     if not (variable and dot and attribute):
         top.fail(f"dependents.{name}", f'{expression!r} must read "VAR.attribute"')
     return Dependent(name=name, variable=variable, attribute=attribute)
 
 
-def _subgoal(fields: FieldReader) -> SubgoalTemplate:
+def _subgoal(fields: TemplateFields) -> SubgoalTemplate:
     fields.check_known(_SUBGOAL_FIELDS)
     kind = fields.optional_text("type") or "arrive"
     if kind != "arrive":
@@ -128,7 +265,7 @@ def _subgoal(fields: FieldReader) -> SubgoalTemplate:
     )
 
 
-def _destination(fields: FieldReader, field: str) -> str | None:
+def _destination(fields: TemplateFields, field: str) -> str | None:
     """A destination as templates keep it: "$VARIABLE", or the ontology's label of the landmark that is named."""
     text = fields.optional_text(field)
     if text is None or text.startswith("$"):
@@ -139,7 +276,7 @@ def _destination(fields: FieldReader, field: str) -> str | None:
     return kind.name.label
 
 
-def _delete_after(fields: FieldReader) -> tuple[int | None, bool]:
+def _delete_after(fields: TemplateFields) -> tuple[int | None, bool]:
     """The two readings of `delete_after_subgoal`: a subgoal's number, or (in published templates) a flag.
 
     The flag means that whoever stands at the destination is gone once the subgoal is reached, as a person who has

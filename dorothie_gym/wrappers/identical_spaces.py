@@ -13,12 +13,12 @@ from pettingzoo import ParallelEnv
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import Role
 from dorothie_gym.spaces import noop
-from dorothie_gym.wrappers.flat_spaces import Flat, FlatActions, FlatObservations
+from dorothie_gym.wrappers.flatten import Flat, FlatActions, FlatObservations
 
-Vector: TypeAlias = NDArray[np.float32]
+FlatVector: TypeAlias = NDArray[np.float32]
 
 
-class IdenticalSpaces(ParallelEnv[str, Vector, Flat]):
+class IdenticalSpaces(ParallelEnv[str, FlatVector, Flat]):
     """`DuoWizardEnv` with one observation space and one action space for all three roles.
 
     Observations are flat vectors (`FlatObservations`), filled up with zeros to the longest. The last three numbers tell
@@ -64,7 +64,7 @@ class IdenticalSpaces(ParallelEnv[str, Vector, Flat]):
         }
         self.action_spaces = {agent: spaces.MultiDiscrete(self.nvec) for agent in self.possible_agents}
 
-    def _bounds(self) -> tuple[Vector, Vector]:
+    def _bounds(self) -> tuple[FlatVector, FlatVector]:
         """Bounds that hold for all roles."""
         roles = len(self.possible_agents)
         low, high = (np.zeros(self._length + roles, dtype=np.float32) for _ in range(2))
@@ -94,14 +94,14 @@ class IdenticalSpaces(ParallelEnv[str, Vector, Flat]):
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Vector], dict[str, dict[str, Any]]]:
+    ) -> tuple[dict[str, FlatVector], dict[str, dict[str, Any]]]:
         """Begins a session, see `DuoWizardEnv.reset`."""
         observations, infos = self.env.reset(seed=seed, options=options)
         return self._flatten(observations), self._pad(infos)
 
     def step(
         self, actions: Mapping[str, Flat]
-    ) -> tuple[dict[str, Vector], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+    ) -> tuple[dict[str, FlatVector], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
         """Plays one decision, see `DuoWizardEnv.step`.
 
         Raises:
@@ -133,7 +133,7 @@ class IdenticalSpaces(ParallelEnv[str, Vector, Flat]):
         """The true state in numbers, see `DuoWizardEnv.state`."""
         return self.env.state()
 
-    def _flatten(self, observations: Mapping[str, Any]) -> dict[str, Vector]:
+    def _flatten(self, observations: Mapping[str, Any]) -> dict[str, FlatVector]:
         flat = {}
         for agent, observation in observations.items():
             row = np.zeros(self._length + len(self.possible_agents), dtype=np.float32)

@@ -55,7 +55,7 @@ class TeacherForcing(PointEnv):
     start=-180) [degrees, positive left].
 
     ## Rewards
-    The mean of `info["reward_terms"]`, see `dorothie_gym.wrappers.point_rules`.
+    The mean of `info["reward_terms"]`, see `dorothie_gym.wrappers.point_env`.
 
     ## Episode End
     Terminated when the session is over; one episode is one session. A session without a point is passed over.

@@ -10,7 +10,7 @@ from dorothie_gym.baselines.reader.mentions import label_words
 from dorothie_gym.baselines.toto import FrozenTexts, Towns
 from dorothie_gym.evaluation.features import build
 from dorothie_gym.ontology import LABELS, LandmarkName, ObjectClass, PhysicalAction, StreetName
-from dorothie_gym.ontology.labels import LABEL_INDEX
+from dorothie_gym.ontology.dialogue_acts import LABEL_INDEX
 from dorothie_gym.world.town.graph import EDGE_TYPES, FEATURES, EdgeType
 from tests.baselines import samples
 from tests.baselines.test_toto import TINY

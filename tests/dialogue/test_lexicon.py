@@ -3,8 +3,8 @@ import copy
 import pytest
 
 from dorothie_gym.dialogue import LexiconError, load_lexicon
+from dorothie_gym.dialogue.entity_recognition import find_names, nearest_name
 from dorothie_gym.dialogue.lexicon import parse_lexicon, read_data, split_words
-from dorothie_gym.dialogue.names import find_names, nearest_name
 from dorothie_gym.ontology import LABELS, ActionValue, LandmarkName, StreetName
 
 

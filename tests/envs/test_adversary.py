@@ -11,7 +11,7 @@ from dorothie_gym.envs.adversary import FROM_CAR, Adversary
 from dorothie_gym.envs.scenario import draw_scenario
 from dorothie_gym.ontology import ExceptionKind, PropKind, Sensor, WeatherParameter
 from dorothie_gym.spaces import AdWizardAction
-from dorothie_gym.spaces.actions import Place
+from dorothie_gym.spaces.actions import LanePosition
 from dorothie_gym.tasks import TaskState
 from dorothie_gym.world.boxes import Box, boxes_touch
 from dorothie_gym.world.config import WorldConfig
@@ -29,7 +29,7 @@ def adversary_in(name: str = "brookside", props: int = 16, vehicles: int = 0) ->
 
 
 def place(lane: int, metres: float, kind: ExceptionKind = ExceptionKind.PLACE_PROP, **fields: Any) -> AdWizardAction:
-    return AdWizardAction(exception=kind, place=Place(lane=lane, metres=round(metres)), **fields)
+    return AdWizardAction(exception=kind, place=LanePosition(lane=lane, metres=round(metres)), **fields)
 
 
 def crowd_of(world: World, kind: ExceptionKind) -> list[Any]:

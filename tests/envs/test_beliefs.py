@@ -25,9 +25,9 @@ from dorothie_gym.ontology import (
 from dorothie_gym.spaces import (
     CoWizardAction,
     GuessColumn,
+    LanePosition,
     Mental,
     ParticipantAction,
-    Place,
     Speech,
     noop,
 )
@@ -182,7 +182,7 @@ def test_the_co_wizard_observes_mean_and_covariance(observe_acts: bool) -> None:
     words = f"the {HIDDEN.name.label} is on {STREET.label}"
     act = DialogueAct.of(DialogueMove.EXPLAIN, HIDDEN.name, STREET)
     said = ParticipantAction(speech=Speech(act=act, text=words))
-    place = Place(lane=HIDDEN.lane, metres=round(HIDDEN.station))
+    place = LanePosition(lane=HIDDEN.lane, metres=round(HIDDEN.station))
     actions = {agent: noop(Role(agent), env.limits) for agent in env.agents}
     row = None
     for k in range(12):

@@ -14,7 +14,7 @@ from dorothie_gym.envs.scenario import draw_scenario
 from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind, PropKind, Role, Sensor
 from dorothie_gym.policies import make_policy
 from dorothie_gym.spaces import AdWizardAction
-from dorothie_gym.spaces.actions import Place
+from dorothie_gym.spaces.actions import LanePosition
 from dorothie_gym.tasks import TaskState
 from dorothie_gym.world.config import WorldConfig
 from dorothie_gym.world.world import World
@@ -47,7 +47,7 @@ def random_action(world: World, rng: np.random.Generator) -> AdWizardAction:
         exception=KINDS[int(rng.integers(len(KINDS)))], prop=tuple(PropKind)[int(rng.integers(len(PropKind)))],
         item=int(rng.integers(max(len(world.actors.props), 1))), count=int(rng.integers(6)),
         extent=int(rng.integers(80)), sensor=tuple(Sensor)[int(rng.integers(len(Sensor)))], on=True,
-        place=Place(lane=lane, metres=round(rng.uniform(least, lanes[lane].length))),
+        place=LanePosition(lane=lane, metres=round(rng.uniform(least, lanes[lane].length))),
     )  # fmt: skip
 
 

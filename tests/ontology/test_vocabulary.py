@@ -1,3 +1,5 @@
+import pickle
+
 import pytest
 
 from dorothie_gym.ontology import OntologyError
@@ -20,3 +22,26 @@ def test_a_spelling_of_punctuation_only_is_refused() -> None:
 
 def test_spellings_are_shown_as_written() -> None:
     assert dict(Vocabulary("number", [("One", 1), ("un", 1)]).spellings) == {"One": 1, "un": 1}
+
+
+def test_error_names_text_vocabulary_and_nearest_spelling() -> None:
+    message = str(OntologyError.unknown("instrukt", "dialogue move", ["Explain", "Instruct"]))
+    assert "'instrukt'" in message and "dialogue move" in message and "'Instruct'" in message
+
+
+def test_error_shows_a_spelling_even_when_none_is_near() -> None:
+    assert "'Explain'" in str(OntologyError.unknown("%%%", "dialogue move", ["Explain"]))
+
+
+def test_error_for_what_is_no_text_names_its_type() -> None:
+    assert "int" in str(OntologyError.unknown(3, "dialogue move", ["Explain"]))
+
+
+def test_error_is_a_value_error_and_survives_pickling() -> None:
+    error = pickle.loads(pickle.dumps(OntologyError("message")))
+    assert isinstance(error, ValueError) and str(error) == "message"
+
+
+def test_a_huge_text_is_neither_compared_nor_shown_as_a_whole() -> None:
+    for text in ("a" * 100_000, ["a"] * 100_000):
+        assert len(str(OntologyError.unknown(text, "slots", ["Action", "Street"]))) < 250

@@ -20,10 +20,10 @@ from dorothie_gym.spaces import (
     ActionDecoder,
     AdWizardAction,
     CoWizardAction,
+    LanePosition,
     Mental,
     ParticipantAction,
     Physical,
-    Place,
     RoleAction,
     SpaceLimits,
     Speech,
@@ -49,11 +49,13 @@ SPEECH = Speech(act=DialogueAct.of(DialogueMove.INSTRUCT, StreetName.BAITS, Land
                 action=MentalAction.KNOWLEDGE_UPDATE,
                 goals=(LandmarkName.KFC, LandmarkName.SHELL),
                 landmark=LandmarkName.PERSON,
-                place=Place(lane=7, metres=41),
+                place=LanePosition(lane=7, metres=41),
             )
         ),
         AdWizardAction(),
-        AdWizardAction(exception=ExceptionKind.SPAWN_VEHICLES, place=Place(lane=5, metres=8), count=3, extent=40),
+        AdWizardAction(
+            exception=ExceptionKind.SPAWN_VEHICLES, place=LanePosition(lane=5, metres=8), count=3, extent=40
+        ),
         AdWizardAction(exception=ExceptionKind.MESSAGE, message="The road is closed\nfor today"),
         AdWizardAction(share=0.5),
     ],

@@ -1,11 +1,125 @@
+import itertools
+import math
+from collections import Counter
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dorothie_gym.ontology import LandmarkName
 from dorothie_gym.tasks import StoryboardError, bind, catalogue, load_template, template_names
+from dorothie_gym.tasks.binding import SPACING, cast, spread_places
 
-from .builders import bound, grid_places, parse, plain, templates
+from .builders import FakePlace, bound, grid_places, parse, plain, templates
+
+
+def variables(*categories):
+    return [[f"V{k}", category] for k, category in enumerate(categories)]
+
+
+def cast_of(*categories, seed=0, dependents=(), subgoals=({}, {})):
+    fields = plain(*subgoals, variables=variables(*categories), dependents=list(dependents))
+    return cast(parse(fields), np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_a_wide_category_leaves_what_a_narrow_one_needs(seed):
+    parts = cast_of("places", "places.cafe", "places.stores", seed=seed, subgoals=({"destination": "House"}, {}))
+    assert parts["$V1"] is LandmarkName.COCO
+    assert len(set(parts.values())) == len(parts)
+
+
+def test_every_kind_that_fits_is_drawn():
+    drawn = Counter(
+        cast_of("places.restaurants", seed=seed, subgoals=({"destination": "Coco"}, {}))["$V0"] for seed in range(200)
+    )
+    assert sorted(name.label for name in drawn if name is not LandmarkName.KFC) == ["BurgerKing", "Panera", "Qdoba"]
+    assert min(drawn.values()) > 25
+
+
+def test_houses_and_people_are_repeated():
+    parts = cast_of(*["places.residential"] * 3, *["people"] * 2)
+    assert Counter(parts.values())[LandmarkName.HOUSE] == 3
+    assert Counter(parts.values())[LandmarkName.PERSON] == 2
+
+
+def test_a_landmark_named_outright_is_not_given_to_a_variable():
+    for seed in range(20):
+        parts = cast_of("places.stores", subgoals=({"destination": "Ikea"}, {}), seed=seed)
+        assert parts["$V0"] is LandmarkName.SEVEN_ELEVEN
+
+
+def test_a_dependent_narrows_a_wide_category_to_what_has_the_attribute():
+    for seed in range(20):
+        parts = cast_of("places", seed=seed, dependents=[["A", "V0.actions"]], subgoals=({"destination": "KFC"}, {}))
+        assert parts["$V0"].label in ("Ikea", "SevenEleven")  # Shell is named outright
+
+
+REFUSED = {
+    "more names than landmarks": (
+        {"variables": variables(*["places.stores"] * 3)},
+        r"variables: there are not enough different landmarks for V0 .places.stores.*besides KFC, Shell",
+    ),
+    "named and wanted": ({"variables": variables("places.gasstation")}, "variables: there are not enough"),
+    "attribute that none has": (
+        {"variables": variables("places.residential"), "dependents": [["I", "V0.items"]]},
+        r"dependents\.I: no landmark of 'places.residential' has the attribute 'items'; it has: none",
+    ),
+    "other attribute": (
+        {"variables": variables("places.cafe"), "dependents": [["I", "V0.items"]]},
+        r"dependents\.I: no landmark of 'places.cafe' has the attribute 'items'; it has: menuitems",
+    ),
+    "too few values": (
+        {"variables": variables("places.cafe"), "dependents": [[f"I{k}", "V0.menuitems"] for k in range(6)]},
+        r"dependents\.I0: 6 different V0.menuitems are asked for, but there are 5; ask for fewer",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_the_catalogue_cannot_serve_is_refused(case):
+    fields, message = REFUSED[case]
+    with pytest.raises(StoryboardError, match="^storyboard test: " + message):
+        parse(plain({}, {}, **fields))
+
+
+def closest_pair(places):
+    return min(
+        min(math.dist(a.position, b.position), math.dist(a.waypoint, b.waypoint))
+        for a, b in itertools.combinations(places, 2)
+    )
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_places_lie_apart_though_many_are_close(seed):
+    chosen = spread_places(grid_places(400, spacing=6.0, lanes=20), 12, np.random.default_rng(seed))
+    assert len({place.id for place in chosen}) == 12
+    assert closest_pair(chosen) >= SPACING
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_lanes_of_their_own_come_first(seed):
+    chosen = spread_places(grid_places(64, lanes=8), 12, np.random.default_rng(seed))
+    assert len({place.lane for place in chosen[:8]}) == 8
+
+
+def test_a_crowded_town_still_gives_distinct_places_the_farthest_first():
+    row = [FakePlace(k, 0, float(k), (float(k), 2.0), (float(k), 0.0), 0) for k in range(10)]
+    chosen = spread_places(row, 2, np.random.default_rng(0))
+    assert closest_pair(chosen) >= 4.0
+    assert {place.id for place in spread_places(row, 10, np.random.default_rng(0))} == set(range(10))
+
+
+def test_two_sides_of_one_stop_are_not_both_taken_while_others_are_free():
+    pairs = [
+        FakePlace(2 * k + side, 2 * k + side, 0.0, (30.0 * k, 20.0 * side), (30.0 * k, 9.0 + 2.0 * side), k)
+        for k in range(6)
+        for side in (0, 1)
+    ]
+    chosen = spread_places(pairs, 6, np.random.default_rng(1))
+    assert {place.street for place in chosen} == set(range(6))
+
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -15,7 +15,7 @@ from dorothie_gym.baselines.selfplay.seat import Mask, Seat
 from dorothie_gym.ontology import ExceptionKind, PropKind, Role, Sensor, WeatherParameter
 from dorothie_gym.policies.ad_wizard import FIRST, SPACING, context
 from dorothie_gym.policies.observation_parser import SeenSubgoal, place_on_path, read_landmarks, read_subgoals, scalar
-from dorothie_gym.spaces import AdWizardAction, Place, PropColumn
+from dorothie_gym.spaces import AdWizardAction, LanePosition, PropColumn
 
 NEAR, FARTHER = 60.0, 100.0
 """How far ahead of the car a roadblock is placed, and a crowd [m]."""
@@ -170,7 +170,7 @@ class AdWizardSeat(Seat[AdWizardMemory]):
         found = place_on_path(self.town, observation, FARTHER if caper in _CROWDS else NEAR)
         if found is None:
             return _NOTHING
-        place = Place(lane=found[0], metres=round(found[1]))
+        place = LanePosition(lane=found[0], metres=round(found[1]))
         if caper in _CROWDS:
             return AdWizardAction(exception=_CROWDS[caper], place=place, count=CROWD, extent=EXTENT)
         return AdWizardAction(exception=ExceptionKind.PLACE_PROP, prop=PropKind.STREET_BARRIER, place=place)

@@ -16,7 +16,7 @@ from dorothie_gym.ontology import Role
 from dorothie_gym.policies.observation_parser import scalar
 from dorothie_gym.spaces import RoleAction, SpaceLimits, observation_space
 from dorothie_gym.world.town import Town
-from dorothie_gym.wrappers.flat_spaces import FlatObservations
+from dorothie_gym.wrappers.flatten import FlatObservations
 
 Vector: TypeAlias = NDArray[np.float32]
 Mask: TypeAlias = NDArray[np.bool_]

@@ -13,7 +13,7 @@ from dorothie_gym.baselines.inputs import NFD, RFN, Labels
 from dorothie_gym.baselines.outputs import Outputs
 from dorothie_gym.baselines.toto.config import LossWeights, TOTOConfig
 from dorothie_gym.ontology import VECTOR_SLOTS
-from dorothie_gym.ontology.labels import SLOT_SPANS
+from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS
 
 _TINY: Final = 1e-6
 """Under a root, so that its slope stays finite at 0."""

@@ -21,7 +21,7 @@ from dorothie_gym.baselines.toto.texts import Texts
 from dorothie_gym.baselines.toto.towns import DEGREES, METRES, Towns
 from dorothie_gym.baselines.training.trainer import Model
 from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, VECTOR_SLOTS, DialogueMove, PhysicalAction
-from dorothie_gym.ontology.labels import SLOT_SPANS
+from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS
 from dorothie_gym.world.town.graph import EDGE_TYPES, FEATURES, LANE_ID, LENGTH
 
 Tokens: TypeAlias = tuple[Tensor, Tensor, Tensor]

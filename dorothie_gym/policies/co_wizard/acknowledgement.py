@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dorothie_gym.dialogue import Heard, Wording
+from dorothie_gym.dialogue import ParsedText, Wording
 from dorothie_gym.ontology import ActionValue, DialogueMove
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.speech import Remark, remark
@@ -18,7 +18,7 @@ _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START})
 """What is done at once is not asked back about."""
 
 
-def take_up(mind: CoWizardState, action: ActionValue, words: Heard, rng: np.random.Generator) -> None:
+def take_up(mind: CoWizardState, action: ActionValue, words: ParsedText, rng: np.random.Generator) -> None:
     """Acknowledges an action that was asked for: not at all, in a word, by repeating it, or by asking back.
 
     Args:

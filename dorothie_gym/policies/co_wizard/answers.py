@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from dorothie_gym.dialogue import Direction, Heard, Wording
+from dorothie_gym.dialogue import Direction, ParsedText, Wording
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueAct,
@@ -38,7 +38,7 @@ CLOSE = 120.0
 
 
 def answer_yes_no(
-    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     """Answers a question that wants a yes or a no."""
     objects, landmarks, actions = act.values(Slot.OBJECT), act.values(Slot.LANDMARK), act.values(Slot.ACTION)
@@ -89,7 +89,7 @@ def _doing(mind: CoWizardState, view: CoWizardView) -> ActionValue:
 
 
 def answer_open(
-    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     """Answers an open question."""
     actions, landmarks = act.values(Slot.ACTION), act.values(Slot.LANDMARK)

@@ -23,8 +23,7 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import SeenLandmark
 from dorothie_gym.policies.route_progress import RouteProgress, streets_named
 from dorothie_gym.policies.speech import remark
-from dorothie_gym.spaces import Mental
-from dorothie_gym.spaces import Place as MapPlace
+from dorothie_gym.spaces import LanePosition, Mental
 from dorothie_gym.world.town.routing import Place, router
 
 MOST_LANES = 40
@@ -256,8 +255,8 @@ def search_on(mind: CoWizardState, view: CoWizardView) -> None:
         mind.journey = None
 
 
-def _map_place(lane: int, station: float) -> MapPlace:
-    return MapPlace(lane=lane, metres=round(station))
+def _map_place(lane: int, station: float) -> LanePosition:
+    return LanePosition(lane=lane, metres=round(station))
 
 
 def give_up(mind: CoWizardState, name: LandmarkName | None) -> None:

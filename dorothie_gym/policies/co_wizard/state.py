@@ -18,8 +18,7 @@ from dorothie_gym.ontology import (
 from dorothie_gym.policies.co_wizard.config import USUAL_SPEED, CoWizardStyle
 from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.policies.speech import SpeechState
-from dorothie_gym.spaces import Mental
-from dorothie_gym.spaces import Place as MapPlace
+from dorothie_gym.spaces import LanePosition, Mental
 from dorothie_gym.world.town import Town
 from dorothie_gym.world.town.routing import Place
 
@@ -174,7 +173,7 @@ class CoWizardState:
     def note_place(self, landmark: LandmarkName, place: Place) -> None:
         """Marks a guess of where a landmark is, and makes it the goal."""
         self.place = place
-        where = MapPlace(lane=place[0], metres=round(place[1]))
+        where = LanePosition(lane=place[0], metres=round(place[1]))
         self.notes = (
             *(note for note in self.notes if note.action is not MentalAction.KNOWLEDGE_UPDATE),
             Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=landmark, place=where),

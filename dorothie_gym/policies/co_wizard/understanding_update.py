@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dorothie_gym.dialogue import Direction, Heard, Wording
+from dorothie_gym.dialogue import Direction, ParsedText, Wording
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueAct,
@@ -106,7 +106,7 @@ def _mishears(mind: CoWizardState, heard: HeardUtterance, rng: np.random.Generat
 
 
 def _instruction(
-    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     landmarks = tuple(name for name in act.values(Slot.LANDMARK) if name not in _UNNAMED)
     actions = tuple(value for value in act.values(Slot.ACTION) if value in _OBEYED)
@@ -138,7 +138,7 @@ def _instruction(
 
 
 def _told_place(
-    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     landmarks = [name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName)]
     statuses, streets = act.values(Slot.STATUS), act.values(Slot.STREET)
@@ -183,7 +183,7 @@ def _told_street(mind: CoWizardState, view: CoWizardView, street: StreetName) ->
 # --- what actions mean ----------------------------------------------------------------------------------------------
 
 
-def _do_turn(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard) -> None:
+def _do_turn(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
     streets = _streets(act.values(Slot.STREET))
     skip = max((words.ordinal or 1) - 1, 0)
     mind.directive = Directive(
@@ -195,7 +195,7 @@ def _do_turn(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: H
     mind.wish, mind.halted, mind.nudge, mind.creeping, mind.arrived = None, False, None, False, False
 
 
-def _do_follow(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard) -> None:
+def _do_follow(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
     close = mind.halted or mind.creeping or view.standing
     if close and (words.further or words.distance is not None):
         distance = float(words.distance) if words.distance is not None else NUDGE
@@ -207,7 +207,7 @@ def _do_follow(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words:
         mind.directive = Directive(direction=Direction.STRAIGHT, junction=choice.junction)
 
 
-def _do_u_turn(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard) -> None:
+def _do_u_turn(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
     mind.wish, mind.wish_until = Wish.U_TURN, view.time + WISH_TIME
     # who has been stopped for a place that is not on the map and then is turned round has gone past it
     mind.creeping = mind.goal is not None and not mind.exact and view.time - mind.told_to_stop_at < JUST_PASSED
@@ -215,22 +215,22 @@ def _do_u_turn(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words:
     mind.detour_at = None
 
 
-def _do_switch(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard) -> None:
+def _do_switch(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
     right = words.direction is Direction.RIGHT
     mind.wish, mind.wish_until = Wish.SWITCH_RIGHT if right else Wish.SWITCH_LEFT, view.time + WISH_TIME
     mind.halted = False
 
 
-def _do_stop(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard) -> None:
+def _do_stop(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
     mind.told_to_stop_at = view.time
     mind.halted, mind.nudge, mind.wish = True, None, None
 
 
-def _do_start(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard) -> None:
+def _do_start(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
     mind.halted = mind.arrived = False
 
 
-def _do_speed(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard) -> None:
+def _do_speed(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
     if words.speed is None and words.faster is False and not mind.exact:
         # nobody says why: the place that is not on the map must be near
         hear_stop_ahead(mind, view, None, 20.0)
@@ -245,11 +245,11 @@ def _do_speed(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: 
     mind.slow_until = view.time + MOMENT
 
 
-def _do_lights(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard) -> None:
+def _do_lights(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
     mind.lights = words.lights is not False
 
 
-_OBEYED: dict[ActionValue, Callable[[CoWizardState, CoWizardView, DialogueAct, Heard], None]] = {
+_OBEYED: dict[ActionValue, Callable[[CoWizardState, CoWizardView, DialogueAct, ParsedText], None]] = {
     ActionValue.J_TURN: _do_turn,
     ActionValue.LANE_FOLLOW: _do_follow,
     ActionValue.U_TURN: _do_u_turn,
@@ -265,7 +265,7 @@ _OBEYED: dict[ActionValue, Callable[[CoWizardState, CoWizardView, DialogueAct, H
 
 
 def _explanation(
-    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     landmarks = [name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName)]
     statuses = act.values(Slot.STATUS)
@@ -293,7 +293,9 @@ def _explanation(
         mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
 
 
-def _reply(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+def _reply(
+    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
     """An answer to an open question, or an amplification: something to do, or where something is."""
     late = act.move is DialogueMove.REPLY_W and view.choice is not None and mind.asked not in (-1, view.choice.lane)
     if late and mind.exact and words.turns:
@@ -320,7 +322,9 @@ def _reply(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Hea
         mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
 
 
-def _yes(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+def _yes(
+    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
     if mind.offer is not None:
         accept_offer(mind, view, rng)
     elif mind.detour_at is not None:
@@ -335,7 +339,7 @@ def _yes(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard
         mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, ActionValue.SPEED_CHANGE, wording=wording))
 
 
-def _no(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+def _no(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator) -> None:
     mind.proposed = mind.offer = None
     mind.slower_asked = False
     if mind.arrived:
@@ -345,7 +349,7 @@ def _no(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard,
 
 
 def _alignment(
-    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     understood = mind.goal is not None or mind.directive is not None
     if understood:
@@ -354,7 +358,9 @@ def _alignment(
         mind.voice = mind.voice.plan(remark(DialogueMove.CONFUSE))
 
 
-def _check(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard, rng: np.random.Generator) -> None:
+def _check(
+    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
     landmarks, streets = act.values(Slot.LANDMARK), act.values(Slot.STREET)
     right = not landmarks or mind.goal in landmarks
     if streets and not landmarks:
@@ -364,7 +370,7 @@ def _check(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Hea
 
 
 def _confusion(
-    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     told = [item for item in mind.voice.said if item.act.move in _CAN_BE_REPEATED]
     if not told:
@@ -376,7 +382,7 @@ def _confusion(
 
 
 def _small_talk(
-    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     if view.time - mind.asked_at < ASKED_LATELY and mind.goal is None:
         mind.voice = mind.voice.plan(remark(DialogueMove.CONFUSE))  # an answer was expected
@@ -386,7 +392,7 @@ def _small_talk(
 
 
 _REACTIONS: dict[
-    DialogueMove, Callable[[CoWizardState, CoWizardView, DialogueAct, Heard, np.random.Generator], None]
+    DialogueMove, Callable[[CoWizardState, CoWizardView, DialogueAct, ParsedText, np.random.Generator], None]
 ] = {
     DialogueMove.INSTRUCT: _instruction,
     DialogueMove.EXPLAIN: _explanation,

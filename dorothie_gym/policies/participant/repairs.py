@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dorothie_gym.dialogue import Heard, speech_seconds
+from dorothie_gym.dialogue import ParsedText, speech_seconds
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, Slot, SlotValue
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
@@ -46,7 +46,7 @@ def _names_something(act: DialogueAct) -> bool:
     return any(value.label not in ("Unknown", "Queried") for value in act.slots)
 
 
-def misunderstood(mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard) -> Remark | None:
+def misunderstood(mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText) -> Remark | None:
     """What to say to a car that takes up something that it has not been told; None if it has understood.
 
     Args:
@@ -76,7 +76,7 @@ def _wrong_place(mind: ParticipantState, act: DialogueAct) -> Remark | None:
     return remark(DialogueMove.CLARIFY, *values)
 
 
-def _wrong_side(mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard) -> Remark | None:
+def _wrong_side(mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText) -> Remark | None:
     """The turn again, if another direction was taken up."""
     if words.direction is None or view.time - mind.voice.last_end > RECENT or act.move is DialogueMove.EXPLAIN:
         return None

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dorothie_gym.dialogue import Direction, Heard, Wording
+from dorothie_gym.dialogue import Direction, ParsedText, Wording
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueAct,
@@ -88,7 +88,7 @@ def listen(mind: ParticipantState, view: ParticipantView, rng: np.random.Generat
 
 
 def _check(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     landmarks, streets = act.values(Slot.LANDMARK), act.values(Slot.STREET)
     if mind.goal is not None and landmarks:
@@ -108,7 +108,7 @@ def _check(
 
 
 def _fits(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> bool:
     """Whether an action that the car names is what is to be done next, or what it has just been told to do."""
     step = next_step(mind, view, DialogueMove.INSTRUCT, rng)
@@ -145,7 +145,7 @@ def _refuse_with_step(mind: ParticipantState, view: ParticipantView, rng: np.ran
 
 
 def _yes_or_no(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     objects, landmarks = act.values(Slot.OBJECT), act.values(Slot.LANDMARK)
     offered = _offered(mind, view, landmarks)
@@ -210,7 +210,7 @@ def _judge_street(mind: ParticipantState, view: ParticipantView, act: DialogueAc
 
 
 def _judge_proposal(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     """Says yes to the right way, and no with the right one to another."""
     if not _fits(mind, view, act, words, rng):
@@ -224,7 +224,7 @@ def _judge_proposal(
 
 
 def _open_question(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     landmarks, actions = act.values(Slot.LANDMARK), act.values(Slot.ACTION)
     if mind.goal is None:
@@ -305,7 +305,7 @@ def _not_here(mind: ParticipantState, view: ParticipantView) -> None:
 
 
 def _explanation(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     landmarks, statuses = act.values(Slot.LANDMARK), act.values(Slot.STATUS)
     if _put_right(mind, view, act, words):
@@ -336,7 +336,7 @@ def _nod(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator
         mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE), *_more(mind, rng))
 
 
-def _put_right(mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard) -> bool:
+def _put_right(mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText) -> bool:
     """Says again what the car has taken for something else; tells whether it had to."""
     again = misunderstood(mind, view, act, words)
     if again is None:
@@ -348,7 +348,7 @@ def _put_right(mind: ParticipantState, view: ParticipantView, act: DialogueAct, 
 
 
 def _confusion(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     last = mind.voice.last
     if mind.guiding and mind.guided is not None:
@@ -360,7 +360,7 @@ def _confusion(
 
 
 def _uptake(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     """A car that repeats the place knows it, and finds the way itself; one that names another has to be put right."""
     if _put_right(mind, view, act, words):
@@ -370,13 +370,13 @@ def _uptake(
 
 
 def _alignment(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     mind.voice = mind.voice.plan_first(remark(DialogueMove.ACKNOWLEDGE, wording=Wording(topic="align")))
 
 
 def _request(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: Heard, rng: np.random.Generator
+    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     """A car that wants to be guided is; one that names a place, or a turn, only repeats what it was told."""
     if act.values(Slot.LANDMARK):
@@ -387,7 +387,7 @@ def _request(
 
 
 _ANSWERS: dict[
-    DialogueMove, Callable[[ParticipantState, ParticipantView, DialogueAct, Heard, np.random.Generator], None]
+    DialogueMove, Callable[[ParticipantState, ParticipantView, DialogueAct, ParsedText, np.random.Generator], None]
 ] = {
     DialogueMove.CHECK: _check,
     DialogueMove.QUERY_YN: _yes_or_no,

@@ -15,7 +15,7 @@ from dorothie_gym.ontology import (
     parse_physical_action,
     parse_prop,
 )
-from dorothie_gym.ontology.errors import OntologyError
+from dorothie_gym.ontology.vocabulary import OntologyError
 from dorothie_gym.sessions.events import Event, EventType
 from dorothie_gym.sessions.sdn.deeds import LEFT, RIGHT
 from dorothie_gym.sessions.sdn.layouts import FRAMES_EACH, MORE, OURS, SDN_RATE

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from dorothie_gym.dialogue.annotation import Annotator
+from dorothie_gym.dialogue.conversation import Span, Utterance
 from dorothie_gym.dialogue.exchanges import EXPECTATIONS, Exchange
-from dorothie_gym.dialogue.utterances import Span, Utterance
+from dorothie_gym.dialogue.transactions import Annotator
 from dorothie_gym.ontology import GoalStatus, LandmarkName, OntologyError, Role, parse_goal_status, parse_landmark
 from dorothie_gym.sessions.events import Event, EventType
 from dorothie_gym.sessions.header import NATIVE

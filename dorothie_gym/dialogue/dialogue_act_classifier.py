@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dorothie_gym.dialogue.conversation import Span
 from dorothie_gym.dialogue.directions import word_lists
 from dorothie_gym.dialogue.lexicon import LexiconError, read_data, strings
-from dorothie_gym.dialogue.understanding import Heard, understand
-from dorothie_gym.dialogue.utterances import Span
+from dorothie_gym.dialogue.nlu import ParsedText, understand
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueAct,
@@ -91,7 +91,7 @@ _MOVING = frozenset({ActionValue.STOP, ActionValue.J_TURN, ActionValue.U_TURN, A
 
 
 @dataclass(frozen=True)
-class Rule:
+class MoveRule:
     """Expressions that betray a move.
 
     Attributes:
@@ -110,7 +110,7 @@ class Rule:
 
 
 @dataclass(frozen=True)
-class Cues:
+class MoveCues:
     """What betrays moves.
 
     Attributes:
@@ -121,7 +121,7 @@ class Cues:
         reports: words by which somebody's wish is told, which is no small talk.
     """
 
-    rules: tuple[Rule, ...]
+    rules: tuple[MoveRule, ...]
     answers: Mapping[DialogueMove, Mapping[DialogueMove, DialogueMove]]
     domain: frozenset[str]
     small_talk: frozenset[str]
@@ -142,7 +142,7 @@ def guess_act(text: str, after: DialogueMove | None = None) -> DialogueAct:
     return act_of(understand(text), after)
 
 
-def act_of(heard: Heard, after: DialogueMove | None = None) -> DialogueAct:
+def act_of(heard: ParsedText, after: DialogueMove | None = None) -> DialogueAct:
     """Returns the act that fits what was heard; see `guess_act`."""
     move = _move_of(heard)
     if move is DialogueMove.INSTRUCT and GoalStatus.COMPLETE in heard.statuses and heard.masked.startswith("#status"):
@@ -157,12 +157,12 @@ def act_of(heard: Heard, after: DialogueMove | None = None) -> DialogueAct:
     return DialogueAct(move, _slots(heard, move))
 
 
-def _is_bare_place(heard: Heard) -> bool:
+def _is_bare_place(heard: ParsedText) -> bool:
     """Returns whether words only name a place to go to: there is no verb, and nothing else is named."""
     return bool(heard.landmarks) and not heard.objects and not heard.question and not _VERB.search(heard.acted)
 
 
-def _move_of(heard: Heard) -> DialogueMove:
+def _move_of(heard: ParsedText) -> DialogueMove:
     sentence, acted = heard.masked.strip(" ,"), heard.acted.strip(" ,")
     if _is_small_talk(heard):
         return DialogueMove.IRRELEVANT
@@ -179,7 +179,7 @@ def _move_of(heard: Heard) -> DialogueMove:
     return _by_form(heard, sentence)
 
 
-def _by_form(heard: Heard, sentence: str) -> DialogueMove:
+def _by_form(heard: ParsedText, sentence: str) -> DialogueMove:
     """Returns the move of words without any cue, by their form alone."""
     if heard.actions:
         return DialogueMove.INSTRUCT  # a bare command: "lights on"
@@ -188,7 +188,7 @@ def _by_form(heard: Heard, sentence: str) -> DialogueMove:
     return DialogueMove.ACKNOWLEDGE if sentence.isalpha() else DialogueMove.IRRELEVANT
 
 
-def _is_small_talk(heard: Heard) -> bool:
+def _is_small_talk(heard: ParsedText) -> bool:
     """Returns whether there is a word of small talk, and nothing that has to do with the ride or somebody's wishes."""
     if heard.actions or heard.streets or heard.objects or heard.landmarks:
         return False
@@ -198,7 +198,7 @@ def _is_small_talk(heard: Heard) -> bool:
     return not words.isdisjoint(_cues().small_talk) and words.isdisjoint(_cues().reports)
 
 
-def _slots(heard: Heard, move: DialogueMove) -> frozenset[SlotValue]:
+def _slots(heard: ParsedText, move: DialogueMove) -> frozenset[SlotValue]:
     if move is DialogueMove.IRRELEVANT:
         return frozenset()
     values = set(heard.values)
@@ -302,7 +302,7 @@ def _is_clause(text: str) -> bool:
 
 
 @functools.cache
-def _cues() -> Cues:
+def _cues() -> MoveCues:
     data = read_data("cues.yaml")
     terms = {
         "{soft}": data.get("soft", ""),
@@ -314,10 +314,10 @@ def _cues() -> Cues:
         for before, changes in data.get("answers", {}).items()
     }
     words = {name: frozenset(strings(f"cues.yaml: {name}", data.get(name))) for name in _WORD_LISTS}
-    return Cues(rules, answers, **words)
+    return MoveCues(rules, answers, **words)
 
 
-def _rule(where: str, rule: Mapping[str, Any], terms: Mapping[str, str]) -> Rule:
+def _rule(where: str, rule: Mapping[str, Any], terms: Mapping[str, str]) -> MoveRule:
     texts = list(strings(f"{where}.cues", rule.get("cues")))
     for name, expression in terms.items():
         texts = [text.replace(name, expression) for text in texts]
@@ -328,7 +328,7 @@ def _rule(where: str, rule: Mapping[str, Any], terms: Mapping[str, str]) -> Rule
     except (re.error, OntologyError) as error:
         raise LexiconError(f"{where}: {error}") from error
     words = frozenset(strings(f"{where}.words", rule.get("words", [])))
-    return Rule(move, masked, acted, _DOMAIN_RULE in texts, words)
+    return MoveRule(move, masked, acted, _DOMAIN_RULE in texts, words)
 
 
 def _either(patterns: list[str]) -> re.Pattern[str] | None:

@@ -1,7 +1,7 @@
-"""Takes the fields out of an action dict, checking each against its space.
+"""Reader of action dicts that checks each field against its space.
 
-What a space allows is looked up once (`FieldTable`). What is plainly right passes with a few comparisons; everything
-else is looked at again by the checks that find the words for what is wrong.
+The bounds of a space are looked up once (`ActionFieldTable`). Valid values pass with a few comparisons; every other
+value goes through slower checks that word the error message.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _ONE_BYTE = "bB?"
 _FLAGS = b"\0\1"
 
 
-class FieldTable:
+class ActionFieldTable:
     """What the fields of an action space may hold.
 
     Attributes:
@@ -48,12 +48,12 @@ class FieldTable:
                 self.texts[name] = field.max_length, frozenset(field.character_set)
 
 
-class FieldReader:
+class ActionReader:
     """Reads the fields of one action."""
 
     __slots__ = ("_action", "_table")
 
-    def __init__(self, action: Mapping[str, Any], table: FieldTable) -> None:
+    def __init__(self, action: Mapping[str, Any], table: ActionFieldTable) -> None:
         """Takes an action; raises `ValueError` if a field is missing or unknown."""
         self._action, self._table = action, table
         if action.keys() != table.known:

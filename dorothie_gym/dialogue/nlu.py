@@ -8,11 +8,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from dorothie_gym.dialogue.directions import Turn, WordLists, find_ordinal, find_turns, mask_directions, word_lists
+from dorothie_gym.dialogue.directions import RouteTurn, WordLists, find_ordinal, find_turns, mask_directions, word_lists
+from dorothie_gym.dialogue.entity_recognition import Mention, find_names
 from dorothie_gym.dialogue.lexicon import LexiconError, load_lexicon, read_data, split_words, strings
-from dorothie_gym.dialogue.names import Mention, find_names
 from dorothie_gym.dialogue.numerals import NUMBER_WORDS, read_cardinals
-from dorothie_gym.dialogue.wording import Direction
+from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology import (
     SLOT_VALUES,
     ActionValue,
@@ -69,7 +69,7 @@ _REPAIR = re.compile(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Heard:
+class ParsedText:
     """What was heard; whatever was not said is None, False or empty. Names are in the order in which they were said.
 
     Attributes:
@@ -102,7 +102,7 @@ class Heard:
     text: str
     masked: str
     acted: str = ""
-    turns: tuple[Turn, ...] = ()
+    turns: tuple[RouteTurn, ...] = ()
     ordinal: int | None = None
     actions: tuple[ActionValue, ...] = ()
     denied: tuple[ActionValue, ...] = ()
@@ -135,7 +135,7 @@ class Heard:
 
 
 @functools.lru_cache(maxsize=2048)
-def understand(text: str) -> Heard:
+def understand(text: str) -> ParsedText:
     """Reads a text in free English, of any case and with typographic or plain apostrophes.
 
     Args:
@@ -157,7 +157,7 @@ def understand(text: str) -> Heard:
     named = _each_once([*(mention.value for mention in mentions), *_asked(masked, words)])
     landmarks = [mention for mention in mentions if isinstance(mention.value, LandmarkName)]
     turns = find_turns(words, lists)
-    return Heard(
+    return ParsedText(
         text=text,
         masked=masked,
         acted=acted,

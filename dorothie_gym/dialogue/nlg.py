@@ -13,12 +13,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from dorothie_gym.dialogue.conversation import Span
 from dorothie_gym.dialogue.grammar import SPOKEN_SLOTS, Template, load_grammar
 from dorothie_gym.dialogue.phrases import Register, open_to
-from dorothie_gym.dialogue.styles import SpeakerStyle, default_style
-from dorothie_gym.dialogue.telling import Draw, Teller, draws_of
-from dorothie_gym.dialogue.utterances import Span
-from dorothie_gym.dialogue.wording import Wording, WordingContext
+from dorothie_gym.dialogue.realization_context import Wording, WordingContext
+from dorothie_gym.dialogue.slot_realizer import Draw, SlotRealizer, draws_of
+from dorothie_gym.dialogue.speaker_style import SpeakerStyle, default_style
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, Slot, SlotValue
 
 MAX_CHARACTERS = 160
@@ -165,7 +165,7 @@ class _Sentence:
         self._style = style
         self._scene = scene
         self._limit = limit
-        self._teller = Teller(act, draw, wording, style, scene, names)
+        self._teller = SlotRealizer(act, draw, wording, style, scene, names)
 
     def text(self) -> str:
         teller, act = self._teller, self._act
@@ -228,7 +228,7 @@ class _Sentence:
         return start if text[-1] in "?." else start + "."
 
 
-def _hesitating(body: str, teller: Teller) -> str:
+def _hesitating(body: str, teller: SlotRealizer) -> str:
     """Returns the sentence with a filled pause, or begun twice."""
     words = body.split()
     filler = load_grammar().fillers.say(teller)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.dialogue import guess_spans, understand
-from tests.dialogue.heard import read_annotated, score
+from tests.dialogue.annotated_utterances import read_annotated, score
 
 
 @pytest.mark.parametrize("name", ["dev", "test", "voices", "more", "cabin", "fresh"])

@@ -14,8 +14,8 @@ from dorothie_gym.dialogue.grammar import SPOKEN_SLOTS, load_grammar
 from dorothie_gym.dialogue.lexicon import load_lexicon
 from dorothie_gym.dialogue.numerals import cardinal, ordinal
 from dorothie_gym.dialogue.phrases import Register, manner_of
-from dorothie_gym.dialogue.styles import SpeakerStyle
-from dorothie_gym.dialogue.wording import Direction, Wording, WordingContext
+from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext
+from dorothie_gym.dialogue.speaker_style import SpeakerStyle
 from dorothie_gym.ontology import (
     SLOT_VALUES,
     ActionValue,
@@ -51,8 +51,8 @@ def draws_of(rng: np.random.Generator) -> Draw:
     return itertools.chain.from_iterable(iter(lambda: rng.random(_BATCH).tolist(), None)).__next__
 
 
-class Teller:
-    """Fills gaps for one act; see `phrases.Teller`.
+class SlotRealizer:
+    """Fills gaps for one act; see `phrases.PhraseSpeaker`.
 
     Attributes:
         values: the act's values by slot.
@@ -193,26 +193,26 @@ class Teller:
 
 _NAMELESS = frozenset({"Unknown", "Queried"})
 
-_GAPS: Mapping[str, Callable[[Teller], str]] = MappingProxyType(
+_GAPS: Mapping[str, Callable[[SlotRealizer], str]] = MappingProxyType(
     {
         "do": lambda teller: teller.action("do"),
         "doing": lambda teller: teller.action("doing"),
         "cmd": lambda teller: teller.action("cmd"),
-        "landmark": Teller.landmark,
-        "street": Teller.street,
+        "landmark": SlotRealizer.landmark,
+        "street": SlotRealizer.street,
         "object": lambda teller: teller.spoken(Slot.OBJECT, "say"),
         "the_object": lambda teller: teller.spoken(Slot.OBJECT, "the"),
         "state": lambda teller: teller.spoken(Slot.STATUS, "say"),
         "order": lambda teller: teller.spoken(Slot.STATUS, "order"),
         "tail": lambda teller: teller.spoken(Slot.STATUS, "tail"),
-        "is": Teller.copula,
-        "side": Teller.direction,
-        "direction": Teller.direction,
-        "nth": Teller.nth,
-        "speed": Teller.speed,
-        "distance": Teller.distance,
-        "past": Teller.past,
-        "dropped": Teller.dropped,
+        "is": SlotRealizer.copula,
+        "side": SlotRealizer.direction,
+        "direction": SlotRealizer.direction,
+        "nth": SlotRealizer.nth,
+        "speed": SlotRealizer.speed,
+        "distance": SlotRealizer.distance,
+        "past": SlotRealizer.past,
+        "dropped": SlotRealizer.dropped,
     }
 )
 

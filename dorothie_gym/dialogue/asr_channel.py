@@ -1,4 +1,4 @@
-"""A recogniser's transcript of what was said: words misheard for others that sound alike, dropped, and put in."""
+"""Speech recognition channel: transcripts with word errors, and the acts that listeners infer from them."""
 
 from __future__ import annotations
 
@@ -8,16 +8,19 @@ import math
 import re
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from rapidfuzz import process
 from rapidfuzz.distance import Levenshtein
 
+from dorothie_gym.dialogue.conversation import Span, Utterance
+from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
+from dorothie_gym.dialogue.exchanges import PATIENCE
 from dorothie_gym.dialogue.lexicon import load_lexicon, read_data, split_words, strings
-from dorothie_gym.dialogue.sounds import sound_of
+from dorothie_gym.dialogue.phonetics import sound_of
 from dorothie_gym.dialogue.talk_files import read_talk_files
-from dorothie_gym.ontology import Slot
+from dorothie_gym.ontology import DialogueMove, Role, Slot
 
 _WORD = re.compile(r"[A-Za-z][A-Za-z']*")
 _CANDIDATES = 6
@@ -25,7 +28,7 @@ _CANDIDATES = 6
 
 
 @dataclass(frozen=True, kw_only=True)
-class Channel:
+class AsrChannel:
     """How badly a recogniser hears.
 
     Attributes:
@@ -42,10 +45,10 @@ class Channel:
 
     def __post_init__(self) -> None:
         if not 0 <= self.rate < 1:
-            raise ValueError(f"Channel.rate must be at least 0 and below 1, not {self.rate}")
+            raise ValueError(f"AsrChannel.rate must be at least 0 and below 1, not {self.rate}")
         if self.substitutions < 0 or self.deletions < 0 or self.substitutions + self.deletions > 1:
             raise ValueError(
-                f"Channel.substitutions ({self.substitutions}) and deletions ({self.deletions}) are shares of the "
+                f"AsrChannel.substitutions ({self.substitutions}) and deletions ({self.deletions}) are shares of the "
                 "errors: none below 0, their sum at most 1"
             )
 
@@ -192,3 +195,45 @@ def _vocabulary_by_sound() -> Mapping[str, tuple[str, ...]]:
         if len(word) > 1:
             found[sound_of(word)].append(word)
     return {sound: tuple(listed) for sound, listed in found.items()}
+
+
+class Recogniser:
+    """Hears the utterances of a session, one after the other, through a `AsrChannel`.
+
+    Words that are heard right keep the act that was meant. Of a span that is misheard only the heard words count: its
+    act is what rules read from them, so that an act that comes along with the words never tells what they were.
+    """
+
+    def __init__(self, channel: AsrChannel, rng: np.random.Generator) -> None:
+        """Begins a session.
+
+        Args:
+            channel: how badly it hears.
+            rng: source of chance; nothing is drawn where the channel's rate is 0.
+        """
+        self._channel, self._rng = channel, rng
+        self._open: dict[Role, tuple[DialogueMove, float]] = {}
+
+    def hear(self, utterance: Utterance) -> Utterance:
+        """Returns the utterance as it is heard: the same spans with heard words, and with acts that fit them.
+
+        Args:
+            utterance: what was said; utterances have to come in the order in which they end.
+        """
+        if self._channel.rate == 0:
+            return utterance
+        after = self._answered_by(utterance)
+        spans = []
+        for place, span in enumerate(utterance.spans):
+            text = self._channel.transcribe(span.text, self._rng)
+            act = span.act if same_words(text, span.text) else guess_act(text, after if place == 0 else None)
+            spans.append(Span(text, act))
+        self._open[utterance.speaker] = (utterance.spans[-1].act.move, utterance.end)
+        return replace(utterance, spans=tuple(spans))
+
+    def _answered_by(self, utterance: Utterance) -> DialogueMove | None:
+        """The last move of somebody else that still waits for an answer; an utterance answers it for good."""
+        waiting = [(end, move) for role, (move, end) in self._open.items() if role is not utterance.speaker]
+        self._open = {role: opened for role, opened in self._open.items() if role is utterance.speaker}
+        end, move = max(waiting, default=(-np.inf, None))
+        return move if utterance.start - end < PATIENCE else None
