@@ -12,8 +12,8 @@ from highway_env.road.road import RoadNetwork
 from rich.console import Console
 from rich.table import Table
 
-from dorothie_gym.world.network import TownNetwork
-from dorothie_gym.world.town import load_town
+from dorothie_gym.maps import load_town
+from dorothie_gym.sim.network.network import TownNetwork
 
 REPEATS = 5
 

@@ -12,13 +12,13 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from dorothie_gym.world.town import load_town, town_names
-from dorothie_gym.world.town.store import CACHE_VARIABLE
+from dorothie_gym.maps import load_town, town_names
+from dorothie_gym.maps.cache import CACHE_VARIABLE
 
 # The clock starts when the package is there: importing numpy and the town package is the same for both.
 LOAD = """
 import sys, time
-from dorothie_gym.world.town import load_town
+from dorothie_gym.maps import load_town
 start = time.perf_counter()
 load_town(sys.argv[1])
 print(time.perf_counter() - start)

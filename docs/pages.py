@@ -17,12 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.policies import make_policy
-from dorothie_gym.rollout import play_session
-from dorothie_gym.sessions import Corpus, EventType, Session
-from dorothie_gym.sessions.statistics import (
+from dorothie_gym.analysis import (
     PAPER,
     Handled,
     Units,
@@ -32,10 +27,15 @@ from dorothie_gym.sessions.statistics import (
     phenomena_of,
     verdicts_of,
 )
-from dorothie_gym.sessions.statistics.handling import kind_of
-from dorothie_gym.sessions.transcript import markdown
-from dorothie_gym.world.graphics.charts import SHEET, SOFT, empty_figure, hexadecimal
-from dorothie_gym.world.graphics.palette import CAR, INK_SOFT, LIGHT_GREEN, NOTE, PROP
+from dorothie_gym.analysis.exception_attribution import kind_of
+from dorothie_gym.analysis.transcript import markdown
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.policies import make_policy
+from dorothie_gym.recording import Corpus, EventType, Session
+from dorothie_gym.rendering.charts import SHEET, SOFT, empty_figure, hexadecimal
+from dorothie_gym.rendering.palette import CAR, INK_SOFT, LIGHT_GREEN, NOTE, PROP
+from dorothie_gym.rollout import play_session
 
 DOCS = Path(__file__).parent
 TRANSCRIPTS, DATA_SHEET, CURVES = DOCS / "transcripts.md", DOCS / "data-sheet.md", DOCS / "navigation_curve.png"

@@ -13,26 +13,26 @@ import gymnasium
 import pettingzoo
 
 if TYPE_CHECKING:
-    from dorothie_gym.envs.config import EnvConfig, RewardWeights
+    from dorothie_gym.benchmark.teacher_forced import NfDEnv, RfNEnv, UfNEnv
+    from dorothie_gym.engine.config import EnvConfig, RewardWeights
+    from dorothie_gym.engine.scenario import Scenario, draw_scenario
     from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
     from dorothie_gym.envs.navigation_config import NavigationWeights
     from dorothie_gym.envs.navigation_continuous_v0 import NavigationContinuousEnv
     from dorothie_gym.envs.navigation_v0 import NavigationEnv
-    from dorothie_gym.envs.scenario import Scenario, draw_scenario
-    from dorothie_gym.evaluation.teacher_forced import NfDEnv, RfNEnv, UfNEnv
+    from dorothie_gym.envs.single_role_v0 import SingleRole
+    from dorothie_gym.maps import Town, load_town
     from dorothie_gym.ontology import Role
     from dorothie_gym.policies import Policy, make_policy
     from dorothie_gym.policies.navigation import NavigationAction
-    from dorothie_gym.sessions import Session, load_sessions
+    from dorothie_gym.recording import Session, load_sessions
+    from dorothie_gym.sim.config import WorldConfig
+    from dorothie_gym.sim.town_env import TownEnv
     from dorothie_gym.spaces import SpaceLimits, noop
     from dorothie_gym.tasks import load_template, template_names
-    from dorothie_gym.world.config import WorldConfig
-    from dorothie_gym.world.town import Town, load_town
-    from dorothie_gym.world.town_env import TownEnv
     from dorothie_gym.wrappers.flatten import FlattenAction, FlattenObservation, flatten
     from dorothie_gym.wrappers.identical_spaces import IdenticalSpaces
     from dorothie_gym.wrappers.record_session import RecordSession
-    from dorothie_gym.wrappers.single_role import SingleRole
     from dorothie_gym.wrappers.teacher_forcing import TeacherForcing
 
 __version__ = "0.1.0"
@@ -129,10 +129,10 @@ def _register() -> None:
     pettingzoo.register("aec", "dorothie_gym/DuoWizard-v0", f"{duo_wizard}:env")
     for view, role in (("Participant", "participant"), ("CoWizard", "co_wizard"), ("AdWizard", "ad_wizard")):
         gymnasium.register(
-            f"dorothie_gym/{view}-v0", "dorothie_gym.wrappers.single_role:SingleRole", kwargs={"role": role}
+            f"dorothie_gym/{view}-v0", "dorothie_gym.envs.single_role_v0:SingleRole", kwargs={"role": role}
         )
     for task in ("UfN", "RfN", "NfD"):
-        gymnasium.register(f"dorothie_gym/{task}-v0", f"dorothie_gym.evaluation.teacher_forced:{task}Env")
+        gymnasium.register(f"dorothie_gym/{task}-v0", f"dorothie_gym.benchmark.teacher_forced:{task}Env")
     gymnasium.register("dorothie_gym/Navigation-v0", "dorothie_gym.envs.navigation_v0:NavigationEnv")
     gymnasium.register(
         "dorothie_gym/Navigation-continuous-v0",
@@ -140,8 +140,8 @@ def _register() -> None:
     )
     gymnasium.register(
         "dorothie_gym/Town-v0",
-        "dorothie_gym.world.town_env:TownEnv",
-        vector_entry_point="dorothie_gym.world.town_vector_env:TownVectorEnv",
+        "dorothie_gym.sim.town_env:TownEnv",
+        vector_entry_point="dorothie_gym.sim.batch.town_vector_env:TownVectorEnv",
     )
 
 

@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 
 import dorothie_gym
 from dorothie_gym.cli import app
-from dorothie_gym.sessions import Session
-from dorothie_gym.world.town import describe, load_town
+from dorothie_gym.maps import describe, load_town
+from dorothie_gym.recording import Session
 
 ROOT = Path(__file__).parents[1]
 RUN_KEYS = [

@@ -9,11 +9,11 @@ import pytest
 from typer.testing import CliRunner
 
 from dorothie_gym.cli import app
-from dorothie_gym.sessions import Corpus, Fold, Session
-from dorothie_gym.sessions.sdn import read_sdn
-from tests.sessions.builders import write
-from tests.sessions.dialogues import talk
-from tests.sessions.sdn.builders import csv, drive, hub, release, sample
+from dorothie_gym.recording import Corpus, Fold, Session
+from dorothie_gym.recording.sdn import read_sdn
+from tests.recording.builders import write
+from tests.recording.dialogues import talk
+from tests.recording.sdn.builders import csv, drive, hub, release, sample
 
 
 @pytest.fixture(autouse=True)

@@ -8,7 +8,7 @@ from click.testing import Result
 from typer.testing import CliRunner
 
 from dorothie_gym.cli import app
-from tests.sessions.sdn.builders import release
+from tests.recording.sdn.builders import release
 
 
 def call(*arguments: object) -> Result:
@@ -62,7 +62,7 @@ def test_what_cannot_be_replayed_says_what_to_do(recorded: Path, tmp_path: Path)
 
 def test_session_is_shown_in_a_window_as_long_as_it_is_open(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    monkeypatch.setattr("dorothie_gym.envs.rendering.HumanWindow.show", lambda self, frame, rate: None)
+    monkeypatch.setattr("dorothie_gym.rendering.frames.HumanWindow.show", lambda self, frame, rate: None)
     result = call("replay", recorded, "--fps", 1, "--json")
     assert result.exit_code == 0, result.output
     assert json.loads(result.stdout)["pictures"] == 20

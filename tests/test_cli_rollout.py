@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 from dorothie_gym.cli.app import app
-from dorothie_gym.evaluation.closed_loop import METRICS
+from dorothie_gym.rollout.closed_loop import METRICS
 
 SHORT = ("--co-wizard", "lane-follow", "--towns", "brookside", "--max-seconds", "6", "--workers", "1")
 

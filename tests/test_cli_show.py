@@ -8,12 +8,12 @@ from rich.console import Console
 
 from dorothie_gym.cli.live import LiveShow, clock
 from dorothie_gym.cli.script import script_lines
-from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
+from dorothie_gym.recording import Event, EventType
 from dorothie_gym.rollout import play_session
-from dorothie_gym.sessions import Event, EventType
 
 TASKS = ("Buy tea", "Go home")
 

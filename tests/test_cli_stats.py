@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 
 from dorothie_gym.cli import app
 from dorothie_gym.ontology import ActionValue, LandmarkName
-from dorothie_gym.sessions import Event
-from tests.sessions.builders import write
-from tests.sessions.statistics.builders import M, car, human
+from dorothie_gym.recording import Event
+from tests.analysis.builders import M, car, human
+from tests.recording.builders import write
 
 KEYS = [
     "sessions", "control_hours", "audio_hours", "utterances", "words", "vocabulary", "transactions", "exchanges",

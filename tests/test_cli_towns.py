@@ -12,7 +12,7 @@ from click.testing import Result
 from typer.testing import CliRunner
 
 from dorothie_gym.cli import app
-from dorothie_gym.world.town import describe, load_town, town_names
+from dorothie_gym.maps import describe, load_town, town_names
 
 KERB_TO_KERB = """
 <OpenDRIVE><header revMajor="1" revMinor="4"/>

@@ -6,9 +6,9 @@ from click.testing import Result
 from typer.testing import CliRunner
 
 from dorothie_gym.cli import app
-from tests.sessions.builders import write
-from tests.sessions.dialogues import talk
-from tests.sessions.sdn.builders import sample
+from tests.recording.builders import write
+from tests.recording.dialogues import talk
+from tests.recording.sdn.builders import sample
 
 
 def call(*arguments: object) -> Result:

@@ -12,20 +12,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dorothie_gym.benchmark import metrics_of, read_predictions
+from dorothie_gym.benchmark.features import Batch
+from dorothie_gym.benchmark.predictions import file_schema
 from dorothie_gym.dialogue.grammar import parse_grammar
 from dorothie_gym.dialogue.talk_files import read_talk_files
-from dorothie_gym.evaluation import metrics_of, read_predictions
-from dorothie_gym.evaluation.closed_loop import METRICS, RecoverySeconds
-from dorothie_gym.evaluation.features import Batch
-from dorothie_gym.evaluation.prediction_files import file_schema
+from dorothie_gym.maps import describe, load_town
 from dorothie_gym.ontology import WeatherParameter
 from dorothie_gym.policies import policy_loader
-from dorothie_gym.sessions import Task
+from dorothie_gym.recording import Task
+from dorothie_gym.rollout.closed_loop import METRICS, RecoverySeconds
+from dorothie_gym.sim.weather import Weather
 from dorothie_gym.tasks import bind, load_template
-from dorothie_gym.world.town import describe, load_town
-from dorothie_gym.world.weather import Weather
-from tests.sessions.builders import write
-from tests.sessions.dialogues import talk
+from tests.recording.builders import write
+from tests.recording.dialogues import talk
 
 DOCS = Path(__file__).parents[1] / "docs"
 

@@ -13,8 +13,8 @@ SNIPPETS = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8")
 
 @pytest.fixture(autouse=True)
 def a_default_corpus_that_is_played_fast(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dorothie_gym.rollout.corpus.SESSIONS", 2)
-    monkeypatch.setattr("dorothie_gym.rollout.corpus.CONFIG", EnvConfig(max_seconds=30.0))
+    monkeypatch.setattr("dorothie_gym.rollout.default_corpus.SESSIONS", 2)
+    monkeypatch.setattr("dorothie_gym.rollout.default_corpus.CONFIG", EnvConfig(max_seconds=30.0))
 
 
 @pytest.mark.parametrize("snippet", SNIPPETS, ids=[f"snippet_{k}" for k in range(len(SNIPPETS))])

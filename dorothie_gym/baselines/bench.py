@@ -16,9 +16,9 @@ from dorothie_gym.baselines.inputs import TASKS, Examples
 from dorothie_gym.baselines.published import PublishedTOTO, Senses, rebuild, train_step
 from dorothie_gym.baselines.toto import TOTO, FrozenTexts, TOTOConfig, Towns
 from dorothie_gym.bench.timing import Progress, cores, cpu_seconds, in_turns, machine, quiet, rounded
-from dorothie_gym.evaluation.features import Columns, build, points
-from dorothie_gym.sessions import Corpus, Session
-from dorothie_gym.sessions.points import Point, task_points
+from dorothie_gym.benchmark.features import Columns, build, points
+from dorothie_gym.recording import Corpus, Session
+from dorothie_gym.recording.points import Point, task_points
 
 _POINTS: Final = 512
 """Points of the corpus that are looked at."""

@@ -10,8 +10,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from dorothie_gym.evaluation.features import Batch, BatchSpec, Columns, PointTable, gather
-from dorothie_gym.sessions import Task
+from dorothie_gym.benchmark.features import Batch, BatchSpec, Columns, PointTable, gather
+from dorothie_gym.recording import Task
 
 Inputs: TypeAlias = Mapping[str, Tensor]
 """The fields of `Batch` by name, as tensors of B points; whole numbers as int64."""

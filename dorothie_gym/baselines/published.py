@@ -17,12 +17,12 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from dorothie_gym.baselines.toto.layers import GraphAttention
-from dorothie_gym.evaluation.features import TownGraph
+from dorothie_gym.benchmark.features import TownGraph
+from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES
 from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, VECTOR_SLOTS, DialogueMove, PhysicalAction, Role
 from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS
-from dorothie_gym.sessions import Session, Task
-from dorothie_gym.sessions.points import DecisionPoint, InferencePoint, Point, View, history_angle
-from dorothie_gym.world.town.graph import EDGE_TYPES, FEATURES
+from dorothie_gym.recording import Session, Task
+from dorothie_gym.recording.points import DecisionPoint, InferencePoint, Point, View, history_angle
 
 WIDTH: Final = 770
 LANES, ROADS, JUNCTIONS = 486, 259, 34

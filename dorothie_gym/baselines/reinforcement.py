@@ -18,9 +18,9 @@ from torch import nn
 from dorothie_gym.baselines.material import TEST, TRAIN, VALIDATION
 from dorothie_gym.baselines.outputs import allowed_angle
 from dorothie_gym.baselines.training import checkpoints
-from dorothie_gym.evaluation import ActionPredictions, ActPredictions, TaskPredictions
-from dorothie_gym.evaluation.teacher_forced import NfDEnv, RfNEnv, TeacherForcedEnv, UfNEnv
-from dorothie_gym.sessions import Corpus, SessionError, Task
+from dorothie_gym.benchmark import ActionPredictions, ActPredictions, TaskPredictions
+from dorothie_gym.benchmark.teacher_forced import NfDEnv, RfNEnv, TeacherForcedEnv, UfNEnv
+from dorothie_gym.recording import Corpus, SessionError, Task
 from dorothie_gym.wrappers.flatten import FlattenAction, FlattenObservation
 
 ENVS: Final[dict[Task, type[TeacherForcedEnv]]] = {Task.UFN: UfNEnv, Task.RFN: RfNEnv, Task.NFD: NfDEnv}

@@ -22,10 +22,10 @@ from dorothie_gym.baselines.toto import TOTO, FrozenTexts
 from dorothie_gym.baselines.training import BEST_FILE, CheckpointError, Trained, predict, train
 from dorothie_gym.baselines.training.curves import draw_curves
 from dorothie_gym.baselines.training.trainer import OnEpoch
-from dorothie_gym.evaluation import ActionPredictions, ActPredictions, TaskPredictions, write_predictions
-from dorothie_gym.evaluation.features import Columns, PointTable
-from dorothie_gym.sessions import Task
-from dorothie_gym.sessions.encoding import write_atomically
+from dorothie_gym.benchmark import ActionPredictions, ActPredictions, TaskPredictions, write_predictions
+from dorothie_gym.benchmark.features import Columns, PointTable
+from dorothie_gym.recording import Task
+from dorothie_gym.recording.json_io import write_atomically
 
 PREDICTIONS_FILE: Final = "predictions.parquet"
 RESULT_FILE: Final = "result.json"

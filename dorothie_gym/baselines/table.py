@@ -10,7 +10,7 @@ from typing import Any, Final
 from dorothie_gym.baselines.material import TEST
 from dorothie_gym.baselines.rows import ROWS, Row
 from dorothie_gym.baselines.runs import PREDICTIONS_FILE, RESULT_FILE, Job
-from dorothie_gym.evaluation import (
+from dorothie_gym.benchmark import (
     FLOORS,
     ResultsTable,
     TaskPredictions,
@@ -19,7 +19,7 @@ from dorothie_gym.evaluation import (
     predict_floor,
     read_predictions,
 )
-from dorothie_gym.sessions import Corpus
+from dorothie_gym.recording import Corpus
 
 PREDICTIONS: Final = PREDICTIONS_FILE
 """Name of the file with the predictions of all models and seeds."""

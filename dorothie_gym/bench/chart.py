@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from dorothie_gym.bench.report import Report, number
-from dorothie_gym.world.graphics.charts import INK, SHEET, SOFT, hexadecimal
-from dorothie_gym.world.graphics.palette import CAR, LIGHT_RED, ROAD
+from dorothie_gym.rendering.charts import INK, SHEET, SOFT, hexadecimal
+from dorothie_gym.rendering.palette import CAR, LIGHT_RED, ROAD
 
 SIZE = 9.0
 """Width of the picture [inches]."""

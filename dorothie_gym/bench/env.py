@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from dorothie_gym.bench.timing import Progress, cores, in_turns, machine, quiet, rounded
 from dorothie_gym.bench.workers import Worker
-from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.spaces import noop
-from dorothie_gym.world.config import FRAME_RATE, WorldConfig
 
 if TYPE_CHECKING:
-    from dorothie_gym.world.stock import StockIntersection
+    from dorothie_gym.sim.highway_reference import StockIntersection
 
 WARM_UP = 60
 """Decisions before anything is measured: 30 s."""
@@ -99,7 +99,7 @@ def measure(
         WorkerError: a process that measures has ended before its time.
     """
     # imported here: a process that only drives needs none of the references
-    from dorothie_gym.world.stock import StockIntersection
+    from dorothie_gym.sim.highway_reference import StockIntersection
 
     progress("town", 0.0)
     session = Session(town, vehicles, pedestrians, seed)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from dorothie_gym.world.config import FRAME_RATE
+from dorothie_gym.sim.config import FRAME_RATE
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,10 +10,12 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from dorothie_gym.world.kernel import empty_world, populate, town_arrays
-from dorothie_gym.world.network.network import TownNetwork
-from dorothie_gym.world.town import load_town
-from dorothie_gym.world.vector_world import VectorWorld
+from dorothie_gym.maps import load_town
+from dorothie_gym.sim.batch.worlds import VectorWorld
+from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.population import populate
+from dorothie_gym.sim.state.town_arrays import town_arrays
+from dorothie_gym.sim.state.world_arrays import empty_world
 
 DT = 1.0 / 30.0
 SUBSTEPS = 15

@@ -10,21 +10,15 @@ from typing import Any
 import numpy as np
 
 from dorothie_gym.bench.timing import Progress, cpu_seconds, in_turns, machine, quiet, rounded
+from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import PropKind
-from dorothie_gym.world.config import FRAME_RATE
-from dorothie_gym.world.kernel import (
-    Kind,
-    TownArrays,
-    Walk,
-    WorldArrays,
-    add_prop,
-    empty_world,
-    populate,
-    step,
-    town_arrays,
-)
-from dorothie_gym.world.network import TownNetwork
-from dorothie_gym.world.town import load_town
+from dorothie_gym.sim.config import FRAME_RATE
+from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.population import add_prop, populate
+from dorothie_gym.sim.state.records import Kind, Walk
+from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
+from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
+from dorothie_gym.sim.step import step
 
 SUBSTEPS = 15
 """Substeps in a call: a decision of half a second."""
@@ -143,7 +137,7 @@ def _run(arrays: TownArrays, world: WorldArrays, calls: int) -> None:
 
 def _stock_work(network: TownNetwork, world: WorldArrays, substeps: int) -> Callable[[], float]:
     # imported here: highway-env is slow to import, and nothing else of this module needs it
-    from dorothie_gym.world.stock import run_stock, stock_road
+    from dorothie_gym.sim.highway_reference import run_stock, stock_road
 
     road = stock_road(network, world)
     return lambda: cpu_seconds(partial(run_stock, road, substeps, 1.0 / FRAME_RATE)) / substeps

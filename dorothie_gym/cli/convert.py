@@ -16,7 +16,7 @@ from dorothie_gym.cli.output import fail, print_json, stderr, stdout, told_plain
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dorothie_gym.sessions import Corpus, CorpusEntry, Session
+    from dorothie_gym.recording import Corpus, CorpusEntry, Session
 
 
 class Layout(enum.StrEnum):
@@ -43,7 +43,7 @@ def convert(
     if maps is not None and not maps.is_dir():
         fail(f"{maps}: there is no such folder; give one with maps (.xodr)")
     with told_plainly():
-        from dorothie_gym.sessions import Corpus
+        from dorothie_gym.recording import Corpus
 
         corpus = Corpus.load(source, maps=maps)
         _check_out(source, out)
@@ -105,9 +105,9 @@ def _convert_one(
     is_one: bool,
 ) -> dict[str, Any]:
     """Converts a session; returns what --json writes of it."""
-    from dorothie_gym.sessions import SessionError
-    from dorothie_gym.sessions.sdn import write_sdn
-    from dorothie_gym.world.town import TownError
+    from dorothie_gym.maps import TownError
+    from dorothie_gym.recording import SessionError
+    from dorothie_gym.recording.sdn import write_sdn
 
     path = entry.path.relative_to(corpus.root)
     row: dict[str, Any] = {"path": str(path)}
@@ -151,7 +151,7 @@ def _progress(total: int, *, quiet: bool) -> Iterator[Callable[[], None]]:
 
 
 def _show(rows: list[dict[str, Any]], out: Path) -> None:
-    from dorothie_gym.sessions.report import report_lines
+    from dorothie_gym.recording.validation import report_lines
 
     console = stdout()
     for row in rows:

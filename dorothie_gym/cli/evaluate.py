@@ -13,8 +13,8 @@ from dorothie_gym.cli.options import Maps
 from dorothie_gym.cli.output import check_file, fail, print_json, told_plainly, wide_stdout
 
 if TYPE_CHECKING:
-    from dorothie_gym.evaluation import CorpusLabels, ResultsTable, Split, TaskPredictions
-    from dorothie_gym.sessions import Corpus, Task
+    from dorothie_gym.benchmark import CorpusLabels, ResultsTable, Split, TaskPredictions
+    from dorothie_gym.recording import Corpus, Task
 
 DETAILED = 2
 """Up to so many models are shown with everything; more of them as the table."""
@@ -54,8 +54,8 @@ def evaluate(
             fail("--save writes the predictions of a floor; give --model majority or --model random with it")
         check_file(save)
     with told_plainly():
-        from dorothie_gym.evaluation import PredictionError, evaluate_predictions, labels_of, read_about
-        from dorothie_gym.sessions import Corpus
+        from dorothie_gym.benchmark import PredictionError, evaluate_predictions, labels_of, read_about
+        from dorothie_gym.recording import Corpus
 
         chosen, part = _tasks(tasks), _split(split)
         if floor is not None:
@@ -69,7 +69,7 @@ def evaluate(
             about = {str(path): told for path in files if (told := read_about(path))}
             table = evaluate_predictions(read, labels, about=about)
             if out is not None:
-                from dorothie_gym.evaluation.report import write_report
+                from dorothie_gym.benchmark.report import write_report
 
                 write_report(table, out)
         except PredictionError as error:
@@ -81,7 +81,7 @@ def evaluate(
 
 
 def _read(files: Sequence[Path], tasks: Sequence[Task]) -> list[TaskPredictions]:
-    from dorothie_gym.evaluation import read_predictions
+    from dorothie_gym.benchmark import read_predictions
 
     read = [given for given in read_predictions(*files) if given.task in tasks]
     if files and not read:
@@ -93,7 +93,7 @@ def _read(files: Sequence[Path], tasks: Sequence[Task]) -> list[TaskPredictions]
 def _floor(
     name: str, corpus: Corpus, labels: CorpusLabels, seeds: range, tasks: Sequence[Task], save: Path | None
 ) -> list[TaskPredictions]:
-    from dorothie_gym.evaluation import labels_of, predict_floor, write_predictions
+    from dorothie_gym.benchmark import labels_of, predict_floor, write_predictions
 
     train = labels_of(corpus, "train")
     drawn = [given for seed in seeds for given in predict_floor(name, train, labels, seed)]
@@ -104,7 +104,7 @@ def _floor(
 
 
 def _tasks(text: str) -> tuple[Task, ...]:
-    from dorothie_gym.sessions import Task
+    from dorothie_gym.recording import Task
 
     names = [name.strip().lower() for name in text.split(",")]
     if names == ["all"]:
@@ -116,7 +116,7 @@ def _tasks(text: str) -> tuple[Task, ...]:
 
 
 def _split(text: str) -> Split:
-    from dorothie_gym.evaluation import SPLITS
+    from dorothie_gym.benchmark import SPLITS
 
     for split in SPLITS:
         if split == text:
@@ -125,7 +125,7 @@ def _split(text: str) -> Split:
 
 
 def _check_floor(name: str) -> None:
-    from dorothie_gym.evaluation import make_floor
+    from dorothie_gym.benchmark import make_floor
 
     try:
         make_floor(name)
@@ -146,7 +146,7 @@ def _flat(table: ResultsTable) -> dict[str, Any]:
     """What a single run comes to over everything that was scored; skipped points are scored in part or not at all."""
     if len(table.runs) != 1:
         return {}
-    from dorothie_gym.evaluation.labels import ALL
+    from dorothie_gym.benchmark.labels import ALL
 
     run = table.runs[0]
     scores = run.parts[ALL]
@@ -161,7 +161,7 @@ def _flat(table: ResultsTable) -> dict[str, Any]:
 
 
 def _show(table: ResultsTable, out: Path | None) -> None:
-    from dorothie_gym.evaluation.terminal import print_counts, print_details, print_table
+    from dorothie_gym.benchmark.terminal import print_counts, print_details, print_table
 
     console = wide_stdout()
     if len(table.models) > DETAILED:

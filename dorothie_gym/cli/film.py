@@ -11,11 +11,11 @@ from typing import Any, Self
 import numpy as np
 
 from dorothie_gym.cli.video import video_writer
+from dorothie_gym.engine.session_scene import scene_of
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.envs.painter import scene_of
-from dorothie_gym.envs.rendering import SceneRenderer
-from dorothie_gym.envs.scene import Actor, Scene
-from dorothie_gym.sessions import FRAME_RATE
+from dorothie_gym.recording import FRAME_RATE
+from dorothie_gym.rendering.frames import SceneRenderer
+from dorothie_gym.rendering.scene import Actor, Scene
 
 FRAMES_PER_SECOND = 10
 """The benchmark's frame rate (design, Time)."""

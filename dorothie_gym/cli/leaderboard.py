@@ -24,9 +24,8 @@ def leaderboard(
 ) -> None:
     """Rank policies by the results of their rollouts: a page with intervals, cost and commands, and a picture."""
     with told_plainly():
-        from dorothie_gym.evaluation.closed_loop import RolloutError
-        from dorothie_gym.evaluation.closed_loop.leaderboard import leaderboard_page, read_entries
-        from dorothie_gym.evaluation.closed_loop.picture import draw_leaderboard
+        from dorothie_gym.rollout.closed_loop import RolloutError
+        from dorothie_gym.rollout.closed_loop.leaderboard import draw_leaderboard, leaderboard_page, read_entries
 
         if out.suffix != ".md":
             fail(f"{out}: the page is Markdown; give a name that ends in .md")

@@ -14,7 +14,7 @@ from dorothie_gym.cli.optional import OWN_NAME
 from dorothie_gym.cli.output import check_picture, fail, print_json, stderr, stdout, told_plainly
 
 if TYPE_CHECKING:
-    from dorothie_gym.world.town.check import Fault
+    from dorothie_gym.maps.lint import Fault
 
 FAULTY = 1
 """Exit code for a town that has faults."""
@@ -42,14 +42,14 @@ def towns(
     if picture is not None:
         check_picture(picture)
     with told_plainly():
-        from dorothie_gym.world.town import describe, fold_of, load_town
-        from dorothie_gym.world.town.check import check_town
+        from dorothie_gym.maps import describe, fold_of, load_town
+        from dorothie_gym.maps.lint import check_town
 
         loaded = load_town(town)
         facts = describe(loaded)
         faults = check_town(loaded) if check else ()
         if picture is not None:
-            from dorothie_gym.world.graphics import town_picture
+            from dorothie_gym.rendering import town_picture
 
             with stderr().status(f"drawing {loaded.name}, a few seconds"):
                 town_picture(loaded, picture, fold=fold_of(loaded.name))
@@ -70,7 +70,7 @@ def _list_towns(check: bool, picture: Path | None, as_json: bool) -> None:
     if picture is not None:
         fail("--picture draws one town; name it: dorothie-gym towns NAME --picture")
     with told_plainly():
-        from dorothie_gym.world.town import describe, fold_of, load_town, town_names
+        from dorothie_gym.maps import describe, fold_of, load_town, town_names
 
         rows = [{**describe(load_town(name)), "fold": fold_of(name)} for name in town_names()]
     print_json(rows) if as_json else _show_towns(rows)

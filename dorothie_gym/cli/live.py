@@ -13,8 +13,8 @@ from rich.table import Table
 from rich.text import Text
 
 from dorothie_gym.cli.script import SPEAKERS, ScriptLine, script_lines
+from dorothie_gym.engine.session_engine import Stage
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.envs.stage import Stage
 from dorothie_gym.ontology import GoalStatus
 from dorothie_gym.tasks import TaskState
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from dorothie_gym.envs.config import EnvConfig
+    from dorothie_gym.engine.config import EnvConfig
 
 AsJson = Annotated[bool, typer.Option("--json", help="Write one JSON object, and nothing else.")]
 
@@ -59,7 +59,7 @@ def env_config(max_seconds: float | None, word_errors: float) -> EnvConfig:
         max_seconds: simulated seconds after which a session is cut off; None for what is usual.
         word_errors: word error rate of the recogniser.
     """
-    from dorothie_gym.envs.config import EnvConfig
+    from dorothie_gym.engine.config import EnvConfig
 
     if max_seconds is None:
         return EnvConfig(word_error_rate=word_errors)

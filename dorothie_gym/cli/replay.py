@@ -14,8 +14,8 @@ from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdou
 from dorothie_gym.cli.video import check_video, video_writer
 
 if TYPE_CHECKING:
-    from dorothie_gym.sessions import Session
-    from dorothie_gym.world.town import Town
+    from dorothie_gym.maps import Town
+    from dorothie_gym.recording import Session
 
 _DIFFERENT = 1
 """Exit code where a session is not what comes out when it is played again."""
@@ -62,7 +62,7 @@ def replay(
 
 
 def _check(path: Path, town: str | None, maps: Path | None, storyboard: Path | None, *, as_json: bool) -> None:
-    from dorothie_gym.sessions import Corpus
+    from dorothie_gym.recording import Corpus
     from dorothie_gym.tasks import load_template
 
     template = None if storyboard is None else load_template(storyboard)
@@ -86,8 +86,8 @@ def _compare(session: Session, town: Town, template: Any) -> dict[str, Any]:
     from dataclasses import asdict
 
     from dorothie_gym import __version__
+    from dorothie_gym.recording import first_difference
     from dorothie_gym.rollout import resimulate
-    from dorothie_gym.sessions import first_difference
 
     begun = time.perf_counter()
     difference = first_difference(session, resimulate(session, town, storyboard=template))
@@ -120,8 +120,8 @@ def _tell(row: dict[str, Any]) -> None:
 
 
 def _show(path: Path, town: str | None, maps: Path | None, fps: float, video: Path | None, *, as_json: bool) -> None:
+    from dorothie_gym.recording import read_session
     from dorothie_gym.rollout import Playback
-    from dorothie_gym.sessions import read_session
 
     session = read_session(path, maps=maps)
     playback = Playback(session, _town(session, town, maps))
@@ -146,7 +146,7 @@ def _show(path: Path, town: str | None, maps: Path | None, fps: float, video: Pa
 def _film(playback: Any, fps: float, video: Path) -> int:
     from rich.progress import track
 
-    from dorothie_gym.envs.rendering import SceneRenderer
+    from dorothie_gym.rendering.frames import SceneRenderer
 
     renderer, console, shown = SceneRenderer(), stderr(), 0
     writer = video_writer(video, fps)
@@ -164,7 +164,7 @@ def _film(playback: Any, fps: float, video: Path) -> int:
 
 
 def _window(playback: Any, fps: float) -> int:
-    from dorothie_gym.envs.rendering import HumanWindow, SceneRenderer
+    from dorothie_gym.rendering.frames import HumanWindow, SceneRenderer
 
     renderer = SceneRenderer()
     try:
@@ -194,8 +194,8 @@ def _is_unseen() -> bool:
 
 def _town(session: Session, town: str | None, maps: Path | None) -> Town:
     """The town of a session."""
-    from dorothie_gym.sessions.sdn.maps import find_town
-    from dorothie_gym.world.town import load_town
+    from dorothie_gym.maps import load_town
+    from dorothie_gym.recording.sdn.maps import find_town
 
     if town is not None:
         return load_town(town)

@@ -26,7 +26,7 @@ from dorothie_gym.cli.players import find_cast
 from dorothie_gym.cli.progress import processors, session_progress
 
 if TYPE_CHECKING:
-    from dorothie_gym.evaluation.closed_loop import RolloutResult, RolloutSettings
+    from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutSettings
 
 
 def rollout(
@@ -51,7 +51,7 @@ def rollout(
     The same table comes out whatever the number of workers. When it is stopped, it tells how to go on.
     """
     with told_plainly():
-        from dorothie_gym.evaluation.closed_loop import RolloutSettings, parse_towns
+        from dorothie_gym.rollout.closed_loop import RolloutSettings, parse_towns
 
         cast = find_cast(participant, co_wizard, ad_wizard)
         try:
@@ -65,7 +65,7 @@ def rollout(
     if as_json:
         print_json(result.to_json())
         return
-    from dorothie_gym.evaluation.closed_loop.terminal import print_result
+    from dorothie_gym.rollout.closed_loop.results import print_result
 
     console = wide_stdout()
     print_result(result, console)
@@ -74,8 +74,8 @@ def rollout(
 
 
 def _play(settings: RolloutSettings, out: Path | None, workers: int, ray: str | None, *, quiet: bool) -> RolloutResult:
-    from dorothie_gym.evaluation.closed_loop import roll_out
     from dorothie_gym.rollout import ProcessError
+    from dorothie_gym.rollout.closed_loop import roll_out
 
     folder = Path(tempfile.mkdtemp(prefix="dorothie_gym-rollout-")) if out is None else out
     try:
@@ -91,8 +91,8 @@ def _play(settings: RolloutSettings, out: Path | None, workers: int, ray: str | 
 
 
 def _tell_interruption(folder: Path, settings: RolloutSettings) -> None:
-    from dorothie_gym.evaluation.closed_loop.plan import command_of
-    from dorothie_gym.evaluation.closed_loop.results import RESULT_FILE, read_result
+    from dorothie_gym.rollout.closed_loop.results import RESULT_FILE, read_result
+    from dorothie_gym.rollout.closed_loop.running import command_of
 
     done = len(read_result(folder).rows) if (folder / RESULT_FILE).is_file() else 0
     stderr().print(

@@ -171,8 +171,8 @@ def _tell_interruption(env: DuoWizardEnv, plan: _Plan) -> None:
 
 def _draw(env: DuoWizardEnv, path: Path) -> None:
     """The whole town at the end of the session, with the way that was driven and the talk."""
-    from dorothie_gym.envs.painter import scene_of
-    from dorothie_gym.envs.rendering import SceneRenderer
+    from dorothie_gym.engine.session_scene import scene_of
+    from dorothie_gym.rendering.frames import SceneRenderer
 
     scenario = env.scenario
     caption = f"{env.town.name} · {scenario.storyboard.name} · seed {scenario.seed}"

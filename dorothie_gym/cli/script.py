@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dorothie_gym.ontology import Role, parse_act
-from dorothie_gym.sessions import Event, EventType
+from dorothie_gym.recording import Event, EventType
 
 SPEAKERS: Mapping[Role, tuple[str, str]] = {
     Role.PARTICIPANT: ("Participant", "bold cyan"),

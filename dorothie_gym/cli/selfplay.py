@@ -32,8 +32,8 @@ def train_selfplay(
     from dorothie_gym.baselines.rl import SettingsError, WeightsError
     from dorothie_gym.baselines.selfplay.settings import selfplay_settings
     from dorothie_gym.baselines.selfplay.training import SelfPlay
+    from dorothie_gym.recording import SessionError
     from dorothie_gym.rollout import ProcessError
-    from dorothie_gym.sessions import SessionError
 
     with told_plainly():
         try:

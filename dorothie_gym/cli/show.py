@@ -21,8 +21,8 @@ def show(
 ) -> None:
     """Write annotated transcripts as Markdown: words, acts, exchanges, transactions, and what happens in between."""
     with told_plainly():
-        from dorothie_gym.sessions import read_session
-        from dorothie_gym.sessions.transcript import markdown
+        from dorothie_gym.analysis.transcript import markdown
+        from dorothie_gym.recording import read_session
 
         page = "\n".join(markdown(read_session(path, maps=maps)) for path in session)
         if out is not None:

@@ -14,7 +14,7 @@ from dorothie_gym.cli.options import AsJson, Maps
 from dorothie_gym.cli.output import check_picture, fail, print_json, stdout, told_plainly
 
 if TYPE_CHECKING:
-    from dorothie_gym.sessions import Corpus
+    from dorothie_gym.recording import Corpus
 
 PICTURE = Path("statistics.png")
 """Picture that is written where `--picture` has no name."""
@@ -75,7 +75,7 @@ def stats(
         picture = PICTURE if picture == Path(OWN_NAME) else picture
         check_picture(picture)
     with told_plainly():
-        from dorothie_gym.sessions import Corpus
+        from dorothie_gym.recording import Corpus
 
         if kappa is not None:
             _kappa(*kappa, maps, as_json=as_json)
@@ -107,11 +107,11 @@ def _check_choice(folder: Path | None, kappa: object, **chosen: bool) -> None:
 
 
 def _count(corpus: Corpus, picture: Path | None, *, as_json: bool) -> None:
-    from dorothie_gym.sessions.statistics import census_of
+    from dorothie_gym.analysis import census_of
 
     census = census_of(corpus)
     if picture is not None:
-        from dorothie_gym.sessions.statistics.picture import draw_profiles
+        from dorothie_gym.analysis.profile_charts import draw_profiles
 
         draw_profiles(census.profiles, census.counts, corpus.root.resolve().name, picture)
     table = census.to_json()
@@ -133,7 +133,7 @@ def _count(corpus: Corpus, picture: Path | None, *, as_json: bool) -> None:
 
 
 def _table2(table: Mapping[str, Any]) -> Table:
-    from dorothie_gym.sessions.statistics import PAPER
+    from dorothie_gym.analysis import PAPER
 
     shown = Table(box=None, pad_edge=False)
     for title in ("", "here", "paper", "a session here", "in the paper"):
@@ -159,7 +159,7 @@ def _per_session(value: float, sessions: float, key: str) -> str:
 
 
 def _folds(folds: Mapping[str, int]) -> Table:
-    from dorothie_gym.sessions.statistics import PAPER_FOLDS
+    from dorothie_gym.analysis import PAPER_FOLDS
 
     shown = Table(box=None, pad_edge=False)
     for title in ("fold", "sessions", "paper"):
@@ -170,7 +170,7 @@ def _folds(folds: Mapping[str, int]) -> Table:
 
 
 def _anchors(anchors: Mapping[str, Any]) -> Table:
-    from dorothie_gym.sessions.statistics.anchors import TOLERANCE
+    from dorothie_gym.analysis.majority_baselines import TOLERANCE
 
     shown = Table(box=None, pad_edge=False)
     for title in ("how easy the tasks are", "here", "allowed", "paper", "unseen"):
@@ -189,7 +189,7 @@ def _anchors(anchors: Mapping[str, Any]) -> Table:
 
 
 def _diversity(diversity: Mapping[str, Any]) -> Table:
-    from dorothie_gym.sessions.statistics.diversity import has_language_models
+    from dorothie_gym.analysis.diversity import has_language_models
 
     shown = Table(box=None, pad_edge=False)
     shown.add_column("how varied the talk is")
@@ -214,7 +214,7 @@ def _percent(share: float | None) -> str:
 
 
 def _phenomena(corpus: Corpus, *, as_json: bool) -> None:
-    from dorothie_gym.sessions.statistics import phenomena_of
+    from dorothie_gym.analysis import phenomena_of
 
     rows = phenomena_of(corpus)
     if as_json:
@@ -232,8 +232,8 @@ def _phenomena(corpus: Corpus, *, as_json: bool) -> None:
 
 
 def _behaviour(corpus: Corpus, *, as_json: bool) -> None:
-    from dorothie_gym.sessions.statistics import verdicts_of
-    from dorothie_gym.sessions.statistics.behaviour import RESAMPLES
+    from dorothie_gym.analysis import verdicts_of
+    from dorothie_gym.analysis.behaviour import RESAMPLES
 
     verdicts = verdicts_of(corpus)
     if as_json:
@@ -256,7 +256,7 @@ def _behaviour(corpus: Corpus, *, as_json: bool) -> None:
 
 
 def _check(corpus: Corpus, *, as_json: bool) -> None:
-    from dorothie_gym.sessions.statistics import faults_of_corpus
+    from dorothie_gym.analysis import faults_of_corpus
 
     found = faults_of_corpus(corpus)
     faulty = {name: faults for name, faults in found.items() if faults}
@@ -284,8 +284,8 @@ def _show_faults(faulty: Mapping[str, Sequence[str]], sessions: int) -> None:
 
 
 def _kappa(first: Path, second: Path, maps: Path | None, *, as_json: bool) -> None:
-    from dorothie_gym.sessions import read_session
-    from dorothie_gym.sessions.statistics import agreement
+    from dorothie_gym.analysis import agreement
+    from dorothie_gym.recording import read_session
 
     found = agreement(read_session(first, maps=maps), read_session(second, maps=maps))
     if as_json:

@@ -16,7 +16,7 @@ from dorothie_gym.cli.output import FAILED, INTERRUPTED, fail, print_json, stder
 if TYPE_CHECKING:
     from dorothie_gym.baselines.runs import Job
     from dorothie_gym.baselines.training import Epoch
-    from dorothie_gym.evaluation import ResultsTable
+    from dorothie_gym.benchmark import ResultsTable
 
 RUNS = Path("runs")
 """Folder of trainings where none is named: one for each corpus within."""
@@ -91,8 +91,8 @@ def table(
     with _told_plainly():
         from dorothie_gym.baselines.rows import ROWS, find_row
         from dorothie_gym.baselines.table import PREDICTIONS, gather_table, table_jobs
-        from dorothie_gym.evaluation import write_predictions
-        from dorothie_gym.evaluation.report import write_report
+        from dorothie_gym.benchmark import write_predictions
+        from dorothie_gym.benchmark.report import write_report
 
         rows = ROWS if models == "all" else [find_row(name.strip()) for name in models.split(",")]
         folder, where = _places(corpus, out)
@@ -165,7 +165,7 @@ def _places(corpus: Path | None, out: Path | None) -> tuple[Path, Path]:
 
 
 def _show(table: ResultsTable) -> None:
-    from dorothie_gym.evaluation.terminal import print_table
+    from dorothie_gym.benchmark.terminal import print_table
 
     console = wide_stdout()
     print_table(table, console)
@@ -180,7 +180,7 @@ def _told_plainly() -> Iterator[None]:
         fail("training needs torch; run: pip install 'dorothie-gym[baselines]'")
     from dorothie_gym.baselines.encoders import EncoderError
     from dorothie_gym.baselines.training import CheckpointError
-    from dorothie_gym.evaluation import PredictionError
+    from dorothie_gym.benchmark import PredictionError
     from dorothie_gym.rollout import ProcessError
 
     with told_plainly():

@@ -71,8 +71,8 @@ def train_rl(
         from dorothie_gym.baselines.rl import SettingsError, Training, WeightsError, tuned_settings
     except ImportError:
         fail(NEEDS)
+    from dorothie_gym.recording import SessionError
     from dorothie_gym.rollout import ProcessError
-    from dorothie_gym.sessions import SessionError
 
     if algorithm == "selfplay":
         from dorothie_gym.cli.selfplay import train_selfplay

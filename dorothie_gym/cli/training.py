@@ -16,7 +16,7 @@ _OPTIONS = ("steps", "environments", "workers", "seed", "evaluate_every", "episo
 
 def processes(environments: int) -> int:
     """A process for each processor, where there is more than one."""
-    from dorothie_gym.world.vector_world import available_processors
+    from dorothie_gym.sim.batch.worlds import available_processors
 
     processors = available_processors()
     return min(processors, environments) if processors > 1 else 0

@@ -10,9 +10,9 @@ import numpy as np
 
 from dorothie_gym.ontology import ActionValue, ObjectClass, WeatherParameter
 from dorothie_gym.policies.navigation.observation_vector import CLOSE, FAR, FAST, KINDS, HeardInstruction, Vector
+from dorothie_gym.sim.state.records import plain
+from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import ObjectColumn, Observation
-from dorothie_gym.world.kernel.records import plain
-from dorothie_gym.world.world import World
 
 AHEAD = (2.0, 4.0, 7.0, 10.0, 14.0, 19.0, 25.0, 32.0, 40.0, 50.0)
 """Points of the path are shown this far ahead [m]."""

@@ -12,10 +12,12 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.engine.scenario import Scenario, draw_scenario
+from dorothie_gym.engine.session_engine import STANDING, Stage
+from dorothie_gym.engine.upcoming_junction import Prospect
 from dorothie_gym.envs.navigation_config import NavigationConfig
-from dorothie_gym.envs.prospect import Prospect
-from dorothie_gym.envs.scenario import Scenario, draw_scenario
-from dorothie_gym.envs.stage import STANDING, Stage
+from dorothie_gym.maps import LinkType, Town, load_town
+from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import LandmarkName, MentalAction, Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
 from dorothie_gym.policies.navigation.actions import ACTIONS, FIRST_TURN, UNDER_WAY, NavigationAction, prepares
@@ -24,6 +26,10 @@ from dorothie_gym.policies.navigation.junction_exits import JunctionExits
 from dorothie_gym.policies.navigation.observation_vector import HeardInstruction, NavigationEncoder, Vector
 from dorothie_gym.policies.observation_parser import read_landmarks
 from dorothie_gym.policies.policy import policy_seed
+from dorothie_gym.sim.ego.driver import MAX_CRUISE, MIN_CRUISE
+from dorothie_gym.sim.infractions import INFRACTION_KINDS, WorldEventKind
+from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import (
     ActionDecoder,
     AdWizardAction,
@@ -36,12 +42,6 @@ from dorothie_gym.spaces import (
     SpaceLimits,
 )
 from dorothie_gym.tasks import StoryboardTemplate, load_template
-from dorothie_gym.world.car.driver import MAX_CRUISE, MIN_CRUISE
-from dorothie_gym.world.network.network import TownNetwork
-from dorothie_gym.world.reports import INFRACTION_KINDS, WorldEventKind
-from dorothie_gym.world.town import LinkType, Town, load_town
-from dorothie_gym.world.town.routing import Place
-from dorothie_gym.world.world import World
 
 NEARER = 1.0
 """Only a way left that is shorter by this counts as having come nearer [m]."""
@@ -295,7 +295,7 @@ class DrivingEnv(gym.Env[Vector, Action]):
         """Draws the aerial view: an array (800, 1280, 3), or in a window in human mode (then returns None)."""
         if self.render_mode is None:
             raise RuntimeError("render() needs render_mode='rgb_array' or 'human' when the environment is made")
-        from dorothie_gym.envs.painter import Painter
+        from dorothie_gym.engine.session_scene import Painter
 
         if self._painter is None:
             self._painter = Painter(human=self.render_mode == "human")

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
-from dorothie_gym.envs.config import EnvConfig
-from dorothie_gym.envs.scenario import Scenario, draw_scenario
-from dorothie_gym.envs.stage import Stage
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.engine.scenario import Scenario, draw_scenario
+from dorothie_gym.engine.session_engine import Stage
+from dorothie_gym.maps import Town, load_town
 from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.sessions import Event, SessionHeader
+from dorothie_gym.recording import Event, SessionHeader
+from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.spaces import ActionDecoder, SpaceLimits, action_space, observation_space
 from dorothie_gym.tasks import StoryboardTemplate, load_template
-from dorothie_gym.world.network.network import TownNetwork
-from dorothie_gym.world.town import Town, load_town
 
 _AGENTS = {str(role): role for role in AGENT_ROLES}
 
@@ -198,7 +198,7 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
         """Draws the aerial view: an array (800, 1280, 3), or in a window in human mode (then returns None)."""
         if self.render_mode is None:
             raise RuntimeError("render() needs render_mode='rgb_array' or 'human' when the environment is made")
-        from dorothie_gym.envs.painter import Painter
+        from dorothie_gym.engine.session_scene import Painter
 
         if self._painter is None:
             self._painter = Painter(human=self.render_mode == "human")
@@ -241,7 +241,7 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
 
     @property
     def last_frames(self) -> NDArray[np.float64]:
-        """Trajectory of the last decision (n, 9), see `dorothie_gym.world.config.FRAME_COLUMNS`."""
+        """Trajectory of the last decision (n, 9), see `dorothie_gym.sim.config.FRAME_COLUMNS`."""
         return self.stage.world.frames
 
     def session_header(self) -> SessionHeader:

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_vector import DECISION_FREQUENCY, MAX_SECONDS
-from dorothie_gym.world.config import WorldConfig
+from dorothie_gym.sim.config import WorldConfig
 
 TRAFFIC: Mapping[str, tuple[int, int]] = MappingProxyType(
     {"none": (0, 0), "light": (4, 2), "medium": (10, 4), "heavy": (30, 20)}

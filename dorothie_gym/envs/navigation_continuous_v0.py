@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from dorothie_gym.envs.continuous_observation import CONTINUOUS_FIELDS, observe_continuous
 from dorothie_gym.envs.driving_session import DrivingEnv, DrivingSession, Info, NavigationMask
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ActionValue, PhysicalAction, Role
 from dorothie_gym.policies.navigation.actions import LEFT, RIGHT
 from dorothie_gym.policies.navigation.instructor import NavigationInstruction
 from dorothie_gym.policies.navigation.junction_exits import SECTORS
 from dorothie_gym.policies.navigation.observation_vector import Vector
+from dorothie_gym.sim.ego.limits import Control
 from dorothie_gym.spaces import CoWizardAction, Physical
 from dorothie_gym.tasks import StoryboardTemplate
-from dorothie_gym.world.car.control import Control
-from dorothie_gym.world.town import Town
 
 LOST = 4.0
 """A car that is farther from its path than this is shown a path from the lane that it is on [m]."""

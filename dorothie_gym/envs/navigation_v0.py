@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from dorothie_gym.envs.driving_session import DrivingEnv, Info, NavigationMask
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.navigation.actions import ACTIONS, NavigationAction, physical_of
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_vector import Vector, navigation_space
 from dorothie_gym.spaces import CoWizardAction
 from dorothie_gym.tasks import StoryboardTemplate
-from dorothie_gym.world.town import Town
 
 
 class NavigationEnv(DrivingEnv[np.int64]):

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from dorothie_gym.dialogue import load_lexicon
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ExceptionKind, LandmarkName, PropKind, Role, Sensor, WeatherParameter
 from dorothie_gym.policies.observation_parser import place_on_path, read_landmarks, read_subgoals, scalar
 from dorothie_gym.policies.policy import Policy
 from dorothie_gym.spaces import ActionDict, AdWizardAction, LanePosition, PropColumn, SpaceLimits
-from dorothie_gym.world.town import Town
 
 
 class Trick(enum.StrEnum):

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import GoalStatus, LandmarkName, ObjectClass, StreetName, WeatherParameter
 from dorothie_gym.spaces import LandmarkColumn, ObjectColumn, SubgoalColumn
-from dorothie_gym.world.town import Town
 
 PARAMETERS = tuple(WeatherParameter)
 

@@ -8,9 +8,9 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.spaces import ActionDict, SpaceLimits
-from dorothie_gym.world.town import Town
 
 State = TypeVar("State")
 

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from dorothie_gym.dialogue import Direction
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.model import Exit, LinkType, wrap_degrees
+from dorothie_gym.maps.routing import Entry, Leg, Place, Route, router
+from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import StreetName
 from dorothie_gym.policies.observation_parser import street_of
-from dorothie_gym.world.town import Town
-from dorothie_gym.world.town.lights import LightColour
-from dorothie_gym.world.town.model import Exit, LinkType, wrap_degrees
-from dorothie_gym.world.town.routing import Entry, Leg, Place, Route, router
 
 PASSED = 3.0
 """A goal that lies further behind than this has been passed [m]."""

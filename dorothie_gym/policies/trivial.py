@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import PhysicalAction, Role
 from dorothie_gym.policies.policy import Policy
 from dorothie_gym.spaces import (
@@ -21,7 +22,6 @@ from dorothie_gym.spaces import (
     action_space,
     noop,
 )
-from dorothie_gym.world.town import Town
 
 
 @dataclass(frozen=True, kw_only=True)

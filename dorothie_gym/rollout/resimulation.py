@@ -7,16 +7,15 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from dorothie_gym.envs.compact import expand, idle_actions
-from dorothie_gym.envs.config import EnvConfig, RewardWeights
+from dorothie_gym.engine.config import EnvConfig, RewardWeights
+from dorothie_gym.engine.recorder import SessionRecorder, expand, idle_actions
+from dorothie_gym.engine.scenario import Scenario, draw_scenario
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.envs.recorder import SessionRecorder
-from dorothie_gym.envs.scenario import Scenario, draw_scenario
-from dorothie_gym.sessions import Session, SessionError, SessionHeader, SessionWriter
+from dorothie_gym.maps import Town
+from dorothie_gym.recording import Session, SessionError, SessionHeader, SessionWriter
+from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.spaces import ActionDict, Observation
 from dorothie_gym.tasks import StoryboardTemplate, load_template, template_names
-from dorothie_gym.world.config import WorldConfig
-from dorothie_gym.world.town import Town
 
 Observations: TypeAlias = Mapping[str, Observation]
 """What each role observes."""

@@ -6,7 +6,7 @@ import string
 import unicodedata
 from dataclasses import dataclass
 
-from dorothie_gym.world.town import Town
+from dorothie_gym.maps import Town
 
 TEXT_CHARACTERS = string.ascii_letters + string.digits + string.punctuation + " \n"
 """What utterances, messages and stories may be written with."""

@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import (
     LABELS,
     NAVIGATION_ACTIONS,
@@ -20,7 +21,7 @@ from dorothie_gym.ontology import (
     parse_landmark,
     parse_street,
 )
-from dorothie_gym.sessions import (
+from dorothie_gym.recording import (
     FRAME_RATE,
     OBJECT_VALUES,
     WAY_LENGTH,
@@ -35,7 +36,6 @@ from dorothie_gym.sessions import (
 from dorothie_gym.spaces import NO_MOVE, LandmarkColumn, Observation, SpaceLimits
 from dorothie_gym.spaces.limits import TEXT_CHARACTERS
 from dorothie_gym.spaces.observations import MAX_UTTERANCE
-from dorothie_gym.world.town import Town
 
 HISTORY: Final = 16
 """Moves and physical actions of the history that are in an observation; the oldest are left out."""

@@ -11,7 +11,8 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 
-from dorothie_gym.sessions import (
+from dorothie_gym.maps import Town
+from dorothie_gym.recording import (
     ANGLE_TOLERANCE,
     DecisionPoint,
     InferencePoint,
@@ -23,7 +24,6 @@ from dorothie_gym.sessions import (
     final_view,
 )
 from dorothie_gym.spaces import Observation, SpaceLimits
-from dorothie_gym.world.town import Town
 from dorothie_gym.wrappers.history_space import (
     act_space,
     check_action,

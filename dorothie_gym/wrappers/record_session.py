@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 from pettingzoo.utils import BaseParallelWrapper
 
+from dorothie_gym.engine.recorder import SessionRecorder
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.envs.recorder import SessionRecorder
-from dorothie_gym.sessions import Event, SessionHeader, SessionWriter
+from dorothie_gym.recording import Event, SessionHeader, SessionWriter
 
 ResetResult: TypeAlias = tuple[dict[Any, Any], dict[Any, dict[str, Any]]]
 StepResult: TypeAlias = tuple[

@@ -10,12 +10,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.engine.recorder import LightStates, actors_around
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.envs.snapshot import LightStates, actors_around
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
 from dorothie_gym.policies.policy import policy_seed
-from dorothie_gym.sessions import (
+from dorothie_gym.recording import (
     Event,
     Point,
     Scene,
@@ -26,9 +27,8 @@ from dorothie_gym.sessions import (
     task_points,
     trajectory_of,
 )
-from dorothie_gym.sessions.scene import Rows, light_rows, weather_rows
+from dorothie_gym.recording.surroundings import Rows, light_rows, weather_rows
 from dorothie_gym.spaces import SpaceLimits
-from dorothie_gym.world.town import Town
 from dorothie_gym.wrappers.point_env import PointEnv
 
 MOST_SILENT = 20
@@ -48,7 +48,7 @@ class TeacherForcing(PointEnv):
     learn from as there are seeds.
 
     ## Observation Space
-    As of `dorothie_gym.evaluation.TeacherForcedEnv`: what was there before the point, in `history_space` of the task.
+    As of `dorothie_gym.benchmark.TeacherForcedEnv`: what was there before the point, in `history_space` of the task.
 
     ## Action Space
     UfN, RfN: `move` Discrete(15), `slots` MultiBinary(69). NfD: `action` Discrete(6), `angle` Discrete(360,

@@ -8,10 +8,10 @@ from dorothie_gym.baselines.inputs import NFD
 from dorothie_gym.baselines.reader import JunctionReader, exit_table, mentions, reader_config
 from dorothie_gym.baselines.reader.mentions import label_words
 from dorothie_gym.baselines.toto import FrozenTexts, Towns
-from dorothie_gym.evaluation.features import build
+from dorothie_gym.benchmark.features import build
+from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES, EdgeType
 from dorothie_gym.ontology import LABELS, LandmarkName, ObjectClass, PhysicalAction, StreetName
 from dorothie_gym.ontology.dialogue_acts import LABEL_INDEX
-from dorothie_gym.world.town.graph import EDGE_TYPES, FEATURES, EdgeType
 from tests.baselines import samples
 from tests.baselines.test_toto import TINY
 
@@ -140,9 +140,9 @@ def test_what_was_understood_already_is_marked():
 
 @pytest.mark.slow
 def test_exits_of_a_played_corpus_hold_nearly_all_turns(tmp_path):
-    from dorothie_gym.evaluation.features import points
+    from dorothie_gym.benchmark.features import points
+    from dorothie_gym.recording import Task
     from dorothie_gym.rollout import generate_corpus
-    from dorothie_gym.sessions import Task
 
     generate_corpus(tmp_path, sessions=6, seed=1, workers=1)
     columns = build(tmp_path)

@@ -2,7 +2,7 @@ import pytest
 
 from dorothie_gym.baselines.rows import ROWS, SIZES, find_row
 from dorothie_gym.baselines.toto import ALL_CHANNELS, Channel
-from dorothie_gym.evaluation import paper_figures
+from dorothie_gym.benchmark import paper_figures
 
 
 def test_every_row_of_the_papers_table_is_there_in_its_words():

@@ -8,7 +8,7 @@ from highway_env.vehicle.behavior import IDMVehicle
 
 from dorothie_gym.bench import env as bench
 from dorothie_gym.bench.env import WITHOUT_SUMO, Session, measure
-from dorothie_gym.world.stock import StockIntersection
+from dorothie_gym.sim.highway_reference import StockIntersection
 
 KEYS = [
     "town", "lanes", "vehicles", "pedestrians", "seed", "substeps_per_step", "steps_per_second", "best", "spread",

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.envs.scenario import Scenario
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.policies import make_policy
 

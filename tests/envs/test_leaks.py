@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.engine.scenario import draw_scenario
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.envs.scenario import draw_scenario
 from dorothie_gym.ontology import Role
+from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.spaces import SubgoalColumn, noop
-from dorothie_gym.world.config import WorldConfig
 from tests.envs.sessions_played import (
     play_at_random,
     play_by_script,

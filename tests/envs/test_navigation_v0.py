@@ -7,10 +7,10 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from dorothie_gym.engine.scenario import draw_scenario
 from dorothie_gym.envs.navigation_config import NavigationWeights
 from dorothie_gym.envs.navigation_continuous_v0 import NavigationContinuousEnv
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
-from dorothie_gym.envs.scenario import draw_scenario
 from dorothie_gym.ontology import DialogueMove
 from dorothie_gym.policies.navigation import FIELDS, NavigationAction, layout
 from tests.envs.navigation_drivers import drive, follow_lane, obey

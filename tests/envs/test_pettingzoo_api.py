@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
+from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs import duo_wizard_v0
-from dorothie_gym.envs.config import EnvConfig
-from dorothie_gym.world.config import WorldConfig
+from dorothie_gym.sim.config import WorldConfig
 
 with warnings.catch_warnings():
     # PettingZoo's tests import an environment of its own in a way that it has deprecated.

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
+from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import ExceptionKind, LandmarkName
 from dorothie_gym.policies import ScriptedAdWizard, Trick
 from dorothie_gym.policies.ad_wizard import context
 from dorothie_gym.spaces import AdWizardAction, SpaceLimits
-from dorothie_gym.world.town import load_town
 from tests.policies.walk import play
 
 TOWN = load_town("brookside")

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dorothie_gym.maps.routing import Entry
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role, Slot
 from dorothie_gym.policies.co_wizard.understanding_update import NUDGE
 from dorothie_gym.policies.participant.arriving import WITHIN
 from dorothie_gym.policies.participant.guidance import RUN_UP, guide
 from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.route_progress import RouteProgress
-from dorothie_gym.world.town.routing import Entry
 from tests.policies.said import with_words
 from tests.policies.test_repairs import Human
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.dialogue import Direction, Wording, word_act
-from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import (
     ActionValue,

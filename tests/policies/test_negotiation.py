@@ -3,11 +3,11 @@ from dataclasses import replace
 import pytest
 
 from dorothie_gym.dialogue import Wording
+from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology import DialogueAct, DialogueMove, GoalStatus, LandmarkName, Slot, StreetName
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.route_progress import first_new_street
 from dorothie_gym.spaces import Speech
-from dorothie_gym.world.town.routing import router
 from tests.policies.test_co_wizard import Talk
 from tests.policies.test_repairs import Human
 

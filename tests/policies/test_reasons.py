@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from dorothie_gym.dialogue import understand
+from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, ObjectClass, PhysicalAction, Slot
 from dorothie_gym.policies.co_wizard.answers import answer_open
 from dorothie_gym.policies.co_wizard.driving import LONGEST_RED, drive, rest, see_green
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.spaces import Motion
-from dorothie_gym.world.town.lights import LightColour
 from tests.policies.test_co_wizard import Talk
 
 M = DialogueMove

@@ -1,4 +1,6 @@
 from dorothie_gym.dialogue import Direction
+from dorothie_gym.maps import LinkType, load_town
+from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.policies.route_progress import (
     RouteProgress,
     find_exit,
@@ -7,8 +9,6 @@ from dorothie_gym.policies.route_progress import (
     next_choice,
     stopping_distance,
 )
-from dorothie_gym.world.town import LinkType, load_town
-from dorothie_gym.world.town.lights import LightColour
 
 TOWN = load_town("brookside")
 CHOICES = [lane.id for lane in TOWN.lanes if is_choice(TOWN, lane.id)]

@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import AGENT_ROLES, PhysicalAction, Role
 from dorothie_gym.policies import LaneFollowPolicy, make_policy
 from dorothie_gym.rollout import play_session
 from dorothie_gym.spaces import ExitColumn, Motion, SpaceLimits, decode_action
-from dorothie_gym.world.town import load_town
 
 
 def decide(motion: Motion, *angles: float) -> Any:

@@ -14,14 +14,14 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
 from dorothie_gym.rollout import SessionPlan, plan_corpus, play_session
 from dorothie_gym.rollout.processes import share_out
 from dorothie_gym.spaces import NO_MOVE, ActionDict
-from dorothie_gym.world.town import Town
 
 
 class Mute(Policy[Any]):

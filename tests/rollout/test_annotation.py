@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.analysis.agreement import inconsistencies
+from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.policies import make_policy
+from dorothie_gym.recording import Session
 from dorothie_gym.rollout import play_session
-from dorothie_gym.sessions import Session
-from dorothie_gym.sessions.statistics.consistency import inconsistencies
 
 
 @pytest.mark.parametrize("seed", [3, 8, 21])

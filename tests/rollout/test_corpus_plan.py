@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS
+from dorothie_gym.recording import FOLDS
 from dorothie_gym.rollout import plan_corpus
-from dorothie_gym.rollout.corpus_plan import PAPER_FOLDS, fold_sizes
-from dorothie_gym.sessions import FOLDS
-from dorothie_gym.world.town import SEEN_TOWNS, UNSEEN_TOWNS
+from dorothie_gym.rollout.corpus_generation import PAPER_FOLDS, fold_sizes
 
 
 def test_folds_of_183_sessions_are_the_papers() -> None:

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.recording import Corpus, SessionError
 from dorothie_gym.rollout import generate_corpus
-from dorothie_gym.sessions import Corpus, SessionError
 from tests.rollout.killing import begin, contents, kill_again_and_again
 
 SHORT = EnvConfig(max_seconds=8.0)

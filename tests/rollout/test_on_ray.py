@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from dorothie_gym.envs.config import EnvConfig
-from dorothie_gym.evaluation.closed_loop import RolloutSettings, roll_out
+from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.rollout import ProcessError, generate_corpus
+from dorothie_gym.rollout.closed_loop import RolloutSettings, roll_out
 from tests.rollout.killing import contents
 
 pytestmark = [pytest.mark.integrations, pytest.mark.timeout(900), pytest.mark.filterwarnings("ignore")]

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dorothie_gym import DuoWizardEnv, Role, make_policy
-from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.rollout import play_session
 from tests.rollout.promises import Promise, success
 

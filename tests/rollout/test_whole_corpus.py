@@ -11,11 +11,7 @@ from typing import Any
 
 import pytest
 
-from dorothie_gym.envs.config import EnvConfig
-from dorothie_gym.ontology import DialogueMove, Role
-from dorothie_gym.rollout import generate_corpus
-from dorothie_gym.sessions import Corpus, Fold
-from dorothie_gym.sessions.statistics import (
+from dorothie_gym.analysis import (
     CLAIMS,
     PAPER,
     PAPER_FOLDS,
@@ -25,6 +21,10 @@ from dorothie_gym.sessions.statistics import (
     phenomena_of,
     verdicts_of,
 )
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.ontology import DialogueMove, Role
+from dorothie_gym.recording import Corpus, Fold
+from dorothie_gym.rollout import generate_corpus
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(3600)]
 

@@ -9,10 +9,10 @@ from gymnasium import spaces
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dorothie_gym.envs.single_role_v0 import SingleRole
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.spaces import NO_MOVE, SpaceLimits, action_space, decode_action
 from dorothie_gym.wrappers.flatten import FlattenAction, FlattenObservation, flatten
-from dorothie_gym.wrappers.single_role import SingleRole
 
 QUIET: dict[str, str] = {role: "silent" for role in AGENT_ROLES}
 

@@ -9,8 +9,8 @@ import gymnasium as gym
 import pytest
 
 import dorothie_gym
-from tests.sessions.builders import session
-from tests.sessions.dialogues import talk
+from tests.recording.builders import session
+from tests.recording.dialogues import talk
 
 QUIET = {"participant": "silent", "ad_wizard": "silent"}
 

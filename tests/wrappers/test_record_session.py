@@ -13,10 +13,10 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from dorothie_gym.sessions import Event, Session, SessionError, SessionHeader
+from dorothie_gym.recording import Event, Session, SessionError, SessionHeader
 from dorothie_gym.wrappers.record_session import RecordSession
-from tests.sessions.builders import header, rows
-from tests.sessions.dialogues import talk
+from tests.recording.builders import header, rows
+from tests.recording.dialogues import talk
 
 ROOT = Path(__file__).parents[2]
 PERIOD = 15  # frames a decision

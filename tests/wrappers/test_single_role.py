@@ -9,11 +9,11 @@ import pytest
 from gymnasium.error import ResetNeeded
 
 import dorothie_gym
+from dorothie_gym.envs.single_role_v0 import SingleRole
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, RandomPolicy, SilentPolicy, make_policy
 from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.spaces import SpaceLimits, noop
-from dorothie_gym.wrappers.single_role import SingleRole
 
 
 class Note(SilentPolicy):

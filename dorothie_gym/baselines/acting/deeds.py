@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from dorothie_gym.dialogue import Direction
+from dorothie_gym.maps import Exit, Town
+from dorothie_gym.maps.lane_neighbours import oncoming_lanes
+from dorothie_gym.maps.model import LinkType, wrap_degrees
 from dorothie_gym.ontology import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, PhysicalAction
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.route_progress import (
@@ -18,9 +21,6 @@ from dorothie_gym.policies.route_progress import (
     lanes_beside,
 )
 from dorothie_gym.spaces import Motion, Physical
-from dorothie_gym.world.town import Exit, Town
-from dorothie_gym.world.town.model import LinkType, wrap_degrees
-from dorothie_gym.world.town.oncoming import oncoming_lanes
 
 AT_END: Final = 6.0
 """A car that stands this near to a junction has no room left to drive up to it [m]."""

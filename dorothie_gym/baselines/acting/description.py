@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final, Self
 
 from dorothie_gym.policies.policy_loader import DESCRIPTION
-from dorothie_gym.sessions.encoding import write_atomically
+from dorothie_gym.recording.json_io import write_atomically
 
 KIND: Final = "benchmark"
 """Kind of these files, by which they are played."""

@@ -8,11 +8,11 @@ from typing import Final, Self
 
 from dorothie_gym.baselines.acting.history import History
 from dorothie_gym.dialogue import Span, speech_seconds
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import PhysicalAction, Role
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.sessions import FRAME_RATE
+from dorothie_gym.recording import FRAME_RATE
 from dorothie_gym.spaces import Motion, Physical, Speech
-from dorothie_gym.world.town import Town
 
 _TICK: Final = 1e-6
 """Slack for sums of decision periods, as a share of one."""

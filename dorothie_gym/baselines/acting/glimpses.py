@@ -11,10 +11,11 @@ from typing import Any, Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.envs.snapshot import LightStates
+from dorothie_gym.engine.recorder import LightStates
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.sessions import (
+from dorothie_gym.recording import (
     ACTOR_DTYPE,
     FRAME_RATE,
     TRAJECTORY_DTYPE,
@@ -26,10 +27,9 @@ from dorothie_gym.sessions import (
     SessionHeader,
     Trajectory,
 )
-from dorothie_gym.sessions.scene import LIGHT_DTYPE, Rows, light_rows
-from dorothie_gym.sessions.tenths import EACH
+from dorothie_gym.recording.resampling import EACH
+from dorothie_gym.recording.surroundings import LIGHT_DTYPE, Rows, light_rows
 from dorothie_gym.spaces import LandmarkColumn, ObjectColumn
-from dorothie_gym.world.town import Town
 
 _KINDS: Final = {
     ObjectClass.VEHICLES.value: ActorKind.VEHICLE,

@@ -11,11 +11,11 @@ from typing import Any, Final, Self
 
 from dorothie_gym.baselines.acting.glimpses import Glimpse, header_of, scene_of, way_of
 from dorothie_gym.dialogue import Span
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, ArgumentKind, Role, Slot
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.sessions import FRAME_RATE, Event, EventType, Session, SessionHeader
+from dorothie_gym.recording import FRAME_RATE, Event, EventType, Session, SessionHeader
 from dorothie_gym.spaces import Physical
-from dorothie_gym.world.town import Town
 
 KEPT: Final = 12.0
 """So much of the way, and of what was around it, is kept [s]: more than any window shows (10 s)."""

@@ -16,6 +16,7 @@ from dorothie_gym.baselines.acting.segments import spans_of
 from dorothie_gym.baselines.acting.trained import TownModel, Trained
 from dorothie_gym.baselines.outputs import Predicted
 from dorothie_gym.dialogue import Span, Wording, draw_style
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import (
     LABELS,
     NAVIGATION_ACTIONS,
@@ -30,10 +31,9 @@ from dorothie_gym.policies.observation_parser import IN_VIEW
 from dorothie_gym.policies.policy import Policy
 from dorothie_gym.policies.route_progress import way_ahead
 from dorothie_gym.policies.speech import SpeechState, remark
-from dorothie_gym.sessions import Task
-from dorothie_gym.sessions.tenths import EACH
+from dorothie_gym.recording import Task
+from dorothie_gym.recording.resampling import EACH
 from dorothie_gym.spaces import ActionDict, CoWizardAction, Motion, Physical, SpaceLimits, heard_acts
-from dorothie_gym.world.town import Town
 
 _TOLD_WAYS: Final = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)
 """Slot values whose words tell which way."""

@@ -21,12 +21,11 @@ from dorothie_gym.baselines.outputs import Predicted
 from dorothie_gym.baselines.rows import build_model, find_row, retell
 from dorothie_gym.baselines.toto import TOTO, TOTOConfig
 from dorothie_gym.baselines.training.checkpoints import CheckpointError, restore
-from dorothie_gym.evaluation.features import Columns, PointTable, TownGraph, points
-from dorothie_gym.evaluation.features.extraction import extract
-from dorothie_gym.evaluation.features.joining import join
-from dorothie_gym.evaluation.features.towns import town_graph
-from dorothie_gym.sessions import Task
-from dorothie_gym.world.town import Town
+from dorothie_gym.benchmark.features import Columns, PointTable, TownGraph, points
+from dorothie_gym.benchmark.features.building import join
+from dorothie_gym.benchmark.features.extraction import extract, town_graph
+from dorothie_gym.maps import Town
+from dorothie_gym.recording import Task
 
 _TOWNS: Final = 4
 """Towns that a model is kept ready for."""

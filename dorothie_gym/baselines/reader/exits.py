@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.evaluation.features import TownGraph
-from dorothie_gym.world.town.graph import EDGE_TYPES, FEATURES, LENGTH, EdgeType
+from dorothie_gym.benchmark.features import TownGraph
+from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES, LENGTH, EdgeType
 
 EXITS: Final = 5
 """Ways on that are kept at most; a crossing has three."""

@@ -24,7 +24,7 @@ from dorothie_gym.baselines.toto.losses import angle_error
 from dorothie_gym.baselines.toto.model import TOTO, Tokens
 from dorothie_gym.baselines.toto.texts import FrozenTexts
 from dorothie_gym.baselines.toto.towns import METRES, Towns
-from dorothie_gym.evaluation.features import PARTICIPANT, Columns
+from dorothie_gym.benchmark.features import PARTICIPANT, Columns
 from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, DialogueMove
 
 RECENT: Final = 3

@@ -12,15 +12,15 @@ import torch
 from numpy.typing import NDArray
 from stable_baselines3.common.callbacks import BaseCallback
 
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.navigation import NavigationAction
 from dorothie_gym.policies.navigation.demonstrations import Demonstration, DemonstrationRecorder
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS
+from dorothie_gym.recording import Corpus, Session, SessionError
+from dorothie_gym.recording.sdn.maps import find_town
 from dorothie_gym.rollout import watch_session
-from dorothie_gym.sessions import Corpus, Session, SessionError
-from dorothie_gym.sessions.sdn.maps import find_town
 from dorothie_gym.spaces import CoWizardAction, SpaceLimits
-from dorothie_gym.world.town import Town
 
 NOTHING = int(NavigationAction.NOTHING)
 """Doing nothing has this number everywhere."""

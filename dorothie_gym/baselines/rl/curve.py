@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from dorothie_gym.world.graphics.charts import INK, SHEET, SOFT, empty_figure, hexadecimal
-from dorothie_gym.world.graphics.palette import CAR
+from dorothie_gym.rendering.charts import INK, SHEET, SOFT, empty_figure, hexadecimal
+from dorothie_gym.rendering.palette import CAR
 
 SIZE = (7.0, 4.0)
 """Of the picture [inches]."""

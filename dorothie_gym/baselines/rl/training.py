@@ -21,7 +21,7 @@ from dorothie_gym.baselines.rl.evaluating import SEEDS_FROM, Outcome, act_with, 
 from dorothie_gym.baselines.rl.settings import SettingsError, TrainingSettings
 from dorothie_gym.baselines.rl.weights import DESCRIPTION, make_model, read_description, restore, save_model
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS
-from dorothie_gym.sessions import Fold
+from dorothie_gym.recording import Fold
 
 PROGRESS, CURVE, BEST, CLONED = "progress.jsonl", "curve.png", "best", "cloned.json"
 """Files of a run beside its model: a line for each evaluation, their picture, a folder with the best model, and what

@@ -8,12 +8,12 @@ from typing import TypeAlias
 from dorothie_gym.baselines.rl.cloning import NOTHING, Lessons, Tell, sessions_of, silent
 from dorothie_gym.baselines.selfplay.seat import Mask, Vector
 from dorothie_gym.baselines.selfplay.seats import make_seat
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.policies.observation_parser import scalar
+from dorothie_gym.recording import Session, SessionError
 from dorothie_gym.rollout import watch_session
-from dorothie_gym.sessions import Session, SessionError
 from dorothie_gym.spaces import ActionDecoder, AdWizardAction, RoleAction, SpaceLimits
-from dorothie_gym.world.town import Town
 
 Lesson: TypeAlias = tuple[Vector, Mask, int]
 """What a seat took in, what made sense, and the number of what was done."""

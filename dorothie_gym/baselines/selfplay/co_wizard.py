@@ -12,7 +12,10 @@ import numpy as np
 
 from dorothie_gym.baselines.selfplay.heard import Remark, listen
 from dorothie_gym.baselines.selfplay.seat import Mask, Seat
-from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.model import wrap_degrees
+from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueAct,
@@ -31,9 +34,6 @@ from dorothie_gym.policies.navigation.observation_vector import FIELDS, HeardIns
 from dorothie_gym.policies.observation_parser import read_landmarks, scalar
 from dorothie_gym.policies.route_progress import CANONICAL
 from dorothie_gym.spaces import CoWizardAction, ExitColumn, Mental, Physical, SpaceLimits, Speech
-from dorothie_gym.world.town import Town
-from dorothie_gym.world.town.model import wrap_degrees
-from dorothie_gym.world.town.routing import Place
 
 
 class OtherAction(enum.IntEnum):

@@ -8,8 +8,8 @@ from typing import Any
 
 from dorothie_gym.baselines.rl.curve import sheet
 from dorothie_gym.ontology import Role
-from dorothie_gym.world.graphics.charts import INK, SHEET, hexadecimal
-from dorothie_gym.world.graphics.palette import CAR, INK_SOFT, NOTE, PROP
+from dorothie_gym.rendering.charts import INK, SHEET, hexadecimal
+from dorothie_gym.rendering.palette import CAR, INK_SOFT, NOTE, PROP
 
 _LINES = {
     Role.CO_WIZARD: ("Co-Wizard", CAR, "-"),

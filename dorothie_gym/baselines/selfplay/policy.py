@@ -16,10 +16,10 @@ from dorothie_gym.baselines.selfplay.learner import draw, make_network
 from dorothie_gym.baselines.selfplay.seat import Seat
 from dorothie_gym.baselines.selfplay.seats import Table, make_seat, pad_masks, pad_vectors
 from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy
 from dorothie_gym.spaces import ActionDict, SpaceLimits
-from dorothie_gym.world.town import Town
 
 
 @dataclass(frozen=True, kw_only=True)

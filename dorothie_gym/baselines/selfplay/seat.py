@@ -12,10 +12,10 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from dorothie_gym.baselines.selfplay.heard import HEARD_SIZE, Remark
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.observation_parser import scalar
 from dorothie_gym.spaces import RoleAction, SpaceLimits, observation_space
-from dorothie_gym.world.town import Town
 from dorothie_gym.wrappers.flatten import FlatObservations
 
 Vector: TypeAlias = NDArray[np.float32]

@@ -12,9 +12,9 @@ from dorothie_gym.baselines.selfplay.ad_wizard import AdWizardSeat
 from dorothie_gym.baselines.selfplay.co_wizard import CoWizardSeat
 from dorothie_gym.baselines.selfplay.participant import ParticipantSeat
 from dorothie_gym.baselines.selfplay.seat import Mask, Seat, Vector
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.spaces import SpaceLimits
-from dorothie_gym.world.town import Town
 
 _SEATS: dict[Role, type[Seat[Any]]] = {
     seat.role: seat for seat in (ParticipantSeat, CoWizardSeat, AdWizardSeat)

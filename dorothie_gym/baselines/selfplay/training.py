@@ -24,7 +24,7 @@ from dorothie_gym.baselines.selfplay.game import AD_WIZARD, Game, Maker
 from dorothie_gym.baselines.selfplay.learner import draw
 from dorothie_gym.baselines.selfplay.settings import SELFPLAY, SelfPlaySettings
 from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.sessions import Fold
+from dorothie_gym.recording import Fold
 
 OPPONENTS = ("scripted", "learned")
 """Ad-Wizards that the team is evaluated against."""

@@ -20,9 +20,9 @@ from dorothie_gym.baselines.toto.losses import point_losses
 from dorothie_gym.baselines.toto.texts import Texts
 from dorothie_gym.baselines.toto.towns import DEGREES, METRES, Towns
 from dorothie_gym.baselines.training.trainer import Model
+from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES, LANE_ID, LENGTH
 from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, VECTOR_SLOTS, DialogueMove, PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS
-from dorothie_gym.world.town.graph import EDGE_TYPES, FEATURES, LANE_ID, LENGTH
 
 Tokens: TypeAlias = tuple[Tensor, Tensor, Tensor]
 """Tokens (B, n, d), their mask (B, n), their times (B, n) [s]."""

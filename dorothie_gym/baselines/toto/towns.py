@@ -10,8 +10,8 @@ import torch
 from torch import Tensor, nn
 
 from dorothie_gym.baselines.inputs import tensor
-from dorothie_gym.evaluation.features import TownGraph
-from dorothie_gym.world.town.graph import FEATURES
+from dorothie_gym.benchmark.features import TownGraph
+from dorothie_gym.maps.lane_graph import FEATURES
 
 METRES: Final = 100.0
 """Unit of places in a model [m]: towns are some hundred metres wide."""

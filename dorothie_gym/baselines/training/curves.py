@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dorothie_gym.baselines.training.trainer import Epoch
-from dorothie_gym.world.graphics.charts import INK, SHEET, SOFT, hexadecimal
-from dorothie_gym.world.graphics.palette import CAR, ROAD
+from dorothie_gym.rendering.charts import INK, SHEET, SOFT, hexadecimal
+from dorothie_gym.rendering.palette import CAR, ROAD
 
 
 def draw_curves(epochs: Sequence[Epoch], title: str, path: Path) -> None:

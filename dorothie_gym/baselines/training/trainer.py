@@ -16,7 +16,7 @@ from torch import Tensor, nn
 from dorothie_gym.baselines.inputs import Examples, Inputs, Labels
 from dorothie_gym.baselines.outputs import Predicted
 from dorothie_gym.baselines.training import checkpoints
-from dorothie_gym.evaluation.features import BatchSpec
+from dorothie_gym.benchmark.features import BatchSpec
 
 BEST_FILE: Final = "best.safetensors"
 """The weights of the epoch with the lowest validation loss."""

@@ -6,6 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from dorothie_gym.maps.lane_neighbours import oncoming_lanes
+from dorothie_gym.maps.model import Exit, LinkType, wrap_degrees
+from dorothie_gym.maps.routing import Entry, Place
+from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import LandmarkName, ObjectClass, PhysicalAction
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
@@ -25,10 +29,6 @@ from dorothie_gym.policies.route_progress import (
     way_ahead,
 )
 from dorothie_gym.spaces import Motion, Physical
-from dorothie_gym.world.town.lights import LightColour
-from dorothie_gym.world.town.model import Exit, LinkType, wrap_degrees
-from dorothie_gym.world.town.oncoming import oncoming_lanes
-from dorothie_gym.world.town.routing import Entry, Place
 
 DECISION = 0.5
 """Time between decisions [s]."""

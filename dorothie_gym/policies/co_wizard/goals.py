@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dorothie_gym.dialogue import Wording
+from dorothie_gym.maps.routing import Place, router
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueMove,
@@ -24,7 +25,6 @@ from dorothie_gym.policies.observation_parser import SeenLandmark
 from dorothie_gym.policies.route_progress import RouteProgress, streets_named
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.spaces import LanePosition, Mental
-from dorothie_gym.world.town.routing import Place, router
 
 MOST_LANES = 40
 """So many lanes of a street are looked at for the one that is reached first."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dorothie_gym.dialogue import Direction, Wording, WordingContext
+from dorothie_gym.maps.model import LinkType
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueMove,
@@ -24,7 +25,6 @@ from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
 from dorothie_gym.policies.route_progress import Choice, direction_of
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.spaces import Motion, Physical
-from dorothie_gym.world.town.model import LinkType
 
 ASK_DISTANCE = 75.0
 """A way is asked for when the junction is this near [m]."""

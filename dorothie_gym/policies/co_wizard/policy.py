@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dorothie_gym.dialogue import draw_style
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ObjectClass, Role
 from dorothie_gym.policies.co_wizard.config import CoWizardStyle
 from dorothie_gym.policies.co_wizard.driving import creep, drive, rest, see_green
@@ -22,7 +23,6 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import Policy
 from dorothie_gym.policies.speech import SpeechState
 from dorothie_gym.spaces import ActionDict, CoWizardAction, Mental, Motion, Physical, SpaceLimits
-from dorothie_gym.world.town import Town
 
 ASTRAY = 2
 """After so many decisions off the plan it is made anew."""

@@ -7,6 +7,8 @@ import math
 from dataclasses import dataclass, field
 
 from dorothie_gym.dialogue import Direction
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import (
     GoalStatus,
     LandmarkName,
@@ -19,8 +21,6 @@ from dorothie_gym.policies.co_wizard.config import USUAL_SPEED, CoWizardStyle
 from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.policies.speech import SpeechState
 from dorothie_gym.spaces import LanePosition, Mental
-from dorothie_gym.world.town import Town
-from dorothie_gym.world.town.routing import Place
 
 
 class Wish(enum.Enum):

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import (
     ObjectClass,
     PhysicalAction,
@@ -16,8 +18,6 @@ from dorothie_gym.ontology import (
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenObject, read_landmarks, read_objects, scalar
 from dorothie_gym.policies.route_progress import Choice, is_choice, next_choice
 from dorothie_gym.spaces import ExitColumn, Motion
-from dorothie_gym.world.town import Town
-from dorothie_gym.world.town.routing import Place
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.maps import LinkType, Town
+from dorothie_gym.maps.lane_neighbours import oncoming_lanes
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.policies.navigation.actions import ACTIONS, FIRST_TURN, NavigationAction, prepares
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits
+from dorothie_gym.sim.ego.driver import MAX_CRUISE, MIN_CRUISE
+from dorothie_gym.sim.ego.manoeuvre_lanes import LEAD, MIN_SWITCH
+from dorothie_gym.sim.ego.obstacles import BRAKING, HALF_LENGTH
+from dorothie_gym.sim.ego.planner import HARD_STOP, U_TURN_SPEED
 from dorothie_gym.spaces import ExitColumn, Motion
-from dorothie_gym.world.car.clearance import BRAKING, HALF_LENGTH
-from dorothie_gym.world.car.driver import MAX_CRUISE, MIN_CRUISE
-from dorothie_gym.world.car.lanes import LEAD, MIN_SWITCH
-from dorothie_gym.world.car.planner import HARD_STOP, U_TURN_SPEED
-from dorothie_gym.world.town import LinkType, Town
-from dorothie_gym.world.town.oncoming import oncoming_lanes
 
 _OFF_LINE = (PhysicalAction.LANE_SWITCH, PhysicalAction.U_TURN)
 

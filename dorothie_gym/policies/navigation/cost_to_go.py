@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
-from dorothie_gym.world.town import Town
-from dorothie_gym.world.town.routing import Place, router
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.routing import Place, router
 
 PASSED = 2.0
 """A goal that lies no farther behind than this counts as reached and not as passed [m]."""

@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.model import wrap_degrees
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.policies.co_wizard import ScriptedCoWizard, attend, respond
 from dorothie_gym.policies.co_wizard.driving import distance_ahead
@@ -24,8 +26,6 @@ from dorothie_gym.policies.navigation.navigation_policy import (
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vector
 from dorothie_gym.policies.route_progress import lanes_beside
 from dorothie_gym.spaces import CoWizardAction, Motion, Physical
-from dorothie_gym.world.town import Town
-from dorothie_gym.world.town.model import wrap_degrees
 
 NEAR_GOAL = 30.0
 """Who stops this near before the place it goes to stops for it [m]."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from dorothie_gym.maps import LinkType
+from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, PhysicalAction, StreetName
 from dorothie_gym.policies.co_wizard.driving import PASSED, distance_ahead, wanted_exit
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Wish
@@ -14,8 +16,6 @@ from dorothie_gym.policies.navigation.junction_exits import JunctionExits, neare
 from dorothie_gym.policies.navigation.observation_vector import HeardInstruction
 from dorothie_gym.policies.route_progress import stopping_distance
 from dorothie_gym.spaces import Motion
-from dorothie_gym.world.town import LinkType
-from dorothie_gym.world.town.routing import Place
 
 AT_PLACE = 3.0
 """A car that stands this close to where it wanted to stop has come there, as far as it can tell [m]."""

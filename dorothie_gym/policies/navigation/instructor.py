@@ -7,6 +7,8 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.routing import Entry, Place
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits, nearest_sector
@@ -22,8 +24,6 @@ from dorothie_gym.policies.observation_parser import (
 )
 from dorothie_gym.policies.route_progress import RouteJunction, RouteProgress
 from dorothie_gym.spaces import ObjectColumn, Observation
-from dorothie_gym.world.town import Town
-from dorothie_gym.world.town.routing import Entry, Place
 
 TELL_DISTANCE = 110.0
 """A turn is told when it is this near [m]."""

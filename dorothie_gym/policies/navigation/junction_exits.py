@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dorothie_gym.maps import Exit, Town
+from dorothie_gym.maps.model import wrap_degrees
 from dorothie_gym.policies.route_progress import is_choice, lanes_beside, next_choice
 from dorothie_gym.spaces import ExitColumn
-from dorothie_gym.world.town import Exit, Town
-from dorothie_gym.world.town.model import wrap_degrees
 
 SECTORS = tuple(range(-180, 180, 45))
 """Middles of the eighths [degrees, positive left]: back, sharp right, right, half right, ahead, ..."""

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import PhysicalAction, Role
 from dorothie_gym.policies import Policy
 from dorothie_gym.policies.co_wizard import CoWizardState, CoWizardStyle, ScriptedCoWizard, attend, respond
@@ -24,7 +25,6 @@ from dorothie_gym.policies.navigation.observation_vector import (
     Vector,
 )
 from dorothie_gym.spaces import ActionDict, Motion, Physical, SpaceLimits
-from dorothie_gym.world.town import Town
 
 Choose: TypeAlias = Callable[[Vector, NDArray[np.bool_]], int]
 """Chooses one of the 18 actions from an observation of `Navigation-v0` (161,) and a mask (18,)."""

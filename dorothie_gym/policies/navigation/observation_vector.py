@@ -12,6 +12,10 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from dorothie_gym.maps import LinkType, Town
+from dorothie_gym.maps.lane_neighbours import oncoming_lanes
+from dorothie_gym.maps.routing import Place
+from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueMove,
@@ -25,12 +29,8 @@ from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 from dorothie_gym.policies.navigation.instructor import NavigationInstruction
 from dorothie_gym.policies.navigation.junction_exits import SECTORS, JunctionExits, SectorExit
 from dorothie_gym.policies.observation_parser import street_of
+from dorothie_gym.sim.ego.driver import MAX_CRUISE
 from dorothie_gym.spaces import ExitColumn, Motion, ObjectColumn
-from dorothie_gym.world.car.driver import MAX_CRUISE
-from dorothie_gym.world.town import LinkType, Town
-from dorothie_gym.world.town.lights import LightColour
-from dorothie_gym.world.town.oncoming import oncoming_lanes
-from dorothie_gym.world.town.routing import Place
 
 Vector: TypeAlias = NDArray[np.float32]
 

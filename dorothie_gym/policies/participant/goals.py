@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from dorothie_gym.dialogue import Wording
+from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueMove,
@@ -22,7 +23,6 @@ from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.policies.speech import Remark, remark
-from dorothie_gym.world.town.routing import router
 
 ROOM_TO_WAIT = 80.0
 """A car that is nearer to its goal than this is not told to wait when something new comes up [m]."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from dorothie_gym.dialogue import Direction, Wording, speech_seconds, word_act
+from dorothie_gym.maps.routing import Entry
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, Slot, SlotValue, StreetName
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.participant.arriving import NEAR, READY, SLOW_SPEED, WITHIN, about_to_arrive, approach
@@ -23,7 +24,6 @@ from dorothie_gym.policies.route_progress import (
     next_choice,
 )
 from dorothie_gym.policies.speech import Remark, remark
-from dorothie_gym.world.town.routing import Entry
 
 TELL_DISTANCE = 110.0
 """A turn is told when it is this near [m]."""

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 
 from dorothie_gym.dialogue import draw_style
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.participant.config import ParticipantStyle
 from dorothie_gym.policies.participant.goals import choose_target, go_on, note_tasks, tell_target
@@ -22,8 +24,6 @@ from dorothie_gym.policies.policy import Policy
 from dorothie_gym.policies.route_progress import light_ahead
 from dorothie_gym.policies.speech import SpeechState
 from dorothie_gym.spaces import ActionDict, ParticipantAction, SpaceLimits
-from dorothie_gym.world.town import Town
-from dorothie_gym.world.town.lights import LightColour
 
 LONGEST_RED = 60.0
 """A car that has been standing for longer than this does not stand because of a light [s]."""

@@ -7,12 +7,12 @@ import math
 import numpy as np
 
 from dorothie_gym.dialogue import Wording, WordingContext
+from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, StreetName, WeatherParameter
 from dorothie_gym.policies.observation_parser import nearest_landmark, place_on_lanes, street_of, weather
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.speech import Remark, remark
-from dorothie_gym.world.town.routing import Place
 
 THICK_FOG = 35.0
 """Fog density from which one cannot see far (percent)."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.observation_parser import (
     SeenLandmark,
@@ -14,8 +16,6 @@ from dorothie_gym.policies.participant.config import ParticipantStyle
 from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.policies.speech import SpeechState
 from dorothie_gym.policies.utterance_input import HeardUtterance
-from dorothie_gym.world.town import Town
-from dorothie_gym.world.town.routing import Place
 
 
 @dataclass(kw_only=True)

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import LandmarkName
 from dorothie_gym.policies.observation_parser import (
     SeenLandmark,
@@ -17,8 +19,6 @@ from dorothie_gym.policies.observation_parser import (
     read_subgoals,
     scalar,
 )
-from dorothie_gym.world.town import Town
-from dorothie_gym.world.town.routing import Place
 
 STANDING = 0.3
 """Below this speed the car stands [m/s]."""

@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 from dorothie_gym.baselines.acting.following import Following
 from dorothie_gym.baselines.acting.history import KEPT, History
 from dorothie_gym.baselines.acting.segments import spans_of
-from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
 from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.recording import Session
 from dorothie_gym.rollout import play_session
-from dorothie_gym.sessions import Session
 from dorothie_gym.spaces import ActionDict, CoWizardAction, heard_acts
-from dorothie_gym.world.town import Town
 
 
 class Listening(Policy[Any]):

@@ -7,9 +7,9 @@ from functools import cache
 from typing import Any
 
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.maps import Town, load_town
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.world.town import Town, load_town
 
 
 @cache

@@ -8,11 +8,11 @@ import pytest
 
 from dorothie_gym.baselines.acting.deeds import Deed, deed_of
 from dorothie_gym.dialogue import Direction
+from dorothie_gym.maps import load_town
+from dorothie_gym.maps.model import LinkType
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, PhysicalAction
 from dorothie_gym.policies.route_progress import Choice
 from dorothie_gym.spaces import Motion, Physical
-from dorothie_gym.world.town import load_town
-from dorothie_gym.world.town.model import LinkType
 from tests.baselines.acting.observed import town, view
 
 TURN, SWITCH, ROUND = PhysicalAction.J_TURN, PhysicalAction.LANE_SWITCH, PhysicalAction.U_TURN

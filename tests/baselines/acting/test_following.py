@@ -8,7 +8,7 @@ from dorothie_gym.baselines.acting.following import Following, carried_out
 from dorothie_gym.baselines.acting.history import History
 from dorothie_gym.dialogue import Span
 from dorothie_gym.ontology import DialogueAct, DialogueMove, PhysicalAction, Role
-from dorothie_gym.sessions import EventType
+from dorothie_gym.recording import EventType
 from dorothie_gym.spaces import Motion, Physical, Speech
 from tests.baselines.acting.observed import town, view
 

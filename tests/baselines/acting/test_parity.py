@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from dorothie_gym.baselines.acting.trained import live_columns
+from dorothie_gym.benchmark.features import Columns, columns_of, gather, points
+from dorothie_gym.benchmark.features.extraction import town_graph
 from dorothie_gym.dialogue import Span
-from dorothie_gym.evaluation.features import Columns, columns_of, gather, points
-from dorothie_gym.evaluation.features.towns import town_graph
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role
-from dorothie_gym.sessions import OBJECT_VALUES, Task
+from dorothie_gym.recording import OBJECT_VALUES, Task
 from tests.baselines.acting.listening import Played, play
-from tests.evaluation.features.played import seen
+from tests.benchmark.features.played import seen
 
 ESTIMATED = {
     "window_pose", "window_speed", "window_lane", "window_kind", "window_values", "window_objects_mask",

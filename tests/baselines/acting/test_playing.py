@@ -14,13 +14,13 @@ import dorothie_gym.baselines  # noqa: F401  # makes the files playable
 from dorothie_gym.baselines.acting.trained import Trained
 from dorothie_gym.baselines.material import Material
 from dorothie_gym.baselines.runs import Job, run
-from dorothie_gym.envs.config import EnvConfig
-from dorothie_gym.evaluation.closed_loop import RolloutSettings, roll_out
+from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED, find_player
-from dorothie_gym.sessions import Session
+from dorothie_gym.recording import Session
+from dorothie_gym.rollout.closed_loop import RolloutSettings, roll_out
 from dorothie_gym.spaces import SpaceLimits
-from tests.evaluation.corpora import corpus
+from tests.benchmark.corpora import corpus
 
 MODELS = ("toto", "reader", "toto-bert")
 

@@ -13,12 +13,12 @@ pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
 import dorothie_gym.baselines  # noqa: E402, F401
 from dorothie_gym.baselines.rl import SettingsError, Training, TrainingSettings, WeightsError  # noqa: E402
-from dorothie_gym.envs.config import EnvConfig  # noqa: E402
+from dorothie_gym.engine.config import EnvConfig  # noqa: E402
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv  # noqa: E402
-from dorothie_gym.evaluation.closed_loop import RolloutSettings, parse_towns, roll_out  # noqa: E402
 from dorothie_gym.ontology import Role  # noqa: E402
 from dorothie_gym.policies import ALL_SCRIPTED, find_player  # noqa: E402
-from dorothie_gym.sessions import Session  # noqa: E402
+from dorothie_gym.recording import Session  # noqa: E402
+from dorothie_gym.rollout.closed_loop import RolloutSettings, parse_towns, roll_out  # noqa: E402
 
 
 def train(folder: Path, algorithm: str = "ppo", **changes: Any) -> None:

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from dorothie_gym.maps import load_town
+from dorothie_gym.maps.routing import router
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo
-from dorothie_gym.world.town import load_town
-from dorothie_gym.world.town.routing import router
 
 
 @pytest.mark.parametrize("town", ["brookside", "midtown"])

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dorothie_gym.envs.config import EnvConfig
+from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.ontology import AGENT_ROLES, PhysicalAction, Role

@@ -1,0 +1,49 @@
+"""What a corpus is like: counts, profiles, phenomena, consistency and agreement, all found anew from the events."""
+
+from dorothie_gym.analysis.agreement import Agreement, agreement, inconsistencies
+from dorothie_gym.analysis.behaviour import CLAIMS, Claim, Verdict, verdicts_of
+from dorothie_gym.analysis.corpus_stats import (
+    PAPER,
+    PAPER_FOLDS,
+    Census,
+    Counts,
+    census_of,
+    faults_of_corpus,
+    phenomena_of,
+)
+from dorothie_gym.analysis.exception_attribution import Handled, handled_by, handling, handling_of_events
+from dorothie_gym.analysis.majority_baselines import Anchors, anchors_of
+from dorothie_gym.analysis.phenomena import PHENOMENA, Finding, Phenomenon, Talk
+from dorothie_gym.analysis.profiles import Profile, Profiles
+from dorothie_gym.analysis.units import SaidUnit, Units
+
+__all__ = [
+    "CLAIMS",
+    "PAPER",
+    "PAPER_FOLDS",
+    "PHENOMENA",
+    "Agreement",
+    "Anchors",
+    "Census",
+    "Claim",
+    "Counts",
+    "Finding",
+    "Handled",
+    "Phenomenon",
+    "Profile",
+    "Profiles",
+    "SaidUnit",
+    "Talk",
+    "Units",
+    "Verdict",
+    "agreement",
+    "anchors_of",
+    "census_of",
+    "faults_of_corpus",
+    "handled_by",
+    "handling",
+    "handling_of_events",
+    "inconsistencies",
+    "phenomena_of",
+    "verdicts_of",
+]

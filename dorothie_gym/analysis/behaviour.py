@@ -1,0 +1,248 @@
+"""The behaviour that the paper reports (sections 4.2 and 4.3), each claim as a figure with a bootstrap interval.
+
+Every claim is a difference that the paper says is positive, so that it holds where the interval lies above zero. Claims
+about exceptions compare exchanges that handle an exception with those that handle none: means over exchanges, as in the
+paper's figure of them.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.analysis.exception_attribution import Handled, handling
+from dorothie_gym.analysis.units import Units
+from dorothie_gym.ontology import DialogueMove, MoveGroup, Role, Slot
+from dorothie_gym.recording.session import Session
+
+RESAMPLES: Final = 2000
+"""Corpora that are drawn, with replacement, from the sessions."""
+
+LEVEL: Final = 0.95
+"""Share of the drawn corpora whose figure lies within the interval (percentiles; Efron 1979)."""
+
+MOST: Final = 0.5
+"""Share of the drawn corpora from which on there is too little to compare."""
+
+_HUMAN, _CAR = Role.PARTICIPANT, Role.CO_WIZARD
+_ENV, _TASK, _NONE = Handled.ENVIRONMENTAL, Handled.TASK, Handled.NONE
+
+Key: TypeAlias = tuple[Any, ...]
+
+
+class Tally:
+    """Exchanges, acts and slot values of each session, counted by kind of exchange, speaker and move or slot.
+
+    A column is a key: ("exchanges", kind), ("move", kind, speaker, move), ("slot", kind, speaker, slot), and
+    ("instruct", kind, slot) for the participant's Instructs that carry the slot.
+    """
+
+    def __init__(self) -> None:
+        self._rows: list[Counter[Key]] = []
+
+    def add(self, units: Units) -> None:
+        """Counts a session."""
+        row: Counter[Key] = Counter()
+        kinds = handling(units)
+        for exchange in units.exchanges:
+            kind = kinds[exchange.id]
+            row["exchanges", kind] += 1
+            for move in exchange.moves:
+                row["move", kind, move.speaker, move.act.move] += 1
+                slots = [value.slot for value in move.act.slots]
+                row.update(("slot", kind, move.speaker, slot) for slot in slots)
+                if move.speaker is _HUMAN and move.act.move is DialogueMove.INSTRUCT:
+                    row.update(("instruct", kind, slot) for slot in set(slots))
+        self._rows.append(row)
+
+    @property
+    def sessions(self) -> int:
+        """Number of sessions."""
+        return len(self._rows)
+
+    def totals(self, weights: NDArray[np.float64]) -> Totals:
+        """Returns the sums over sessions.
+
+        Args:
+            weights: (n, sessions), how often each session counts; a row for each sum.
+        """
+        keys = sorted({key for row in self._rows for key in row}, key=repr)
+        table = np.array([[row[key] for key in keys] for row in self._rows], dtype=np.float64)
+        sums = weights @ table.reshape(len(self._rows), len(keys))
+        return Totals({key: sums[:, k] for k, key in enumerate(keys)}, len(weights))
+
+
+class Totals:
+    """Sums over sessions by key, n of each (see `Tally`)."""
+
+    def __init__(self, sums: dict[Key, NDArray[np.float64]], count: int) -> None:
+        self._sums, self._nothing = sums, np.zeros(count)
+
+    def of(self, *keys: Key) -> NDArray[np.float64]:
+        """Sum of the keys, (n,)."""
+        return sum((self._sums.get(key, self._nothing) for key in keys), self._nothing)
+
+    def mean(self, kind: Handled, *keys: Key) -> NDArray[np.float64]:
+        """Sum of the keys in an exchange of a kind on average, (n,); NaN where there is no such exchange."""
+        exchanges = self.of(("exchanges", kind))
+        return np.divide(self.of(*keys), exchanges, out=np.full_like(exchanges, np.nan), where=exchanges > 0)
+
+    def share(self, speaker: Role, *moves: DialogueMove) -> NDArray[np.float64]:
+        """Share of the moves among all acts of a speaker, (n,); NaN where they say nothing."""
+        every = self.of(*(("move", kind, speaker, move) for kind in Handled for move in DialogueMove))
+        found = self.of(*(("move", kind, speaker, move) for kind in Handled for move in moves))
+        return np.divide(found, every, out=np.full_like(every, np.nan), where=every > 0)
+
+
+Figure: TypeAlias = Callable[[Totals], NDArray[np.float64]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Claim:
+    """Something that the paper reports of how people and cars talk.
+
+    Attributes:
+        name: short, for JSON.
+        title: in words.
+        figure: what is positive if the claim is true.
+    """
+
+    name: str
+    title: str
+    figure: Figure
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """What a corpus says of a claim.
+
+    Attributes:
+        claim: the claim.
+        difference: its figure over all sessions; None where there is nothing to compare.
+        low, high: ends of its interval; None likewise.
+    """
+
+    claim: Claim
+    difference: float | None
+    low: float | None
+    high: float | None
+
+    @property
+    def holds(self) -> bool:
+        """Whether the interval lies above zero."""
+        return self.low is not None and self.low > 0.0
+
+    def to_json(self) -> dict[str, Any]:
+        """Returns `name`, `title`, `difference`, `low`, `high` and `holds`."""
+        names = ("difference", "low", "high", "holds")
+        return {"name": self.claim.name, "title": self.claim.title, **{name: getattr(self, name) for name in names}}
+
+
+def verdicts_of(sessions: Iterable[Session], *, resamples: int = RESAMPLES, seed: int = 0) -> tuple[Verdict, ...]:
+    """Returns what sessions say of each of the `CLAIMS`.
+
+    The interval holds the middle 95 % of the figure over corpora that are drawn from the sessions with replacement,
+    those left out that have nothing to compare. It is None where there are fewer than two sessions, or where half of
+    the drawn corpora, or more, have nothing to compare.
+
+    Args:
+        sessions: of a corpus.
+        resamples: corpora that are drawn, at least 1.
+        seed: of the draws.
+    """
+    tally = Tally()
+    for session in sessions:
+        tally.add(Units(session))
+    if not tally.sessions:
+        return tuple(Verdict(claim=claim, difference=None, low=None, high=None) for claim in CLAIMS)
+    count = tally.sessions
+    whole = tally.totals(np.ones((1, count)))
+    drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=resamples)
+    totals = tally.totals(drawn.astype(np.float64))
+    return tuple(_verdict(claim, whole, totals if count > 1 else None) for claim in CLAIMS)
+
+
+def _verdict(claim: Claim, whole: Totals, drawn: Totals | None) -> Verdict:
+    difference = float(claim.figure(whole)[0])
+    if np.isnan(difference):
+        return Verdict(claim=claim, difference=None, low=None, high=None)
+    figures = np.full(1, np.nan) if drawn is None else claim.figure(drawn)
+    if np.isnan(figures).mean() >= MOST:
+        return Verdict(claim=claim, difference=difference, low=None, high=None)
+    low, high = np.nanquantile(figures, ((1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0))
+    return Verdict(claim=claim, difference=difference, low=float(low), high=float(high))
+
+
+# --- the claims -----------------------------------------------------------------------------------------------------
+
+
+def _mostly(speaker: Role, moves: Sequence[DialogueMove], totals: Totals) -> NDArray[np.float64]:
+    """Share of the moves among a speaker's acts, less that of the commonest other move."""
+    others = np.array([totals.share(speaker, move) for move in DialogueMove if move not in moves])
+    above: NDArray[np.float64] = totals.share(speaker, *moves) - others.max(axis=0)
+    return above
+
+
+def _more(kind: Handled, keys: Callable[[Handled], Iterable[Key]], sign: float, totals: Totals) -> NDArray[np.float64]:
+    """Mean number in an exchange that handles an exception of a kind, less that in one that handles none."""
+    return sign * (totals.mean(kind, *keys(kind)) - totals.mean(_NONE, *keys(_NONE)))
+
+
+def _moves(speaker: Role, moves: Sequence[DialogueMove], kind: Handled) -> Iterable[Key]:
+    return (("move", kind, speaker, move) for move in moves)
+
+
+def _slots(speaker: Role, slot: Slot, kind: Handled) -> Iterable[Key]:
+    return (("slot", kind, speaker, slot),)
+
+
+def _instructs(slot: Slot, kind: Handled) -> Iterable[Key]:
+    return (("instruct", kind, slot),)
+
+
+def _claim(name: str, title: str, kind: Handled, keys: Callable[[Handled], Iterable[Key]], sign: float = 1.0) -> Claim:
+    return Claim(name=name, title=title, figure=partial(_more, kind, keys, sign))
+
+
+_INSTRUCT, _EXPLAIN = (DialogueMove.INSTRUCT,), (DialogueMove.EXPLAIN,)
+_GROUNDING = (DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM)
+_ASK, _INFORM = MoveGroup.ASK.moves, MoveGroup.INFORM.moves
+
+CLAIMS: Final[tuple[Claim, ...]] = (
+    Claim(
+        name="human_mostly_instructs",
+        title="humans: mostly Instruct",
+        figure=partial(_mostly, _HUMAN, _INSTRUCT),
+    ),
+    Claim(
+        name="car_mostly_grounds",
+        title="car: mostly Acknowledge, Confirm",
+        figure=partial(_mostly, _CAR, _GROUNDING),
+    ),
+    _claim("environmental_car_explains", "environmental: car, more Explain", _ENV, partial(_moves, _CAR, _EXPLAIN)),
+    _claim("environmental_car_asks", "environmental: car, more questions", _ENV, partial(_moves, _CAR, _ASK)),
+    _claim("environmental_car_actions", "environmental: car, more Action slots", _ENV,
+           partial(_slots, _CAR, Slot.ACTION)),
+    _claim("environmental_car_objects", "environmental: car, more Object slots", _ENV,
+           partial(_slots, _CAR, Slot.OBJECT)),
+    _claim("environmental_human_instructs_less", "environmental: humans, fewer Instruct", _ENV,
+           partial(_moves, _HUMAN, _INSTRUCT), -1.0),
+    _claim("environmental_human_informs", "environmental: humans, more replies", _ENV,
+           partial(_moves, _HUMAN, _INFORM)),
+    _claim("task_human_instructs", "task: humans, more Instruct", _TASK, partial(_moves, _HUMAN, _INSTRUCT)),
+    _claim("task_human_landmarks", "task: humans, more Landmark slots", _TASK, partial(_slots, _HUMAN, Slot.LANDMARK)),
+    _claim("task_human_statuses", "task: humans, more Status slots", _TASK, partial(_slots, _HUMAN, Slot.STATUS)),
+    _claim("task_human_instructs_landmark", "task: humans, more Instruct + Landmark", _TASK,
+           partial(_instructs, Slot.LANDMARK)),
+    _claim("task_human_instructs_status", "task: humans, more Instruct + Status", _TASK,
+           partial(_instructs, Slot.STATUS)),
+    _claim("task_car_informs", "task: car, more informing moves", _TASK, partial(_moves, _CAR, _INFORM)),
+)  # fmt: skip
+"""In the order of the paper. Asking are Align, Check, QueryYN and QueryW, informing Clarify, Confirm and the replies
+(spec of the ontology, decision tree)."""

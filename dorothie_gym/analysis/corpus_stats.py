@@ -1,0 +1,270 @@
+"""Everything that is counted over a corpus, in one pass over its sessions."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Final
+
+from dorothie_gym.analysis.agreement import inconsistencies
+from dorothie_gym.analysis.diversity import has_language_models, plain, repetition, trigram_perplexity, words_of
+from dorothie_gym.analysis.majority_baselines import Anchors
+from dorothie_gym.analysis.phenomena import PHENOMENA, Phenomenon, Talk
+from dorothie_gym.analysis.profiles import Profiles
+from dorothie_gym.analysis.units import Units
+from dorothie_gym.ontology import PhysicalAction, Role
+from dorothie_gym.recording.corpus import Corpus
+from dorothie_gym.recording.events import ActionRecord
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.splits import FOLDS, Fold
+
+_STEADY = (PhysicalAction.STOP, PhysicalAction.LANE_FOLLOW)
+"""Done twice in a row among the navigation actions, the second changes nothing."""
+
+
+def effective_actions(session: Session) -> Iterator[ActionRecord]:
+    """Yields the Co-Wizard's actions that changed something.
+
+    What was refused is no action. Lights that are switched to what they are, a stop after a stop and following the lane
+    while it is followed change nothing. Hazard stops, and going on after them, are the car's own.
+    """
+    lights: bool | None = None
+    last: PhysicalAction | None = None
+    for action in session.physical_actions:
+        if action.source is not Role.CO_WIZARD:
+            continue
+        if action.action is PhysicalAction.LIGHT_CHANGE:
+            if action.up is not None and action.up == lights:
+                continue
+            lights = action.up
+        elif action.action is not PhysicalAction.SPEED_CHANGE:
+            if action.action in _STEADY and action.action is last:
+                continue
+            last = action.action
+        yield action
+
+
+# --- Table 2 of the paper for any sessions ---------------------------------------------------------------------------
+
+PAPER: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "sessions": 183,
+        "control_hours": 18.7,
+        "audio_hours": 2.9,
+        "utterances": 8415,
+        "words": 50398,
+        "vocabulary": 1373,
+        "transactions": 578,
+        "exchanges": 4089,
+        "moves": 11623,
+        "slot_values": 8618,
+        "physical_actions": 9448,
+    }
+)
+"""Table 2 of the paper."""
+
+PAPER_FOLDS: Final[Mapping[Fold, int]] = MappingProxyType(
+    dict(zip(FOLDS, (123, 14, 6, 25, 15), strict=True)),
+)
+"""Sessions of each fold of the paper's corpus (table 2)."""
+
+
+@dataclass
+class Counts:
+    """What is counted over sessions, one added after the other.
+
+    Attributes:
+        sessions: number of sessions.
+        control_seconds: their length [s].
+        audio_seconds: how long the participants spoke [s].
+        transactions: units found by the rule of `dialogue.transactions`.
+        exchanges: units found by the rule of `dialogue.exchanges`.
+        moves: dialogue moves of participants and Co-Wizards.
+        slot_values: values that these moves carry.
+        physical_actions: of the Co-Wizards, that changed something.
+        words: how often each word occurs.
+        texts: how often each utterance occurs, without case and punctuation.
+        folds: sessions by fold; those outside of folds are not in it.
+    """
+
+    sessions: int = 0
+    control_seconds: float = 0.0
+    audio_seconds: float = 0.0
+    transactions: int = 0
+    exchanges: int = 0
+    moves: int = 0
+    slot_values: int = 0
+    physical_actions: int = 0
+    words: Counter[str] = field(default_factory=Counter)
+    texts: Counter[str] = field(default_factory=Counter)
+    folds: Counter[Fold] = field(default_factory=Counter)
+
+    def add(self, session: Session, units: Units, fold: Fold | None) -> None:
+        """Counts a session."""
+        self.sessions += 1
+        self.control_seconds += session.duration
+        self.transactions += len(units.transactions)
+        self.exchanges += len(units.exchanges)
+        self.physical_actions += sum(1 for _ in effective_actions(session))
+        for utterance in units.utterances:
+            self.texts[plain(utterance.text)] += 1
+            self.words.update(words_of(utterance.text))
+            self.moves += len(utterance.moves)
+            self.slot_values += sum(len(move.act.slots) for move in utterance.moves)
+        self.audio_seconds += _spoken_seconds(
+            (utterance.start, utterance.end) for utterance in units.utterances if utterance.speaker is Role.PARTICIPANT
+        )
+        if fold is not None:
+            self.folds[fold] += 1
+
+    @property
+    def utterances(self) -> int:
+        """Number of utterances of participants and Co-Wizards."""
+        return self.texts.total()
+
+    def to_json(self) -> dict[str, Any]:
+        """Returns the figures of the table; the ratio is None where nobody spoke."""
+        return {
+            "sessions": self.sessions,
+            "control_hours": self.control_seconds / 3600,
+            "audio_hours": self.audio_seconds / 3600,
+            "utterances": self.utterances,
+            "words": self.words.total(),
+            "vocabulary": len(self.words),
+            "transactions": self.transactions,
+            "exchanges": self.exchanges,
+            "moves": self.moves,
+            "slot_values": self.slot_values,
+            "physical_actions": self.physical_actions,
+            "folds": {fold.value: self.folds[fold] for fold in Fold if self.folds[fold]},
+            "distinct_utterance_ratio": len(self.texts) / self.utterances if self.utterances else None,
+        }
+
+
+def _spoken_seconds(stretches: Iterable[tuple[float, float]]) -> float:
+    """Seconds in which somebody spoke: what overlaps counts once."""
+    total, until = 0.0, 0.0
+    for start, end in sorted(stretches):
+        total += max(0.0, end - max(start, until))
+        until = max(until, end)
+    return total
+
+
+# --- Everything that is counted over a corpus, in one pass over its sessions -----------------------------------------
+
+
+@dataclass
+class Census:
+    """What a corpus is like.
+
+    Attributes:
+        counts: table 2 of the paper.
+        anchors: how easy the tasks are for who knows nothing.
+        profiles: moves and slots per transaction and exchange.
+        texts: the utterances of the folds that train and of those that test.
+        incomplete: names of sessions that were cut off; they count as far as they go.
+    """
+
+    counts: Counts = field(default_factory=Counts)
+    anchors: Anchors = field(default_factory=Anchors)
+    profiles: Profiles = field(default_factory=Profiles)
+    texts: dict[str, list[str]] = field(default_factory=lambda: {"train": [], "test": []})
+    incomplete: list[str] = field(default_factory=list)
+
+    def add(self, session: Session, fold: Fold | None = None) -> None:
+        """Counts a session."""
+        units = Units(session)
+        self.counts.add(session, units, fold)
+        self.anchors.add(session)
+        self.profiles.add(units)
+        split = None if fold is None else fold.value.split("/")[0]
+        if split in self.texts:
+            self.texts[split].extend(utterance.text for utterance in units.utterances)
+        if not session.complete:
+            self.incomplete.append(session.name)
+
+    def diversity(self) -> dict[str, Any]:
+        """How varied the talk is.
+
+        Returns:
+            What `diversity.repetition` tells, and `perplexity` of the utterances of the folds that test under a trigram
+            of those that train; None where there are no such folds, nltk is not installed, or it is infinite.
+        """
+        train, test = self.texts["train"], self.texts["test"]
+        perplexity = trigram_perplexity(train, test) if has_language_models() else None
+        if perplexity is not None and not math.isfinite(perplexity):
+            perplexity = None
+        return {**repetition(self.counts.texts), "perplexity": perplexity}
+
+    def to_json(self) -> dict[str, Any]:
+        """Returns the figures of table 2, `anchors` and `diversity`."""
+        return {**self.counts.to_json(), "anchors": self.anchors.to_json(), "diversity": self.diversity()}
+
+
+def census_of(corpus: Corpus) -> Census:
+    """Counts a corpus; raises `SessionError` where a session cannot be read."""
+    census = Census()
+    for entry in corpus.entries:
+        census.add(entry.load(), entry.fold)
+    return census
+
+
+def phenomena_of(sessions: Iterable[Session]) -> list[dict[str, Any]]:
+    """Counts the 24 phenomena.
+
+    Returns:
+        For each `number`, `title`, `cause`, in how many `sessions` its cause occurs, in how many of them it `occurs`,
+        their `share` (None without a cause), `findings` in all, `forms` ({form: findings}), and `example`: session,
+        time [s] and text of the first finding, None if there is none.
+    """
+    rows = [_Row(phenomenon) for phenomenon in PHENOMENA]
+    for session in sessions:
+        talk = Talk(session)
+        for row in rows:
+            row.add(talk)
+    return [row.to_json() for row in rows]
+
+
+def faults_of_corpus(corpus: Corpus) -> dict[str, tuple[str, ...]]:
+    """Returns the faults of annotation of each session by the name of its folder within the corpus."""
+    return {_name(corpus, entry.path): inconsistencies(entry.load()) for entry in corpus.entries}
+
+
+def _name(corpus: Corpus, path: Any) -> str:
+    return str(path.relative_to(corpus.root)) if path != corpus.root else path.resolve().name
+
+
+class _Row:
+    def __init__(self, phenomenon: Phenomenon) -> None:
+        self.phenomenon = phenomenon
+        self.sessions = self.occurs = 0
+        self.forms = dict.fromkeys(phenomenon.forms, 0)
+        self.example: dict[str, Any] | None = None
+
+    def add(self, talk: Talk) -> None:
+        if not self.phenomenon.has_cause(talk):
+            return
+        self.sessions += 1
+        findings = list(self.phenomenon.find(talk))
+        self.occurs += bool(findings)
+        for finding in findings:
+            self.forms[finding.form] += 1
+        if findings and self.example is None:
+            turn = findings[0].turn
+            self.example = {"session": talk.session.name, "time": round(turn.start, 1), "text": turn.text}
+
+    def to_json(self) -> dict[str, Any]:
+        return {
+            "number": self.phenomenon.number,
+            "title": self.phenomenon.title,
+            "cause": self.phenomenon.cause,
+            "sessions": self.sessions,
+            "occurs": self.occurs,
+            "share": self.occurs / self.sessions if self.sessions else None,
+            "findings": sum(self.forms.values()),
+            "forms": self.forms,
+            "example": self.example,
+        }

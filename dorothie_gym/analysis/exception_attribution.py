@@ -1,0 +1,251 @@
+"""Which exchange handles which exception: a rule over events and references, so that it can be found anew.
+
+An exchange handles an exception if it begins after it, within `WINDOW`, and one of its acts refers to it:
+
+- weather: to what it covers (sky, ground, water), or in words to fog, rain, night, ...; within `PROMPT` to speed or
+  lights too;
+- vehicles or pedestrians that appear: to such;
+- something on the road: to an obstacle, in words to a way that is blocked or free again; the time counts anew from when
+  the car comes near, and from then on, within `PROMPT`, to a U-turn or another lane too;
+- a sensor fault: in words, to a sensor or to what it shows; or begun by the car within `FAULT` with a question what to
+  do, which it cannot see for itself;
+- a task: to the landmark of the task, or to what is given up or put off.
+
+A question that begins within `PATIENCE` after an exchange that handles something on the road, and names no place,
+belongs to it; so does, after one that handles a task, a question of status or where to go. Where several fit, the
+latest counts.
+"""
+
+from __future__ import annotations
+
+import bisect
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from dorothie_gym.analysis.units import SaidUnit, Units
+from dorothie_gym.dialogue.exchanges import PATIENCE
+from dorothie_gym.ontology import (
+    ActionValue,
+    ExceptionKind,
+    GoalStatus,
+    LandmarkName,
+    MoveGroup,
+    ObjectClass,
+    Role,
+    Slot,
+    SlotValue,
+)
+from dorothie_gym.recording.events import Event, EventType
+from dorothie_gym.recording.session import Session
+from dorothie_gym.sim.config import FRAME_RATE
+
+WINDOW: Final = 60.0
+"""An exception is handled within this time [s]."""
+
+PROMPT: Final = 20.0
+"""An act that names nothing but what the car is to do, which may have other reasons, is about what happened within this
+time before [s]."""
+
+FAULT: Final = 30.0
+"""A sensor fault ends by itself within this time [s] (spec: design)."""
+
+NEAR: Final = 60.0
+"""The car has met something on the road when it comes this close to it [m]: it is seen from there by day."""
+
+OBSTACLES: Final = (
+    ObjectClass.STATIC, ObjectClass.DYNAMIC, ObjectClass.OTHER, ObjectClass.FENCE, ObjectClass.VEGETATION,
+    ObjectClass.TRAFFIC_SIGN, ObjectClass.GUARD_RAIL, ObjectClass.WALL, ObjectClass.UNLABELED,
+)  # fmt: skip
+"""What lies across a road may be called."""
+
+
+class Handled(StrEnum):
+    """What an exchange handles."""
+
+    ENVIRONMENTAL = "environmental"
+    TASK = "task"
+    NONE = "none"
+
+
+_AROUND: Final[frozenset[SlotValue]] = frozenset({ActionValue.U_TURN, ActionValue.LANE_SWITCH})
+"""How one gets around what is on the road: means it once the car is near."""
+
+_CAUTION: Final[frozenset[SlotValue]] = frozenset({ActionValue.SPEED_CHANGE, ActionValue.LIGHT_CHANGE})
+"""What one does about the weather."""
+
+_REFERENCES: Final[Mapping[ExceptionKind, frozenset[SlotValue]]] = MappingProxyType(
+    {
+        ExceptionKind.WEATHER: frozenset(
+            {ObjectClass.SKY, ObjectClass.GROUND, ObjectClass.WATER, ObjectClass.TERRAIN}
+        ),
+        ExceptionKind.SPAWN_VEHICLES: frozenset({ObjectClass.VEHICLES}),
+        ExceptionKind.SPAWN_PEDESTRIANS: frozenset({ObjectClass.PEDESTRIAN}),
+        ExceptionKind.PLACE_PROP: frozenset(OBSTACLES),
+        ExceptionKind.MOVE_PROP: frozenset(OBSTACLES),
+        ExceptionKind.DELETE_PROP: frozenset(OBSTACLES),
+    }
+)  # fmt: skip
+
+_BLOCKED: Final = re.compile(
+    r"\b(?:road ?)?block(?:s|ed|ing|ade)?\b|\bobstacles?\b|\bbarriers?\b|\bcones?\b|\bdetour\b|\bdead end\b"
+    r"|\b(?:road|street|lane|way|it)(?:'s| is) (?:closed|shut|clear|free|open)\b|\bget (?:past|through|around)\b"
+    r"|\b(?:another|different|other) way\b|\bway (?:a)?round\b|\bin the (?:way|road)\b|\bacross the road\b"
+)
+_WORDS: Final[Mapping[ExceptionKind, re.Pattern[str]]] = MappingProxyType(
+    {
+        ExceptionKind.WEATHER: re.compile(
+            r"\bfog\w*|\bmist\w*|\brain\w*|\bpour(?:s|ing)\b|\bdrizzl\w*|\bstorm\w*|\bcloud\w*|\bwind(?:y|s)?\b"
+            r"|\bdark\w*|\bnight\w*|\bdusk\b|\bsun(?:set|light|shine|ny)?\b|\b(?:day|head)?lights? (?:on|off)\b"
+            r"|\bvisibility\b|\bwet\b|\bslippery\b|\bpuddles?\b|\bweather\b|\b(?:hardly|barely) see\b"
+            r"|\bclear(?:s|ed|ing)? up\b"
+        ),
+        ExceptionKind.SPAWN_VEHICLES: re.compile(r"\btraffic(?! lights?)\b|\bjam\b|\bcongest\w+|\bso many cars\b"),
+        ExceptionKind.SPAWN_PEDESTRIANS: re.compile(r"\bcrowd\w*|\bpedestrians?\b|\bso many people\b"),
+        ExceptionKind.PLACE_PROP: _BLOCKED,
+        ExceptionKind.MOVE_PROP: _BLOCKED,
+        ExceptionKind.DELETE_PROP: _BLOCKED,
+        ExceptionKind.SENSOR_FAULT: re.compile(
+            r"\bgps\b|\bsatellites?\b|\bpositioning\b|\b(?:my|our) position\b|\bcameras?\b"
+            r"|\b(?:the|my) (?:view|picture)\b|\bblur\w*|\bsensors?\b|\bwhere (?:we are|i am|we're|i'm)\b"
+            r"|\bcan(?:'t|not) see anything\b"
+        ),
+    }
+)
+"""Words that refer to an exception of a kind, in a text whose case is folded."""
+
+_PUT_OFF: Final = frozenset({GoalStatus.ABANDONED, GoalStatus.PENDING})
+_ASKING: Final = frozenset(MoveGroup.ASK.moves)
+
+
+def kind_of(event: Event) -> ExceptionKind | None:
+    """Returns the kind of an exception; None for other events and for kinds that are unknown."""
+    name = str(event.data.get("kind")).upper() if event.type is EventType.EXCEPTION else ""
+    return ExceptionKind[name] if name in ExceptionKind.__members__ else None
+
+
+def time_met(session: Session, event: Event) -> float:
+    """Returns when the car first came near what an exception put on the road [s]; infinity if never, or unknown."""
+    x, y = event.data.get("x"), event.data.get("y")
+    if not isinstance(x, int | float) or not isinstance(y, int | float):
+        return math.inf
+    rows = session.trajectory[session.trajectory["frame"] >= event.frame]
+    near = np.flatnonzero((rows["x"] - x) ** 2 + (rows["y"] - y) ** 2 <= NEAR**2)
+    return float(rows["frame"][near[0]]) / FRAME_RATE if len(near) else math.inf
+
+
+def handled_by(units: Units) -> dict[int, Event]:
+    """Returns for each exchange that handles an exception its number and the exception."""
+    session = units.session
+    happened = [
+        _Happened(event, kind, time_met(session, event) if kind.is_plan_level else math.inf)
+        for event in session.of_type(EventType.EXCEPTION)
+        if (kind := kind_of(event)) is not None
+    ]
+    times = [each.event.time for each in happened]
+    met = [k for k, each in enumerate(happened) if math.isfinite(each.met)]
+    found: dict[int, Event] = {}
+    last: tuple[float, _Happened] | None = None
+    for exchange in sorted(units.exchanges, key=lambda unit: unit.start):
+        fresh = range(bisect.bisect_left(times, exchange.start - WINDOW), bisect.bisect_right(times, exchange.start))
+        latest = (happened[k] for k in sorted({*fresh, *met}, reverse=True))
+        cause = next((each for each in latest if each.is_handled_in(exchange)), None)
+        if (
+            cause is None
+            and last is not None
+            and exchange.start - last[0] <= PATIENCE
+            and last[1].is_asked_on(exchange)
+        ):
+            cause = last[1]
+        if cause is not None:
+            found[exchange.id] = cause.event
+            last = exchange.end, cause
+    return found
+
+
+def handling(units: Units) -> dict[int, Handled]:
+    """Returns for the number of each exchange whether it handles an environmental or a task exception, or none."""
+    events = handled_by(units)
+    kinds = {number: kind_of(event) for number, event in events.items()}
+    return {
+        unit.id: Handled.NONE
+        if (kind := kinds.get(unit.id)) is None
+        else (Handled.TASK if kind.is_task else Handled.ENVIRONMENTAL)
+        for unit in units.exchanges
+    }
+
+
+def handling_of_events(units: Units) -> dict[int, Handled]:
+    """Returns what each dialogue move and physical action of a session handles, by the number of its event.
+
+    A move handles what its exchange does. A physical action belongs to the exchange of the last move that was over
+    before it, if that is at most `PATIENCE` ago: an exchange is open that long.
+    """
+    kinds = handling(units)
+    found = {
+        move.index: kinds.get(number, Handled.NONE) if (number := units.exchange_of(move)) is not None else Handled.NONE
+        for move in units.session.moves()
+    }
+    said = units.session.moves()
+    frames = [move.frame for move in said]
+    for action in units.session.physical_actions:
+        last = bisect.bisect_left(frames, action.frame) - 1
+        recent = last >= 0 and action.frame - frames[last] <= PATIENCE * FRAME_RATE
+        found[action.index] = found[said[last].index] if recent else Handled.NONE
+    return found
+
+
+@dataclass(frozen=True)
+class _Happened:
+    """An exception, its kind, and when the car came near what it put on the road [s]."""
+
+    event: Event
+    kind: ExceptionKind
+    met: float
+
+    def is_handled_in(self, exchange: SaidUnit) -> bool:
+        """Whether an exchange is in time, and one of its acts refers to the exception."""
+        is_near = 0.0 <= exchange.start - self.met <= WINDOW
+        since = exchange.start - self.event.time
+        if not is_near and not 0.0 <= since <= WINDOW:
+            return False
+        values = {value for move in exchange.moves for value in move.act.slots}
+        if self.kind.is_task:
+            return bool(_PUT_OFF & values) or self._place() in values
+        if values & _REFERENCES.get(self.kind, frozenset()) or self._is_met_by(values, exchange.start):
+            return True
+        words = _WORDS.get(self.kind)
+        if words is not None and any(words.search(move.span.casefold().replace("’", "'")) for move in exchange.moves):
+            return True
+        return self.kind is ExceptionKind.SENSOR_FAULT and since <= FAULT and _asks_what_to_do(exchange)
+
+    def _is_met_by(self, values: set[SlotValue], time: float) -> bool:
+        """Whether what the car is to do at a time [s] is what one does about such a thing, soon enough after it."""
+        if self.kind is ExceptionKind.WEATHER:
+            return time - self.event.time <= PROMPT and bool(values & _CAUTION)
+        return 0.0 <= time - self.met <= PROMPT and bool(values & _AROUND)
+
+    def is_asked_on(self, exchange: SaidUnit) -> bool:
+        """Whether an exchange, right after one that handles the exception, goes on with it by a question."""
+        first = exchange.moves[0].act
+        if first.move not in _ASKING:
+            return False
+        if self.kind.is_task:
+            return bool(first.values(Slot.STATUS)) or LandmarkName.QUERIED in first.slots
+        return self.kind.is_plan_level and not first.values(Slot.LANDMARK)
+
+    def _place(self) -> LandmarkName | None:
+        label = self.event.data.get("landmark")
+        return next((name for name in LandmarkName if name.label == label), None)
+
+
+def _asks_what_to_do(exchange: SaidUnit) -> bool:
+    first = exchange.moves[0]
+    asks = first.act.move in _ASKING and bool(first.act.values(Slot.ACTION))
+    return first.speaker is Role.CO_WIZARD and asks

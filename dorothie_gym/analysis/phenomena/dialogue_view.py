@@ -1,0 +1,303 @@
+"""A session as talk: turns with their acts, and what happened in the world between them."""
+
+from __future__ import annotations
+
+import bisect
+import math
+import re
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
+
+from dorothie_gym.analysis.exception_attribution import time_met
+from dorothie_gym.analysis.units import Units, goals_of
+from dorothie_gym.ontology import (
+    ActionValue,
+    DialogueAct,
+    DialogueMove,
+    ExceptionKind,
+    GoalStatus,
+    LandmarkName,
+    MentalAction,
+    ObjectClass,
+    PhysicalAction,
+    Role,
+    Slot,
+    SlotValue,
+    StreetName,
+)
+from dorothie_gym.recording.events import Event, EventType, UtteranceRecord
+from dorothie_gym.recording.session import Session
+from dorothie_gym.sim.config import FRAME_RATE
+
+ANSWER = 15.0
+"""Within this time of a turn's end its answer begins [s]: an exchange's patience, and the answer's own time."""
+
+_LONGEST = 60.0
+"""No utterance is longer than this [s]: turns that began earlier are over."""
+
+_UNKNOWN = (ActionValue.UNKNOWN, StreetName.UNKNOWN, LandmarkName.UNKNOWN, GoalStatus.UNKNOWN)
+_QUERIED = (
+    ActionValue.QUERIED, StreetName.QUERIED, LandmarkName.QUERIED, GoalStatus.QUERIED, ObjectClass.QUERIED,
+)  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Turn:
+    """An utterance.
+
+    Attributes:
+        number: its place in the talk.
+        speaker: who spoke.
+        text: its words.
+        recognised: what a recogniser heard, None where there was none.
+        acts: its acts, in order.
+        spans: the words of each act.
+        exchanges: number of the exchange of each act.
+        start, end: when it was said [s].
+    """
+
+    number: int
+    speaker: Role
+    text: str
+    recognised: str | None
+    acts: tuple[DialogueAct, ...]
+    spans: tuple[str, ...]
+    exchanges: tuple[int | None, ...]
+    start: float
+    end: float
+
+    def does(self, *moves: DialogueMove) -> bool:
+        """Whether one of its acts is one of the moves."""
+        return any(act.move in moves for act in self.acts)
+
+    def doing(self, *moves: DialogueMove) -> Iterator[DialogueAct]:
+        """Yields its acts that are one of the moves."""
+        return (act for act in self.acts if act.move in moves)
+
+    def names(self, slot: Slot) -> frozenset[SlotValue]:
+        """The values of a slot in all its acts, those that are unknown or asked for left out."""
+        return frozenset(value for act in self.acts for value in named(act, slot))
+
+    def mentions(self, *values: SlotValue) -> bool:
+        """Whether one of its acts carries one of the values."""
+        return any(value in act.slots for act in self.acts for value in values)
+
+    def says(self, pattern: re.Pattern[str], *moves: DialogueMove) -> bool:
+        """Whether the words of one of its acts, of those that do one of the moves if any is given, have the pattern.
+
+        Talk that is not about the drive has no say.
+        """
+        return any(
+            pattern.search(span.casefold().replace("’", "'"))
+            for act, span in zip(self.acts, self.spans, strict=True)
+            if act.move is not DialogueMove.IRRELEVANT and (not moves or act.move in moves)
+        )
+
+
+class Talk:
+    """The turns of participant and Co-Wizard in a session, and what happened.
+
+    Attributes:
+        session: the session.
+        units: its exchanges and transactions.
+        turns: utterances in the order in which they began.
+        goals: landmarks of the subgoals.
+    """
+
+    def __init__(self, session: Session, units: Units | None = None) -> None:
+        """Reads a session.
+
+        Args:
+            session: any.
+            units: of the session, if they are known already.
+        """
+        self.session = session
+        self.units = Units(session) if units is None else units
+        ordered = sorted(self.units.utterances, key=lambda utterance: (utterance.start, utterance.end))
+        self.turns = tuple(self._turn(k, utterance) for k, utterance in enumerate(ordered))
+        self.goals = frozenset(goals_of(session)) | {
+            landmark for landmark in map(_landmark, session.of_type(EventType.SUBGOAL, EventType.EXCEPTION)) if landmark
+        }
+
+    def by(self, speaker: Role, *moves: DialogueMove) -> Iterator[Turn]:
+        """Yields the turns of a speaker that do one of the moves; all of them if none is given."""
+        return (turn for turn in self.turns if turn.speaker is speaker and (not moves or turn.does(*moves)))
+
+    def answers(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER) -> Iterator[Turn]:
+        """Yields the other speaker's turns that begin during a turn or soon after it and do one of the moves."""
+        for other in self.later(turn, within=within):
+            if other.speaker is not turn.speaker and (not moves or other.does(*moves)):
+                yield other
+
+    def answered(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER) -> bool:
+        """Whether there is such an answer."""
+        return any(True for _ in self.answers(turn, *moves, within=within))
+
+    def replies(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER) -> Iterator[Turn]:
+        """Yields the answers that do one of the moves within an exchange that the turn is in.
+
+        Where the exchange is not known, any answer will do.
+        """
+        own = set(turn.exchanges)
+        for other in self.answers(turn, *moves, within=within):
+            placed = zip(other.acts, other.exchanges, strict=True)
+            if None in own or any(act.move in moves and (k is None or k in own) for act, k in placed):
+                yield other
+
+    def replied(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER) -> bool:
+        """Whether there is such a reply."""
+        return any(True for _ in self.replies(turn, *moves, within=within))
+
+    def later(self, turn: Turn, *, within: float) -> Iterator[Turn]:
+        """Yields the turns after a turn that begin at most `within` seconds after its end."""
+        for k in range(turn.number + 1, len(self.turns)):
+            other = self.turns[k]
+            if other.start - turn.end > within:
+                return
+            yield other
+
+    def before(self, turn: Turn, *, within: float) -> Iterator[Turn]:
+        """Yields the turns before a turn that ended at most `within` seconds before its start, latest first."""
+        for k in range(turn.number - 1, -1, -1):
+            other = self.turns[k]
+            if turn.start - other.start > within + _LONGEST:
+                return
+            if turn.start - other.end <= within:
+                yield other
+
+    # --- what happened ----------------------------------------------------------------------------------------------
+
+    def exceptions(self, *kinds: ExceptionKind) -> Iterator[Event]:
+        """Yields the exceptions of the kinds."""
+        names = {kind.name for kind in kinds}
+        return (e for e in self.session.of_type(EventType.EXCEPTION) if str(e.data.get("kind")).upper() in names)
+
+    def did(self, *actions: PhysicalAction, since: float = 0.0, until: float = math.inf) -> bool:
+        """Whether the Co-Wizard did one of the actions in a stretch of time [s]."""
+        return any(_falls(self._action_times.get(action, ()), since, until) for action in actions)
+
+    def switched(self, action: PhysicalAction, up: bool, *, since: float, until: float) -> bool:
+        """Whether the Co-Wizard did an action up (or on), or down (or off), in a stretch of time [s]."""
+        done = (each for each in self.session.physical_actions if each.source is Role.CO_WIZARD)
+        return any(
+            each.action is action and each.up is up and since <= each.frame / FRAME_RATE <= until for each in done
+        )
+
+    def believed(self, *actions: MentalAction, since: float = 0.0, until: float = math.inf) -> bool:
+        """Whether the Co-Wizard did one of the mental actions in a stretch of time [s]."""
+        return any(_falls(self._belief_times.get(action.label, ()), since, until) for action in actions)
+
+    def happened(self, *types: EventType) -> bool:
+        """Whether there is an event of one of the types."""
+        return bool(self.session.of_type(*types))
+
+    @cached_property
+    def met_roadblocks(self) -> tuple[float, ...]:
+        """When the car came near each thing that the Ad-Wizard had put on the road and that it met [s]."""
+        props = self.exceptions(ExceptionKind.PLACE_PROP, ExceptionKind.MOVE_PROP)
+        return tuple(met for met in (time_met(self.session, event) for event in props) if math.isfinite(met))
+
+    @cached_property
+    def _action_times(self) -> dict[PhysicalAction, list[float]]:
+        times: dict[PhysicalAction, list[float]] = {}
+        for action in self.session.physical_actions:
+            if action.source is Role.CO_WIZARD:
+                times.setdefault(action.action, []).append(action.frame / FRAME_RATE)
+        return times
+
+    @cached_property
+    def _belief_times(self) -> dict[str, list[float]]:
+        times: dict[str, list[float]] = {}
+        for event in self.session.of_type(EventType.BELIEF_UPDATE):
+            times.setdefault(str(event.data.get("action")), []).append(event.time)
+        return times
+
+    @cached_property
+    def hidden_goals(self) -> frozenset[str]:
+        """Labels of the subgoals' landmarks that the Co-Wizard does not have on its map."""
+        rows = self.session.header.landmarks
+        goals = {subgoal["landmark"] for subgoal in self.session.header.subgoals}
+        return frozenset(rows[k]["name"] for k in goals if 0 <= k < len(rows) and rows[k]["hidden"])
+
+    def _turn(self, number: int, utterance: UtteranceRecord) -> Turn:
+        return Turn(
+            number=number,
+            speaker=utterance.speaker,
+            text=utterance.text,
+            recognised=utterance.moves[0].recognised,
+            acts=tuple(move.act for move in utterance.moves),
+            spans=tuple(move.span for move in utterance.moves),
+            exchanges=tuple(self.units.exchange_of(move) for move in utterance.moves),
+            start=utterance.start,
+            end=utterance.end,
+        )
+
+
+def named(act: DialogueAct, slot: Slot) -> frozenset[SlotValue]:
+    """Returns the values of a slot in an act, those that are unknown or asked for left out."""
+    return frozenset(value for value in act.values(slot) if value not in _UNKNOWN and value not in _QUERIED)
+
+
+def asks_for(act: DialogueAct, *slots: Slot) -> bool:
+    """Whether an act leaves a value of one of the slots open, as a question does."""
+    return any(value in _QUERIED and value.slot in slots for value in act.slots)
+
+
+def _falls(times: Sequence[float], since: float, until: float) -> bool:
+    """Whether one of the times, which rise, lies in a stretch."""
+    k = bisect.bisect_left(times, since)
+    return k < len(times) and times[k] <= until
+
+
+def labels(values: Collection[SlotValue]) -> frozenset[str]:
+    """Returns the labels of values."""
+    return frozenset(value.label for value in values)
+
+
+def _landmark(event: Event) -> LandmarkName | None:
+    label = event.data.get("landmark")
+    return next((name for name in LandmarkName if name.label == label), None)
+
+
+# --- What a query of a phenomenon is ---------------------------------------------------------------------------------
+
+HUMAN, CAR = Role.PARTICIPANT, Role.CO_WIZARD
+
+
+@dataclass(frozen=True)
+class Finding:
+    """An occurrence: the turn that it begins with, and which of the phenomenon's forms it has."""
+
+    turn: Turn
+    form: str
+
+
+Query: TypeAlias = Callable[[Talk], Iterator[Finding]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Phenomenon:
+    """Something that talk between people and cars has (spec of the dialogue).
+
+    Attributes:
+        number: 1 to 24, as in the spec.
+        title: a few words.
+        cause: what has to happen for it to be possible, in words.
+        has_cause: whether it happened, read from acts, texts and events of the world.
+        find: its occurrences, each with its form.
+        forms: the forms that `find` tells apart.
+    """
+
+    number: int
+    title: str
+    cause: str
+    has_cause: Callable[[Talk], bool]
+    find: Query
+    forms: tuple[str, ...]
+
+
+def both_speak(talk: Talk) -> bool:
+    """Whether both sides say something."""
+    return {HUMAN, CAR} <= {turn.speaker for turn in talk.turns}

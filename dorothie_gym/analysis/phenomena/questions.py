@@ -1,0 +1,187 @@
+"""Phenomena 5 to 7, 15, 16, 19 to 21, 24: questions, answers, and how understanding is kept up."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+
+from dorothie_gym.analysis.diversity import plain, words_of
+from dorothie_gym.analysis.phenomena.dialogue_view import CAR, HUMAN, Finding, Talk, Turn
+from dorothie_gym.analysis.phenomena.ways import asks_why
+from dorothie_gym.dialogue.exchanges import EXPECTATIONS, PATIENCE
+from dorothie_gym.ontology import DialogueMove, PhysicalAction, Slot, SlotValue
+from dorothie_gym.recording.events import EventType
+
+M = DialogueMove
+
+QUESTIONS = (M.QUERY_YN, M.QUERY_W, M.CHECK, M.ALIGN)
+AGAIN = 30.0
+"""A question that is put again is put within this time [s]."""
+
+LATELY = 45.0
+"""Who names a place that was named within this time [s] has not made it up."""
+
+_YES_NO: Mapping[DialogueMove, str] = MappingProxyType(
+    {M.REPLY_Y: "yes", M.REPLY_N: "no", M.REPLY_U: "unsure"},
+)
+
+
+def yes_no(talk: Talk) -> Iterator[Finding]:
+    """5: the car asks a yes/no question; the participant says yes, no, or is not sure."""
+    for turn in talk.by(CAR, M.QUERY_YN):
+        answer = next(talk.replies(turn, *_YES_NO), None)
+        if answer is not None:
+            yield Finding(turn, next(_YES_NO[act.move] for act in answer.doing(*_YES_NO)))
+
+
+def check(talk: Talk) -> Iterator[Finding]:
+    """6: the car checks what it takes to be so, and the participant verifies or denies it."""
+    for turn in talk.by(CAR, M.CHECK):
+        answer = next(talk.replies(turn, M.CONFIRM, M.REPLY_Y, M.REPLY_N, M.CLARIFY), None)
+        if answer is not None:
+            yield Finding(turn, "confirmed" if answer.does(M.CONFIRM, M.REPLY_Y) else "denied")
+
+
+def align(talk: Talk) -> Iterator[Finding]:
+    """7: somebody asks whether it came across: it did, or it did not and is said in other words."""
+    for turn in talk.turns:
+        if not turn.does(M.ALIGN):
+            continue
+        if talk.replied(turn, M.ACKNOWLEDGE, M.REPLY_Y):
+            yield Finding(turn, "understood")
+            continue
+        puzzled = next(talk.replies(turn, M.CONFUSE, M.REPLY_N), None)
+        if puzzled is not None and talk.answered(puzzled, M.CLARIFY, M.INSTRUCT):
+            yield Finding(turn, "repaired")
+
+
+def perception(talk: Talk) -> Iterator[Finding]:
+    """15: the participant asks whether the car sees something, and it says so."""
+    for turn in talk.by(HUMAN, M.QUERY_YN):
+        if not any(act.values(Slot.OBJECT) for act in turn.doing(M.QUERY_YN)):
+            continue
+        answer = next(talk.replies(turn, M.REPLY_Y, M.REPLY_N, M.REPLY_U), None)
+        if answer is not None:
+            yield Finding(turn, "seen" if answer.does(M.REPLY_Y) else "not seen")
+
+
+def reason(talk: Talk) -> Iterator[Finding]:
+    """16: the participant asks why the car does what it does, and it gives a reason."""
+    for turn in talk.by(HUMAN, M.QUERY_W, M.QUERY_YN):
+        if asks_why(turn) and talk.replied(turn, M.REPLY_W, M.EXPLAIN):
+            yield Finding(turn, "explained")
+
+
+def acts_by_itself(talk: Talk) -> bool:
+    """Whether the car does something that wants a reason: stops for a hazard, or turns round."""
+    return talk.happened(EventType.HAZARD_STOP) or talk.did(PhysicalAction.U_TURN)
+
+
+def overlap(talk: Talk) -> Iterator[Finding]:
+    """19: both begin an exchange while the other is still speaking, and both are answered."""
+    begun = sorted(_answered_exchanges(talk), key=lambda turn: turn.number)
+    for k, first in enumerate(begun):
+        for other in itertools.islice(begun, k + 1, None):
+            if other.start >= first.end:
+                break
+            if first.speaker is not other.speaker:
+                yield Finding(first, "both answered")
+                break
+
+
+def _answered_exchanges(talk: Talk) -> Iterator[Turn]:
+    """The turns that open an exchange of which the other speaker is a part."""
+    opened: dict[int | None, Turn] = {}
+    answered: dict[int | None, Turn] = {}
+    for turn in talk.turns:
+        for act, exchange in zip(turn.acts, turn.exchanges, strict=True):
+            if exchange is None:
+                continue
+            if exchange not in opened:
+                opened[exchange] = turn
+            elif opened[exchange].speaker is not turn.speaker and act.move not in EXPECTATIONS:
+                answered.setdefault(exchange, opened[exchange])
+    return (opener for opener in answered.values() if opener.does(*EXPECTATIONS))
+
+
+def irrelevant(talk: Talk) -> Iterator[Finding]:
+    """20: talk that is not about the drive."""
+    for turn in talk.turns:
+        if turn.does(M.IRRELEVANT):
+            yield Finding(turn, "human" if turn.speaker is HUMAN else "car")
+
+
+def abandoned(talk: Talk) -> Iterator[Finding]:
+    """21: a question gets no answer for ten seconds, and is put in other words, or dropped."""
+    said_by_both: dict[int | None, set[object]] = {}
+    for turn in talk.turns:
+        for exchange in turn.exchanges:
+            said_by_both.setdefault(exchange, set()).add(turn.speaker)
+    for turn in talk.turns:
+        asked = [k for act, k in zip(turn.acts, turn.exchanges, strict=True) if act.move in QUESTIONS]
+        unanswered = any(k is not None and len(said_by_both[k]) == 1 for k in asked)
+        if not unanswered or talk.session.duration - turn.end < PATIENCE:
+            continue
+        answered = talk.answers(turn, *(set(M) - {M.IRRELEVANT, M.ALIGN}), within=PATIENCE)
+        if any(not other.does(*EXPECTATIONS) for other in answered):
+            continue
+        yield Finding(turn, "asked again" if _asked_again(talk, turn) else "dropped")
+
+
+def _asked_again(talk: Talk, turn: Turn) -> bool:
+    slots = {value.slot for act in turn.doing(*QUESTIONS) for value in act.slots}
+    for other in talk.later(turn, within=AGAIN):
+        if other.speaker is turn.speaker and other.does(*QUESTIONS) and plain(other.text) != plain(turn.text):
+            if not slots or slots & {value.slot for act in other.doing(*QUESTIONS) for value in act.slots}:
+                return True
+    return False
+
+
+def somebody_asks(talk: Talk) -> bool:
+    """Whether there is a question."""
+    return any(turn.does(*QUESTIONS) for turn in talk.turns)
+
+
+def speech_trouble(talk: Talk) -> Iterator[Finding]:
+    """24: the participant was misheard, which shows in what the car says, and puts it right.
+
+    What the car makes of it shows as confusion, or as a name that was not said; the participant then clarifies, denies,
+    or says what was meant once more.
+    """
+    for turn in talk.by(HUMAN):
+        if not misheard(turn):
+            continue
+        for answer in talk.answers(turn):
+            puzzled = answer.does(M.CONFUSE)
+            got = answer.names(Slot.LANDMARK) | answer.names(Slot.STREET)
+            mistaken = bool(got) and not got & _said_lately(talk, turn)
+            if (puzzled or mistaken) and _put_right(talk, turn, answer):
+                yield Finding(turn, "not understood" if puzzled else "misunderstood")
+                break
+
+
+def _said_lately(talk: Talk, turn: Turn) -> frozenset[SlotValue]:
+    """Places that were named in a turn, or by anybody shortly before it."""
+    turns = [turn, *talk.before(turn, within=LATELY)]
+    return frozenset(value for each in turns for slot in (Slot.LANDMARK, Slot.STREET) for value in each.names(slot))
+
+
+def _put_right(talk: Talk, turn: Turn, answer: Turn) -> bool:
+    for repair in talk.answers(answer):
+        if repair.does(M.CLARIFY, M.REPLY_N):
+            return True
+        meant = {value for act in turn.acts for value in act.slots}
+        if repair.does(M.INSTRUCT, M.EXPLAIN, M.REPLY_W) and meant & {v for act in repair.acts for v in act.slots}:
+            return True
+    return False
+
+
+def misheard(turn: Turn) -> bool:
+    """Whether a recogniser heard other words than were said."""
+    return turn.recognised is not None and words_of(turn.recognised) != words_of(turn.text)
+
+
+def somebody_misheard(talk: Talk) -> bool:
+    """Whether the participant was misheard."""
+    return any(misheard(turn) for turn in talk.by(HUMAN))

@@ -1,0 +1,129 @@
+"""Phenomena 1 to 4, 17, 18, 22: where to go and how."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from dorothie_gym.analysis.phenomena.dialogue_view import CAR, HUMAN, Finding, Talk, Turn, asks_for, named
+from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, LandmarkName, PhysicalAction, Slot
+
+M = DialogueMove
+
+STEPS = (
+    ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH, ActionValue.U_TURN, ActionValue.J_TURN, ActionValue.STOP,
+    ActionValue.START,
+)  # fmt: skip
+
+_TAKEN_UP = (M.ACKNOWLEDGE, M.CONFIRM, M.REPLY_Y)
+_WAYS = frozenset({ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH, ActionValue.U_TURN, ActionValue.J_TURN})
+"""Steps that choose a way."""
+
+_NOT_TO_BE = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE})
+
+_WHY = re.compile(r"\bwhy\b(?! not\b| don't\b)|\bhow come\b|\bwhat for\b|\breason\b")
+_WAY = re.compile(r"\bhow (?:are|will|do|would)\b|\bwhich (?:way|route|road|street)\b|\broute\b|\bplan\b|\bway\b")
+_WRONG = re.compile(
+    r"\bwrong (?:way|turn|one|street|road|lane|side|direction|exit|corner)\b"
+    r"|\b(?:was|is|that's|it's|went|gone|turned) wrong\b|\bwent past\b|\bpassed it\b"
+    r"|\b(?:you|we|you've|we've)(?: have)?(?: just)? (?:missed|passed) (?:it|that|the|our)\b"
+    r"|\bnot (?:that|this|the right) (?:way|one|turn|street|road)\b|\bturned? too (?:early|late|soon)\b"
+    r"|\b(?:you|we) (?:should(?:'ve| have)|shouldn't have) (?:turned|gone|taken|stayed|kept|stopped|made|been|driven)\b"
+    r"|\bdidn't (?:say|mean|want)\b"
+)
+_REFERENCE = re.compile(
+    r"(?<!out )\bthere\b"
+    r"|\b(?:the|this|that) (?:next|last|first|second|third|other|same) (?:one|street|road|side|turn|light|corner)\b"
+    r"|\bnext one\b|\bother side\b|\bsame (?:street|road|place|way)\b|\bone we (?:just )?(?:passed|saw|took)\b"
+    r"|\bpast it\b|\bthe latter\b|\bthe former\b"
+)
+_NOT_A_PLACE = re.compile(
+    r"\bthere(?:'s| is| are| was| were| will| seems|'re)\b|\b(?:hi|hey|hello|almost|nearly|hang|hold on) there\b"
+    r"|\b(?:is|are|was|were) there (?:a|an|any|no|some|something|time)\b|\bthere (?:you|we) (?:go|are)\b|\bthere yet\b"
+)
+
+
+def goal_level(talk: Talk) -> Iterator[Finding]:
+    """1: the participant instructs by naming a place, and the car takes it up."""
+    for turn in talk.by(HUMAN, M.INSTRUCT):
+        goals = [act for act in turn.doing(M.INSTRUCT) if named(act, Slot.LANDMARK) and not act.slots & _NOT_TO_BE]
+        if goals and talk.replied(turn, *_TAKEN_UP):
+            yield Finding(turn, "goal")
+
+
+def step_level(talk: Talk) -> Iterator[Finding]:
+    """2: the participant instructs the next step without naming a place, and the car takes it up."""
+    for turn in talk.by(HUMAN, M.INSTRUCT):
+        steps = [act for act in turn.doing(M.INSTRUCT) if named(act, Slot.ACTION) & set(STEPS)]
+        if steps and not turn.names(Slot.LANDMARK) and talk.replied(turn, *_TAKEN_UP):
+            yield Finding(turn, "step")
+
+
+def two_acts(talk: Talk) -> Iterator[Finding]:
+    """3: an utterance of the participant does two different things."""
+    for turn in talk.by(HUMAN):
+        if len({act.move for act in turn.acts} - {M.IRRELEVANT}) > 1:
+            yield Finding(turn, "two acts")
+
+
+def asked_at_junction(talk: Talk) -> Iterator[Finding]:
+    """4: the car asks which way, and the participant says it."""
+    for turn in talk.by(CAR, M.QUERY_W):
+        if not any(asks_for(act, Slot.ACTION, Slot.STREET) for act in turn.doing(M.QUERY_W)):
+            continue
+        for answer in talk.replies(turn, M.REPLY_W, M.INSTRUCT):
+            if answer.names(Slot.ACTION) & _WAYS or answer.names(Slot.STREET):
+                yield Finding(turn, "told")
+                break
+
+
+def plan_on_request(talk: Talk) -> Iterator[Finding]:
+    """17: the participant asks how the car will go, and it names turns or streets."""
+    for turn in talk.by(HUMAN, M.QUERY_W):
+        asks = any(asks_for(act, Slot.ACTION, Slot.STREET) for act in turn.doing(M.QUERY_W))
+        if turn.says(_WHY, M.QUERY_W) or not (asks or turn.says(_WAY, M.QUERY_W)):
+            continue
+        for answer in talk.replies(turn, M.REPLY_W):
+            told = {value for act in answer.doing(M.REPLY_W, M.EXPLAIN) for value in act.slots}
+            if answer.names(Slot.STREET) or told & set(STEPS):
+                yield Finding(turn, "described")
+                break
+
+
+def wrong_turn(talk: Talk) -> Iterator[Finding]:
+    """18: the participant says that the car went wrong, and it says or does something about it."""
+    for turn in talk.by(HUMAN, *_OBJECTS):
+        turned = talk.did(*_TURNS, since=turn.start - 45.0, until=turn.end)
+        if not turn.says(_WRONG, *_OBJECTS) or not turned:
+            continue
+        if talk.did(PhysicalAction.U_TURN, since=turn.start, until=turn.end + 30.0):
+            yield Finding(turn, "corrected")
+        elif talk.answered(turn):
+            yield Finding(turn, "answered")
+
+
+_OBJECTS = (M.EXPLAIN, M.REPLY_N, M.INSTRUCT, M.CLARIFY)
+_TURNS = (PhysicalAction.J_TURN, PhysicalAction.U_TURN, PhysicalAction.LANE_SWITCH)
+
+
+def turns_at_junctions(talk: Talk) -> bool:
+    """Whether the car turned at a junction."""
+    return talk.did(PhysicalAction.J_TURN)
+
+
+def references(talk: Talk) -> Iterator[Finding]:
+    """22: a place is pointed at, by where or when, instead of being named."""
+    for turn in talk.turns:
+        spans = (span for act, span in zip(turn.acts, turn.spans, strict=True) if act.move is not M.IRRELEVANT)
+        if any(_REFERENCE.search(_NOT_A_PLACE.sub(" ", span.casefold().replace("’", "'"))) for span in spans):
+            yield Finding(turn, "human" if turn.speaker is HUMAN else "car")
+
+
+def asks_where_next(talk: Talk, number: int) -> bool:
+    """Whether the turn of a number is the question where to go next."""
+    return any(LandmarkName.QUERIED in act.slots for act in talk.turns[number].doing(M.QUERY_W))
+
+
+def asks_why(turn: Turn) -> bool:
+    """Whether a turn asks for a reason."""
+    return turn.says(_WHY, M.QUERY_W, M.QUERY_YN)

@@ -1,0 +1,132 @@
+"""The paper's figures 3 to 5 of a corpus as one picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from textwrap import wrap
+from typing import Any, Final
+
+from dorothie_gym.analysis.corpus_stats import Counts
+from dorothie_gym.analysis.exception_attribution import Handled
+from dorothie_gym.analysis.profiles import CLASSES, SLOTS, Profile, Profiles
+from dorothie_gym.ontology import DialogueMove, Role
+from dorothie_gym.rendering.charts import GRID, INK, SHEET, SOFT, empty_figure
+
+SIZE: Final = (12.0, 9.2)
+"""Width and height of the picture [inches]."""
+
+LETTERS: Final = 17
+"""Letters in a line below a bar."""
+
+_COLOURS: Final = {
+    Handled.ENVIRONMENTAL: ("#9bd0b5", "#2f8f62"),
+    Handled.TASK: ("#f3cb8d", "#cf7f1d"),
+    Handled.NONE: ("#a9c4f2", "#2f62c4"),
+}
+"""For people (light) and the car (dark)."""
+
+_NAMES: Final = {
+    Handled.ENVIRONMENTAL: "environmental",
+    Handled.TASK: "task",
+    Handled.NONE: "none",
+}
+_SPEAKERS: Final = ((Role.PARTICIPANT, "human"), (Role.CO_WIZARD, "car"))
+
+
+def draw_profiles(profiles: Profiles, counts: Counts, title: str, path: Path) -> None:
+    """Draws moves and slots per transaction by speaker, and per exchange by the kind of exception that it handles.
+
+    Args:
+        profiles: what to draw.
+        counts: of the same sessions, for the words above the figures.
+        title: name of the corpus.
+        path: PNG file to write.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    with empty_figure(*SIZE) as figure:
+        grid = figure.add_gridspec(
+            2, 2, left=0.06, right=0.98, top=0.84, bottom=0.09, hspace=0.42, wspace=0.13, width_ratios=(14, 8)
+        )
+        _words(figure, counts, title)
+        _per_transaction(figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1]), profiles.transactions)
+        _per_exchange(figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1]), profiles)
+        figure.savefig(path, format="png")
+
+
+def _words(figure: Any, counts: Counts, title: str) -> None:
+    figure.text(0.06, 0.95, title, fontsize=15, weight="bold")
+    line = (
+        f"{_number(counts.sessions, 'session')} · {_number(counts.utterances, 'utterance')} · "
+        f"{_number(counts.transactions, 'transaction')} · {_number(counts.exchanges, 'exchange')}"
+    )
+    figure.text(0.06, 0.918, line, fontsize=10, color=SOFT)
+
+
+def _number(count: int, noun: str) -> str:
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
+def _per_transaction(moves: Any, slots: Any, profile: Profile) -> None:
+    shown = [move for move in DialogueMove if move is not DialogueMove.IRRELEVANT] + [DialogueMove.IRRELEVANT]
+    light, dark = _COLOURS[Handled.NONE]
+    for k, (role, name) in enumerate(_SPEAKERS):
+        colour = (light, dark)[k]
+        at = [x + (k - 0.5) * 0.4 for x in range(len(shown))]
+        moves.bar(at, [profile.mean_move(role, move) for move in shown], 0.38, color=colour, label=name)
+        at = [x + (k - 0.5) * 0.4 for x in range(len(SLOTS))]
+        slots.bar(at, [profile.mean_slot(role, slot) for slot in SLOTS], 0.38, color=colour)
+    _dress(moves, "Moves in a transaction", [move.label for move in shown], slanted=True)
+    _dress(slots, "Slot values in a transaction", [slot.label for slot in SLOTS])
+    for axes in (moves, slots):
+        _give_room(axes, 1.06)
+    moves.legend(frameon=True, facecolor=SHEET, edgecolor=SHEET, framealpha=1.0, fontsize=9, loc="upper right")
+
+
+def _per_exchange(moves: Any, slots: Any, profiles: Profiles) -> None:
+    width = 0.13
+    bars = [(kind, k, role) for kind in Handled for k, (role, _) in enumerate(_SPEAKERS)]
+    for place, (kind, k, role) in enumerate(bars):
+        profile, colour = profiles.exchanges[kind], _COLOURS[kind][k]
+        offset = (place - (len(bars) - 1) / 2) * width
+        units = "" if k else f" ({_number(profile.units, 'exchange')})"
+        label = f"{_NAMES[kind]}, {_SPEAKERS[k][1]}{units}"
+        heights = [profile.mean_move(role, *group) for group in CLASSES.values()]
+        moves.bar([x + offset for x in range(len(CLASSES))], heights, width * 0.93, color=colour, label=label)
+        heights = [profile.mean_slot(role, slot) for slot in SLOTS]
+        slots.bar([x + offset for x in range(len(SLOTS))], heights, width * 0.93, color=colour)
+    _dress(moves, "Moves in an exchange, by the exception that it handles", [_class_label(name) for name in CLASSES])
+    _dress(slots, "Slot values in an exchange, likewise", [slot.label for slot in SLOTS])
+    _give_room(moves)
+    moves.legend(frameon=False, fontsize=8, ncols=3, loc="upper center", columnspacing=1.2)
+
+
+def _class_label(name: str) -> str:
+    """Name of a class of moves, and below it the moves that are in it."""
+    moves = [move.label for move in CLASSES[name]]
+    if moves == [name]:
+        return name
+    return "\n".join([name, *wrap(", ".join(moves), LETTERS)])
+
+
+def _give_room(axes: Any, times: float = 1.22) -> None:
+    """Leaves room above the bars, for the legend where there is one."""
+    axes.set_ylim(0.0, axes.get_ylim()[1] * times)
+
+
+def _dress(axes: Any, title: str, labels: list[str], *, slanted: bool = False) -> None:
+    axes.set_facecolor(SHEET)
+    axes.set_title(title, loc="left", fontsize=11, color=INK, pad=10)
+    axes.set_xticks(range(len(labels)), labels, fontsize=9 if "\n" not in "".join(labels) else 7.5, color=INK)
+    if slanted:
+        for label in axes.get_xticklabels():
+            label.set(rotation=32, ha="right", rotation_mode="anchor")
+    axes.tick_params(axis="both", length=0)
+    axes.tick_params(axis="y", labelsize=8, labelcolor=SOFT)
+    axes.set_ylabel("mean number", fontsize=8.5)
+    axes.grid(axis="y", color=GRID, linewidth=0.8)
+    axes.set_axisbelow(True)
+    for side, spine in axes.spines.items():
+        spine.set_visible(side == "bottom")
+        spine.set_color(SOFT)

@@ -1,0 +1,176 @@
+"""A session as a page that people read: who said what, with its annotation, and what happened in between."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any, Final
+
+from dorothie_gym.analysis import PHENOMENA, Handled, Talk, Units, handling
+from dorothie_gym.ontology import MentalAction, Role
+from dorothie_gym.recording.events import INFRACTIONS, Event, EventType, UtteranceRecord, action_record
+from dorothie_gym.recording.session import Session
+
+NAMES: Final[Mapping[Role, str]] = {
+    Role.PARTICIPANT: "Participant",
+    Role.CO_WIZARD: "Co-Wizard",
+    Role.AD_WIZARD: "Ad-Wizard",
+    Role.AGENT: "Car",
+}
+
+_HANDLED: Final = {Handled.ENVIRONMENTAL: " (env)", Handled.TASK: " (task)", Handled.NONE: ""}
+_MENTAL: Final = {action.label: action.label for action in MentalAction if action is not MentalAction.PLAN_UPDATE}
+_HEAD: Final = ("time", "who", "words [acts], or what happens", "exchange", "transaction")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TranscriptLine:
+    """A line of a transcript.
+
+    Attributes:
+        time: when it began [s].
+        speaker: whose line it is.
+        text: words with the act of each span behind it; of what is not said, what happens.
+        said: whether it is an utterance.
+        exchanges: number of each exchange that it is part of, and what kind of exception that handles, if any.
+        transaction: number of its transaction; empty where it has none.
+    """
+
+    time: float
+    speaker: Role
+    text: str
+    said: bool
+    exchanges: str = ""
+    transaction: str = ""
+
+
+def transcript_lines(session: Session) -> tuple[TranscriptLine, ...]:
+    """Returns the lines of a session in the order in which they began.
+
+    Exchanges and transactions are those that the rules find. Actions of the car between two utterances share a line.
+    """
+    units = Units(session)
+    kinds = handling(units)
+    said = [_said(utterance, units, kinds) for utterance in units.utterances]
+    happened = [line for event in session.events for line in _happened(event, session)]
+    ordered = sorted([*said, *happened], key=lambda line: line.time)
+    return tuple(_together(ordered))
+
+
+def markdown(session: Session, title: str | None = None) -> str:
+    """Returns a session as a section of a Markdown page.
+
+    Args:
+        session: any.
+        title: of the section; the session's name where it is None.
+    """
+    head = [f"## {title or session.name}", "", *_facts(session), ""]
+    rows = [" | ".join(_HEAD), " | ".join("---" for _ in _HEAD)]
+    for line in transcript_lines(session):
+        words = _escaped(line.text) if line.said else f"*{_escaped(line.text)}*"
+        rows.append(f"{line.time:.1f} | {NAMES[line.speaker]} | {words} | {line.exchanges} | {line.transaction}")
+    return "\n".join([*head, *(f"| {row} |" for row in rows)]) + "\n"
+
+
+# --- the head -------------------------------------------------------------------------------------------------------
+
+
+def _facts(session: Session) -> Iterator[str]:
+    header = session.header
+    yield f"- Town {header.town}, storyboard {header.storyboard or '-'}, seed {header.seed}, {session.duration:.0f} s."
+    if header.story:
+        yield f"- Story: {_escaped(header.story)}"
+    for number, subgoal in enumerate(header.subgoals):
+        place = header.landmarks[subgoal["landmark"]]
+        hidden = ", hidden from the car" if place["hidden"] else ""
+        yield f"- Errand {number}: {_escaped(subgoal['description'])} ({place['name']}{hidden})"
+    if session.summary:
+        ended = "success" if session.summary.get("success") else "no success"
+        yield f"- Ended with {ended} ({session.summary.get('reason', '-')})."
+    talk = Talk(session)
+    found = Counter({each.number: sum(1 for _ in each.find(talk)) for each in PHENOMENA if each.has_cause(talk)})
+    shown = ", ".join(f"{number} ({count})" for number, count in sorted(found.items()) if count)
+    yield f"- Phenomena (how often): {shown or '-'}."
+
+
+# --- the lines ------------------------------------------------------------------------------------------------------
+
+
+def _said(utterance: UtteranceRecord, units: Units, kinds: Mapping[int, Handled]) -> TranscriptLine:
+    numbers = [units.exchange_of(move) for move in utterance.moves]
+    known = list(dict.fromkeys(number for number in numbers if number is not None))
+    transaction = units.transaction_of(utterance.moves[0])
+    text = " ".join(f"{move.span} [{str(move.act).removesuffix('()')}]" for move in utterance.moves)
+    heard = utterance.moves[0].recognised
+    if heard is not None and heard != utterance.text:
+        text += f' (heard: "{heard}")'
+    return TranscriptLine(
+        time=utterance.start,
+        speaker=utterance.speaker,
+        text=text,
+        said=True,
+        exchanges=", ".join(f"{number}{_HANDLED[kinds[number]]}" for number in known),
+        transaction="" if transaction is None else str(transaction),
+    )
+
+
+def _happened(event: Event, session: Session) -> Iterator[TranscriptLine]:
+    text = _told(event, session)
+    if text:
+        yield TranscriptLine(time=event.time, speaker=event.source, text=text, said=False)
+
+
+def _told(event: Event, session: Session) -> str:
+    """What an event is called; empty for what a reader would not miss."""
+    data = event.data
+    if event.type is EventType.PHYSICAL_ACTION:
+        return _deed(event)
+    if event.type is EventType.BELIEF_UPDATE and data.get("action") in _MENTAL:
+        about = data.get("landmarks", data.get("landmark"))
+        names = about if isinstance(about, Sequence) and not isinstance(about, str) else [about]
+        status = f" {data['status']}" if "status" in data else ""
+        return f"{data['action']}({', '.join(str(name) for name in names if name is not None)}{status})"
+    if event.type is EventType.EXCEPTION:
+        more = ", ".join(f"{k} {v}" for k, v in data.items() if k != "kind" and isinstance(v, str | int | float))
+        return f"{str(data.get('kind')).replace('_', ' ')}: {more}"
+    if event.type is EventType.MESSAGE:
+        return f"message: “{data.get('text')}”"
+    if event.type is EventType.SUBGOAL:
+        return f"errand {data.get('subgoal')} ({data.get('landmark')}) is {data.get('status')}"
+    if event.type is EventType.HAZARD_STOP:
+        return f"brakes for {data.get('reason')}"
+    if event.type in INFRACTIONS:
+        return event.type_name
+    return f"the session is over: {data.get('reason')}" if event.type is EventType.END else ""
+
+
+def _deed(event: Event) -> str:
+    deed = action_record(event, 0, "event")
+    text = deed.action.label
+    if deed.angle is not None:
+        text += f" {abs(deed.angle):.0f}° {'left' if deed.angle > 0 else 'right'}" if deed.angle else " straight on"
+    elif deed.up is not None:
+        text += " up" if deed.up else " down"
+    return text
+
+
+def _together(lines: Iterable[TranscriptLine]) -> Iterator[TranscriptLine]:
+    """Joins neighbouring lines of one role that are not said; what is repeated is counted."""
+    for (said, speaker), group in groupby(lines, key=lambda line: (line.said, line.speaker)):
+        same = list(group)
+        if said:
+            yield from same
+            continue
+        texts = [(text, sum(1 for _ in again)) for text, again in groupby(line.text for line in same)]
+        text = "; ".join(text if count == 1 else f"{text} ({count} times)" for text, count in texts)
+        yield TranscriptLine(time=same[0].time, speaker=speaker, text=text, said=False)
+
+
+def _escaped(text: Any) -> str:
+    """A text as Markdown shows it in a table."""
+    clean = " ".join(str(text).split())
+    for letter in "\\|*_<>`":
+        clean = clean.replace(letter, f"\\{letter}")
+    return clean

@@ -1,0 +1,99 @@
+"""The three tasks on recordings: metrics, predictions as files, floors, the table, teacher-forced environments."""
+
+from dorothie_gym.benchmark.claims import Claim, Finding, Verdict, above, findings
+from dorothie_gym.benchmark.intervals import Estimate
+from dorothie_gym.benchmark.labels import SPLITS, CorpusLabels, Split, TaskLabels, Unscored, labels_of
+from dorothie_gym.benchmark.metrics import (
+    COLUMNS,
+    ActionAccuracy,
+    ArgumentAccuracy,
+    ArgumentAccuracyPaper,
+    JointAccuracy,
+    JointAccuracyPaper,
+    Metric,
+    MoveAccuracy,
+    SlotF1,
+    SlotScorePaper,
+    keys_of,
+    metrics_of,
+    title_of,
+)
+from dorothie_gym.benchmark.paper_results import PaperFigure, paper_figure, paper_figures
+from dorothie_gym.benchmark.prediction_reader import read_about, read_predictions
+from dorothie_gym.benchmark.predictions import (
+    ActionPredictions,
+    ActPredictions,
+    PredictionError,
+    TaskPredictions,
+    act_labels,
+    action_labels,
+    write_predictions,
+)
+from dorothie_gym.benchmark.scoring import RunScore, Scores, score_runs, score_task
+from dorothie_gym.benchmark.table import ResultsTable, evaluate_files, evaluate_predictions
+from dorothie_gym.benchmark.teacher_forced import NfDEnv, RfNEnv, TeacherForcedEnv, UfNEnv
+from dorothie_gym.benchmark.trivial_baselines import (
+    FLOORS,
+    FloorModel,
+    MajorityModel,
+    RandomModel,
+    make_floor,
+    predict_floor,
+)
+
+__all__ = [
+    "ActPredictions",
+    "ActionAccuracy",
+    "ActionPredictions",
+    "ArgumentAccuracy",
+    "ArgumentAccuracyPaper",
+    "COLUMNS",
+    "Claim",
+    "CorpusLabels",
+    "Estimate",
+    "FLOORS",
+    "Finding",
+    "FloorModel",
+    "JointAccuracy",
+    "JointAccuracyPaper",
+    "MajorityModel",
+    "Metric",
+    "MoveAccuracy",
+    "NfDEnv",
+    "PaperFigure",
+    "PredictionError",
+    "RandomModel",
+    "ResultsTable",
+    "RfNEnv",
+    "RunScore",
+    "SPLITS",
+    "Scores",
+    "Unscored",
+    "SlotF1",
+    "SlotScorePaper",
+    "Split",
+    "TaskLabels",
+    "TaskPredictions",
+    "TeacherForcedEnv",
+    "UfNEnv",
+    "Verdict",
+    "above",
+    "act_labels",
+    "action_labels",
+    "evaluate_files",
+    "evaluate_predictions",
+    "findings",
+    "keys_of",
+    "labels_of",
+    "make_floor",
+    "metrics_of",
+    "paper_figure",
+    "paper_figures",
+    "predict_floor",
+    "read_about",
+    "read_predictions",
+    "score_runs",
+    "score_task",
+    "title_of",
+    "write_predictions",
+]

@@ -1,0 +1,222 @@
+"""A corpus becomes columns."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.benchmark.features.columns import GROUPS, NO_TEXT, Columns, Sessions, TownGraph
+from dorothie_gym.benchmark.features.extraction import SessionColumns, extract, town_graph
+from dorothie_gym.benchmark.features.store import keep, recall
+from dorothie_gym.maps import Town, TownError
+from dorothie_gym.maps.cache import compiler_digest
+from dorothie_gym.recording import FOLDS, Corpus, CorpusEntry, Fold, Session, SessionError
+from dorothie_gym.recording.file_names import ACTIONS_FILE
+from dorothie_gym.recording.sdn.maps import find_town
+
+_STARTS = {"landmarks": "place", "streets": "text"}
+"""Groups whose rows are found by session, with a column that tells their number."""
+
+
+def join(
+    key: str,
+    names: Sequence[str],
+    folds: Sequence[str],
+    parts: Sequence[SessionColumns],
+    towns: Sequence[TownGraph],
+    unreadable: Sequence[tuple[str, str]],
+) -> Columns:
+    """Returns the columns of sessions as those of a corpus.
+
+    Args:
+        key: hash of all that decided them.
+        names: names of the sessions.
+        folds: their folds.
+        parts: their columns, in the same order.
+        towns: the towns that occur.
+        unreadable: sessions that could not be read, (name, reason) each.
+    """
+    pool: dict[str, int] = {}
+    rows = [_Shifted(part, pool) for part in parts]
+    groups: dict[str, Any] = {}
+    for group, kind in GROUPS.items():
+        if group != "sessions":
+            wanted = [field.name for field in dataclasses.fields(kind)]
+            groups[group] = kind(**{name: _column(rows, group, name) for name in wanted})
+    number = {town.name: index for index, town in enumerate(towns)}
+    groups["sessions"] = Sessions(
+        names=tuple(names),
+        folds=tuple(folds),
+        town=np.array([number[part.town] for part in parts], dtype=np.int32),
+        has_objects=np.concatenate([part.arrays["sessions.has_objects"] for part in parts]),
+    )
+    return Columns(
+        key=key,
+        **groups,
+        texts=tuple(pool),
+        towns=tuple(towns),
+        unreadable=tuple(unreadable),
+        unpointed=tuple((index, *found) for index, part in enumerate(parts) for found in part.unpointed),
+    )
+
+
+class _Shifted:
+    """The arrays of a session, with texts as numbers of the corpus."""
+
+    def __init__(self, part: SessionColumns, pool: dict[str, int]) -> None:
+        self.arrays = part.arrays
+        numbers = np.array([pool.setdefault(text, len(pool)) for text in part.texts] + [NO_TEXT], dtype=np.int32)
+        self._numbers = numbers  # -1 picks the last, which is -1
+
+    def column(self, group: str, name: str) -> NDArray[Any]:
+        found = self.arrays[f"{group}.{name}"]
+        return self._numbers[found] if name.endswith("text") else found
+
+    def count(self, group: str) -> int:
+        return len(next(rows for name, rows in self.arrays.items() if name.startswith(f"{group}.")))
+
+
+_POINTS_AT = {("moves", "utterance"): "utterances", ("frames", "look"): "looks", ("looks", "start"): "objects"}
+"""Columns that hold rows of another group."""
+
+
+def _column(rows: Sequence[_Shifted], group: str, name: str) -> NDArray[Any]:
+    if name == "session":
+        return np.repeat(np.arange(len(rows), dtype=np.int32), [row.count(group) for row in rows])
+    if name == "start" and group in _STARTS:
+        return np.concatenate(([0], np.cumsum([row.count(group) for row in rows]))).astype(np.int64)
+    columns = [row.column(group, name) for row in rows]
+    target = _POINTS_AT.get((group, name))
+    if target is not None:
+        first = np.concatenate(([0], np.cumsum([row.count(target) for row in rows])))
+        # -1 means that there is none
+        columns = [
+            np.where(column >= 0, column + start, column).astype(column.dtype)
+            for column, start in zip(columns, first, strict=False)
+        ]
+        if name == "start":
+            columns.append(first[-1:].astype(np.int64))
+    return np.concatenate(columns)
+
+
+# --- A corpus becomes columns ----------------------------------------------------------------------------------------
+
+_SOURCES: Final = ("ontology", "dialogue", "sessions", "evaluation/features", "world")
+"""Packages that decide what the columns of a session are."""
+
+_READ: Final = (".json", ".jsonl", ".csv", ".parquet", ".journal")
+"""Endings of files that sessions are read from."""
+
+
+def build(corpus: Corpus | Path | str, *, cache: bool = True, told: Callable[[], object] | None = None) -> Columns:
+    """Returns a corpus as columns: as it was kept when it was built before, else built and kept for the next time.
+
+    Args:
+        corpus: a corpus or its folder.
+        cache: whether to look for it, and keep it, in the user's cache folder (`DOROTHIE_GYM_CACHE`).
+        told: called after each session that was read.
+
+    Raises:
+        SessionError: there is no session, or none can be read.
+    """
+    corpus = corpus if isinstance(corpus, Corpus) else Corpus.load(corpus)
+    key = _key(corpus)
+    found = recall(key) if cache else None
+    if found is None:
+        found = _build(corpus, key, told)
+        if cache:
+            keep(found)
+    return found
+
+
+def columns_of(session: Session, fold: str = "", maps: Path | None = None) -> Columns:
+    """Returns the columns of a session that is in no corpus; they are not kept."""
+    town = find_town(session.header.town, maps)
+    part = extract(session, town)
+    return join(part.signature, [session.name], [fold], [part], [town_graph(part.town, town)], [])
+
+
+def _build(corpus: Corpus, key: str, told: Callable[[], object] | None) -> Columns:
+    towns: dict[str, Town | None] = {}
+    read: list[tuple[CorpusEntry, SessionColumns]] = []
+    unreadable = []
+    for entry in corpus.entries:
+        try:
+            session = entry.load()
+            if session.header.town not in towns:
+                towns[session.header.town] = find_town(session.header.town, entry.maps)
+            read.append((entry, extract(session, towns[session.header.town])))
+        except (SessionError, TownError) as error:
+            unreadable.append((entry.name, str(error)))
+        if told is not None:
+            told()
+    if not read:
+        reason = unreadable[0][1] if unreadable else "there is none"
+        raise SessionError(f"{corpus.root}: no session can be read: {reason}")
+    read.sort(key=_place)
+    names = sorted({part.town for _, part in read})
+    return join(
+        key,
+        [entry.name for entry, _ in read],
+        [_fold_name(entry.fold) for entry, _ in read],
+        [part for _, part in read],
+        [town_graph(name, towns[name]) for name in names],
+        unreadable,
+    )
+
+
+def _place(row: tuple[CorpusEntry, SessionColumns]) -> tuple[int, str, int, str]:
+    """Order of sessions: it must not depend on names, which differ between layouts."""
+    entry, part = row
+    fold = entry.fold
+    place = FOLDS.index(fold) if fold in FOLDS else len(FOLDS) + (0 if fold is None else 1)
+    return place, part.town, part.seed, part.signature
+
+
+def _fold_name(fold: Fold | None) -> str:
+    return "" if fold is None else fold.value
+
+
+def _key(corpus: Corpus) -> str:
+    """Hash of all that decides the columns: what the sessions' files hold, their names and folds, and our sources."""
+    digest = hashlib.sha256(f"{_sources_digest()} {compiler_digest()} numpy {np.__version__}\n".encode())
+    for folder in sorted({entry.maps for entry in corpus.entries if entry.maps is not None}):
+        _add_files(digest, folder, (".xodr", ".yaml", ".yml"))
+    for entry in corpus.entries:
+        digest.update(f"session {entry.name!r} {entry.fold} {entry.sign!r}\n".encode())
+        _add_files(digest, entry.path, _READ)
+    return digest.hexdigest()
+
+
+def _add_files(digest: hashlib._Hash, folder: Path, endings: tuple[str, ...]) -> None:
+    for path in sorted(folder.iterdir()):
+        if path.suffix in endings and path.name != ACTIONS_FILE and path.is_file():
+            with path.open("rb") as file:
+                digest.update(f"{path.name} {hashlib.file_digest(file, 'sha256').hexdigest()}\n".encode())
+
+
+@functools.cache
+def _sources_digest() -> str:
+    digest = hashlib.sha256()
+    package = files("dorothie_gym")
+    for name in _SOURCES:
+        for path, text in sorted(_sources(package.joinpath(*name.split("/")), name)):
+            digest.update(f"{path} {len(text)}\n".encode() + text)
+    return digest.hexdigest()
+
+
+def _sources(folder: Traversable, prefix: str) -> Iterator[tuple[str, bytes]]:
+    for entry in folder.iterdir():
+        if entry.is_dir():
+            yield from _sources(entry, f"{prefix}/{entry.name}")
+        elif entry.name.endswith(".py"):
+            yield f"{prefix}/{entry.name}", entry.read_bytes()

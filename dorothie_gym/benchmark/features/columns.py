@@ -1,0 +1,300 @@
+"""A corpus as columns: what happened in all its sessions, one row for each thing, sessions one after another.
+
+Everything is at the benchmark's rate of 10 Hz: `tenth` counts tenths of a second since the session began, and what
+happened within a tenth carries its number. `texts` holds every distinct text once; columns that end in `text` are its
+indices, -1 where there is none. Rows of a session follow one another, in the order in which they became visible.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import json
+from dataclasses import dataclass
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Ints: TypeAlias = NDArray[np.int32]
+Reals: TypeAlias = NDArray[np.float32]
+Flags: TypeAlias = NDArray[np.bool_]
+
+NO_TEXT: Final = -1
+"""Index of a text that is not there."""
+
+TENTHS: Final = 10
+"""Tenths in a second: the rate of the benchmark [Hz] (paper, section 4)."""
+
+PARTICIPANT, CO_WIZARD = 0, 1
+"""Values of columns `speaker`."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Sessions:
+    """The sessions (S,), by fold, town and seed, and by content where that is equal: their names do not count.
+
+    Attributes:
+        names: name of each.
+        folds: fold of each, as `Fold`'s value; empty for one that lies in none.
+        town: index of its town in `Columns.towns`.
+        has_objects: whether it was recorded what stood and moved around the car.
+    """
+
+    names: tuple[str, ...]
+    folds: tuple[str, ...]
+    town: Ints
+    has_objects: Flags
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Moves:
+    """Dialogue moves of both speakers (n,), those of an utterance together, flagged or not.
+
+    Attributes:
+        session: index of its session.
+        tenth: when its utterance was over: it is visible later than that.
+        point_tenth: when it is a point: at its own event, which in recordings of people may come before `tenth`.
+        event: number of its event in the session.
+        speaker: 0 participant, 1 Co-Wizard.
+        utterance: row of `Columns.utterances`.
+        move: id of its `DialogueMove`, 0..14.
+        slots: (n, 69) its slot values, in the order of `LABELS`.
+        span_text: words of this move.
+        flagged: whether it is a point of the benchmark.
+        handling: what its exchange handles, 0 nothing, 1 a task exception, 2 an environmental one (a label, no input).
+    """
+
+    session: Ints
+    tenth: Ints
+    point_tenth: Ints
+    event: Ints
+    speaker: Ints
+    utterance: Ints
+    move: Ints
+    slots: Flags
+    span_text: Ints
+    flagged: Flags
+    handling: Ints
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Utterances:
+    """What was said (n,).
+
+    Attributes:
+        session: index of its session.
+        tenth: when it was over.
+        speaker: 0 participant, 1 Co-Wizard.
+        text: its words.
+        recognised_text: what a speech recogniser heard, -1 where there was none.
+    """
+
+    session: Ints
+    tenth: Ints
+    speaker: Ints
+    text: Ints
+    recognised_text: Ints
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Actions:
+    """Physical actions (n,), flagged or not.
+
+    Attributes:
+        session: index of its session.
+        tenth: when it was done.
+        event: number of its event in the session.
+        action: `PhysicalAction` less 1: 0..5 are the classes of NfD, 6 is SpeedChange, 7 LightChange.
+        angle: argument as it stands in a history [degrees, positive left]: -180 for a U-turn, 0 where it has none or
+            it is not known (`history_angle`).
+        up: 1 faster or on, -1 slower or off, 0 for other actions.
+        label_angle: argument as NfD's label [degrees]: 0 for an action that takes none, NaN where it is not known.
+        flagged: whether it is a point of NfD.
+        handling: as of `Moves`, by the rule of `handling_of_events`.
+    """
+
+    session: Ints
+    tenth: Ints
+    event: Ints
+    action: Ints
+    angle: Reals
+    up: Ints
+    label_angle: Reals
+    flagged: Flags
+    handling: Ints
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Frames:
+    """Where the car was (n,), ten rows a second.
+
+    Attributes:
+        session: index of its session.
+        tenth: when.
+        pose: (n, 3) x, y [m], heading [degrees, clockwise from east, in [-180, 180)].
+        speed: over the tenth before [m/s]; 0 in a session's first row.
+        lane: lane of the town, -1 where it is not known.
+        look: row of `Columns.looks` that was the last then, -1 before the first.
+    """
+
+    session: Ints
+    tenth: Ints
+    pose: Reals
+    speed: Reals
+    lane: Ints
+    look: Ints
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Looks:
+    """Moments (n,) at which it was recorded what is around the car, about twice a second.
+
+    Attributes:
+        session: index of its session.
+        tenth: when.
+        start: first row of `Columns.objects` of each, and one more: those of look i are `start[i]:start[i + 1]`.
+    """
+
+    session: Ints
+    tenth: Ints
+    start: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Objects:
+    """What was perceived around the car (n,), the nearest of each look first.
+
+    Attributes:
+        kind: see `dorothie_gym.recording.ObjectKind`.
+        values: (n, 8) columns as in `dorothie_gym.recording.OBJECT_VALUES`, relative to the car as it was at the look.
+    """
+
+    kind: Ints
+    values: Reals
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Landmarks:
+    """Landmarks that are not hidden from the Co-Wizard (n,).
+
+    Attributes:
+        start: (S + 1,) those of session s are `start[s]:start[s + 1]`.
+        place: (n, 2) x, y [m].
+        lane: lane of the town that it is at, -1 where it is not known.
+        street: number of its street, -1 for none.
+        text: its name.
+    """
+
+    start: NDArray[np.int64]
+    place: Reals
+    lane: Ints
+    street: Ints
+    text: Ints
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Streets:
+    """Streets of each session's town (n,), in the order of their numbers.
+
+    Attributes:
+        start: (S + 1,) those of session s are `start[s]:start[s + 1]`.
+        text: its name.
+    """
+
+    start: NDArray[np.int64]
+    text: Ints
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Goals:
+    """Where the car was to go: a label of the belief head, never an input (hidden landmarks are among them).
+
+    The goal at a point is the first of the session that is reached after it.
+
+    Attributes:
+        session: index of its session (n,).
+        tenth: when the subgoal was completed.
+        place: (n, 2) x, y [m] of its landmark.
+    """
+
+    session: Ints
+    tenth: Ints
+    place: Reals
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TownGraph:
+    """The lane graph of a town (L lanes, E edges, s streets); no lanes where the town is not known.
+
+    Attributes:
+        name: of the town.
+        lanes: (L, 14) columns as in `dorothie_gym.maps.lane_graph.FEATURES` [m, degrees].
+        road: (L,) number of its road within the town, 0.. without gaps.
+        junction: (L,) 0 outside of junctions, else 1.. without gaps.
+        street: (L,) its street, -1 for none.
+        edges: (2, E) from and to.
+        edge_types: (E,) index in `dorothie_gym.maps.lane_graph.EDGE_TYPES`.
+        member_start: (s + 1,) `members[member_start[i]:member_start[i + 1]]` are the lanes of street i.
+        members: the lanes of all streets.
+    """
+
+    name: str
+    lanes: Reals
+    road: Ints
+    junction: Ints
+    street: Ints
+    edges: Ints
+    edge_types: Ints
+    member_start: Ints
+    members: Ints
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Columns:
+    """A corpus as columns; arrays may be views of files.
+
+    Attributes:
+        key: hash of all that decided the content, our own sources among it: what a cache goes by.
+        texts: every distinct text: what was said, what was recognised, names of streets and landmarks.
+        towns: towns of the sessions, by name.
+        unreadable: sessions that could not be read, (name, reason) each.
+        unpointed: flagged events that are no point, (session, event, reason) each.
+    """
+
+    key: str
+    sessions: Sessions
+    moves: Moves
+    utterances: Utterances
+    actions: Actions
+    frames: Frames
+    looks: Looks
+    objects: Objects
+    landmarks: Landmarks
+    streets: Streets
+    goals: Goals
+    texts: tuple[str, ...]
+    towns: tuple[TownGraph, ...]
+    unreadable: tuple[tuple[str, str], ...] = ()
+    unpointed: tuple[tuple[int, int, str], ...] = ()
+
+    @functools.cached_property
+    def content(self) -> str:
+        """Hash of what is told of the sessions: the same for the same corpus, whatever its layout and our version."""
+        names = [self.sessions.folds, self.texts, [town.name for town in self.towns]]
+        digest = hashlib.sha256(json.dumps(names).encode())
+        for part in (*(getattr(self, group) for group in GROUPS), *self.towns):
+            for field in dataclasses.fields(part):
+                values = getattr(part, field.name)
+                if isinstance(values, np.ndarray):
+                    digest.update(f"{field.name} {values.dtype.str} {values.shape}\n".encode())
+                    digest.update(values.tobytes())
+        return digest.hexdigest()
+
+
+GROUPS: Final[dict[str, type[Any]]] = {
+    "sessions": Sessions, "moves": Moves, "utterances": Utterances, "actions": Actions, "frames": Frames,
+    "looks": Looks, "objects": Objects, "landmarks": Landmarks, "streets": Streets, "goals": Goals,
+}  # fmt: skip
+"""The groups of `Columns` that hold arrays over the whole corpus."""

@@ -1,0 +1,225 @@
+"""One session as columns."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.analysis.exception_attribution import Handled, handling_of_events
+from dorothie_gym.analysis.units import Units
+from dorothie_gym.benchmark.features.columns import CO_WIZARD, NO_TEXT, PARTICIPANT, TENTHS, TownGraph
+from dorothie_gym.maps import NO_JUNCTION, Town
+from dorothie_gym.maps.lane_graph import FEATURES
+from dorothie_gym.ontology import LABELS, GoalStatus, Role
+from dorothie_gym.recording import (
+    NO_LANE,
+    EventType,
+    Session,
+    history_angle,
+    is_decision,
+    label_angle,
+    unpointed_events,
+)
+from dorothie_gym.recording.recorded_perception import OBJECT_VALUES, light_switches, perceived
+from dorothie_gym.recording.resampling import EACH, at_tenths
+
+HEADING_STEP: Final = 1e-3
+"""Headings are rounded to this [degrees], so that the last digits do not tell in which unit a file had them."""
+
+SPEAKERS: Final = {Role.PARTICIPANT: PARTICIPANT, Role.CO_WIZARD: CO_WIZARD}
+HANDLINGS: Final = (Handled.NONE, Handled.TASK, Handled.ENVIRONMENTAL)
+"""What the numbers in columns `handling` mean."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SessionColumns:
+    """The columns of one session: rows of groups by "group.field", indices within the session.
+
+    Attributes:
+        arrays: by "group.field".
+        texts: distinct texts.
+        town: name of the town.
+        seed: of the session, -1 where there is none.
+        unpointed: flagged events that are no point, (event, reason) each.
+        signature: hash of all the above: the same for the same session, whatever layout it was read from.
+    """
+
+    arrays: dict[str, NDArray[Any]]
+    texts: tuple[str, ...]
+    town: str
+    seed: int
+    unpointed: tuple[tuple[int, str], ...]
+    signature: str
+
+
+def extract(session: Session, town: Town | None) -> SessionColumns:
+    """Returns the columns of a session; `town` is None where it is not known."""
+    session = at_tenths(session)
+    pool = _Pool()
+    handled = {event: HANDLINGS.index(kind) for event, kind in handling_of_events(Units(session)).items()}
+    arrays = {
+        **_places(session, pool),  # first: numbers of texts then do not depend on what is said later
+        **_said(session, pool, handled),
+        **_done(session, handled),
+        **_frames(session, town),
+        **_goals(session),
+    }
+    arrays["sessions.has_objects"] = np.array([len(session.scene.actors) > 0])
+    unpointed = unpointed_events(session)
+    content = hashlib.sha256(repr((session.header.town, list(pool.texts), unpointed)).encode())
+    for name in sorted(arrays):
+        content.update(f"{name} {arrays[name].dtype} {arrays[name].shape}".encode() + arrays[name].tobytes())
+    seed = session.header.seed
+    return SessionColumns(
+        arrays=arrays,
+        texts=tuple(pool.texts),
+        town=session.header.town,
+        seed=-1 if seed is None else seed,
+        unpointed=unpointed,
+        signature=content.hexdigest(),
+    )
+
+
+class _Pool:
+    """Numbers of texts."""
+
+    def __init__(self) -> None:
+        self.texts: dict[str, int] = {}
+
+    def number(self, text: str | None) -> int:
+        return NO_TEXT if text is None else self.texts.setdefault(text, len(self.texts))
+
+
+def _said(session: Session, pool: _Pool, handled: Mapping[int, int]) -> dict[str, NDArray[Any]]:
+    """Moves and utterances, by when the whole utterance was over."""
+    spoken = [utterance for utterance in session.utterances() if utterance.speaker in SPEAKERS]
+    spoken.sort(key=lambda utterance: (max(move.frame for move in utterance.moves), utterance.moves[0].index))
+    over = [max(move.frame for move in utterance.moves) // EACH for utterance in spoken]
+    for utterance in spoken:
+        for text in (utterance.text, utterance.moves[0].recognised, *(move.span for move in utterance.moves)):
+            pool.number(text)
+    moves = [(row, move) for row, utterance in enumerate(spoken) for move in utterance.moves]
+    return {
+        "utterances.tenth": _ints(over),
+        "utterances.speaker": _ints([SPEAKERS[utterance.speaker] for utterance in spoken]),
+        "utterances.text": _ints([pool.number(utterance.text) for utterance in spoken]),
+        "utterances.recognised_text": _ints([pool.number(utterance.moves[0].recognised) for utterance in spoken]),
+        "moves.tenth": _ints([over[row] for row, _ in moves]),
+        "moves.point_tenth": _ints([move.frame // EACH for _, move in moves]),
+        "moves.event": _ints([move.index for _, move in moves]),
+        "moves.speaker": _ints([SPEAKERS[move.speaker] for _, move in moves]),
+        "moves.utterance": _ints([row for row, _ in moves]),
+        "moves.move": _ints([int(move.act.move) for _, move in moves]),
+        "moves.slots": np.array([move.act.vector for _, move in moves], dtype=np.bool_).reshape(-1, len(LABELS)),
+        "moves.span_text": _ints([pool.number(move.span) for _, move in moves]),
+        "moves.flagged": np.array([move.flagged for _, move in moves], dtype=np.bool_),
+        "moves.handling": _ints([handled[move.index] for _, move in moves]),
+    }
+
+
+def _done(session: Session, handled: Mapping[int, int]) -> dict[str, NDArray[Any]]:
+    done = session.physical_actions
+    return {
+        "actions.tenth": _ints([act.frame // EACH for act in done]),
+        "actions.event": _ints([act.index for act in done]),
+        "actions.action": _ints([act.action.value - 1 for act in done]),
+        "actions.angle": np.array([history_angle(act) for act in done], dtype=np.float32),
+        "actions.up": _ints([0 if act.up is None else (1 if act.up else -1) for act in done]),
+        "actions.label_angle": np.array([label_angle(act) for act in done], dtype=np.float32),
+        "actions.flagged": np.array([is_decision(act) for act in done], dtype=np.bool_),
+        "actions.handling": _ints([handled[act.index] for act in done]),
+    }
+
+
+def _frames(session: Session, town: Town | None) -> dict[str, NDArray[Any]]:
+    """Where the car was, and what was perceived around it."""
+    rows = session.trajectory
+    degrees = np.rint(np.degrees(rows["heading"]) / HEADING_STEP) * HEADING_STEP
+    pose = np.stack([rows["x"], rows["y"], (degrees + 180.0) % 360.0 - 180.0], axis=1)
+    tenths = rows["frame"] // EACH
+    speed = np.zeros(len(rows))
+    if len(rows) > 1:
+        way = np.hypot(np.diff(rows["x"]), np.diff(rows["y"]))
+        speed[1:] = way / (np.diff(tenths) / TENTHS)
+    looks = list(perceived(session.scene, pose, rows["frame"], light_switches(session), town))
+    look_tenths = np.array([frame // EACH for frame, _, _ in looks], dtype=np.int64)
+    kinds = [kind for _, kind, _ in looks]
+    values = [value for _, _, value in looks]
+    return {
+        "frames.tenth": tenths.astype(np.int32),
+        "frames.pose": pose.astype(np.float32),
+        "frames.speed": speed.astype(np.float32),
+        "frames.lane": (rows["lane"] if town is not None else np.full(len(rows), NO_LANE)).astype(np.int32),
+        "frames.look": (np.searchsorted(look_tenths, tenths, side="right") - 1).astype(np.int32),
+        "looks.tenth": look_tenths.astype(np.int32),
+        "looks.start": np.concatenate(([0], np.cumsum([len(kind) for kind in kinds]))).astype(np.int64)[:-1],
+        "objects.kind": np.concatenate([*kinds, np.empty(0, dtype=np.int64)]).astype(np.int32),
+        "objects.values": np.concatenate(values or [np.empty((0, len(OBJECT_VALUES)))]).astype(np.float32),
+    }
+
+
+def _places(session: Session, pool: _Pool) -> dict[str, NDArray[Any]]:
+    """Landmarks that the Co-Wizard knows, and streets."""
+    known = [row for row in session.header.landmarks if not row["hidden"]]
+    return {
+        "landmarks.place": _pairs([(row["x"], row["y"]) for row in known]),
+        "landmarks.lane": _ints([row["lane"] for row in known]),
+        "landmarks.street": _ints([row["street"] for row in known]),
+        "landmarks.text": _ints([pool.number(row["name"]) for row in known]),
+        "streets.text": _ints([pool.number(name) for name in session.header.street_names]),
+    }
+
+
+def _goals(session: Session) -> dict[str, NDArray[Any]]:
+    """Subgoals that were completed, and where they were."""
+    header, tenths, places = session.header, [], []
+    for event in session.of_type(EventType.SUBGOAL):
+        number = event.data.get("subgoal")
+        if event.data.get("status") == GoalStatus.COMPLETE.label and isinstance(number, int):
+            if 0 <= number < len(header.subgoals):
+                landmark = header.landmarks[header.subgoals[number]["landmark"]]
+                tenths.append(event.frame // EACH)
+                places.append((landmark["x"], landmark["y"]))
+    return {"goals.tenth": _ints(tenths), "goals.place": _pairs(places)}
+
+
+def _ints(values: Sequence[int]) -> NDArray[np.int32]:
+    return np.array(values, dtype=np.int32).reshape(-1)
+
+
+def _pairs(values: Sequence[tuple[float, float]]) -> NDArray[np.float32]:
+    return np.array(values, dtype=np.float32).reshape(-1, 2)
+
+
+# --- The lane graph of a town as arrays ------------------------------------------------------------------------------
+
+
+def town_graph(name: str, town: Town | None) -> TownGraph:
+    """Returns the graph of a town; without lanes where it is not known."""
+    if town is None:
+        empty = np.empty(0, dtype=np.int32)
+        return TownGraph(
+            name=name, lanes=np.empty((0, len(FEATURES)), dtype=np.float32), road=empty, junction=empty, street=empty,
+            edges=empty.reshape(2, 0), edge_types=empty, member_start=np.zeros(1, dtype=np.int32), members=empty,
+        )  # fmt: skip
+    graph = town.to_graph()
+    members = [graph.members(street) for street in range(graph.num_streets)]
+    inside = graph.junction_ids != NO_JUNCTION
+    junction = np.zeros(len(graph), dtype=np.int32)
+    junction[inside] = 1 + np.unique(graph.junction_ids[inside], return_inverse=True)[1]
+    return TownGraph(
+        name=name,
+        lanes=graph.features.astype(np.float32),
+        road=np.unique(graph.road_ids, return_inverse=True)[1].astype(np.int32),
+        junction=junction,
+        street=graph.street.astype(np.int32),
+        edges=np.ascontiguousarray(graph.edges.T, dtype=np.int32),
+        edge_types=graph.edge_types.astype(np.int32),
+        member_start=np.concatenate(([0], np.cumsum([len(lanes) for lanes in members]))).astype(np.int32),
+        members=np.concatenate([*members, np.empty(0)]).astype(np.int32),
+    )

@@ -1,0 +1,211 @@
+"""The points of a task: where each stands in the columns, what is visible there, and its label."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.benchmark.features.columns import CO_WIZARD, PARTICIPANT, Columns, Flags, Ints, Reals
+from dorothie_gym.benchmark.labels import NO_ANGLE, Unscored
+from dorothie_gym.ontology import LABELS
+from dorothie_gym.recording import Fold, Task
+from dorothie_gym.recording.splits import check_fold
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PointTable:
+    """The points of a task (n,), by session and event.
+
+    What is visible at a point are rows `*_start:*_stop` of the columns: those of tenths strictly before the point's; at
+    a point of NfD also utterances that were over in its own tenth and stand before it in the record.
+
+    Attributes:
+        task: the task.
+        session: index of the session in `Columns.sessions`.
+        tenth: when the point is [0.1 s].
+        event: number of its event in the session.
+        row: row of the point itself in `Columns.moves` (UfN, RfN) or `Columns.actions` (NfD): its label, never input.
+        handling: 0 nothing, 1 a task exception, 2 an environmental one (`Handled`).
+        moves_start, moves_stop: visible rows of `Columns.moves`.
+        spans_start, spans_stop: further visible rows of it: earlier acts of the current utterance (UfN, else empty).
+        utterances_start, utterances_stop: visible rows of `Columns.utterances`.
+        actions_start, actions_stop: visible rows of `Columns.actions`.
+        frames_start, frames_stop: visible rows of `Columns.frames`.
+        current: row of `Columns.utterances` of the current utterance (UfN), -1 otherwise.
+        label_move: (n,) id of the move; -1 in NfD.
+        label_slots: (n, 69) slot values; all False in NfD.
+        label_action: (n,) class of NfD, 0..5; -1 in UfN and RfN.
+        label_angle: (n,) its angle [degrees, positive left]; NaN where unknown, and in UfN and RfN.
+        label_belief: (n, 5) way to the next frame dx, dy [m], its heading [degrees], way to the goal dx, dy [m], in the
+            town's axes; NaN where unknown.
+        skipped: flagged events that are a point of no task (`task` None), and points of this one that are not scored in
+            whole, and why. Sessions that cannot be read are in `Columns.unreadable`.
+    """
+
+    task: Task
+    session: Ints
+    tenth: Ints
+    event: Ints
+    row: Ints
+    handling: Ints
+    moves_start: Ints
+    moves_stop: Ints
+    spans_start: Ints
+    spans_stop: Ints
+    utterances_start: Ints
+    utterances_stop: Ints
+    actions_start: Ints
+    actions_stop: Ints
+    frames_start: Ints
+    frames_stop: Ints
+    current: Ints
+    label_move: Ints
+    label_slots: Flags
+    label_action: Ints
+    label_angle: Reals
+    label_belief: Reals
+    skipped: tuple[Unscored, ...] = ()
+
+    def __len__(self) -> int:
+        """Number of points."""
+        return len(self.session)
+
+
+def points(columns: Columns, task: Task, fold: Fold | str | None = None) -> PointTable:
+    """Returns the points of a task.
+
+    Args:
+        columns: the corpus.
+        task: the task.
+        fold: sessions of this fold only, or of several ("val", "test", "seen", "unseen"); None takes all.
+
+    Raises:
+        SessionError: the fold is unknown.
+    """
+    chosen = _sessions_of(columns, fold)
+    if task is Task.NFD:
+        acts = columns.actions
+        row = np.flatnonzero(acts.flagged & chosen[acts.session])
+        session, tenth, event, handling = (
+            column[row] for column in (acts.session, acts.tenth, acts.event, acts.handling)
+        )
+    else:
+        moves = columns.moves
+        speaker = PARTICIPANT if task is Task.UFN else CO_WIZARD
+        row = np.flatnonzero(moves.flagged & (moves.speaker == speaker) & chosen[moves.session])
+        session, tenth, event, handling = (
+            column[row] for column in (moves.session, moves.point_tenth, moves.event, moves.handling)
+        )
+    seen: dict[str, Any] = {}
+    for name in ("moves", "utterances", "actions", "frames"):
+        seen[f"{name}_start"], seen[f"{name}_stop"] = _visible(getattr(columns, name), session, tenth)
+    if task is Task.NFD:
+        _add_just_heard(columns, seen, session, tenth, event)
+    table = PointTable(
+        task=task,
+        session=session,
+        tenth=tenth,
+        event=event,
+        row=row.astype(np.int32),
+        handling=handling,
+        **seen,
+        **_current(columns, task, row),
+        **_labels(columns, task, row),
+        label_belief=_belief(columns, session, tenth, (seen["frames_start"], seen["frames_stop"])),
+    )
+    return replace(table, skipped=tuple(_skipped(columns, table, chosen)))
+
+
+def _sessions_of(columns: Columns, fold: Fold | str | None) -> Flags:
+    """Which sessions are in a fold (S,)."""
+    if fold is None:
+        return np.ones(len(columns.sessions.names), dtype=np.bool_)
+    wanted = check_fold(fold)
+    return np.array([bool(name) and Fold(name).matches(wanted) for name in columns.sessions.folds], dtype=np.bool_)
+
+
+def _visible(group: Any, session: Ints, tenth: Ints) -> tuple[Ints, Ints]:
+    """First row and end of the rows of a group that are of tenths strictly before each point's."""
+    # Rows rise by session and tenth: a number that rises with both finds both ends.
+    span = np.int64(1) << 32
+    rows = group.session.astype(np.int64) * span + group.tenth
+    first = session.astype(np.int64) * span
+    start = np.searchsorted(rows, first, side="left")
+    return start.astype(np.int32), np.searchsorted(rows, first + tenth, side="left").astype(np.int32)
+
+
+def _add_just_heard(columns: Columns, seen: dict[str, Any], session: Ints, tenth: Ints, event: Ints) -> None:
+    """Adds the utterances of the points' own tenths that stand before them in the record."""
+    moves = columns.moves
+    _, through = _visible(moves, session, tenth + 1)
+    stop, said_stop = seen["moves_stop"].copy(), seen["utterances_stop"].copy()
+    for point in np.flatnonzero(through > stop).tolist():
+        while stop[point] < through[point]:
+            utterance = moves.utterance[stop[point]]
+            end = int(np.searchsorted(moves.utterance, utterance, side="right"))  # moves lie in the order of utterances
+            if moves.event[end - 1] >= event[point]:
+                break
+            stop[point], said_stop[point] = end, utterance + 1
+    seen["moves_stop"], seen["utterances_stop"] = stop, said_stop
+
+
+def _current(columns: Columns, task: Task, row: NDArray[np.int64]) -> dict[str, Any]:
+    """The utterance to be understood, and its earlier acts."""
+    if task is not Task.UFN:
+        nothing = np.zeros(len(row), dtype=np.int32)
+        return {"spans_start": nothing, "spans_stop": nothing, "current": nothing - 1}
+    utterance = columns.moves.utterance[row]
+    first = np.searchsorted(columns.moves.utterance, utterance, side="left")  # moves lie in the order of utterances
+    return {"spans_start": first.astype(np.int32), "spans_stop": row.astype(np.int32), "current": utterance}
+
+
+def _labels(columns: Columns, task: Task, row: NDArray[np.int64]) -> dict[str, Any]:
+    count = len(row)
+    if task is Task.NFD:
+        return {
+            "label_move": np.full(count, -1, dtype=np.int32),
+            "label_slots": np.zeros((count, len(LABELS)), dtype=np.bool_),
+            "label_action": columns.actions.action[row],
+            "label_angle": columns.actions.label_angle[row],
+        }
+    return {
+        "label_move": columns.moves.move[row],
+        "label_slots": columns.moves.slots[row],
+        "label_action": np.full(count, -1, dtype=np.int32),
+        "label_angle": np.full(count, np.nan, dtype=np.float32),
+    }
+
+
+def _belief(columns: Columns, session: Ints, tenth: Ints, seen: tuple[Ints, Ints]) -> Reals:
+    """What the belief head is to predict (n, 5)."""
+    frames, goals = columns.frames, columns.goals
+    labels = np.full((len(session), 5), np.nan, dtype=np.float32)
+    start, stop = seen
+    known = stop > start
+    here = np.zeros((len(session), 2), dtype=np.float32)
+    here[known] = frames.pose[stop[known] - 1, :2]
+    inside = known & (stop < len(frames.session))
+    inside[inside] = frames.session[stop[inside]] == session[inside]
+    labels[inside, :2] = frames.pose[stop[inside], :2] - here[inside]
+    labels[inside, 2] = frames.pose[stop[inside], 2]
+    _, goal = _visible(goals, session, tenth)
+    ahead = known & (goal < len(goals.session))
+    ahead[ahead] = goals.session[goal[ahead]] == session[ahead]
+    labels[ahead, 3:] = goals.place[goal[ahead]] - here[ahead]
+    return labels
+
+
+def _skipped(columns: Columns, table: PointTable, chosen: Flags) -> Iterator[Unscored]:
+    names = columns.sessions.names
+    for session, event, reason in columns.unpointed:
+        if chosen[session]:
+            yield Unscored(session=names[session], event=event, task=None, reason=reason)
+    if table.task is Task.NFD:
+        for row in np.flatnonzero(np.isnan(table.label_angle)).tolist():
+            yield Unscored(
+                session=names[table.session[row]], event=int(table.event[row]), task=Task.NFD, reason=NO_ANGLE
+            )

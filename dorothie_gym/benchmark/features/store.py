@@ -1,0 +1,201 @@
+"""Columns as files, kept between runs in the user's cache folder.
+
+An entry is a folder of `.npy` files, which are mapped into memory and not read, and `columns.json` with what is no
+array and a checksum of every file. It is found by a hash of all that decides what is in it. Whatever is damaged is
+built anew and replaced. (This guards against accidents; somebody who can write to the user's cache folder can write to
+their programs as well.)
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import logging
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.benchmark.features.columns import GROUPS, Columns, TownGraph
+from dorothie_gym.maps.cache import cache_folder
+
+INDEX_FILE: Final = "columns.json"
+PART: Final = ".part"
+
+EMPTY: Final = 128
+"""Bytes of an `.npy` file without content: its header."""
+
+MOST_ENTRIES: Final = 12
+"""When there are more, those that were used longest ago are removed: an entry of 183 sessions takes up about 40 MB."""
+
+_log = logging.getLogger(__name__)
+
+
+class StoreError(ValueError):
+    """A folder holds no columns: it is damaged, or another program's."""
+
+
+def features_folder() -> Path | None:
+    """Folder that columns are kept in, beside that of towns; None if nothing is to be kept."""
+    towns = cache_folder()
+    return None if towns is None else towns.parent / "features"
+
+
+def recall(key: str) -> Columns | None:
+    """Returns the columns that were kept under a key; None where there are none, or they are damaged."""
+    folder = features_folder()
+    if folder is None:
+        return None
+    try:
+        columns = read_columns(folder / key)
+        os.utime(folder / key)
+    except FileNotFoundError:
+        return None
+    except (OSError, StoreError) as error:
+        _log.debug("the cached features %s are of no use and are built anew: %s", folder / key, error)
+        return None
+    return columns if columns.key == key else None
+
+
+def keep(columns: Columns) -> None:
+    """Keeps columns under their key, in one step: other processes see all of them or nothing."""
+    folder = features_folder()
+    if folder is None:
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        part = Path(tempfile.mkdtemp(prefix=f"{columns.key[:16]}.", suffix=PART, dir=folder))
+        try:
+            write_columns(columns, part)
+            _publish(part, folder / columns.key)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+        _prune(folder)
+    except OSError as error:
+        _log.debug("features cannot be kept in %s: %s", folder, error)
+
+
+def _publish(part: Path, target: Path) -> None:
+    """Gives a finished folder its name, unless another process was faster."""
+    try:
+        part.rename(target)
+    except OSError:
+        if recall(target.name) is None:  # what stands there is damaged
+            shutil.rmtree(target)
+            part.rename(target)
+
+
+def write_columns(columns: Columns, folder: Path) -> None:
+    """Writes columns into an empty folder.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    files = {}
+    for name, array in _arrays(columns).items():
+        path = folder / f"{name}.npy"
+        np.save(path, array, allow_pickle=False)
+        files[name] = _digest(path)
+    page = {
+        "key": columns.key,
+        "names": columns.sessions.names,
+        "folds": columns.sessions.folds,
+        "texts": columns.texts,
+        "towns": [town.name for town in columns.towns],
+        "unreadable": columns.unreadable,
+        "unpointed": columns.unpointed,
+        "files": files,
+    }
+    text = json.dumps(page, ensure_ascii=False)
+    page_digest = hashlib.sha256(text.encode()).hexdigest()
+    (folder / INDEX_FILE).write_text(f"{page_digest}\n{text}\n", encoding="utf-8", newline="\n")
+
+
+def read_columns(folder: Path) -> Columns:
+    """Reads what `write_columns` wrote, arrays as maps of their files.
+
+    Raises:
+        FileNotFoundError: there is nothing.
+        StoreError: a file is damaged or missing; the message names it.
+        OSError: a file cannot be read.
+    """
+    page = _page(folder / INDEX_FILE)
+    arrays = {name: _array(folder / f"{name}.npy", digest) for name, digest in page["files"].items()}
+    try:
+        return _columns(page, arrays)
+    except (KeyError, TypeError) as error:
+        raise StoreError(f"{folder}: {error} is missing") from None
+
+
+def _page(path: Path) -> dict[str, Any]:
+    digest, _, text = path.read_text(encoding="utf-8").partition("\n")
+    text = text.removesuffix("\n")
+    if hashlib.sha256(text.encode()).hexdigest() != digest:
+        raise StoreError(f"{path}: does not fit its checksum")
+    page: dict[str, Any] = json.loads(text)
+    return page
+
+
+def _array(path: Path, digest: str) -> NDArray[Any]:
+    if not path.is_file() or _digest(path) != digest:
+        raise StoreError(f"{path}: is missing, or does not fit its checksum")
+    if path.stat().st_size <= EMPTY:  # what is empty cannot be mapped
+        empty: NDArray[Any] = np.load(path, allow_pickle=False)
+        return empty
+    mapped: NDArray[Any] = np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
+    return mapped
+
+
+def _columns(page: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Columns:
+    groups: dict[str, Any] = {}
+    for group, kind in GROUPS.items():
+        found: dict[str, Any] = {name: arrays[f"{group}.{name}"] for name in _array_fields(kind)}
+        if group == "sessions":
+            found |= {"names": tuple(page["names"]), "folds": tuple(page["folds"])}
+        groups[group] = kind(**found)
+    towns = tuple(
+        TownGraph(name=name, **{field: arrays[f"towns.{k}.{field}"] for field in _array_fields(TownGraph)})
+        for k, name in enumerate(page["towns"])
+    )
+    return Columns(
+        key=page["key"],
+        **groups,
+        texts=tuple(page["texts"]),
+        towns=towns,
+        unreadable=tuple((str(name), str(reason)) for name, reason in page["unreadable"]),
+        unpointed=tuple((int(session), int(event), str(reason)) for session, event, reason in page["unpointed"]),
+    )
+
+
+def _arrays(columns: Columns) -> dict[str, NDArray[Any]]:
+    """Every array by the name of its file."""
+    found = {
+        f"{group}.{name}": getattr(getattr(columns, group), name)
+        for group, kind in GROUPS.items()
+        for name in _array_fields(kind)
+    }
+    for k, town in enumerate(columns.towns):
+        found |= {f"towns.{k}.{name}": getattr(town, name) for name in _array_fields(TownGraph)}
+    return found
+
+
+def _array_fields(kind: type[Any]) -> list[str]:
+    return [field.name for field in dataclasses.fields(kind) if field.name not in ("name", "names", "folds")]
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _prune(folder: Path) -> None:
+    """Removes the entries that were used longest ago where there are too many."""
+    entries = sorted(folder.iterdir(), key=lambda entry: (entry.stat().st_mtime_ns, entry.name))
+    for entry in entries[:-MOST_ENTRIES]:
+        shutil.rmtree(entry, ignore_errors=True)

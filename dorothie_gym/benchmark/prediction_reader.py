@@ -1,0 +1,305 @@
+"""Reading `predictions.parquet` of whoever wrote it, with one clear message for every row that is wrong."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.benchmark.predictions import (
+    ABOUT,
+    SLOT_TEXTS,
+    VERSION,
+    ActionPredictions,
+    ActPredictions,
+    PredictionError,
+    Predictions,
+    TaskPredictions,
+    joined_actions,
+    joined_acts,
+)
+from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, DialogueMove
+from dorothie_gym.recording import Task
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+SHOWN: Final = 5
+"""So many wrong rows are named; of the others there is the number."""
+
+_PAGE: Final = "see docs/predictions.md"
+_REQUIRED: Final = {"version": "int", "model": "str", "seed": "int", "task": "str", "session": "str", "event": "int"}
+_ANSWERS: Final = {"move": "str", "action": "str", "angle": "float", "skipped": "str"}
+_WANTED: Final = {"int": "whole numbers", "str": "texts", "float": "numbers"}
+
+_LAST_EVENT: Final = 2**31
+"""No session has more events."""
+
+_MOVES: Final = {move.label: int(move) for move in DialogueMove}
+_ACTIONS: Final = {action.label: action.nfd_class for action in NAVIGATION_ACTIONS}
+_TASKS: Final = tuple(Task)
+_PLACES: Final = {text: place for place, text in enumerate(SLOT_TEXTS)}
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """A file's columns as lists of Python values."""
+
+    source: str
+    columns: Mapping[str, Sequence[Any]]
+
+    def name(self, row: int) -> str:
+        """What a message calls a row."""
+        values = self.columns
+        return f"row {row} (session {values['session'][row]}, event {values['event'][row]}, {values['task'][row]})"
+
+
+def read_predictions(*paths: Path | str) -> tuple[TaskPredictions, ...]:
+    """Reads files of predictions; several may hold several seeds or tasks of one model.
+
+    Returns:
+        One for each model, seed and task, in the order in which they come up; models before seeds before tasks.
+
+    Raises:
+        PredictionError: a file is no parquet file, lacks a column, a column has another type, a value is none of the
+            vocabulary, or a point has two rows; the message names file and row (counted from 0) and what to do.
+        OSError: a file cannot be read.
+    """
+    found: dict[tuple[str, int, Task], list[TaskPredictions]] = {}
+    for path in paths:
+        for given in _read_file(Path(path)):
+            found.setdefault((given.model, given.seed, given.task), []).append(given)
+    models = list(dict.fromkeys(model for model, _, _ in found))
+    ordered = sorted(found.items(), key=lambda item: (models.index(item[0][0]), item[0][1], _TASKS.index(item[0][2])))
+    return tuple(_merged(pieces) for _, pieces in ordered)
+
+
+def read_about(path: Path | str) -> dict[str, Any]:
+    """Returns what a file tells of how its predictions were made; empty where it tells nothing.
+
+    Raises:
+        PredictionError: it is no parquet file, or what it tells is no JSON.
+        OSError: it cannot be read.
+    """
+    told = (_open(Path(path)).schema.metadata or {}).get(ABOUT)
+    try:
+        value = {} if told is None else json.loads(told)
+    except ValueError as error:
+        raise PredictionError(f"{path}: {ABOUT.decode()} in its metadata is no JSON ({error}); {_PAGE}") from None
+    return value if isinstance(value, dict) else {"about": value}
+
+
+def _open(path: Path) -> pa.Table:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    content = path.read_bytes()
+    try:
+        table = pq.ParquetFile(pa.BufferReader(content)).read()
+        table.validate(full=True)
+    except (pa.ArrowException, OSError) as error:  # damaged pages raise OSError
+        raise PredictionError(f"{path}: is no parquet file, or damaged ({error}); {_PAGE}") from None
+    return table
+
+
+def _read_file(path: Path) -> Iterator[TaskPredictions]:
+    table = _open(path)
+    _check_columns(table, str(path))
+    columns: dict[str, Sequence[Any]] = {
+        name: table.column(name).to_pylist() if name in table.column_names else [None] * table.num_rows
+        for name in (*_REQUIRED, *_ANSWERS, "slots")
+    }
+    rows = _Rows(str(path), columns)
+    _check_required(rows)
+    groups: dict[tuple[str, int, Task], list[int]] = {}
+    keys = zip(columns["model"], columns["seed"], columns["task"], strict=True)
+    for row, (model, seed, task) in enumerate(keys):
+        groups.setdefault((model, seed, Task(task)), []).append(row)
+    for (model, seed, task), members in groups.items():
+        yield _task_predictions(rows, model, seed, task, members)
+
+
+def _check_columns(table: pa.Table, source: str) -> None:
+    for name in _REQUIRED:
+        if name not in table.column_names:
+            hint = f"; write the number {VERSION} in every row" if name == "version" else ""
+            raise PredictionError(f"{source}: column {name!r} is missing{hint}; {_PAGE}")
+    for name, wanted in {**_REQUIRED, **_ANSWERS}.items():
+        if name in table.column_names and not _is_type(table.schema.field(name).type, wanted):
+            there = table.schema.field(name).type
+            raise PredictionError(
+                f"{source}: column {name!r} holds {there}, but {_WANTED[wanted]} are expected; {_PAGE}"
+            )
+    if "slots" in table.column_names and not _is_slots(table.schema.field("slots").type):
+        raise PredictionError(
+            f"{source}: column 'slots' holds {table.schema.field('slots').type}, but lists of texts like "
+            f"{SLOT_TEXTS[0]!r} or lists of {len(LABELS)} booleans are expected; {_PAGE}"
+        )
+
+
+def _is_type(kind: pa.DataType, wanted: str) -> bool:
+    from pyarrow import types
+
+    if types.is_null(kind):
+        return True  # a column of nothing but nulls: its rows are checked one by one
+    if types.is_dictionary(kind):
+        kind = kind.value_type
+    if wanted == "str":
+        return bool(types.is_string(kind) or types.is_large_string(kind) or types.is_string_view(kind))
+    return bool(types.is_integer(kind) or (wanted == "float" and types.is_floating(kind)))
+
+
+def _is_slots(kind: pa.DataType) -> bool:
+    from pyarrow import types
+
+    if types.is_null(kind):
+        return True
+    if not (types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind)):
+        return False
+    return bool(types.is_boolean(kind.value_type)) or _is_type(kind.value_type, "str")
+
+
+def _check_required(rows: _Rows) -> None:
+    """Checks the columns that say which point a row is of."""
+    tasks = {task.value for task in Task}
+    wrong = []
+    for row in range(len(rows.columns["version"])):
+        missing = next((name for name in _REQUIRED if rows.columns[name][row] is None), None)
+        if missing is not None:
+            wrong.append(f"{rows.name(row)}: {missing} is null; it must be given in every row")
+        elif (version := rows.columns["version"][row]) != VERSION:
+            wrong.append(f"{rows.name(row)}: version is {version}; this release reads version {VERSION}")
+        elif not 0 <= rows.columns["event"][row] <= _LAST_EVENT:
+            wrong.append(f"{rows.name(row)}: events are counted from 0 within their session")
+        elif (task := rows.columns["task"][row]) not in tasks:
+            wrong.append(f"{rows.name(row)}: task is {task!r}; it must be one of {', '.join(sorted(tasks))}")
+    _refuse(rows.source, wrong)
+
+
+def _task_predictions(rows: _Rows, model: str, seed: int, task: Task, members: Sequence[int]) -> TaskPredictions:
+    _check_twice(rows, members)
+    skipped, session, event = (rows.columns[name] for name in ("skipped", "session", "event"))
+    given = [row for row in members if not skipped[row]]
+    predicted = _actions(rows, given) if task is Task.NFD else _acts(rows, given)
+    return TaskPredictions(
+        model=model,
+        seed=int(seed),
+        task=task,
+        sessions=np.array([session[row] for row in given], dtype=np.str_),
+        events=np.array([event[row] for row in given], dtype=np.int64),
+        predicted=predicted,
+        left_out={(session[row], event[row]): skipped[row] for row in members if skipped[row]},
+        source=rows.source,
+    )
+
+
+def _check_twice(rows: _Rows, members: Sequence[int]) -> None:
+    first: dict[tuple[str, int], int] = {}
+    wrong = []
+    for row in members:
+        key = (rows.columns["session"][row], rows.columns["event"][row])
+        if key in first:
+            model, seed = rows.columns["model"][row], rows.columns["seed"][row]
+            wrong.append(f"{rows.name(row)}: row {first[key]} is of the same point, model {model} and seed {seed}; "
+                         "leave one of them out")  # fmt: skip
+        first.setdefault(key, row)
+    _refuse(rows.source, wrong)
+
+
+def _acts(rows: _Rows, members: Sequence[int]) -> ActPredictions:
+    moves = np.zeros(len(members), dtype=np.int64)
+    slots = np.zeros((len(members), len(LABELS)), dtype=np.bool_)
+    wrong = []
+    for k, row in enumerate(members):
+        move, given = rows.columns["move"][row], rows.columns["slots"][row]
+        if move not in _MOVES:
+            wrong.append(f"{rows.name(row)}: move is {move!r}; it must be one of {', '.join(_MOVES)}")
+        elif fault := _fault_in_slots(given):
+            wrong.append(f"{rows.name(row)}: {fault}")
+        else:
+            moves[k] = _MOVES[move]
+            slots[k] = _vector(given)
+    _refuse(rows.source, wrong)
+    return ActPredictions(moves=moves, slots=slots)
+
+
+def _fault_in_slots(given: Sequence[Any] | None) -> str | None:
+    if given is None:
+        return "slots is null; write an empty list where no slot is meant"
+    if any(isinstance(value, bool) for value in given):
+        if len(given) != len(LABELS) or None in given:
+            return f"slots has {len(given)} booleans; it must have {len(LABELS)}, none of them null"
+        return None
+    unknown = next((value for value in given if value not in _PLACES), None)
+    if unknown is None and None not in given:
+        return None
+    return f"slots names {unknown!r}; it must be a slot and a value like {SLOT_TEXTS[0]!r} or 'Landmark=KFC'"
+
+
+def _vector(given: Sequence[Any]) -> NDArray[np.bool_]:
+    if given and isinstance(given[0], bool):
+        return np.array(given, dtype=np.bool_)
+    vector = np.zeros(len(LABELS), dtype=np.bool_)
+    vector[[_PLACES[text] for text in given]] = True
+    return vector
+
+
+def _actions(rows: _Rows, members: Sequence[int]) -> ActionPredictions:
+    actions = np.zeros(len(members), dtype=np.int64)
+    angles = np.zeros(len(members), dtype=np.float64)
+    wrong = []
+    for k, row in enumerate(members):
+        action, angle = rows.columns["action"][row], rows.columns["angle"][row]
+        if action not in _ACTIONS:
+            wrong.append(f"{rows.name(row)}: action is {action!r}; it must be one of {', '.join(_ACTIONS)}")
+        elif angle is None or not np.isfinite(angle):
+            wrong.append(f"{rows.name(row)}: angle is {angle}; write degrees, positive left, 0 where there is none")
+        else:
+            actions[k], angles[k] = _ACTIONS[action], angle
+    _refuse(rows.source, wrong)
+    return ActionPredictions(actions=actions, angles=angles)
+
+
+def _merged(pieces: Sequence[TaskPredictions]) -> TaskPredictions:
+    """Puts together what several files say of one model, seed and task."""
+    if len(pieces) == 1:
+        return pieces[0]
+    first: dict[tuple[str, int], str] = {}
+    for piece in pieces:
+        for key in (*zip(piece.sessions.tolist(), piece.events.tolist(), strict=True), *piece.left_out):
+            if key in first:
+                raise PredictionError(
+                    f"{piece.source}: session {key[0]}, event {key[1]}, {piece.task}: {first[key]} has a row for the "
+                    f"same point, model {piece.model} and seed {piece.seed}; leave one out, or give them other seeds"
+                )
+            first[key] = piece.source
+    head = pieces[0]
+    return TaskPredictions(
+        model=head.model,
+        seed=head.seed,
+        task=head.task,
+        sessions=np.concatenate([piece.sessions for piece in pieces]),
+        events=np.concatenate([piece.events for piece in pieces]),
+        predicted=_together([piece.predicted for piece in pieces]),
+        left_out={key: reason for piece in pieces for key, reason in piece.left_out.items()},
+        source=", ".join(piece.source for piece in pieces),
+    )
+
+
+def _together(pieces: Sequence[Predictions]) -> Predictions:
+    acts = [piece for piece in pieces if isinstance(piece, ActPredictions)]
+    if acts:
+        return joined_acts(acts)
+    return joined_actions([piece for piece in pieces if isinstance(piece, ActionPredictions)])
+
+
+def _refuse(source: str, wrong: Sequence[str]) -> None:
+    """Raises what is wrong with a file, if anything is."""
+    if wrong:
+        more = [f"... and {len(wrong) - SHOWN} more rows"] if len(wrong) > SHOWN else []
+        raise PredictionError("\n".join([f"{source}: {wrong[0]}", *wrong[1:SHOWN], *more]))

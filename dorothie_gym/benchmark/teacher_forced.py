@@ -1,0 +1,295 @@
+"""The three tasks as Gymnasium environments over a corpus: history in, prediction out, the record goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, ClassVar, Final
+
+import numpy as np
+
+from dorothie_gym.benchmark.metrics import (
+    ActionAccuracy,
+    ArgumentAccuracy,
+    JointAccuracy,
+    MoveAccuracy,
+    SlotF1,
+    SlotScorePaper,
+)
+from dorothie_gym.benchmark.predictions import ActionPredictions, ActPredictions, act_labels, action_labels
+from dorothie_gym.maps import Town
+from dorothie_gym.recording import (
+    Corpus,
+    CorpusEntry,
+    DecisionPoint,
+    Fold,
+    InferencePoint,
+    Point,
+    Session,
+    SessionError,
+    Task,
+    task_points,
+)
+from dorothie_gym.recording.sdn.maps import find_town
+from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.wrappers.point_env import PointEnv
+
+DEFAULT: Final = "default"
+"""The corpus that is played once and kept in the user's cache folder."""
+
+ALL: Final = "all"
+
+SPLITS: Final[Mapping[str, str]] = {fold.value.replace("/", "_"): fold.value for fold in Fold}
+"""Names of splits, and the folds that they are: `val` and `test` are those of seen and unseen towns together."""
+
+KEPT: Final = 16
+"""Sessions that an environment keeps in memory, those used last."""
+
+
+class TeacherForcedEnv(PointEnv):
+    """What the three tasks have in common.
+
+    ## Description
+    An episode walks through the points of one recorded session. What is predicted never changes what is observed next.
+
+    ## Observation Space
+    A dict of what was recorded before the point (see `dorothie_gym.recording.points`), newest first in the histories:
+
+    | field | shape | content |
+    |---|---|---|
+    | `utterance` | text | UfN only: the words whose act is to be inferred |
+    | `time` | (1,) | of the point [s] |
+    | `moves` | (16,) | last moves of both speakers, 15 where there is none |
+    | `move_speakers` | (16,) | who spoke: 0 nobody, 1 participant, 2 Co-Wizard |
+    | `move_slots`, `move_times` | (16, 69), (16,) | slots in the order of `LABELS`, when it was over [s] |
+    | `participant_text`, `co_wizard_text` | text | last utterance of each |
+    | `actions` | (16,) | last physical actions, 0 where there is none |
+    | `action_angles`, `action_times` | (16,) each | angles [degrees, positive left], when [s] |
+    | `pose`, `speed` | (3,), (1,) | car's x, y [m], heading [rad, clockwise]; speed [m/s] |
+    | `way`, `way_length` | (25, 4), a number | x, y, heading, speed every 0.4 s, and how many of them there are |
+    | `object_kinds` | (objects,) | what was perceived at the last look: 0 nothing, else 1 + `ObjectKind` |
+    | `objects` | (objects, 8) | the same, the nearest first, columns as in `OBJECT_VALUES` |
+    | `street_names` | (streets,) | id of each street's `StreetName` |
+    | `landmarks` | (landmarks, 6) | those that are not hidden, columns as in `LandmarkColumn` |
+
+    ## Rewards
+    The mean of `info["reward_terms"]`, the per-point form of the task's two metrics.
+
+    ## Episode End
+    Terminated after the session's last point; the last observation is of the whole record. One episode is one session.
+
+    ## Arguments
+    corpus: "default" (a small corpus that is played once and kept in the user's cache folder), a folder of sessions of
+        any layout, a `Corpus`, or sessions.
+    split: "all", or the fold that sessions are taken from: "train", "val", "val_seen", "val_unseen", "test",
+        "test_seen", "test_unseen".
+    limits: sizes of the observation's tables.
+    render_mode: None or "ansi".
+
+    `reset(options={"session": n or name})` chooses the session, which is drawn at random otherwise; those without a
+    point of the task are passed over. The infos hold `session` (name) and `points_left`; after a step `index` (number
+    of the event), `label` (in the form of an action), `reward_terms`, and `metrics` of the episode so far (None: not
+    defined yet).
+
+    Raises:
+        SessionError: there are no sessions, one cannot be read, or none has a point of the task.
+        ValueError: `split`, `render_mode` or an action is not one of those above, or a session has more landmarks or
+            streets than `limits`; the message names the field.
+        CacheError: the default corpus cannot be kept.
+    """
+
+    of_task: ClassVar[Task]
+
+    def __init__(
+        self,
+        corpus: Corpus | Path | str | Sequence[Session] = DEFAULT,
+        *,
+        split: str = ALL,
+        limits: SpaceLimits | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        super().__init__(self.of_task, limits, render_mode)
+        self._library = _Library(corpus, split, self.of_task, self.limits)
+        self._session: Session | None = None
+        self._town: Town | None = None
+        self._done: list[tuple[Mapping[str, Any], Any]] = []
+        self._count = 0
+
+    def _begin(self, seed: int | None, options: Mapping[str, Any]) -> Iterator[Point]:
+        wanted = options.get("session")
+        order = self.np_random.permutation(len(self._library)).tolist() if wanted is None else [self._number(wanted)]
+        for number in order:
+            self._session, points = self._library.read(number)
+            if points:
+                self._done, self._count = [], len(points)
+                self._town = find_town(self._session.header.town, self._library.maps(number))
+                return iter(points)
+        raise SessionError(f"none of the {len(order)} sessions has a point of the task {self.task.value}")
+
+    def _number(self, wanted: object) -> int:
+        names = self._library.names
+        if isinstance(wanted, str) and wanted in names:
+            return names.index(wanted)
+        if isinstance(wanted, int) and 0 <= wanted < len(names):
+            return wanted
+        raise ValueError(f"option 'session' is {wanted!r}; it must be a number below {len(names)} or a session's name")
+
+    def _now(self) -> tuple[Session, Town | None]:
+        assert self._session is not None  # an episode has begun
+        return self._session, self._town
+
+    def _info(self) -> dict[str, Any]:
+        assert self._session is not None  # an episode has begun
+        return {"session": self._session.name, "points_left": self._count - len(self._done)}
+
+    def _judge(self, action: Mapping[str, Any], point: Point) -> dict[str, Any]:
+        self._done.append((action, point))
+        metrics = _act_metrics if self.task is not Task.NFD else _decision_metrics
+        found = metrics([action for action, _ in self._done], [point for _, point in self._done])
+        return {
+            "points_left": self._count - len(self._done),
+            "metrics": {key: None if np.isnan(value) else value for key, value in found.items()},
+        }
+
+
+class UfNEnv(TeacherForcedEnv):
+    """Understanding from navigation: what does the participant mean?
+
+    ## Action Space
+    `move` Discrete(15), `slots` MultiBinary(69).
+
+    ## Rewards
+    The mean of two terms: `move`, 1 if the move is right; `slots`, F1 over the point's (slot, value) pairs, 1 where
+    there is none and none is predicted.
+
+    ## Version History
+    v0. The rest as in `TeacherForcedEnv`.
+    """
+
+    of_task = Task.UFN
+
+
+class RfNEnv(TeacherForcedEnv):
+    """Response from navigation: what does the Co-Wizard say next?
+
+    ## Action Space
+    `move` Discrete(15), `slots` MultiBinary(69).
+
+    ## Rewards
+    As of `UfNEnv`.
+
+    ## Version History
+    v0. The rest as in `TeacherForcedEnv`.
+    """
+
+    of_task = Task.RFN
+
+
+class NfDEnv(TeacherForcedEnv):
+    """Navigation from dialogue: where does the Co-Wizard drive next?
+
+    ## Action Space
+    `action` Discrete(6), a class of `PhysicalAction.nfd_class`; `angle` Discrete(360, start=-180), its argument
+    [degrees, positive left], 0 for actions that take none.
+
+    ## Rewards
+    The mean of two terms: `action`, 1 if the action is right; `joint`, 1 if the angle is within 15 degrees on the
+    circle as well. Where the recording does not know the angle there is no `joint`, and the reward is `action`.
+
+    ## Version History
+    v0. The rest as in `TeacherForcedEnv`.
+    """
+
+    of_task = Task.NFD
+
+
+class _Library:
+    """The sessions of a split, read when they are asked for.
+
+    Args:
+        corpus: as of `TeacherForcedEnv`; `split` likewise.
+        split: see there.
+        task: whose points are wanted.
+        limits: sizes that sessions must keep within.
+    """
+
+    def __init__(
+        self, corpus: Corpus | Path | str | Sequence[Session], split: str, task: Task, limits: SpaceLimits
+    ) -> None:
+        if split not in (ALL, *SPLITS):
+            raise ValueError(f"split is {split!r}; it must be one of {', '.join((ALL, *SPLITS))}")
+        self._task, self._limits = task, limits
+        found = _sessions(corpus, split)
+        self.names = [one.name for one in found]
+        self._found = found
+        self.read = lru_cache(maxsize=KEPT)(self._read)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def maps(self, number: int) -> Path | None:
+        """Returns the folder with maps that a session was given with."""
+        found = self._found[number]
+        return None if isinstance(found, Session) else found.maps
+
+    def _read(self, number: int) -> tuple[Session, tuple[Point, ...]]:
+        found = self._found[number]
+        session = found if isinstance(found, Session) else found.load()
+        _check_size(session, self._limits)
+        return session, task_points(session, self._task)
+
+
+def _sessions(corpus: Corpus | Path | str | Sequence[Session], split: str) -> Sequence[CorpusEntry | Session]:
+    """Sessions, or entries that load them."""
+    if isinstance(corpus, str) and corpus == DEFAULT:
+        # Playing sessions needs the environments, which are slow to import: only where it is asked for.
+        from dorothie_gym.rollout.default_corpus import default_corpus
+
+        corpus = default_corpus()
+    if isinstance(corpus, Path | str):
+        corpus = Corpus.load(corpus)
+    if isinstance(corpus, Corpus):
+        chosen = corpus if split == ALL else corpus.filter(fold=SPLITS[split])
+        if not len(chosen):
+            folds = ", ".join(fold.value.replace("/", "_") for fold in corpus.folds) or "no folds"
+            raise SessionError(f"{corpus.root}: split {split!r} has no session; there are {folds}")
+        return chosen.entries
+    if not corpus:
+        raise SessionError("corpus is empty; give a folder of sessions, some sessions, or 'default'")
+    if split != ALL:
+        raise ValueError(f"split is {split!r}, but sessions in memory lie in no fold: it must be {ALL!r}")
+    return tuple(corpus)
+
+
+def _check_size(session: Session, limits: SpaceLimits) -> None:
+    for name, size in (("landmarks", limits.landmarks), ("streets", limits.streets)):
+        count = len(session.header.landmarks if name == "landmarks" else session.header.street_names)
+        if count > size:
+            raise ValueError(f"session {session.name} has {count} {name}; SpaceLimits.{name} is {size}: raise it")
+
+
+def _act_metrics(actions: Sequence[Mapping[str, Any]], points: Sequence[InferencePoint]) -> dict[str, float]:
+    predicted = ActPredictions(
+        moves=np.array([action["move"] for action in actions], dtype=np.int64),
+        slots=np.array([action["slots"] for action in actions], dtype=np.bool_),
+    )
+    labels = act_labels(points)
+    return {
+        "move_accuracy": MoveAccuracy().compute(predicted, labels),
+        "slot_f1": SlotF1().compute(predicted, labels),
+        "slot_score_paper": SlotScorePaper().compute(predicted, labels),
+    }
+
+
+def _decision_metrics(actions: Sequence[Mapping[str, Any]], points: Sequence[DecisionPoint]) -> dict[str, float]:
+    predicted = ActionPredictions(
+        actions=np.array([action["action"] for action in actions], dtype=np.int64),
+        angles=np.array([action["angle"] for action in actions], dtype=np.float64),
+    )
+    labels = action_labels(points)
+    return {
+        "action_accuracy": ActionAccuracy().compute(predicted, labels),
+        "argument_accuracy": ArgumentAccuracy().compute(predicted, labels),
+        "joint_accuracy": JointAccuracy().compute(predicted, labels),
+    }

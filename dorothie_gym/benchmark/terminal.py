@@ -1,0 +1,198 @@
+"""The table and everything behind it, for a terminal (rich)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from dorothie_gym.analysis import Handled
+from dorothie_gym.benchmark.claims import Finding, Verdict
+from dorothie_gym.benchmark.intervals import Estimate
+from dorothie_gym.benchmark.labels import ALL
+from dorothie_gym.benchmark.metrics import (
+    COLUMNS,
+    PAPER_SUFFIX,
+    SHOWN,
+    TASK_NAMES,
+    has_paper_figure,
+    metric_title,
+    metrics_of,
+    shown_title,
+    task_of,
+    title_of,
+)
+from dorothie_gym.benchmark.paper_results import PaperFigure, paper_figure
+from dorothie_gym.benchmark.report import (
+    NONE,
+    claim_line,
+    legend,
+    notes,
+    part_title,
+    percent,
+    points_rows,
+    row_title,
+)
+from dorothie_gym.benchmark.scoring import class_labels
+from dorothie_gym.benchmark.table import ResultsTable
+from dorothie_gym.recording import Task
+
+WIDE: Final = 110
+"""From this width on the tasks stand side by side."""
+
+NOTES: Final = 8
+"""So many notes are shown; the JSON has all."""
+
+_VERDICTS: Final = {
+    Verdict.HOLDS: "green", Verdict.FAILS: "red", Verdict.UNDECIDED: "yellow", Verdict.UNTESTED: "dim",
+}  # fmt: skip
+
+
+def print_table(table: ResultsTable, console: Console) -> None:
+    """Prints all models: figures by part of the corpus, ours above the paper's, the findings, and what was counted."""
+    for part in table.parts:
+        console.print(f"[bold]{part_title(part)}[/]")
+        for tasks in _side_by_side(table, console):
+            console.print(_figures(table, part, tasks))
+            console.print()
+    console.print(legend(table).replace(" / the paper's", ", below them in grey the paper's"), style="dim")
+    console.print()
+    for finding in table.findings():
+        if any(claim.difference.seeds for claim in finding.claims):
+            _print_finding(finding, console)
+    print_counts(table, console)
+
+
+def print_details(table: ResultsTable, model: str, console: Console) -> None:
+    """Prints one model: every metric by part, by what is handled, and the accuracy of each class."""
+    console.print(f"[bold]{escape(model)}[/]")
+    for make in (_metrics, _by_handling):
+        for tasks in _side_by_side(table, console):
+            console.print(make(table, model, tasks))
+            console.print()
+    for shown in _classes(table, model):
+        console.print(shown)
+        console.print()
+
+
+def print_counts(table: ResultsTable, console: Console) -> None:
+    """Prints the points of each fold, and what was not scored and why."""
+    heads, rows = points_rows(table)
+    shown = _grid(*heads)
+    for row in rows:
+        shown.add_row(*row)
+    console.print(shown)
+    console.print()
+    told = list(notes(table))
+    for note in told[: NOTES + 1]:
+        console.print(note, style="dim", markup=False, soft_wrap=True)
+    if len(told) > NOTES + 1:
+        console.print(f"... and {len(told) - NOTES - 1} more; --json has all", style="dim")
+
+
+def _side_by_side(table: ResultsTable, console: Console) -> Sequence[Sequence[Task]]:
+    """The tasks that have a table together: all of them where the terminal is wide enough, else each its own."""
+    return [table.tasks] if console.width >= WIDE else [(task,) for task in table.tasks]
+
+
+def _figures(table: ResultsTable, part: str, tasks: Sequence[Task]) -> Table:
+    names = {TASK_NAMES[task] for task in tasks}
+    keys = [key for key in SHOWN if task_of(key) in names]
+    shown = Table(box=None, pad_edge=False)
+    shown.add_column("model", vertical="top")
+    for key in keys:
+        shown.add_column(f"{task_of(key)}\n{shown_title(key)}", justify="right")
+    for model in table.models:
+        shown.add_row(escape(row_title(table, model)), *(_cell(table, model, part, key) for key in keys))
+    return shown
+
+
+def _cell(table: ResultsTable, model: str, part: str, key: str) -> str:
+    ours = _percent(table.estimate(model, part, key))
+    text = f"[bold]{ours}[/]" if model in table.best(part, key) else ours
+    paper = paper_figure(model, part, key) if has_paper_figure(key) else None
+    return text if paper is None else f"{text}\n[dim]{_percent(paper)}[/]"
+
+
+def _percent(figure: Estimate | PaperFigure) -> str:
+    return percent(figure).replace(" ± ", " ±")
+
+
+def _print_finding(finding: Finding, console: Console) -> None:
+    colour = _VERDICTS[finding.verdict]
+    console.print(f"[bold]{escape(finding.statement)}[/] ({finding.part}): [{colour}]{finding.verdict}[/]")
+    for claim in finding.claims:
+        console.print(f"  {claim_line(claim)}", style="dim", markup=False, soft_wrap=True)
+    if finding.note:
+        console.print(f"  {finding.note}", style="dim italic", markup=False)
+    console.print()
+
+
+def _metrics(table: ResultsTable, model: str, tasks: Sequence[Task]) -> Table:
+    columns = [(task, part) for task in tasks for part in table.parts]
+    shown = _grid("", *(_heading(task, part) for task, part in columns))
+    points = [str(table.points(model, part, task)) for task, part in columns]
+    shown.add_row("points scored", *points, style="dim")
+    names = dict.fromkeys(name for task in tasks for name in metrics_of(task) if _is_own(name))
+    for name in names:
+        cells = [
+            _percent(table.estimate(model, part, f"{task}_{name}")) if name in metrics_of(task) else ""
+            for task, part in columns
+        ]
+        shown.add_row(metric_title(name), *cells)
+    return shown
+
+
+def _is_own(name: str) -> bool:
+    """Whether a metric is worth a row of its own: the paper's protocol takes moves and actions as we do."""
+    return name.removesuffix(PAPER_SUFFIX) not in ("move_accuracy", "action_accuracy") or PAPER_SUFFIX not in name
+
+
+def _heading(task: Task, part: str) -> str:
+    return TASK_NAMES[task] if part == ALL else f"{TASK_NAMES[task]}\n{part}"
+
+
+def _by_handling(table: ResultsTable, model: str, tasks: Sequence[Task]) -> Table:
+    keys = [key for key in COLUMNS if task_of(key) in {TASK_NAMES[task] for task in tasks}]
+    shown = _grid(
+        "exchanges that handle", *(title_of(key).replace(" accuracy", "").replace(" ", "\n", 1) for key in keys)
+    )
+    for part in table.parts:
+        for kind in Handled:
+            cells = []
+            for key in keys:
+                count = table.points(model, part, Task(key.partition("_")[0]), kind)
+                figure = _percent(table.estimate(model, part, key, kind))
+                cells.append(f"{figure} [dim]({count})[/]" if count else NONE)
+            what = "nothing" if kind is Handled.NONE else f"{kind} exceptions"
+            shown.add_row(what if part == ALL else f"{what}, {part}", *cells)
+    return shown
+
+
+def _classes(table: ResultsTable, model: str) -> Iterator[Table]:
+    for task in table.tasks:
+        estimates = {part: table.per_class(model, part, task) for part in table.parts}
+        counts = {part: table.confusion(model, part, task) for part in table.parts}
+        shown = _grid(f"{TASK_NAMES[task]}, right of", *(("labels" if p == ALL else p) for p in table.parts))
+        names = dict.fromkeys(name for part in table.parts for name in estimates[part])
+        order = list(class_labels(task))
+        for name in sorted(names, key=order.index):
+            cells = []
+            for part in table.parts:
+                matrix = counts[part]
+                estimate = estimates[part].get(name)
+                seeds = max(len(table.runs_of(model)), 1)
+                count = 0 if matrix is None else int(matrix[order.index(name)].sum()) // seeds
+                cells.append(NONE if estimate is None else f"{_percent(estimate)} [dim]({count})[/]")
+            shown.add_row(name, *cells)
+        yield shown
+
+
+def _grid(*heads: str) -> Table:
+    shown = Table(box=None, pad_edge=False)
+    for k, head in enumerate(heads):
+        shown.add_column(head, justify="right" if k else "left", no_wrap=not k)
+    return shown

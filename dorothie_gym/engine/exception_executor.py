@@ -1,0 +1,245 @@
+"""Carries out the Ad-Wizard's exceptions, or tells why not: nothing may make the task impossible."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from dorothie_gym.maps.model import Array, LinkType
+from dorothie_gym.ontology import ExceptionKind, GoalStatus, PropKind
+from dorothie_gym.sim.bodies import Prop
+from dorothie_gym.sim.collisions import Box, boxes_touch
+from dorothie_gym.sim.ego.obstacles import BRAKING
+from dorothie_gym.sim.roadblocks import crowds, cuts_off
+from dorothie_gym.sim.world import World
+from dorothie_gym.spaces import AdWizardAction
+from dorothie_gym.tasks import StoryboardError, TaskState
+
+FROM_START = 30.0
+"""A prop stands at least this far behind the start of its lane [m], so that the car can turn round before it."""
+
+FROM_END = 8.0
+"""And this far before its end [m]."""
+
+FROM_SITE = 25.0
+"""And this far along the lane from any landmark's waypoint [m]: the car has to be able to stop there."""
+
+FROM_CAR = 25.0
+"""Nothing appears closer to the car than this [m], nor than it can stop, and turn round, before."""
+
+FROM_VEHICLE = 6.0
+"""A prop appears no closer to a vehicle's middle than this [m]."""
+
+FROM_PROP = 0.5
+"""And leaves this much room around it to other props [m]."""
+
+FROM_WAYPOINT = 8.0
+"""No vehicle appears closer along the lane to a landmark's waypoint than this [m]."""
+
+SPAWN_STEP = 3.5
+"""Places for newcomers are looked for at this distance along the lanes [m]."""
+
+MOST = 30
+"""Vehicles, and pedestrians, that spawning fills a town up to."""
+
+Outcome: TypeAlias = str | dict[str, Any]
+"""A reason for a refusal, or what was done, for the log."""
+
+
+class Adversary:
+    """The Ad-Wizard's hands in the world and the task."""
+
+    def __init__(self, world: World, task: TaskState, max_props: int) -> None:
+        self._world, self._task, self._max_props = world, task, max_props
+        self._handlers: dict[ExceptionKind, Callable[[AdWizardAction], Outcome]] = {
+            ExceptionKind.WEATHER: self._weather,
+            ExceptionKind.SPAWN_VEHICLES: self._spawn,
+            ExceptionKind.SPAWN_PEDESTRIANS: self._spawn,
+            ExceptionKind.PLACE_PROP: self._place_prop,
+            ExceptionKind.MOVE_PROP: self._move_prop,
+            ExceptionKind.DELETE_PROP: self._delete_prop,
+            ExceptionKind.SENSOR_FAULT: self._fault,
+            ExceptionKind.TASK_TRIGGER: self._change_task,
+            ExceptionKind.TASK_DELETE: self._change_task,
+            ExceptionKind.TASK_CHANGE: self._change_task,
+            ExceptionKind.MESSAGE: self._message,
+        }
+
+    def carry_out(self, action: AdWizardAction) -> Outcome:
+        """Carries out an exception other than NONE."""
+        return self._handlers[action.exception](action)
+
+    # --- environment ------------------------------------------------------------------------------------------------
+
+    def _weather(self, action: AdWizardAction) -> Outcome:
+        weather = self._world.weather
+        before = weather.values[action.weather]
+        value = weather.set_share(action.weather, action.share)
+        if value == before:
+            return f"{action.weather} is {value:g} already"
+        return {"parameter": str(action.weather), "value": round(value, 3)}
+
+    def _spawn(self, action: AdWizardAction) -> Outcome:
+        world = self._world
+        if (reason := self._no_such_place(action)) is not None:
+            return reason
+        if action.count == 0:
+            return "nobody was to come: count is 0"
+        crowd = world.actors.vehicles if action.exception is ExceptionKind.SPAWN_VEHICLES else world.actors.pedestrians
+        there = len(crowd)
+        if there >= MOST:
+            return f"there are {MOST} of them in the town already"
+        middle = world.town.lanes[action.place.lane].position(action.place.metres)
+        half = max(float(action.extent), 5.0)
+        driving = action.exception is ExceptionKind.SPAWN_VEHICLES
+        candidates = self._places_within(middle, half, driving=driving)
+        order = np.random.default_rng([world.frame, action.place.lane, action.place.metres]).permutation(
+            len(candidates)
+        )
+        done = 0
+        for k in order:
+            if done == action.count or there + done >= MOST:
+                break
+            lane, station = candidates[int(k)]
+            if driving:
+                done += world.actors.add_vehicle(lane, station, distance=FROM_CAR + self._stopping_distance())
+            else:
+                done += world.actors.add_pedestrian(lane, station)
+        if done == 0:
+            return "there is no room for anybody in the rectangle"
+        corners = (float(middle[0] - half), float(middle[0] + half), float(middle[1] - half), float(middle[1] + half))
+        return {"asked": action.count, "count": done, **dict(zip(("x0", "x1", "y0", "y1"), corners, strict=True))}
+
+    def _places_within(self, middle: Array, half: float, *, driving: bool) -> list[tuple[int, float]]:
+        """Places in a square where somebody may appear: on lanes but no landmark's waypoint, or at the right kerb."""
+        world, town = self._world, self._world.town
+        places = []
+        for lane in town.lanes:
+            if lane.in_junction or lane.length < 12.0:
+                continue
+            if not driving and town.neighbour(lane.id, LinkType.LANE_CHANGE_RIGHT) is not None:
+                continue
+            waypoints = [site.station for site in town.sites if site.lane == lane.id] if driving else []
+            for station in np.arange(6.0, lane.length - 5.0, SPAWN_STEP).tolist():
+                x, y = lane.position(station) if driving else world.actors.kerb(lane.id, station)
+                if max(abs(x - middle[0]), abs(y - middle[1])) > half:
+                    continue
+                if all(abs(waypoint - station) >= FROM_WAYPOINT for waypoint in waypoints):
+                    places.append((lane.id, station))
+        return places
+
+    def _place_prop(self, action: AdWizardAction) -> Outcome:
+        if len(self._world.actors.props) >= self._max_props:
+            return f"there are {self._max_props} props already"
+        if (reason := self._no_such_place(action) or self._unsafe(action, action.prop, without=None)) is not None:
+            return reason
+        prop = self._world.actors.add_prop(action.prop, action.place.lane, float(action.place.metres))
+        return {"prop": str(prop.kind), "lane": prop.lane_id, "station": prop.station, **_xy(prop)}
+
+    def _move_prop(self, action: AdWizardAction) -> Outcome:
+        prop = self._prop(action.item)
+        if prop is None:
+            return f"there is no prop {action.item}"
+        if (reason := self._no_such_place(action) or self._unsafe(action, prop.kind, without=prop)) is not None:
+            return reason
+        self._world.actors.move_prop(prop, action.place.lane, float(action.place.metres))
+        return {
+            "item": action.item,
+            "prop": str(prop.kind),
+            "lane": prop.lane_id,
+            "station": prop.station,
+            **_xy(prop),
+        }
+
+    def _delete_prop(self, action: AdWizardAction) -> Outcome:
+        prop = self._prop(action.item)
+        if prop is None:
+            return f"there is no prop {action.item}"
+        gone = {"item": action.item, "prop": str(prop.kind), **_xy(prop)}
+        self._world.actors.remove_prop(prop)
+        return gone
+
+    def _fault(self, action: AdWizardAction) -> Outcome:
+        reason = self._world.set_fault(action.sensor, action.on)
+        return reason if reason is not None else {"sensor": str(action.sensor), "on": action.on}
+
+    # --- task -------------------------------------------------------------------------------------------------------
+
+    def _change_task(self, action: AdWizardAction) -> Outcome:
+        task = self._task
+        change = {
+            ExceptionKind.TASK_TRIGGER: task.trigger,
+            ExceptionKind.TASK_DELETE: task.delete,
+            ExceptionKind.TASK_CHANGE: task.change,
+        }[action.exception]
+        try:
+            change(action.item)
+        except StoryboardError as error:
+            return str(error)
+        row = task.landmark_of(action.item)
+        landmark = task.storyboard.landmarks[row]
+        status = GoalStatus.ABANDONED if action.exception is ExceptionKind.TASK_DELETE else task.status(action.item)
+        return {"subgoal": action.item, "landmark": landmark.name.label, "row": row, "status": status.label}
+
+    def _message(self, action: AdWizardAction) -> Outcome:
+        return {} if action.message else "the message is empty"
+
+    # --- what must not be -------------------------------------------------------------------------------------------
+
+    def _prop(self, item: int) -> Prop | None:
+        props = self._world.actors.props
+        return props[item] if item < len(props) else None
+
+    def _no_such_place(self, action: AdWizardAction) -> str | None:
+        lanes = self._world.town.lanes
+        if action.place.lane >= len(lanes):
+            return f"the town has no lane {action.place.lane}; its lanes are 0..{len(lanes) - 1}"
+        length = lanes[action.place.lane].length
+        if action.place.metres > length:
+            return f"lane {action.place.lane} is only {length:.0f} m long"
+        return None
+
+    def _stopping_distance(self) -> float:
+        """Way in which the car stops, on the road as wet as it is [m]."""
+        return self._world.weather.braking_distance(float(self._world.car.speed), BRAKING)
+
+    def _unsafe(self, action: AdWizardAction, kind: PropKind, *, without: Prop | None) -> str | None:
+        """Why a prop must not stand at a place.
+
+        The checks are about every site of the town and not about those of the live subgoals only: otherwise a refusal
+        would tell where hidden landmarks are. Whatever is reachable at all stays reachable.
+        """
+        world, town = self._world, self._world.town
+        lane = town.lanes[action.place.lane]
+        station = float(action.place.metres)
+        if lane.in_junction:
+            return "a prop in a junction would leave no room to turn round"
+        if not FROM_START <= station <= lane.length - FROM_END:
+            return f"a prop stands at least {FROM_START:.0f} m into its lane and {FROM_END:.0f} m before its end"
+        place = lane.position(station)
+        if math.hypot(*(place - world.car.position)) < FROM_CAR + self._stopping_distance():
+            return "it would appear inside the car's stopping distance"
+        for site in town.sites:
+            if site.lane == lane.id and abs(site.station - station) < FROM_SITE:
+                return "it would stand where a landmark is reached"
+        props = [prop for prop in world.actors.props if prop is not without]
+        box = Box(
+            float(place[0]), float(place[1]), lane.heading_at(station), kind.length + FROM_PROP, kind.width + FROM_PROP
+        )
+        if any(math.hypot(*(place - other.position)) < FROM_VEHICLE for other in world.actors.vehicles) or any(
+            boxes_touch(box, Box.of(prop)) for prop in props
+        ):
+            return "there is something in that place already"
+        standing = [(prop.lane_id, prop.station) for prop in props]
+        if crowds(town, (lane.id, station), standing):
+            return "there would be no room to turn round before it and the prop beside it"
+        if cuts_off(town, (world.planner.lane, world.planner.station), standing, (lane.id, station)):
+            return "it would cut every way to a place where a landmark may be"
+        return None
+
+
+def _xy(prop: Prop) -> dict[str, float]:
+    return {"x": round(float(prop.position[0]), 3), "y": round(float(prop.position[1]), 3)}

@@ -1,0 +1,140 @@
+"""Which actions would not be refused: masks in the form that `Dict.sample(mask=...)` takes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from dorothie_gym.engine.observation_buffers import Shape, Sheet
+from dorothie_gym.engine.upcoming_junction import Prospect
+from dorothie_gym.maps import LinkType
+from dorothie_gym.ontology import SPEED_STEP, ExceptionKind, PhysicalAction, Role
+from dorothie_gym.sim.ego.driver import MAX_CRUISE, MIN_CRUISE
+from dorothie_gym.sim.ego.manoeuvre_lanes import SIDES
+from dorothie_gym.sim.world import World
+from dorothie_gym.spaces import SpaceLimits, action_space
+from dorothie_gym.tasks import TaskState
+
+Mask = NDArray[np.int8]
+
+EVERY_TIME = (
+    ExceptionKind.NONE,
+    ExceptionKind.WEATHER,
+    ExceptionKind.SPAWN_VEHICLES,
+    ExceptionKind.SPAWN_PEDESTRIANS,
+    ExceptionKind.SENSOR_FAULT,
+    ExceptionKind.MESSAGE,
+)
+"""Exceptions that are always worth trying."""
+
+
+class Masks:
+    """Masks of the three roles: what depends on the town once, what depends on the moment each time.
+
+    Fields are masked one by one, so an action that passes may still be refused for the way its fields combine. Boxes,
+    texts and multi-binary fields take no mask (None).
+    """
+
+    def __init__(self, world: World, task: TaskState, limits: SpaceLimits, prospect: Prospect | None = None) -> None:
+        self._world, self._task, self._limits = world, task, limits
+        self._prospect = prospect or Prospect(world)
+        self._unmasked: dict[Role, dict[str, None]] = {}
+        self._sheets: dict[Role, Sheet] = {}
+        town = world.town
+        longest = max(lane.length for lane in town.lanes)
+        for role in (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD):
+            fields = {name: _shape(space) for name, space in action_space(role, limits).spaces.items()}
+            self._unmasked[role] = {name: None for name, shape in fields.items() if shape is None}
+            sheet = Sheet({name: (np.int8, shape) for name, shape in fields.items() if shape is not None})
+            for array in sheet.form.values():
+                array[...] = 1
+            if "lane" in sheet.form:
+                sheet.form["lane"][len(town.lanes) :] = 0
+                sheet.form["metres"][int(longest) + 1 :] = 0
+            if "plan" in sheet.form:
+                sheet.form["plan"][:, len(town.junctions) + 1 :] = 0
+            self._sheets[role] = sheet
+        self._sheets[Role.AD_WIZARD].form["exception"][:] = 0
+        self._sheets[Role.AD_WIZARD].form["exception"][[int(kind) for kind in EVERY_TIME]] = 1
+        self._state: tuple[Any, ...] = ()  # of the car, and what there is in the town, that the forms are of
+        self._there = (-1, -1)
+        self._beside: dict[int, tuple[bool, ...]] = {}  # whether a lane has one to its left, and to its right
+
+    def mask(self, role: Role) -> dict[str, Any]:
+        """The mask of a role's action space now; it is its taker's to change."""
+        if role is Role.CO_WIZARD:
+            self._note_car()
+        elif role is Role.AD_WIZARD:
+            self._note_town()
+        fields = self._sheets[role].copy()
+        fields.update(self._unmasked[role])
+        if role is Role.CO_WIZARD:
+            fields["plan"] = tuple(fields["plan"])
+        return fields
+
+    def _note_car(self) -> None:
+        """What the car may be told to do, and with which angles, when anything that this depends on has changed."""
+        planner, speed, cruise = self._world.planner, float(self._world.car.speed), self._world.driver.cruise
+        state = (
+            planner.path, planner.s, planner.held, planner.manoeuvre, planner.roadblock, planner.props, speed, cruise
+        )  # fmt: skip
+        if state == self._state:
+            return
+        self._state = state
+        form = self._sheets[Role.CO_WIZARD].form
+        physical, angle = form["physical"], form["angle"]
+        lane = planner.lane
+        busy = planner.in_manoeuvre or self._world.town.lanes[lane].in_junction
+        beside_left, beside_right = self._lanes_beside(lane)
+        left = not busy and beside_left and planner.may_switch(LinkType.LANE_CHANGE_LEFT, speed)
+        right = not busy and beside_right and planner.may_switch(LinkType.LANE_CHANGE_RIGHT, speed)
+        committed = planner.is_committed(speed)
+        exits = () if committed else self._prospect.options().exits
+        leaves = not busy and not committed and (planner.held or planner.manoeuvre[0] is not None)
+        physical[PhysicalAction.LANE_FOLLOW] = leaves
+        physical[PhysicalAction.LANE_SWITCH] = left or right
+        # a U-turn begins on the leftmost lane
+        physical[PhysicalAction.U_TURN] = not busy and not beside_left and planner.may_turn_round(speed)
+        physical[PhysicalAction.J_TURN] = bool(exits)
+        physical[PhysicalAction.STOP] = not planner.held
+        physical[PhysicalAction.START] = planner.held
+        physical[PhysicalAction.SPEED_CHANGE] = MIN_CRUISE + SPEED_STEP <= cruise or cruise <= MAX_CRUISE - SPEED_STEP
+        planned = None if planner.held else planner.turn_ahead
+        angle[:] = 0
+        angle[180] = 1
+        for way in exits:
+            angle[way.angle + 180] = way.angle != planned
+        for side, possible in ((90, left), (-90, right)):
+            angle[side + 180] |= possible
+
+    def _lanes_beside(self, lane: int) -> tuple[bool, ...]:
+        found = self._beside.get(lane)
+        if found is None:
+            town = self._world.town
+            found = self._beside[lane] = tuple(town.neighbour(lane, side) is not None for side in SIDES)
+        return found
+
+    def _note_town(self) -> None:
+        """What the Ad-Wizard may do with props and the task, when those have changed."""
+        task, props = self._task, len(self._world.actors.props)
+        if (task.version, props) == self._there:
+            return
+        self._there = task.version, props
+        form = self._sheets[Role.AD_WIZARD].form["exception"]
+        form[ExceptionKind.PLACE_PROP] = props < self._limits.props
+        form[ExceptionKind.MOVE_PROP] = form[ExceptionKind.DELETE_PROP] = props > 0
+        form[ExceptionKind.TASK_TRIGGER] = bool(task.possible_triggers())
+        form[ExceptionKind.TASK_DELETE] = bool(task.possible_deletions())
+        form[ExceptionKind.TASK_CHANGE] = bool(task.possible_changes())
+
+
+def _shape(space: spaces.Space[Any]) -> Shape | None:
+    """Shape of the mask of a field, if it takes one; the choices of a multi-discrete one are all as many."""
+    if isinstance(space, spaces.Discrete):
+        return (int(space.n),)
+    if isinstance(space, spaces.MultiDiscrete):
+        return len(space.nvec), int(space.nvec[0])
+    return None

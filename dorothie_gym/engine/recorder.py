@@ -1,0 +1,222 @@
+"""What happens in an environment, handed to a writer decision by decision; the environment does not know of it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from dorothie_gym.maps import LightColour, LightProgramme, Town
+from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.recording import ACTOR_DTYPE, ActorKind, Decision, SessionError, SessionWriter
+from dorothie_gym.sim.bodies import Pedestrian
+from dorothie_gym.sim.state.records import Kind, Walk, plain
+from dorothie_gym.sim.world import World
+from dorothie_gym.spaces import ActionDict, SpaceLimits, action_space, noop
+
+if TYPE_CHECKING:
+    from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+
+_ACTOR_KINDS = np.full(max(Kind) + 1, -1, dtype=np.int64)
+_ACTOR_KINDS[Kind.CAR], _ACTOR_KINDS[Kind.CYCLIST] = ActorKind.VEHICLE, ActorKind.CYCLIST
+"""By `Kind` of a vehicle; -1 for places that are empty and for the car itself."""
+
+_PLACE = ("key", "x", "y", "heading")
+
+
+def actors_around(world: World) -> NDArray[np.void]:
+    """Returns everybody and everything on the road besides the car as rows of `ACTOR_DTYPE` (n,)."""
+    state = world.actors.arrays
+    vehicles, pedestrians, props = plain(state.vehicles), plain(state.pedestrians), plain(state.props)
+    kinds = _ACTOR_KINDS[vehicles["kind"]]
+    driving = np.flatnonzero(kinds >= 0)
+    walking = np.flatnonzero(pedestrians["state"] != Walk.EMPTY)
+    standing = np.flatnonzero(props["present"])
+    first, second = len(driving), len(driving) + len(walking)
+    rows = np.empty(second + len(standing), dtype=ACTOR_DTYPE)
+    if first:
+        part = rows[:first]
+        part["kind"] = kinds[driving]
+        for name in (*_PLACE, "speed", "length", "width"):
+            part[name] = vehicles[name][driving]
+    if second > first:
+        part = rows[first:second]
+        part["kind"], part["length"], part["width"] = ActorKind.PEDESTRIAN, Pedestrian.LENGTH, Pedestrian.WIDTH
+        for name in (*_PLACE, "speed"):
+            part[name] = pedestrians[name][walking]
+    if len(standing):
+        part = rows[second:]
+        part["kind"], part["speed"] = ActorKind.PROP, 0.0
+        for name in (*_PLACE, "length", "width"):
+            part[name] = props[name][standing]
+    return rows
+
+
+_CLOSE = 1e-3
+"""So shortly before a light changes it is looked at anew: sums of durations are not exact [s]."""
+
+
+class LightStates:
+    """What the traffic lights of a town show; put together anew only when one of them has changed.
+
+    Args:
+        town: the town.
+    """
+
+    def __init__(self, town: Town) -> None:
+        self._programmes = town.programmes
+        self._since, self._until = 0.0, -math.inf
+        self._states: dict[int, LightColour] = {}
+
+    def at(self, time: float) -> dict[int, LightColour]:
+        """Returns the colours at a simulated time [s] by id of the signal; not to be modified."""
+        if not self._since <= time < self._until:
+            remaining = (_remaining(programme, time) for programme in self._programmes)
+            self._since, self._until = time, time + min(remaining, default=math.inf) - _CLOSE
+            phases = [(programme.phase_at(time), programme.signals) for programme in self._programmes]
+            self._states = {signal: phase.colour(signal) for phase, signals in phases for signal in signals}
+        return self._states
+
+
+def _remaining(programme: LightProgramme, time: float) -> float:
+    """How long the present phase still lasts [s]."""
+    now = (time - programme.offset) % programme.cycle
+    ends = itertools.accumulate(phase.duration for phase in programme.phases)
+    return next((end - now for end in ends if now < end), 0.0)
+
+
+# --- Actions of a decision, written down without what says nothing, and put together again ---------------------------
+
+
+@lru_cache(maxsize=16)
+def _idle(role: Role, limits: SpaceLimits) -> ActionDict:
+    return noop(role, limits)
+
+
+@lru_cache(maxsize=16)
+def _arrays(role: Role, limits: SpaceLimits) -> frozenset[str]:
+    return frozenset(name for name, value in _idle(role, limits).items() if isinstance(value, np.ndarray))
+
+
+def compact(actions: Mapping[str, Mapping[str, Any]], limits: SpaceLimits) -> dict[Role, dict[str, Any]]:
+    """Returns actions as a `Decision` keeps them.
+
+    Args:
+        actions: actions of the roles that the environment has taken, by agent.
+        limits: sizes of its spaces.
+    """
+    found = {}
+    for role in AGENT_ROLES:
+        idle, arrays = _idle(role, limits), _arrays(role, limits)
+        fields: dict[str, Any] = {}
+        for name, value in actions[str(role)].items():
+            if name in arrays:
+                values = np.asarray(value)
+                if values.any():
+                    fields[name] = _short(values, _is_flags(role, name, limits))
+            elif value != idle[name]:
+                fields[name] = value if isinstance(value, str) else int(value)
+        if fields:
+            found[role] = fields
+    return found
+
+
+def expand(decision: Decision, limits: SpaceLimits) -> dict[str, ActionDict]:
+    """Returns the actions of a decision as the environment takes them, by agent.
+
+    Raises:
+        SessionError: a role has no such field, or it holds what it cannot hold.
+    """
+    return {str(role): _expanded(decision, role, limits) for role in AGENT_ROLES}
+
+
+def idle_actions(limits: SpaceLimits) -> dict[str, ActionDict]:
+    """Returns the actions of a decision in which nobody does anything, by agent."""
+    return {str(role): _idle(role, limits) for role in AGENT_ROLES}
+
+
+def _short(values: np.ndarray[Any, Any], flags: bool) -> list[int]:
+    places = np.flatnonzero(values)
+    short: list[int] = places.tolist() if flags else values[: int(places[-1]) + 1].tolist()
+    return short
+
+
+def _expanded(decision: Decision, role: Role, limits: SpaceLimits) -> ActionDict:
+    idle = _idle(role, limits)
+    fields = decision.actions.get(role)
+    if not fields:
+        return idle
+    action = dict(idle)
+    for name, value in fields.items():
+        where = f"decision at frame {decision.frame}, {role}: field {name!r}"
+        if name not in idle:
+            raise SessionError(f"{where} is none of {', '.join(idle)}")
+        if isinstance(idle[name], np.ndarray):
+            value = _long(value, idle[name], _is_flags(role, name, limits), where)
+        action[name] = value
+    return action
+
+
+def _long(value: Any, idle: np.ndarray[Any, Any], flags: bool, where: str) -> np.ndarray[Any, Any]:
+    array = idle.copy()
+    if not isinstance(value, list | tuple) or not all(type(item) is int and 0 <= item < 2**31 for item in value):
+        raise SessionError(f"{where} must be a list of whole numbers")
+    if (max(value, default=0) if flags else len(value) - 1) >= len(array):
+        raise SessionError(f"{where} goes beyond the {len(array)} places that there are")
+    if flags:
+        array[list(value)] = 1
+    else:
+        array[: len(value)] = value
+    return array
+
+
+@lru_cache(maxsize=256)
+def _is_flags(role: Role, name: str, limits: SpaceLimits) -> bool:
+    """Whether the field is an array of 0 and 1."""
+    return isinstance(action_space(role, limits)[name], spaces.MultiBinary)
+
+
+# --- What happens in an environment, handed to a writer decision by decision; the environment does not kn ------------
+
+
+class SessionRecorder:
+    """Records what the roles decide, what comes of it, and once a decision what is around the car.
+
+    Args:
+        env: an environment that has just been reset; what happened in the reset is recorded at once.
+        writer: where it is written.
+    """
+
+    def __init__(self, env: DuoWizardEnv, writer: SessionWriter) -> None:
+        self._env, self._writer = env, writer
+        self._lights = LightStates(env.town)
+        self._frame = env.stage.world.frame
+        self._append()
+
+    def record(self, actions: Mapping[str, Mapping[str, Any]]) -> None:
+        """Records a decision after it has been played.
+
+        Args:
+            actions: what the environment was given, by agent.
+
+        Raises:
+            SessionError: something of it cannot be written.
+            OSError: the folder cannot be written.
+        """
+        self._writer.add_decision(self._frame, compact(actions, self._env.limits))
+        self._append()
+
+    def _append(self) -> None:
+        frames, world = self._env.last_frames, self._env.stage.world
+        self._writer.append(self._env.last_events, frames)
+        self._frame = world.frame
+        if len(frames) and frames[-1, 0] == world.frame:
+            self._writer.add_actors(world.frame, actors_around(world))
+            self._writer.add_lights(world.frame, self._lights.at(world.time))
+            self._writer.add_weather(world.frame, world.weather.values)

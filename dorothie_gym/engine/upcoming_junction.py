@@ -1,0 +1,78 @@
+"""What lies ahead of the car on its planned path: the next junction where there is a choice."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dorothie_gym.engine.path_measurements import next_choice
+from dorothie_gym.maps import Exit
+from dorothie_gym.maps.model import Array
+from dorothie_gym.sim.ego.path import Path
+from dorothie_gym.sim.world import World
+from dorothie_gym.spaces import ExitColumn
+
+
+class Options(NamedTuple):
+    """Turn options at a junction.
+
+    Attributes:
+        exits: ways on, from right to left.
+        rows: the same as rows of `ExitColumn` (n, 6), the distance still to be filled in.
+        distance: to the junction along the path [m].
+        lane: at whose end it is; -1 where there is none.
+    """
+
+    exits: tuple[Exit, ...]
+    rows: Array
+    distance: float
+    lane: int
+
+
+NO_OPTIONS = Options((), np.zeros((0, len(ExitColumn))), 0.0, -1)
+
+
+class Prospect:
+    """The path ahead of the car in a session; its answers are those of the planner (`LocalPlanner`)."""
+
+    def __init__(self, world: World) -> None:
+        town = self._town = world.town
+        self._planner = world.planner
+        self._numbers = {junction.id: k for k, junction in enumerate(town.junctions)}
+        self._rows: dict[int, Array] = {}
+        self._path: Path | None = None  # of which, and of where on it, the options are known
+        self._s = 0.0
+        self._options = NO_OPTIONS
+        # lanes outside junctions at whose end a turn has to be chosen
+        self._chooses = np.array([not lane.in_junction and _is_choice(town.exits(lane.id)) for lane in town.lanes])
+
+    def options(self) -> Options:
+        """Turn options at the next junction with a choice; none where the path comes to none."""
+        planner = self._planner
+        if planner.path is not self._path or planner.s != self._s:
+            self._path, self._s = planner.path, planner.s
+            self._options = self._find(planner.path, planner.s)
+        return self._options
+
+    def _find(self, path: Path, s: float) -> Options:
+        point = next_choice(path.lanes, path.index_at(s), self._chooses)
+        if point < 0:
+            return NO_OPTIONS
+        lane = int(path.lanes[point])
+        left = self._town.lanes[lane].length - float(path.stations[point])
+        return Options(self._town.exits(lane), self._rows_of(lane), float(path.s[point]) + left - s, lane)
+
+    def _rows_of(self, lane: int) -> Array:
+        rows = self._rows.get(lane)
+        if rows is None:
+            rows = self._rows[lane] = np.array([self._row(way) for way in self._town.exits(lane)])
+        return rows
+
+    def _row(self, way: Exit) -> tuple[float, ...]:
+        street = self._town.lanes[way.lane].street
+        return 1.0, way.angle, 0.0, way.lane, street, self._numbers.get(way.junction_id, -1)
+
+
+def _is_choice(exits: tuple[Exit, ...]) -> bool:
+    return len(exits) > 1 and any(way.junction_id >= 0 for way in exits)

@@ -1,0 +1,196 @@
+"""Geometric neighbours of lanes: parallel lanes, oncoming lanes, lane edges."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from dorothie_gym.compilation import allocating
+from dorothie_gym.maps.model import Array, LinkType, Town
+from dorothie_gym.maps.polyline import (
+    HEADING,
+    HEIGHT,
+    STATION,
+    IntArray,
+    LaneTable,
+    X,
+    Y,
+    local_coordinates,
+    position,
+    value_at,
+)
+
+MAX_GAP = 13.0
+"""Largest distance between the lanes' centre lines [m]: a median is crossed, a park is not."""
+
+MAX_HEIGHT = 1.0
+"""Largest difference of height [m]."""
+
+MIN_OPPOSITION = math.radians(150.0)
+"""Smallest difference of direction [rad]."""
+
+MIN_GAP = 1.0
+"""Smallest distance between the centre lines [m]."""
+
+MAX_OFFSET = 3.0
+"""Farthest along the lane that the closest place of the other may be [m]: beyond, that one has ended."""
+
+SAMPLING = 4.0
+"""Lanes near a lane are found by points about this far apart [m], on short ones up to twice as far."""
+
+
+class Oncoming(NamedTuple):
+    """The place on the oncoming lane that lies across from a place on a lane: station and distance in metres."""
+
+    lane: int
+    station: float
+    gap: float
+
+
+class OncomingLanes:
+    """Answers, for places on the lanes of a town, which lane runs the other way to their left."""
+
+    def __init__(self, town: Town) -> None:
+        self._town = town
+        self._table = LaneTable.of(town.lanes)
+        owners, points = [], []
+        for lane in town.lanes:
+            if lane.in_junction:
+                continue
+            for station in np.linspace(0.0, lane.length, max(2, int(lane.length / SAMPLING) + 1)):
+                points.append(lane.position(float(station)))
+                owners.append(lane.id)
+        self._owners = np.array(owners)
+        self._points = np.array(points)
+        self._near: dict[int, IntArray] = {}
+
+    def at(self, lane_id: int, station: float) -> Oncoming | None:
+        """The oncoming place, or None: in a junction, from a lane that is not the leftmost, or with nothing there."""
+        candidates = self._near.get(lane_id)
+        if candidates is None:
+            candidates = self._near[lane_id] = self._lanes_near(lane_id)
+        if not len(candidates):
+            return None
+        table = self._table
+        found = Oncoming(*_across(table.points, table.offsets, table.ends, lane_id, station, candidates))
+        return found if found.lane >= 0 else None
+
+    def _lanes_near(self, lane_id: int) -> IntArray:
+        """Lanes outside junctions that come near enough to a lane to be oncoming somewhere along it, by their ids."""
+        lane = self._town.lanes[lane_id]
+        if lane.in_junction or self._town.neighbour(lane_id, LinkType.LANE_CHANGE_LEFT) is not None:
+            return np.empty(0, dtype=np.int64)
+        reach = math.hypot(MAX_GAP, MAX_OFFSET) + 2 * SAMPLING  # points are at most two samplings apart
+        own = self._points[self._owners == lane_id]
+        around = ((self._points >= own.min(axis=0) - reach) & (self._points <= own.max(axis=0) + reach)).all(axis=1)
+        gaps = self._points[around][:, None] - own[None, :]
+        near = (np.square(gaps).sum(axis=2) <= reach * reach).any(axis=1)
+        return np.unique(self._owners[around][near]).astype(np.int64)
+
+
+@allocating
+def _across(
+    points: Array, offsets: IntArray, ends: Array, lane: int, station: float, candidates: IntArray
+) -> tuple[int, float, float]:
+    """The closest of some lanes that is oncoming at a place of a lane (-1: none), the station on it, and the gap."""
+    x, y = position(points, offsets, ends, lane, station, 0.0)
+    heading = value_at(points, offsets, lane, HEADING, station)
+    height = value_at(points, offsets, lane, HEIGHT, station)
+    c, n = math.cos(heading), math.sin(heading)
+    found, at, least = -1, 0.0, math.inf
+    for other in candidates:
+        there, _ = local_coordinates(points, offsets, ends, other, x, y)
+        there = min(max(there, 0.0), points[offsets[other + 1] - 1, STATION])
+        turn = value_at(points, offsets, other, HEADING, there) - heading
+        if abs((turn + math.pi) % (2 * math.pi) - math.pi) < MIN_OPPOSITION:
+            continue
+        dx = value_at(points, offsets, other, X, there) - x
+        dy = value_at(points, offsets, other, Y, there) - y
+        across, along = dy * c - dx * n, dx * c + dy * n  # positive right
+        if not -MAX_GAP <= across < -MIN_GAP or abs(along) > MAX_OFFSET:
+            continue
+        if abs(value_at(points, offsets, other, HEIGHT, there) - height) > MAX_HEIGHT:
+            continue
+        if -across < least:
+            found, at, least = other, there, -across
+    return found, at, least
+
+
+@lru_cache(maxsize=16)
+def oncoming_lanes(town: Town) -> OncomingLanes:
+    """The table of a town, made once."""
+    return OncomingLanes(town)
+
+
+# --- Lanes beside one another ----------------------------------------------------------------------------------------
+
+
+def rightmost(town: Town, lane_id: int) -> int:
+    """The last of the lanes beside one another to the right: who walks beside it does not walk on another lane."""
+    while (beside := town.neighbour(lane_id, LinkType.LANE_CHANGE_RIGHT)) is not None:
+        lane_id = beside
+    return lane_id
+
+
+def leftmost(town: Town, lane_id: int) -> int:
+    """The lane of the same direction that is farthest to the left."""
+    while (beside := town.neighbour(lane_id, LinkType.LANE_CHANGE_LEFT)) is not None:
+        lane_id = beside
+    return lane_id
+
+
+# --- Where the lanes of a town are, to keep people off them ----------------------------------------------------------
+
+LEVEL = 2.0
+"""Lanes that are farther above or below than this are no matter [m]."""
+
+SAMPLE = 0.5
+"""Step in which lanes, and lines between places, are sampled [m]."""
+
+
+class LaneEdges:
+    """Lanes as discs on their centre lines, as wide as they are."""
+
+    def __init__(self, town: Town) -> None:
+        rows = []
+        for lane in town.lanes:
+            at = np.linspace(0.0, lane.length, max(2, math.ceil(lane.length / SAMPLE) + 1))
+            rows.append(
+                np.column_stack(
+                    [np.interp(at, lane.stations, column) for column in (*lane.points.T, lane.widths / 2)]
+                )
+            )  # fmt: skip
+        self._discs = np.concatenate(rows)  # (n, 4) x, y, z, radius
+        self._tree = cKDTree(self._discs[:, :2])
+        self._widest = float(self._discs[:, 3].max())
+
+    def height(self, place: Array) -> float:
+        """Height of the road that is nearest to a place (2,) [m]."""
+        return float(self._discs[int(self._tree.query(place)[1]), 2])
+
+    def is_clear(self, ends: Sequence[Array] | Array, height: float, margin: float) -> bool:
+        """Whether a straight line between two places keeps off all lanes by a margin [m]."""
+        first, last = ends[0][:2], ends[1][:2]
+        count = max(2, math.ceil(float(np.hypot(*(last - first))) / SAMPLE) + 1)
+        share = np.linspace(0.0, 1.0, count)[:, None]
+        places = (1.0 - share) * first + share * last
+        return bool(self.free(np.column_stack((places, np.full(len(places), height))), margin).all())
+
+    def free(self, places: Array, margin: float) -> NDArray[np.bool_]:
+        """Which places (n, 3) keep off all lanes of their height by a margin [m]."""
+        near: Any = self._tree.query_ball_point(places[:, :2], self._widest + margin, return_sorted=False)
+        counts = np.fromiter((len(discs) for discs in near), dtype=np.int64, count=len(places))
+        free = np.ones(len(places), dtype=bool)
+        if not counts.any():
+            return free
+        owners = np.repeat(np.arange(len(places)), counts)
+        discs = self._discs[np.concatenate([np.asarray(found, dtype=np.int64) for found in near if found])]
+        gaps = np.hypot(*(discs[:, :2] - places[owners, :2]).T)
+        free[owners[(gaps < discs[:, 3] + margin) & (np.abs(discs[:, 2] - places[owners, 2]) < LEVEL)]] = False
+        return free

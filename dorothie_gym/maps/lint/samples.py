@@ -1,0 +1,72 @@
+"""Places along all lanes of a town at once, for whatever compares lanes with one another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from dorothie_gym.maps.model import Array, Town
+
+SPACING = 1.0
+"""Largest distance between samples of a lane [m]."""
+
+SAME_LEVEL = 0.5
+"""Places less than this above each other are the same ground [m]: one floor of a bridge is thicker than that."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LaneSamples:
+    """Samples of all lanes, lane after lane in driving direction.
+
+    Attributes:
+        owner: lane of each sample (n,).
+        points: places on the centre lines (n, 2) [m].
+        heights: (n,) [m].
+        along: directions of the lanes (n, 2), of length 1.
+        widths: (n,) [m].
+        first: row of the first sample of each lane, and n at the end (lanes + 1,).
+    """
+
+    owner: NDArray[np.intp]
+    points: Array
+    heights: Array
+    along: Array
+    widths: Array
+    first: NDArray[np.intp]
+
+    @cached_property
+    def right(self) -> Array:
+        """Directions to the right of the lanes (n, 2), of length 1."""
+        return np.column_stack((-self.along[:, 1], self.along[:, 0]))
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """The points, to look up what is near."""
+        return cKDTree(self.points)
+
+    def rows(self, lane: int) -> slice:
+        """Samples of one lane."""
+        return slice(int(self.first[lane]), int(self.first[lane + 1]))
+
+
+def sample_lanes(town: Town) -> LaneSamples:
+    """Samples every lane at both ends and at most `SPACING` apart."""
+    rows = []
+    for lane in town.lanes:
+        s = np.linspace(0.0, lane.length, max(2, int(np.ceil(lane.length / SPACING)) + 1))
+        columns = (*lane.points.T, lane.headings, lane.widths)
+        rows.append(np.column_stack([np.interp(s, lane.stations, column) for column in columns]))
+    counts = [len(row) for row in rows]
+    table = np.concatenate(rows)  # (n, 5)
+    return LaneSamples(
+        owner=np.repeat(np.arange(len(rows)), counts),
+        points=np.ascontiguousarray(table[:, :2]),
+        heights=table[:, 2],
+        along=np.column_stack((np.cos(table[:, 3]), np.sin(table[:, 3]))),
+        widths=table[:, 4],
+        first=np.concatenate(([0], np.cumsum(counts))),
+    )

@@ -1,0 +1,232 @@
+"""Centre lines of lanes: sampled densely from the road's profiles, thinned where they are straight, joined at links."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from dorothie_gym.maps.errors import TownError
+from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.opendrive.records import SIDEWALK, OpenDriveRecords, RoadRecord
+from dorothie_gym.maps.opendrive.topology import SHORTEST_LANE, Topology, runs_forward
+
+# Distance between the samples taken from the file [m]: the chord of a 5 m radius is then 1.6 mm off its arc.
+_DENSE_STEP = 0.25
+# Distance at which curvature is measured [m], and the one between points of the result: largest on straights, largest
+# on curves, smallest.
+_GRID_STEP = 0.5
+_LONGEST_STEP, _LONGEST_CURVE_STEP, _SHORTEST_STEP = 20.0, 2.0, 0.25
+# Largest distance between a chord and its arc that we aim at [m]; with the sampling's error it stays below 1 cm.
+_CHORD_ERROR = 0.005
+# Curvature below which a lane counts as straight [1/m]: 20 m of it bend by 5 mm.
+_STRAIGHT = 1e-4
+# Ends of linked lanes further apart than this [m] are no slip of rounding: they are left as the file has them, and
+# `check` tells of them. CARLA's maps need 2 mm.
+_LARGEST_STITCH = 0.05
+# A lane's own centre line may not jump further than this from one sample to the next [m].
+_LARGEST_JUMP = 10.0
+# Length over which a lane gives way to its moved end [m], for each metre that it moves, and at least for one.
+_STITCH_LENGTH = 10.0
+# A lane narrower than this [m] and than this share of its greatest width (or of what it meets) is opening or closing.
+_OPEN_WIDTH, _OPEN_SHARE = 1.75, 0.5
+
+
+@dataclass(frozen=True)
+class RoadSamples:
+    """Samples along one road, in the file's frame.
+
+    Attributes:
+        x, y, z: reference line (n,) each [m].
+        heading: its direction (n,) [rad].
+        tilt: roll angle of the road (n,) [rad], its left side up where it is positive.
+        spans: which samples belong to which lane section.
+        centres: for each section, by lane number: lateral place of the lane's middle and its width (m,) [m], of driving
+            lanes and sidewalks.
+    """
+
+    x: Array
+    y: Array
+    z: Array
+    heading: Array
+    tilt: Array
+    spans: tuple[slice, ...]
+    centres: tuple[dict[int, tuple[Array, Array]], ...]
+
+    def line(self, pieces: Iterable[tuple[int, int]]) -> Array:
+        """Middle of lanes, given as (section, lane) one after another along the road: x, y, z, width in OUR frame."""
+        rows = []
+        for section, lane in pieces:
+            here = self.spans[section]
+            lateral, width = self.centres[section][lane]
+            across = lateral * np.cos(self.tilt[here])
+            x = self.x[here] - across * np.sin(self.heading[here])
+            y = self.y[here] + across * np.cos(self.heading[here])
+            z = self.z[here] + lateral * np.sin(self.tilt[here])
+            rows.append(np.column_stack((x, -y, z, np.maximum(width, 0.0))))  # y south from here on
+        return np.concatenate(rows)
+
+
+def sample_centrelines(
+    records: OpenDriveRecords, topology: Topology, samples: Mapping[int, RoadSamples]
+) -> list[Array]:
+    """Centre lines of all lanes in our frame and in driving direction, ends of linked lanes joined.
+
+    A lane that opens beside others, or ends there, and is linked to none at that end, begins where it is half as wide
+    as it becomes: nobody could drive in the wedge before.
+
+    Args:
+        records: the file.
+        topology: its lanes.
+        samples: its roads, by their ids.
+
+    Returns:
+        One array (n, 4) a lane: x, y, z and width [m].
+
+    Raises:
+        TownError: a lane's centre line has no length, or leaves a gap that no rounding explains.
+    """
+    entered, left = ({link[k] for link in topology.links} for k in (1, 0))
+    lines = []
+    for k, chain in enumerate(topology.chains):
+        road = records.roads[chain[0].road]
+        forward = runs_forward(road, chain[0].lane)
+        dense = samples[road.id].line((p.section, p.lane) for p in (chain if forward else chain[::-1]))
+        dense = dense if forward else dense[::-1]
+        if k not in entered or k not in left:
+            dense = _without_wedges(dense, k not in entered, k not in left)
+        fault = _fault(dense)
+        if fault:
+            element = f"road {road.id} / laneSection {chain[0].section} / lane {chain[0].lane}"
+            raise TownError(records.source, element, fault)
+        lines.append(thin(dense))
+    _stitch(lines, topology.links)
+    return lines
+
+
+def _is_open(widths: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    return widths >= min(_OPEN_WIDTH, _OPEN_SHARE * float(widths.max()))
+
+
+def _without_wedges(line: Array, at_start: bool, at_end: bool) -> Array:
+    """A centre line (n, 4) without the samples at its ends where the lane is still opening or already closing."""
+    wide = np.flatnonzero(_is_open(line[:, 3]))
+    first, last = wide[0] if at_start else 0, wide[-1] if at_end else len(line) - 1
+    kept = line[first : last + 1]
+    return kept if np.hypot(*np.ptp(kept[:, :2], axis=0)) >= SHORTEST_LANE else line
+
+
+def _fault(dense: Array) -> str:
+    """What makes a centre line (n, 4) impossible to drive; empty if nothing does."""
+    if np.hypot(*np.ptp(dense[:, :2], axis=0)) < SHORTEST_LANE / 2:
+        return "its centre line shrinks to a point: the bend is too sharp for it"
+    jump = float(np.max(np.hypot(*np.diff(dense[:, :2], axis=0).T)))
+    return f"its centre line jumps by {jump:.1f} m; check geometry, offsets and widths" if jump > _LARGEST_JUMP else ""
+
+
+def sample_road(road: RoadRecord) -> RoadSamples:
+    """Samples a road every few decimetres, section by section."""
+    pieces, picks, spans = [], [], []
+    total = 0
+    for section in road.sections:
+        length = section.end - section.start
+        count = int(np.ceil(length / _DENSE_STEP)) + 1 if length > 0.0 else 1
+        s = np.linspace(section.start, section.end, count)
+        pieces.append(s)
+        # At its end a section still obeys its own profiles, not those that begin there with the next one.
+        picks.append(np.minimum(s, section.end - min(1e-7, 0.5 * length)))
+        spans.append(slice(total, total + count))
+        total += count
+    s, pick = np.concatenate(pieces), np.concatenate(picks)
+    x, y, heading = road.line.place(s, pick)
+    offset = road.offset.at(s, pick)
+    centres = tuple(
+        _lateral_places(road, k, s[span] - road.sections[k].start, pick[span] - road.sections[k].start, offset[span])
+        for k, span in enumerate(spans)
+    )
+    elevation, tilt = road.elevation.at(s, pick), road.superelevation.at(s, pick)
+    return RoadSamples(x=x, y=y, z=elevation, heading=heading, tilt=tilt, spans=tuple(spans), centres=centres)
+
+
+def _lateral_places(
+    road: RoadRecord, section: int, ds: Array, pick: Array, offset: Array
+) -> dict[int, tuple[Array, Array]]:
+    """Centre and width of lanes of a section, which are laid side by side from the middle outwards.
+
+    A lane given by its border ends there whatever lies between (OpenDRIVE 1.7, section 11.6.2).
+    """
+    lanes = road.sections[section].lanes
+    places = {}
+    for side in (1, -1):
+        edge = offset
+        for number in sorted((n for n in lanes if n * side > 0), key=abs):
+            lane = lanes[number]
+            width = lane.width.at(ds, pick) if lane.border is None else side * (lane.border.at(ds, pick) - edge)
+            if lane.drives or lane.type in SIDEWALK:
+                places[number] = (edge + 0.5 * side * width, width)
+            edge = edge + side * width
+    return places
+
+
+def thin(line: Array) -> Array:
+    """The same line (n, 4) with as few points as its curvature, its width and its height allow."""
+    step = np.hypot(*np.diff(line[:, :2], axis=0).T)
+    line = line[np.concatenate(([True], step > 1e-6))]
+    station = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))))
+    count = max(2, int(np.ceil(station[-1] / _GRID_STEP)))
+    grid = np.linspace(0.0, station[-1], count + 1)
+    h = grid[1]
+    bend = np.diff(_at(grid, station, line), n=2, axis=0) / h**2  # (count - 1, 4) second derivatives
+    curvature = np.hypot(bend[:, 0], bend[:, 1])
+    sharpest = np.max(np.column_stack((curvature, np.abs(bend[:, 2:]))), axis=1)
+    longest = np.where(curvature > _STRAIGHT, _LONGEST_CURVE_STEP, _LONGEST_STEP)
+    spacing = np.clip(np.sqrt(8.0 * _CHORD_ERROR / np.maximum(sharpest, 1e-9)), _SHORTEST_STEP, longest)
+    spacing = np.concatenate((spacing[:1], np.minimum(spacing[:-1], spacing[1:]), spacing[-1:]))  # (count,) intervals
+    points = np.concatenate(([0.0], np.cumsum(h / spacing)))  # how many points until here
+    total = max(1, int(np.ceil(points[-1] - 1e-9)))
+    return _at(np.interp(np.linspace(0.0, points[-1], total + 1), points, grid), station, line)
+
+
+def _at(where: Array, station: Array, line: Array) -> Array:
+    return np.column_stack([np.interp(where, station, column) for column in line.T])
+
+
+def _stitch(lines: list[Array], links: tuple[tuple[int, int], ...]) -> None:
+    """Moves the ends of linked lanes to one common point: files leave gaps of some millimetres or centimetres."""
+    group = list(range(2 * len(lines)))  # 2 k is the start of lane k, 2 k + 1 its end
+
+    def find(end: int) -> int:
+        while group[end] != end:
+            end = group[end]
+        return end
+
+    for source, target in links:
+        a, b = find(2 * source + 1), find(2 * target)
+        group[max(a, b)] = min(a, b)
+    members: dict[int, list[int]] = {}
+    for end in range(2 * len(lines)):
+        members.setdefault(find(end), []).append(end)
+    for ends in members.values():
+        if len(ends) > 1:
+            _join(lines, ends)
+
+
+def _join(lines: list[Array], ends: list[int]) -> None:
+    """Moves ends of lanes to the middle of those that are open; one that is only opening there comes out of them."""
+    places = np.array([lines[e // 2][-1 if e % 2 else 0] for e in ends])  # (n, 4)
+    open_ = _is_open(places[:, 3])
+    target = places[open_, :3].mean(axis=0)
+    shift = target - places[:, :3]
+    if np.ptp(places[open_, :3], axis=0).max() > _LARGEST_STITCH or np.max(np.abs(shift)) <= 1e-9:
+        return
+    for end, move, width in zip(ends, shift, places[:, 3], strict=True):
+        if np.hypot(*move[:2]) <= max(_LARGEST_STITCH, places[:, 3].max() - width):
+            _move_end(lines[end // 2], bool(end % 2), move)
+
+
+def _move_end(line: Array, at_end: bool, move: Array) -> None:
+    station = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))))
+    away = station[-1] - station if at_end else station
+    reach = min(_STITCH_LENGTH * max(1.0, float(np.hypot(*move[:2]))), station[-1])
+    line[:, :3] += (0.5 + 0.5 * np.cos(np.pi * np.minimum(away / reach, 1.0)))[:, None] * move

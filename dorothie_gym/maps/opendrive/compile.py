@@ -1,0 +1,147 @@
+"""From records to a `Town`: lanes, links, junctions, signals, streets and sites."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+from dorothie_gym.maps.map_inference import lay_sites, name_streets
+from dorothie_gym.maps.model import Array, Junction, Lane, LaneLink, LinkType, Town
+from dorothie_gym.maps.opendrive.centrelines import sample_centrelines, sample_road
+from dorothie_gym.maps.opendrive.furniture import lay_sidewalks, place_crosswalks, place_signals
+from dorothie_gym.maps.opendrive.parse import parse_opendrive
+from dorothie_gym.maps.opendrive.records import OpenDriveRecords, RoadRecord
+from dorothie_gym.maps.opendrive.topology import Piece, Topology, build_topology, successor_links
+from dorothie_gym.maps.traffic_light_programs import derive_programmes
+
+# Limit of a road that names none, in built-up areas [m/s] (50 km/h).
+DEFAULT_SPEED_LIMIT = 50.0 / 3.6
+
+# Lanes have to run side by side for this long before one can change between them [m].
+SHORTEST_LANE_CHANGE = 5.0
+
+
+def read_opendrive(path: str | Path) -> Town:
+    """Reads an OpenDRIVE file (1.4, as CARLA's towns) into a town named like the file.
+
+    The file's y points north and ours south: everything is mirrored once. A lane is a chain of lane sections of one
+    road that go on one to one; lanes of other types than "driving" (and the types of ramps) are left out.
+
+    Args:
+        path: file to read.
+
+    Returns:
+        The town. OpenDRIVE has neither streets as people name them nor places for landmarks: both are derived.
+
+    Raises:
+        TownError: the file cannot be read; the error names the file, the element and the reason.
+    """
+    records = parse_opendrive(path)
+    topology = build_topology(records)
+    samples = {road.id: sample_road(road) for road in records.roads.values()}
+    lanes = _lanes(records, topology, sample_centrelines(records, topology, samples))
+    links = successor_links(lanes, topology) + _lane_change_links(records, topology, lanes)
+    lanes, streets = name_streets(lanes, links)
+    junctions, signals = _junctions(lanes), place_signals(records, topology, lanes)
+    return Town(
+        name=Path(path).stem,
+        lanes=lanes,
+        links=links,
+        junctions=junctions,
+        streets=streets,
+        sites=lay_sites(lanes, links),
+        signals=signals,
+        crosswalks=place_crosswalks(records),
+        sidewalks=lay_sidewalks(records, samples, lanes),
+        programmes=derive_programmes(lanes, links, junctions, signals),
+    )
+
+
+def _lanes(records: OpenDriveRecords, topology: Topology, lines: list[Array]) -> tuple[Lane, ...]:
+    limits = _speed_limits(records, topology)
+    return tuple(
+        Lane(
+            id=k,
+            road_id=chain[0].road,
+            lane_id=chain[0].lane,
+            junction_id=records.roads[chain[0].road].junction,
+            points=line[:, :3].copy(),
+            widths=line[:, 3].copy(),
+            speed_limit=limit,
+        )
+        for k, (chain, line, limit) in enumerate(zip(topology.chains, lines, limits, strict=True))
+    )
+
+
+def _speed_limits(records: OpenDriveRecords, topology: Topology) -> list[float]:
+    """Limit of each lane; one without its own (most connectors) takes the lowest of the lanes that it links."""
+    own = [_own_limit(records.roads[chain[0].road], chain) for chain in topology.chains]
+    linked: defaultdict[int, list[float]] = defaultdict(list)
+    for source, target in topology.links:
+        for lane, other in ((source, own[target]), (target, own[source])):
+            if other is not None:
+                linked[lane].append(other)
+    return [min(linked[k], default=DEFAULT_SPEED_LIMIT) if limit is None else limit for k, limit in enumerate(own)]
+
+
+def _own_limit(road: RoadRecord, chain: tuple[Piece, ...]) -> float | None:
+    """The lowest limit that holds anywhere on the lane, where the road or the lane names one."""
+    limits = [speed for p in chain for _, speed in road.sections[p.section].lanes[p.lane].speeds]
+    if not limits:
+        start = min(road.sections[p.section].start for p in chain)
+        end = max(road.sections[p.section].end for p in chain)
+        until = [*(s for s, _ in road.speeds[1:]), np.inf]
+        limits = [v for (s, v), e in zip(road.speeds, until, strict=False) if s < end and e > start]
+    return min(limits, default=None)
+
+
+def _lane_change_links(records: OpenDriveRecords, topology: Topology, lanes: tuple[Lane, ...]) -> tuple[LaneLink, ...]:
+    """Links between lanes that run side by side, each pair once and the longest neighbour of a lane first."""
+    lane_of = {piece: k for k, chain in enumerate(topology.chains) for piece in chain}
+    shared: defaultdict[tuple[int, int], float] = defaultdict(float)
+    open_: defaultdict[tuple[int, int], bool] = defaultdict(bool)
+    for piece, inner in lane_of.items():
+        road = records.roads[piece.road]
+        section = road.sections[piece.section]
+        outward = 1 if piece.lane > 0 else -1
+        outer = lane_of.get(Piece(piece.road, piece.section, piece.lane + outward))
+        if lanes[inner].in_junction or outer is None:
+            continue
+        changes = section.lanes[piece.lane].changes  # the mark on a lane's outer edge
+        for pair, toward in (((inner, outer), outward), ((outer, inner), -outward)):
+            shared[pair] += section.end - section.start
+            open_[pair] |= _permits(changes, toward)
+    rows = []
+    for (source, target), length in shared.items():
+        if open_[source, target] and length >= SHORTEST_LANE_CHANGE:
+            outward = abs(lanes[target].lane_id) > abs(lanes[source].lane_id)
+            rows.append((source, -length, target, _side(records.roads[lanes[source].road_id], outward)))
+    return tuple(LaneLink(source, target, side) for source, _, target, side in sorted(rows))
+
+
+def _permits(changes: tuple[str, ...], toward: int) -> bool:
+    """Whether a road mark lets cars change to higher (1) or lower (-1) lane numbers; one that says nothing does."""
+    allowing = ("both", "increase" if toward > 0 else "decrease")
+    return not changes or any(change in allowing for change in changes)
+
+
+def _side(road: RoadRecord, outward: bool) -> LinkType:
+    """Side of the driver on which the outer (or inner) lane lies: the outer one is at the kerb."""
+    return LinkType.LANE_CHANGE_RIGHT if outward == road.right_hand else LinkType.LANE_CHANGE_LEFT
+
+
+def _junctions(lanes: tuple[Lane, ...]) -> tuple[Junction, ...]:
+    """Junctions that lanes cross, each at the middle of the box around its connectors."""
+    members: defaultdict[int, list[Lane]] = defaultdict(list)
+    for lane in lanes:
+        if lane.in_junction:
+            members[lane.junction_id].append(lane)
+    junctions = []
+    for number in sorted(members):
+        points = np.concatenate([lane.points[:, :2] for lane in members[number]])
+        x, y = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        connectors = tuple(lane.id for lane in members[number])
+        junctions.append(Junction(id=number, position=(float(x), float(y)), connectors=connectors))
+    return tuple(junctions)

@@ -1,0 +1,244 @@
+"""What stands on or beside the roads of a file: lights, signs and crosswalks, placed in our frame."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from dorothie_gym.maps.model import NO_STREET, Array, Crosswalk, Lane, Sidewalk, Signal, SignalKind
+from dorothie_gym.maps.opendrive.centrelines import RoadSamples, thin
+from dorothie_gym.maps.opendrive.records import SIDEWALK, CrosswalkRecord, OpenDriveRecords, RoadRecord, SignalRecord
+from dorothie_gym.maps.opendrive.topology import Piece, Topology, runs_forward
+
+# Types of signal that CARLA's maps use: lights as in OpenDRIVE 1.4, annex, signs by their numbers in German law.
+SIGNAL_TYPES = {
+    "1000001": SignalKind.TRAFFIC_LIGHT,
+    "1000002": SignalKind.OTHER,  # a light for those on foot
+    "206": SignalKind.STOP,
+    "205": SignalKind.YIELD,
+    "274": SignalKind.SPEED,
+}
+
+# Kinds that have to be heeded at the end of a lane.
+_CONTROLS = (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP, SignalKind.YIELD)
+
+# A light or sign this far before a junction, or less, is meant for it, though a lane may end in between [m].
+_FARTHEST = 50.0
+
+# One that stands nearer to the start of its lane than to its end, and further than this from its end, is the far one of
+# two at a junction that lies behind it [m].
+_NEAR_THE_END = 30.0
+
+
+def place_signals(records: OpenDriveRecords, topology: Topology, lanes: tuple[Lane, ...]) -> tuple[Signal, ...]:
+    """Signals of a file, one for each `signal` element, in order of their ids.
+
+    `Signal.lanes` are the lanes at whose end a driver has to heed it (speed limits: on which they hold): those that
+    lead into the junction that it stands before, and where the file names connectors, those that lead into them.
+    """
+    ways = _Ways(topology, lanes)
+    ruled: defaultdict[int, dict[int, None]] = defaultdict(dict)
+    placed = [(road, record) for road in records.roads.values() for record in road.signals]
+    owners = {record.id: (road, record) for road, record in placed if not record.reference}
+    for road, record in placed:
+        if record.id in owners:  # a reference may have lost its signal
+            controls = _kind(owners[record.id][1]) in _CONTROLS
+            for lane in ways.ruled(road, record, controls):
+                ruled[record.id].update(dict.fromkeys(ways.approaches(lane, controls)))
+    return tuple(_signal(number, *owners[number], tuple(sorted(ruled[number])), lanes) for number in sorted(owners))
+
+
+def _kind(record: SignalRecord) -> SignalKind:
+    return SIGNAL_TYPES.get(record.type, SignalKind.TRAFFIC_LIGHT if record.dynamic else SignalKind.OTHER)
+
+
+class _Ways:
+    """Finds the lanes that a signal is meant for."""
+
+    def __init__(self, topology: Topology, lanes: tuple[Lane, ...]) -> None:
+        self._lanes = lanes
+        self._at: defaultdict[int, list[tuple[Piece, int]]] = defaultdict(list)  # by road
+        for k, chain in enumerate(topology.chains):
+            for piece in chain:
+                self._at[piece.road].append((piece, k))
+        self._before: defaultdict[int, list[int]] = defaultdict(list)
+        self._after: defaultdict[int, list[int]] = defaultdict(list)
+        for source, target in topology.links:
+            self._before[target].append(source)
+            self._after[source].append(target)
+
+    def ruled(self, road: RoadRecord, record: SignalRecord, controls: bool) -> Iterator[int]:
+        """Lanes of this road that a signal rules: those that it names, else those of its direction."""
+
+        def away(piece: Piece) -> tuple[float, int]:
+            section = road.sections[piece.section]
+            return max(section.start - record.s, record.s - section.end, 0.0), -piece.section
+
+        # The section that the signal stands in, or the one beside it where that is left out for having no length.
+        here = min((piece for piece, _ in self._at[road.id]), key=away, default=None)
+        for piece, lane in self._at[road.id]:
+            if here is None or piece.section != here.section or not _names(road, record, piece.lane):
+                continue
+            if record.lanes or not controls or self._lanes[lane].in_junction or self._is_ahead(road, record, lane):
+                yield lane
+
+    def _is_ahead(self, road: RoadRecord, record: SignalRecord, lane: int) -> bool:
+        """Whether a signal stands where a driver in its lane comes upon it before the junction."""
+        sections = [road.sections[piece.section] for piece, k in self._at[road.id] if k == lane]
+        behind = record.s - min(section.start for section in sections)
+        ahead = max(section.end for section in sections) - record.s
+        if not runs_forward(road, self._lanes[lane].lane_id):
+            behind, ahead = ahead, behind
+        return ahead <= max(behind, _NEAR_THE_END)
+
+    def approaches(self, lane: int, controls: bool) -> Iterator[int]:
+        """Lanes outside junctions by which one comes to a lane; for what controls a junction, those that end at it."""
+        if not self._lanes[lane].in_junction:
+            yield self._last_before_junction(lane) if controls else lane
+            return
+        seen, todo = {lane: None}, [lane]
+        while todo:
+            for before in self._before[todo.pop()]:
+                if not self._lanes[before].in_junction:
+                    yield before
+                elif before not in seen:
+                    seen[before] = None
+                    todo.append(before)
+
+    def _last_before_junction(self, lane: int) -> int:
+        """The lane that one comes to in going on to the next junction, if there is one near by and one way to it."""
+        way, further = lane, 0.0
+        while further <= _FARTHEST:
+            onward = self._after[way]
+            if any(self._lanes[k].in_junction for k in onward):
+                return way
+            if len(onward) != 1:
+                break
+            way, further = onward[0], further + self._lanes[onward[0]].length
+        return lane
+
+
+def _names(road: RoadRecord, record: SignalRecord, lane: int) -> bool:
+    """Whether a signal is for a lane; its orientation decides where it names lanes of both directions, or none."""
+    spans: list[tuple[float, float]] = [(min(span), max(span)) for span in record.lanes] or [(-math.inf, math.inf)]
+    if not any(low <= lane <= high for low, high in spans):
+        return False
+    both = min(low for low, _ in spans) < 0 < max(high for _, high in spans)
+    return not both or record.orientation not in "+-" or (record.orientation == "+") == runs_forward(road, lane)
+
+
+def _signal(
+    number: int, road: RoadRecord, record: SignalRecord, ruled: tuple[int, ...], lanes: tuple[Lane, ...]
+) -> Signal:
+    s = np.clip(np.array([record.s]), 0.0, road.length)
+    x, y, heading = (float(v[0]) for v in road.line.place(s))
+    z = float(road.elevation.at(s)[0]) + record.z
+    position = (x - record.t * np.sin(heading), -(y + record.t * np.cos(heading)), z)
+    if ruled:  # exporters disagree about orientation and hOffset; a signal faces those who have to heed it
+        facing = float(lanes[ruled[0]].headings[-1]) + np.pi
+    else:
+        facing = -(heading + record.heading + (0.0 if record.orientation == "-" else np.pi))
+    return Signal(
+        id=number,
+        kind=_kind(record),
+        position=(float(position[0]), float(position[1]), z),
+        heading=float((facing + np.pi) % (2.0 * np.pi) - np.pi),
+        lanes=ruled,
+        value=record.value,
+    )
+
+
+def place_crosswalks(records: OpenDriveRecords) -> tuple[Crosswalk, ...]:
+    """Crosswalks of a file, outlines (n, 2) in our frame, numbered in the file's order."""
+    found = [(road, crossing) for road in records.roads.values() for crossing in road.crosswalks]
+    return tuple(Crosswalk(id=k, outline=_outline(road, crossing)) for k, (road, crossing) in enumerate(found))
+
+
+def _outline(road: RoadRecord, crossing: CrosswalkRecord) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    if crossing.on_road:
+        s, t = crossing.corners.T
+        x, y, heading = road.line.place(np.clip(s, 0.0, road.length))
+        return np.column_stack((x - t * np.sin(heading), -(y + t * np.cos(heading))))
+    x, y, heading = road.line.place(np.clip(np.array([crossing.s]), 0.0, road.length))
+    x, y = x - crossing.t * np.sin(heading), y + crossing.t * np.cos(heading)
+    angle = heading + crossing.heading
+    u, v = crossing.corners.T
+    return np.column_stack((x + u * np.cos(angle) - v * np.sin(angle), -(y + u * np.sin(angle) + v * np.cos(angle))))
+
+
+# --- Pavements of a file: lanes of type sidewalk, joined to stretches along each side of a road ----------------------
+
+# Where a sidewalk is narrower nobody walks [m].
+NARROWEST = 0.5
+
+# A shorter stretch leads nowhere [m].
+SHORTEST = 1.0
+
+# A middle line may not jump further than this from one sample to the next [m].
+LARGEST_JUMP = 2.0
+
+# Stretches of two lane sections whose ends are this close are one [m].
+TOUCHING = 0.5
+
+
+def lay_sidewalks(
+    records: OpenDriveRecords, samples: Mapping[int, RoadSamples], lanes: tuple[Lane, ...]
+) -> tuple[Sidewalk, ...]:
+    """Sidewalks of a file, along their roads, in the file's order.
+
+    Args:
+        records: the file.
+        samples: its roads, by their ids.
+        lanes: the town's lanes with their streets; a sidewalk belongs to the street of its side of its road.
+    """
+    street: dict[tuple[int, bool], int] = {}
+    for lane in lanes:
+        for left in (lane.lane_id > 0, lane.lane_id < 0):  # the other side's lanes stand in where a side has none
+            if lane.street != NO_STREET:
+                street.setdefault((lane.road_id, left), lane.street)
+    found = [
+        (line, street.get((road.id, left), NO_STREET))
+        for road in records.roads.values()
+        for left in (True, False)
+        for line in _stretches(road, samples[road.id], left)
+    ]
+    return tuple(
+        Sidewalk(id=k, points=line[:, :3].copy(), width=float(np.median(line[:, 3])), street=number)
+        for k, (line, number) in enumerate(found)
+    )
+
+
+def _stretches(road: RoadRecord, samples: RoadSamples, left: bool) -> Iterator[Array]:
+    """Middle lines (n, 4) of the sidewalks at one side of a road: x, y, z, width [m]."""
+    open_: list[Array] = []
+    for k, section in enumerate(road.sections):
+        begun = []
+        for number, lane in sorted(section.lanes.items()):
+            if lane.type in SIDEWALK and (number > 0) == left:
+                for line in _wide_parts(samples.line([(k, number)])):
+                    before = next((j for j, other in enumerate(open_) if _gap(other[-1], line[0]) < TOUCHING), None)
+                    begun.append(line if before is None else np.concatenate((open_.pop(before), line)))
+        yield from _finished(open_)
+        open_ = begun
+    yield from _finished(open_)
+
+
+def _wide_parts(line: Array) -> list[Array]:
+    """Parts of a middle line where the sidewalk is wide enough; a jump in the file's profiles divides it, too."""
+    wide = line[:, 3] >= NARROWEST
+    step = np.hypot(*np.diff(line[:, :2], axis=0).T)
+    edges = np.flatnonzero(np.diff(wide) | (step > LARGEST_JUMP)) + 1
+    return [part for part in np.split(line, edges) if part[0, 3] >= NARROWEST]
+
+
+def _gap(a: Array, b: Array) -> float:
+    return float(np.hypot(*(a[:2] - b[:2])))
+
+
+def _finished(lines: list[Array]) -> Iterator[Array]:
+    for line in lines:
+        if float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum()) >= SHORTEST:
+            yield thin(line)

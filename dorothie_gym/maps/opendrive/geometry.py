@@ -1,0 +1,185 @@
+"""Plan view and profiles of an OpenDRIVE road: from the distance along its reference line to places in the plane.
+
+Everything here is in OpenDRIVE's own frame (x east, y NORTH, headings counter-clockwise, lateral positive LEFT); the
+compiler flips it once. Formulas: ASAM OpenDRIVE 1.4, sections 5.3.4 (geometry) and 5.3.5 (elevation).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from dorothie_gym.maps.model import Array
+
+# 32 Gauss-Legendre nodes integrate cos and sin of the heading to rounding error up to four full turns per element.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
+
+# Grid on which a polynomial's arc length is tabulated: 1 cm of grid on a 10 m element, interpolated linearly.
+_ARC_LENGTH_STEPS = 1000
+
+
+class Primitive(Protocol):
+    """One element of a plan view, in the local frame of its start (u ahead, v to the left)."""
+
+    def place(self, distance: Array, length: float) -> tuple[Array, Array, Array]:
+        """Place at distances along the element.
+
+        Args:
+            distance: (n,) [m], from 0 to `length`.
+            length: length of the element [m].
+
+        Returns:
+            u (n,) [m], v (n,) [m] and heading (n,) [rad] relative to the start.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Arc:
+    """Constant curvature [1/m], positive left; a line is an arc of curvature 0."""
+
+    curvature: float = 0.0
+
+    def place(self, distance: Array, length: float) -> tuple[Array, Array, Array]:
+        """See `Primitive.place`."""
+        half = 0.5 * self.curvature * distance
+        chord = distance * np.sinc(half / np.pi)  # np.sinc(x) = sin(pi x) / (pi x), exact for curvature 0
+        return chord * np.cos(half), chord * np.sin(half), 2.0 * half
+
+
+@dataclass(frozen=True)
+class Spiral:
+    """Clothoid: curvature [1/m] that changes linearly from `start` to `end`."""
+
+    start: float
+    end: float
+
+    def place(self, distance: Array, length: float) -> tuple[Array, Array, Array]:
+        """See `Primitive.place`."""
+        rate = (self.end - self.start) / length
+
+        def heading(along: Array) -> Array:
+            return along * (self.start + 0.5 * rate * along)
+
+        inner = heading(0.5 * distance[:, None] * (_NODES + 1.0))  # (n, nodes)
+        u = 0.5 * distance * (np.cos(inner) @ _WEIGHTS)
+        v = 0.5 * distance * (np.sin(inner) @ _WEIGHTS)
+        return u, v, heading(distance)
+
+
+@dataclass(frozen=True)
+class Polynomial:
+    """Parametric cubic: u(p) and v(p), coefficients from the constant term up.
+
+    Attributes:
+        u, v: four coefficients each.
+        span: p at the end of the element; None where p is the distance itself (`pRange="arcLength"`).
+        by_arc_length: p runs until the curve is as long as the element (poly3, where p is u itself).
+    """
+
+    u: tuple[float, float, float, float]
+    v: tuple[float, float, float, float]
+    span: float | None = None
+    by_arc_length: bool = False
+
+    def place(self, distance: Array, length: float) -> tuple[Array, Array, Array]:
+        """See `Primitive.place`."""
+        p = distance if self.span is None else self._parameter(distance, length, self.span)
+        slope_u, slope_v = self._slopes(p)
+        powers = p[:, None] ** np.arange(4)
+        return powers @ np.array(self.u), powers @ np.array(self.v), np.arctan2(slope_v, slope_u)
+
+    def _slopes(self, p: Array) -> tuple[Array, Array]:
+        powers = p[:, None] ** np.arange(3) * (1.0, 2.0, 3.0)
+        return powers @ np.array(self.u[1:]), powers @ np.array(self.v[1:])
+
+    def _parameter(self, distance: Array, length: float, span: float) -> Array:
+        """Parameter at a distance along the curve: its arc length, tabulated by Simpson's rule, turned round."""
+        grid = np.linspace(0.0, span, 2 * _ARC_LENGTH_STEPS + 1)
+        speed = np.hypot(*self._slopes(grid))
+        steps = (speed[:-2:2] + 4.0 * speed[1::2] + speed[2::2]) * (grid[2] / 6.0)
+        along = np.concatenate(([0.0], np.cumsum(steps)))
+        # A normalised element is as long as its attribute says: rounding in the file must not open a gap at its end.
+        reach = distance if self.by_arc_length else distance * (along[-1] / length)
+        return np.interp(reach, along, grid[::2])
+
+
+def poly3(a: float, b: float, c: float, d: float, length: float) -> Polynomial:
+    """Element v(u) = a + b u + c u^2 + d u^3; u cannot run further than the element is long."""
+    return Polynomial((0.0, 1.0, 0.0, 0.0), (a, b, c, d), span=length, by_arc_length=True)
+
+
+class ReferenceLine:
+    """Plan view of a road: elements one after another.
+
+    Args:
+        starts: (n, 5) rows of s [m], x [m], y [m], heading [rad] and length [m], in order of s.
+        primitives: n elements.
+    """
+
+    def __init__(self, starts: Array, primitives: Sequence[Primitive]) -> None:
+        self.starts = starts
+        self.primitives = tuple(primitives)
+        self._curvature = np.array([p.curvature if isinstance(p, Arc) else np.nan for p in primitives])
+
+    def place(self, s: Array, pick: Array | None = None) -> tuple[Array, Array, Array]:
+        """Place of the reference line.
+
+        Args:
+            s: distance along the road (n,) [m].
+            pick: where to look for the element that holds (n,) [m]; `s` if not given.
+
+        Returns:
+            x (n,) [m], y (n,) [m], heading (n,) [rad].
+        """
+        index = _holding(self.starts[:, 0], s if pick is None else pick)
+        origin = self.starts[index]
+        distance = s - origin[:, 0]
+        u, v, turned = Arc().place(distance, 0.0)
+        curvature = self._curvature[index]
+        round_ = ~np.isnan(curvature)
+        half = 0.5 * curvature[round_] * distance[round_]
+        chord = distance[round_] * np.sinc(half / np.pi)
+        u[round_], v[round_], turned[round_] = chord * np.cos(half), chord * np.sin(half), 2.0 * half
+        for k in np.unique(index[~round_]):
+            here = index == k
+            u[here], v[here], turned[here] = self.primitives[k].place(distance[here], float(self.starts[k, 4]))
+        c, n = np.cos(origin[:, 3]), np.sin(origin[:, 3])
+        return origin[:, 1] + u * c - v * n, origin[:, 2] + u * n + v * c, origin[:, 3] + turned
+
+
+class Cubics:
+    """A profile along a road: a + b ds + c ds^2 + d ds^3 piece by piece (elevation, lane offset, lane width).
+
+    Args:
+        rows: (n, 5) rows of start [m], a, b, c, d, in order of start; n = 0 gives 0 everywhere.
+    """
+
+    def __init__(self, rows: Array) -> None:
+        self.rows = rows
+        if len(rows) == 1:  # most profiles
+            self._simple = not rows[0, 2:].any()
+        else:
+            self._simple = len(rows) == 0 or not rows[:, 2:].any() and bool(np.all(rows[:, 1] == rows[0, 1]))
+
+    def at(self, s: Array, pick: Array | None = None) -> Array:
+        """Value (n,) at distances (n,) [m]; `pick` as in `ReferenceLine.place`."""
+        if self._simple:
+            return np.full(len(s), self.rows[0, 1] if len(self.rows) else 0.0)
+        row = self.rows[_holding(self.rows[:, 0], s if pick is None else pick)]
+        ds = s - row[:, 0]
+        value: Array = row[:, 1] + ds * (row[:, 2] + ds * (row[:, 3] + ds * row[:, 4]))
+        return value
+
+
+NO_CUBICS = Cubics(np.empty((0, 5)))
+"""The profile that is 0 everywhere, for the many that a file leaves out."""
+
+
+def _holding(starts: Array, s: Array) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    """Index of the piece that holds each s: the last one that starts at or before it."""
+    index: np.ndarray[tuple[int], np.dtype[np.intp]] = np.searchsorted(starts, s, side="right") - 1
+    return np.maximum(index, 0)

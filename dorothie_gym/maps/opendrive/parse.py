@@ -1,0 +1,404 @@
+"""Reading an OpenDRIVE file into records; what cannot be read is one `TownError` with file, element and reason."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import NoReturn, TypeAlias
+
+import numpy as np
+from lxml import etree
+
+from dorothie_gym.maps.errors import TownError
+from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.opendrive.geometry import (
+    NO_CUBICS,
+    Arc,
+    Cubics,
+    Polynomial,
+    Primitive,
+    ReferenceLine,
+    Spiral,
+    poly3,
+)
+from dorothie_gym.maps.opendrive.records import (
+    ConnectionRecord,
+    CrosswalkRecord,
+    LaneRecord,
+    OpenDriveRecords,
+    RoadLink,
+    RoadRecord,
+    SectionRecord,
+    SignalRecord,
+)
+
+# The kind of XML node that lxml calls an element; its stubs name the class with an underscore.
+Element: TypeAlias = etree._Element
+
+# Metres per second in one unit; a limit without a unit is in m/s (OpenDRIVE 1.4, section 5.3.2.2).
+SPEED_UNITS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
+
+# Elements that only group others: they are left out where an element is named.
+_GROUPS = ("left", "right", "center", "lanes", "planView", "signals", "objects")
+
+
+def describe(element: Element) -> str:
+    """Name of an element for a person who looks for it, e.g. `road 12 / laneSection 0 / lane -1`."""
+    parts = []
+    for node in (*reversed(list(element.iterancestors())), element):
+        parent = node.getparent()
+        if parent is None or node.tag in _GROUPS:
+            continue
+        name = node.get("id")
+        if name is None and len(siblings := parent.findall(node.tag)) > 1:
+            name = str(siblings.index(node))
+        parts.append(f"{node.tag} {name}" if name is not None else str(node.tag))
+    where = " / ".join(parts) or str(element.tag)
+    return f"{where} (line {element.sourceline})" if element.sourceline else where
+
+
+class ElementReader:
+    """Reads attributes of a file's elements; whatever is wrong is one `TownError` that names file and element.
+
+    Attributes:
+        source: the file, as its user named it.
+    """
+
+    def __init__(self, source: str) -> None:
+        self.source = source
+
+    def root(self) -> Element:
+        """The outermost element; namespaces are taken off, for OpenDRIVE's names are its own."""
+        parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True)
+        try:
+            text = Path(self.source).read_bytes()
+        except (OSError, ValueError) as error:  # ValueError: a null character in the path
+            reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+            raise TownError(self.source, "file", f"cannot be opened: {reason}") from error
+        try:
+            root = etree.fromstring(text, parser)
+        except etree.XMLSyntaxError as error:
+            line = f"line {error.lineno}" if error.lineno else "file"
+            raise TownError(self.source, line, f"is not complete XML: {error.msg}") from error
+        except ValueError as error:
+            raise TownError(self.source, "file", f"is not XML: {error}") from error
+        if str(root.tag).startswith("{"):
+            for element in root.iter("*"):
+                element.tag = etree.QName(element).localname
+        if root.tag != "OpenDRIVE":
+            self.fail(root, "is not an OpenDRIVE file; its outermost element must be OpenDRIVE")
+        return root
+
+    def fail(self, element: Element, reason: str) -> NoReturn:
+        """Raises the error for an element."""
+        raise TownError(self.source, describe(element), reason)
+
+    def text(self, element: Element, name: str) -> str:
+        """An attribute that has to be there."""
+        text = element.get(name)
+        if text is None:
+            self.fail(element, f"attribute {name} is missing")
+        return text
+
+    def number(self, element: Element, name: str, default: float | None = None) -> float:
+        """A finite number; an attribute that is missing is the default, if there is one."""
+        if default is not None and element.get(name) is None:
+            return default
+        text = self.text(element, name)
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            self.fail(element, f"attribute {name} must be a number, not {text!r}")
+        return value
+
+    def integer(self, element: Element, name: str) -> int:
+        """A whole number that has to be there."""
+        text = self.text(element, name)
+        try:
+            return int(text)
+        except ValueError:
+            self.fail(element, f"attribute {name} must be a whole number, not {text!r}")
+
+    def cubics(self, parent: Element, path: str, start: str) -> Cubics:
+        """A profile: rows of where they start and four coefficients, in order of their starts."""
+        rows = [[self.number(e, name) for name in (start, "a", "b", "c", "d")] for e in parent.iterfind(path)]
+        return Cubics(np.array(sorted(rows, key=lambda row: row[0]))) if rows else NO_CUBICS
+
+    def speed(self, element: Element) -> float | None:
+        """Limit [m/s]; None where the file says that there is none or that it is not known."""
+        if element.get("max", "") in ("no limit", "undefined"):
+            return None
+        unit = element.get("unit") or "m/s"
+        if unit not in SPEED_UNITS:
+            self.fail(element, f"attribute unit must be one of {', '.join(SPEED_UNITS)}, not {unit!r}")
+        limit = self.number(element, "max") * SPEED_UNITS[unit]
+        return limit if limit > 0.0 else None
+
+
+# --- Signals and crosswalks of a road, from their XML elements to records --------------------------------------------
+
+# Where an object's corners may be: in its own frame, or on its road.
+_CORNERS = (("cornerLocal", ("u", "v")), ("cornerRoad", ("s", "t")))
+
+
+def read_signals(reader: ElementReader, road: Element) -> tuple[SignalRecord, ...]:
+    """Signals and references to signals of other roads, in the file's order."""
+    return tuple(_signal(reader, e) for e in road.iterfind("signals/*") if e.tag in ("signal", "signalReference"))
+
+
+def read_crosswalks(reader: ElementReader, road: Element) -> tuple[CrosswalkRecord, ...]:
+    """Objects that are crosswalks and have an outline, or a length and a width."""
+    objects = (e for e in road.iterfind("objects/object") if e.get("type", "").lower() == "crosswalk")
+    return tuple(crossing for e in objects if (crossing := _crosswalk(reader, e)) is not None)
+
+
+def _signal(reader: ElementReader, element: Element) -> SignalRecord:
+    return SignalRecord(
+        id=reader.integer(element, "id"),
+        type=element.get("type", ""),
+        dynamic=element.get("dynamic") == "yes",
+        value=_value(reader, element),
+        s=reader.number(element, "s"),
+        t=reader.number(element, "t", 0.0),
+        z=reader.number(element, "zOffset", 0.0),
+        heading=reader.number(element, "hOffset", 0.0),
+        orientation=element.get("orientation", "none"),
+        lanes=tuple((reader.integer(e, "fromLane"), reader.integer(e, "toLane")) for e in element.iterfind("validity")),
+        reference=element.tag == "signalReference",
+    )
+
+
+def _value(reader: ElementReader, element: Element) -> float | None:
+    """Value of a sign, a limit in m/s; -1 and an empty text say that it has none."""
+    if element.get("value") in (None, "", "-1"):
+        return None
+    value = reader.number(element, "value") * SPEED_UNITS.get(element.get("unit") or "km/h", 1.0)
+    return value if value >= 0.0 else None
+
+
+def _crosswalk(reader: ElementReader, element: Element) -> CrosswalkRecord | None:
+    """The first outline counts: it is the outer one."""
+    for tag, names in _CORNERS:
+        outline = next((o for o in element.iter("outline") if o.find(tag) is not None), None)
+        if outline is not None:
+            corners = np.array([[reader.number(c, name) for name in names] for c in outline.iterfind(tag)])
+            break
+    else:
+        tag, corners = "cornerLocal", _rectangle(reader, element)
+    if len(corners) < 3:
+        return None
+    return CrosswalkRecord(
+        s=reader.number(element, "s"),
+        t=reader.number(element, "t", 0.0),
+        heading=reader.number(element, "hdg", 0.0),
+        corners=_open_ring(corners),
+        on_road=tag == "cornerRoad",
+    )
+
+
+def _rectangle(reader: ElementReader, element: Element) -> Array:
+    """Corners (4, 2) of an object that has only a length and a width; none if it has not even these."""
+    u, v = (0.5 * reader.number(element, name, 0.0) for name in ("length", "width"))
+    return np.array([[-u, -v], [u, -v], [u, v], [-u, v]]) if u > 0.0 and v > 0.0 else np.empty((0, 2))
+
+
+def _open_ring(corners: Array) -> Array:
+    """Outline without the repeated first corner at its end."""
+    return corners[:-1] if len(corners) > 3 and np.allclose(corners[0], corners[-1]) else corners
+
+
+# --- Reading an OpenDRIVE file into records; what cannot be read is one `TownError` with file, element an ------------
+
+# A longer road is a slip of the pen, and would be sampled until memory ends [m].
+LONGEST_ROAD = 100_000.0
+
+# How far behind the end of its road a lane section may start: exporters round [m].
+ROUNDING = 0.1
+
+# Shapes that an element of a reference line may have.
+_SHAPES = ("line", "arc", "spiral", "poly3", "paramPoly3")
+
+
+def parse_opendrive(path: str | Path) -> OpenDriveRecords:
+    """Reads a file into records.
+
+    Raises:
+        TownError: the file is missing, is not OpenDRIVE, breaks off, or has an element that cannot be understood.
+    """
+    return _Parser(str(path)).parse()
+
+
+class _Parser(ElementReader):
+    """Reads roads, where they run, and how they and their lanes are joined."""
+
+    def parse(self) -> OpenDriveRecords:
+        root = self.root()
+        roads: dict[int, RoadRecord] = {}
+        for element in root.iterfind("road"):
+            road = self._road(element)
+            if road.id in roads:
+                self.fail(element, "another road has the same id; give each road its own")
+            roads[road.id] = road
+        if not roads:
+            self.fail(root, "has no roads; export the map again")
+        junctions = {}
+        for element in root.iterfind("junction"):
+            connections = (self._connection(c, roads) for c in element.iterfind("connection"))
+            junctions[self.integer(element, "id")] = tuple(c for c in connections if c is not None)
+        self._check_road_links(root, roads, junctions)
+        return OpenDriveRecords(source=self.source, roads=roads, junctions=junctions)
+
+    def _road(self, road: Element) -> RoadRecord:
+        length = self.number(road, "length")
+        if not 0.0 <= length <= LONGEST_ROAD:
+            self.fail(road, f"attribute length must lie in 0 to {LONGEST_ROAD:g} m, but is {length:g}")
+        return RoadRecord(
+            id=self.integer(road, "id"),
+            length=length,
+            junction=self.integer(road, "junction") if road.get("junction") else -1,
+            right_hand=road.get("rule", "RHT").upper() != "LHT",
+            line=self._line(road),
+            elevation=self.cubics(road, "elevationProfile/elevation", "s"),
+            superelevation=self.cubics(road, "lateralProfile/superelevation", "s"),
+            offset=self.cubics(road, "lanes/laneOffset", "s"),
+            sections=self._sections(road, length),
+            predecessor=self._road_link(road, "predecessor"),
+            successor=self._road_link(road, "successor"),
+            speeds=tuple(
+                (self.number(kind, "s"), speed)
+                for kind in road.iterfind("type")
+                for element in kind.iterfind("speed")
+                if (speed := self.speed(element)) is not None
+            ),
+            signals=read_signals(self, road),
+            crosswalks=read_crosswalks(self, road),
+        )
+
+    def _line(self, road: Element) -> ReferenceLine:
+        starts, primitives = [], []
+        for element in road.iterfind("planView/geometry"):
+            row = [self.number(element, name) for name in ("s", "x", "y", "hdg", "length")]
+            if row[4] < 0.0:
+                self.fail(element, f"attribute length must not be negative, but is {row[4]:g}")
+            shape = next((child for child in element.iterchildren("*") if child.tag != "userData"), None)
+            if shape is None:
+                self.fail(element, f"has no shape; it needs one of {', '.join(_SHAPES)}")
+            starts.append(row)
+            primitives.append(self._primitive(shape, row[4]) if row[4] > 0.0 else Arc())
+        if not primitives:
+            self.fail(road, "has no geometry, so that nobody knows where it runs")
+        table = np.array(starts)
+        order = np.argsort(table[:, 0], kind="stable")
+        return ReferenceLine(table[order], [primitives[k] for k in order])
+
+    def _primitive(self, shape: Element, length: float) -> Primitive:
+        if shape.tag == "line":
+            return Arc()
+        if shape.tag == "arc":
+            return Arc(self.number(shape, "curvature"))
+        if shape.tag == "spiral":
+            return Spiral(self.number(shape, "curvStart"), self.number(shape, "curvEnd"))
+        if shape.tag == "poly3":
+            a, b, c, d = (self.number(shape, name) for name in "abcd")
+            return poly3(a, b, c, d, length)
+        if shape.tag == "paramPoly3":
+            u = tuple(self.number(shape, f"{name}U") for name in "abcd")
+            v = tuple(self.number(shape, f"{name}V") for name in "abcd")
+            span = None if shape.get("pRange") == "arcLength" else 1.0
+            return Polynomial((u[0], u[1], u[2], u[3]), (v[0], v[1], v[2], v[3]), span=span)
+        self.fail(shape, f"unknown geometry {shape.tag}; known are {', '.join(_SHAPES)}")
+
+    def _sections(self, road: Element, length: float) -> tuple[SectionRecord, ...]:
+        elements = road.findall("lanes/laneSection")
+        if not elements:
+            self.fail(road, "has no lane section")
+        starts = [self.number(e, "s") for e in elements]
+        if any(later < earlier for earlier, later in zip(starts, starts[1:], strict=False)):
+            self.fail(road, "its lane sections are not in the order of s")
+        if starts[0] < -ROUNDING or starts[-1] > length + ROUNDING:
+            self.fail(road, f"its lane sections must start between 0 and its length of {length:g} m")
+        ends = [*starts[1:], max(length, starts[-1])]
+        return tuple(
+            SectionRecord(start=start, end=end, lanes={lane.id: lane for lane in map(self._lane, e.iterfind("*/lane"))})
+            for e, start, end in zip(elements, starts, ends, strict=True)
+        )
+
+    def _lane(self, lane: Element) -> LaneRecord:
+        width = self.cubics(lane, "width", "sOffset")
+        record = LaneRecord(
+            id=self.integer(lane, "id"),
+            type=lane.get("type", "none"),
+            width=width,
+            border=self._border(lane) if len(width.rows) == 0 else None,
+            predecessor=self._lane_link(lane, "predecessor"),
+            successor=self._lane_link(lane, "successor"),
+            speeds=tuple(
+                (self.number(e, "sOffset"), speed)
+                for e in lane.iterfind("speed")
+                if (speed := self.speed(e)) is not None
+            ),
+            changes=tuple(str(e.get("laneChange")) for e in lane.iterfind("roadMark") if e.get("laneChange")),
+        )
+        if record.drives and len(width.rows) == 0 and record.border is None:
+            self.fail(lane, "is a driving lane without a width or border element")
+        return record
+
+    def _border(self, lane: Element) -> Cubics | None:
+        border = self.cubics(lane, "border", "sOffset")
+        return border if len(border.rows) else None
+
+    def _lane_link(self, lane: Element, side: str) -> int | None:
+        link = lane.find(f"link/{side}")
+        return None if link is None else self.integer(link, "id")
+
+    def _road_link(self, road: Element, side: str) -> RoadLink | None:
+        """What a road meets; nothing where the file says -1, or a place midway along another road.
+
+        The latter is how a virtual junction (OpenDRIVE 1.6) lets a side road out of a main road, which has no lane that
+        ends there: such a road stays without a way on at that end.
+        """
+        link = road.find(f"link/{side}")
+        if link is None or link.get("elementId") == "-1" or link.get("elementS") is not None:
+            return None
+        is_road = link.get("elementType", "road") == "road"
+        contact = self._contact(link) if is_road else ""
+        return RoadLink(is_road=is_road, id=self.integer(link, "elementId"), contact=contact)
+
+    def _contact(self, element: Element) -> str:
+        contact = self.text(element, "contactPoint")
+        if contact not in ("start", "end"):
+            self.fail(element, f"attribute contactPoint must be start or end, not {contact!r}")
+        return contact
+
+    def _connection(self, element: Element, roads: dict[int, RoadRecord]) -> ConnectionRecord | None:
+        """A connection by a connecting road, or in a direct junction (OpenDRIVE 1.7) straight to the linked road."""
+        direct = element.get("connectingRoad") is None
+        other = "linkedRoad" if direct else "connectingRoad"
+        if element.get(other) is None:
+            return None  # in a virtual junction a connection may lead nowhere
+        incoming, connecting = self.integer(element, "incomingRoad"), self.integer(element, other)
+        for name, road in (("incomingRoad", incoming), (other, connecting)):
+            if road not in roads:
+                self.fail(element, f"attribute {name} refers to road {road}, which is not in the file")
+        return ConnectionRecord(
+            incoming=incoming,
+            connecting=connecting,
+            contact=self._contact(element),
+            lanes=tuple((self.integer(e, "from"), self.integer(e, "to")) for e in element.iterfind("laneLink")),
+            direct=direct,
+        )
+
+    def _check_road_links(
+        self,
+        root: Element,
+        roads: dict[int, RoadRecord],
+        junctions: dict[int, tuple[ConnectionRecord, ...]],
+    ) -> None:
+        for element, road in zip(root.iterfind("road"), roads.values(), strict=True):
+            for side, link in (("predecessor", road.predecessor), ("successor", road.successor)):
+                if link is not None and link.id not in (roads if link.is_road else junctions):
+                    kind = "road" if link.is_road else "junction"
+                    found = element.find(f"link/{side}")
+                    self.fail(element if found is None else found, f"refers to {kind} {link.id}, not in the file")

@@ -1,0 +1,198 @@
+"""No street may touch another one, itself, or a junction that it does not run through, unless it passes above it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NoReturn, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.yaml.arms import Arm
+from dorothie_gym.maps.yaml.courses import Course
+from dorothie_gym.maps.yaml.movements import SMALLEST_RING_TRIM, SMALLEST_TRIM, Way
+from dorothie_gym.maps.yaml.stretches import Crossing, Stretch
+
+Indices: TypeAlias = NDArray[np.int64]
+
+HEADROOM = 4.5
+"""Difference of height from which a street passes above another one [m]."""
+_SPACING = 2.0
+"""Distance between the samples that are compared [m]."""
+_SLACK = 0.5
+"""How much closer than edge to edge roads may come [m]: half a sample to the side of another is less than that off."""
+
+
+def check_crossings(
+    crossings: Sequence[Crossing], arms: Mapping[int, tuple[Arm, ...]], trims: Mapping[tuple[int, bool], float]
+) -> None:
+    """Refuses junctions that overlap.
+
+    Args:
+        crossings: all of them.
+        arms: by id of the crossing.
+        trims: room that each end of a stretch leaves to its crossing [m].
+
+    Raises:
+        TownError: two junctions on one level are closer than the sum of their radii.
+    """
+    radii = {crossing.id: _radius(crossing, arms[crossing.id], trims) for crossing in crossings}
+    for k, crossing in enumerate(crossings):
+        for other in crossings[:k]:
+            gap, mine, its = math.dist(crossing.centre, other.centre), radii[crossing.id], radii[other.id]
+            if other.plan is crossing.plan or abs(crossing.height - other.height) >= HEADROOM:
+                continue
+            if gap < mine + its:
+                crossing.plan.entry.fail(
+                    f"it is {gap:.1f} m from {other.name!r}, closer than their radii of {mine:.1f} m and {its:.1f} m;"
+                    " move them apart or make one junction of them"
+                )
+
+
+def _radius(crossing: Crossing, arms: Sequence[Arm], trims: Mapping[tuple[int, bool], float]) -> float:
+    """How far a crossing reaches to all sides [m]; the long corners of ramps and on rings are left to `clearance`."""
+    if crossing.on_ring:
+        return SMALLEST_RING_TRIM
+    if any(arm.street.ramp for arm in arms):
+        return SMALLEST_TRIM
+    return max(trims[arm.stretch, arm.at_start] for arm in arms)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Samples:
+    """Points on the middles of roads, those of stretches first, then those of crossings.
+
+    Attributes:
+        points: where they are (n, 3) [m].
+        before, after: distance along the road from its start and to its end (n,) [m].
+        reach: half the width of the road (n,) [m].
+        pavement: width of its pavements (n,) [m].
+        owner: index of the stretch, or of the crossing and the number of stretches more (n,).
+    """
+
+    points: Array
+    before: Array
+    after: Array
+    reach: Array
+    pavement: Array
+    owner: Indices
+
+
+def check_clearance(
+    crossings: Sequence[Crossing],
+    stretches: Sequence[Stretch],
+    courses: Sequence[Course],
+    ways: Mapping[int, tuple[Way, ...]],
+) -> None:
+    """Compares all roads and ways through crossings with one another.
+
+    Raises:
+        TownError: two of them touch on one level that do not meet there.
+    """
+    samples = _samples(crossings, stretches, courses, ways)
+    # What is wider apart than two of the widest roads cannot touch.
+    farthest = 2.0 * float(samples.reach.max() + samples.pavement.max())
+    pairs = cKDTree(samples.points[:, :2]).query_pairs(farthest, output_type="ndarray")
+    a, b = np.ascontiguousarray(pairs.T)
+    x, y, z = np.ascontiguousarray(samples.points.T)
+    dx, dy, dz = x[a] - x[b], y[a] - y[b], z[a] - z[b]
+    room = samples.reach[a] + samples.reach[b] + np.maximum(samples.pavement[a], samples.pavement[b]) - _SLACK
+    near = (dx**2 + dy**2 < room**2) & (np.abs(dz) < HEADROOM)
+    pairs, room = pairs[near], room[near]
+    touching = pairs[~_may_be_near(samples, crossings, stretches, pairs, room)]
+    if len(touching):
+        _refuse(crossings, stretches, samples, touching[0])
+
+
+def _may_be_near(
+    samples: _Samples, crossings: Sequence[Crossing], stretches: Sequence[Stretch], pairs: Indices, room: Array
+) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Which pairs (n, 2) of samples belong together: they follow each other, or meet at a crossing."""
+    place = {crossing.id: k for k, crossing in enumerate(crossings)}
+    nowhere = [-1] * len(crossings)
+    starts = np.array([*(place[stretch.start.id] for stretch in stretches), *nowhere])
+    ends = np.array([*(place[stretch.end.id] for stretch in stretches), *nowhere])
+    first, second = samples.owner[pairs].T
+    a, b = pairs.T
+    # Samples of one stretch are near each other for as long as a half circle of its width.
+    fine = (first == second) & (
+        (first >= len(stretches)) | (np.abs(samples.before[a] - samples.before[b]) < 2.0 * room)
+    )
+    # Stretches that meet at a crossing were trimmed there; corner to corner they are closer than side to side.
+    for tips_a, from_a in ((starts, samples.before), (ends, samples.after)):
+        for tips_b, from_b in ((starts, samples.before), (ends, samples.after)):
+            meet = (tips_a[first] == tips_b[second]) & (tips_a[first] >= 0)
+            fine |= meet & (from_a[a] < room) & (from_b[b] < room)
+    # A crossing touches its own arms, and others on the same ring.
+    plans = np.array([*[-1] * len(stretches), *(crossing.plan.id for crossing in crossings)])
+    fine |= (plans[first] == plans[second]) & (plans[first] >= 0)
+    for one, other in ((first, second), (second, first)):
+        crossing = one - len(stretches)
+        fine |= (crossing >= 0) & ((starts[other] == crossing) | (ends[other] == crossing))
+    result: np.ndarray[tuple[int], np.dtype[np.bool_]] = fine
+    return result
+
+
+def _refuse(crossings: Sequence[Crossing], stretches: Sequence[Stretch], samples: _Samples, pair: Indices) -> NoReturn:
+    """Raises the error of two samples that touch."""
+    first, second = sorted((int(k) for k in samples.owner[pair]), reverse=True)
+    place = [round(float(c)) for c in samples.points[pair[0], :2]]
+    if first < len(stretches):
+        stretch, other = stretches[first], stretches[second]
+        if first == second:
+            stretch.street.entry.fail(f"{stretch.label()} it runs into itself near {place}; move its points apart")
+        stretch.street.entry.fail(
+            f"{stretch.label()} it touches street {other.street.name!r} near {place}; put a junction there, move one of"
+            f" them away, or lead one {HEADROOM:g} m above the other"
+        )
+    crossing = crossings[first - len(stretches)]
+    if second >= len(stretches):
+        crossing.plan.entry.fail(
+            f"the ways through it touch those through {crossings[second - len(stretches)].name!r} near {place}; move"
+            " them apart"
+        )
+    stretches[second].street.entry.fail(
+        f"{stretches[second].label()} it runs over junction {crossing.name!r} without naming it; name it in the"
+        f" course, keep away, or pass {HEADROOM:g} m above or below"
+    )
+
+
+def _samples(
+    crossings: Sequence[Crossing],
+    stretches: Sequence[Stretch],
+    courses: Sequence[Course],
+    ways: Mapping[int, tuple[Way, ...]],
+) -> _Samples:
+    """Samples of all stretches, then of all crossings: along the ways through them, and their centres."""
+    rows = []  # each (n, 8): the attributes in their order
+
+    def add(places: Array, along: Array, height: Array, *, half: float, pavement: float, owner: int) -> None:
+        rest = np.tile((half, pavement, float(owner)), (len(places), 1))
+        rows.append(np.column_stack((places, height, along, along[-1] - along, rest)))
+
+    for k, (stretch, course) in enumerate(zip(stretches, courses, strict=True)):
+        section = stretch.section
+        places, along = course.path.every(_SPACING, (section.right - section.left) / 2.0)
+        half = (section.right + section.left) / 2.0
+        add(places, along, course.heights.at(along), half=half, pavement=stretch.street.sidewalk, owner=k)
+    for k, crossing in enumerate(crossings, start=len(stretches)):
+        half = SMALLEST_RING_TRIM if crossing.on_ring else SMALLEST_TRIM
+        height = np.full(1, crossing.height)
+        add(np.array([crossing.centre]), np.zeros(1), height, half=half, pavement=0.0, owner=k)
+        for way in ways[crossing.id]:
+            places, along = way.path.every(_SPACING)
+            half = way.movement.target.street.width / 2.0
+            add(places, along, np.full(len(places), crossing.height), half=half, pavement=0.0, owner=k)
+    table = np.concatenate(rows)
+    return _Samples(
+        points=table[:, :3],
+        before=table[:, 3],
+        after=table[:, 4],
+        reach=table[:, 5],
+        pavement=table[:, 6],
+        owner=table[:, 7].astype(np.int64),
+    )

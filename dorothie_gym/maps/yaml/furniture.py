@@ -1,0 +1,280 @@
+"""Crosswalks at crossings and pavements beside streets."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from dorothie_gym.maps.model import Array, Crosswalk, Junction, Lane, LaneLink, Sidewalk, Signal, SignalKind, Site
+from dorothie_gym.maps.traffic_light_programs import derive_programmes, yellow_time
+from dorothie_gym.maps.traffic_lights import LightPhase, LightProgramme
+from dorothie_gym.maps.yaml.arms import Approach, find_slips
+from dorothie_gym.maps.yaml.geometry import Point, wrap
+from dorothie_gym.maps.yaml.layout import Layout
+from dorothie_gym.maps.yaml.nodes import Entry
+from dorothie_gym.maps.yaml.plan import GreenPlan, LightsPlan, StreetPlan
+from dorothie_gym.maps.yaml.stretches import Crossing
+
+CROSSWALK_SPAN = (0.5, 3.5)
+"""A crosswalk lies between these distances beyond the ends of the lanes, towards the junction [m]."""
+CROSSWALK_ASIDE = 0.5
+"""A crosswalk reaches this far beyond the edges of the road [m]."""
+
+
+def crosswalks(layout: Layout, approaches: Callable[[Crossing], Sequence[Approach]]) -> tuple[Crosswalk, ...]:
+    """One for each arm of the street at the junction, across all of its lanes and its median."""
+    found: list[Crosswalk] = []
+    for name, street in layout.plan.crosswalks:
+        for crossing in layout.crossings_of(name):
+            for approach in approaches(crossing):
+                if approach.arm.street is street:
+                    found.append(Crosswalk(id=len(found), outline=_outline(approach)))
+    return tuple(found)
+
+
+def _outline(approach: Approach) -> Array:
+    """Corners (4, 2) of the crosswalk across an arm [m], clockwise from the left one next to the lanes."""
+    outgoing, incoming = approach.outgoing, approach.through
+    # Any lane will do to measure from: seen outwards, each ends as far from the centre as the others.
+    lane = outgoing[0] if outgoing else incoming[0]
+    x, y = lane.points[0 if outgoing else -1, :2]
+    heading = float(lane.headings[0]) if outgoing else float(lane.headings[-1]) + math.pi
+    arm = approach.arm
+    offset = arm.outgoing[0].offset if outgoing else arm.incoming[0].offset
+    left, right = -arm.left - offset - CROSSWALK_ASIDE, arm.right - offset + CROSSWALK_ASIDE
+    pavement = arm.street.sidewalk
+    outward, sideways = (
+        np.array((math.cos(heading), math.sin(heading))),
+        np.array((-math.sin(heading), math.cos(heading))),
+    )
+    near, far = CROSSWALK_SPAN
+    corners = ((near, left + pavement), (near, right - pavement), (far, right - pavement), (far, left + pavement))
+    return np.array([np.array((x, y)) - ahead * outward + aside * sideways for ahead, aside in corners])
+
+
+def sidewalks(layout: Layout) -> tuple[Sidewalk, ...]:
+    """Pavements beside every stretch whose street has them: right of its course, then left of it.
+
+    A ring has one on its outer side only, which is the right one; nobody walks on its island.
+    """
+    found: list[Sidewalk] = []
+    for stretch, course in zip(layout.stretches, layout.courses, strict=True):
+        street, width = stretch.street, stretch.street.sidewalk
+        if width > 0.0:
+            right, left = stretch.section.right + width / 2.0, -stretch.section.left - width / 2.0
+            for offset in (right, left) if stretch.arc is None else (right,):
+                points = course.beside(offset)
+                found.append(Sidewalk(id=len(found), points=points, width=width, street=layout.numbers[street.id]))
+    return tuple(found)
+
+
+# --- Lights and signs at the approaches of crossings, and the programmes of the lights -------------------------------
+
+SIGNAL_HEIGHT = 3.0
+"""A light or a sign is this high above the road [m]."""
+SIGNAL_ASIDE, MEDIAN_ASIDE = 1.0, 0.5
+"""It stands this far from the edge of the lane at the kerb, and from that of a left-turn lane in the median [m]."""
+CLEARANCE_TIME = 2.0
+"""Between written phases: how long after their yellow all lights that change are red [s]."""
+
+
+def place_signals(
+    layout: Layout,
+    approaches: Callable[[Crossing], Sequence[Approach]],
+    lanes: Sequence[Lane],
+    links: Sequence[LaneLink],
+    junctions: Sequence[Junction],
+) -> tuple[tuple[Signal, ...], tuple[LightProgramme, ...]]:
+    """Places all signals of a town and makes the programmes of its lights.
+
+    A lit approach has one light for all lanes but its left-turn lane, which has its own. Approaches have stop and yield
+    signs where the plan says so; those of ramps that join and of streets onto roundabouts have yield signs if nothing
+    else rules them.
+
+    Args:
+        layout: the layout.
+        approaches: tells the arms of a crossing with their lanes.
+        lanes: lanes of the town.
+        links: links between them.
+        junctions: its junctions.
+
+    Raises:
+        TownError: a written programme names lights that are not there, or leaves one without green.
+    """
+    signals: list[Signal] = []
+    heads: dict[str, list[_Head]] = {}
+    for crossing in layout.crossings:
+        kinds = _kinds(layout, crossing)
+        for approach in approaches(crossing):
+            kind = kinds.get(approach.arm.index)
+            if kind is not None and approach.through:
+                placed = _heads(approach, kind, len(signals))
+                signals.extend(head.signal for head in placed)
+                heads.setdefault(crossing.name, []).extend(placed)
+    return tuple(signals), _programmes(layout, heads, (lanes, links, junctions))
+
+
+@dataclass(frozen=True)
+class _Head:
+    """A signal, the street at whose approach it stands, and whether it rules the left-turn lane alone."""
+
+    signal: Signal
+    street: StreetPlan
+    left: bool
+
+
+def _kinds(layout: Layout, crossing: Crossing) -> dict[int, SignalKind]:
+    """What stands at the arms of a crossing, by index of the arm."""
+    arms, plan, name = layout.arms[crossing.id], layout.plan, crossing.plan.name
+    if any(lights.junction == name for lights in plan.lights):
+        return {arm.index: SignalKind.TRAFFIC_LIGHT for arm in arms}
+    kinds = {arm.index: SignalKind.YIELD for arm in arms if crossing.on_ring and not arm.on_ring}
+    kinds.update({index: SignalKind.YIELD for index in find_slips(crossing, arms) if arms[index].incoming})
+    for kind, signs in ((SignalKind.YIELD, plan.yields), (SignalKind.STOP, plan.stops)):
+        for junction, street in signs:
+            if junction == name:
+                kinds.update({arm.index: kind for arm in arms if arm.street is street})
+    return kinds
+
+
+def _heads(approach: Approach, kind: SignalKind, number: int) -> list[_Head]:
+    """The signals of an approach, the first of them with id `number`."""
+    street, through, pocket = approach.arm.street, approach.through, approach.pocket
+    kerb = through[0]
+    aside = kerb.widths[-1] / 2.0 + SIGNAL_ASIDE
+    if kind is not SignalKind.TRAFFIC_LIGHT or pocket is None:
+        return [_Head(_signal(number, kind, approach.incoming, kerb, aside), street, left=False)]
+    middle = -pocket.widths[-1] / 2.0 - MEDIAN_ASIDE
+    return [
+        _Head(_signal(number, kind, through, kerb, aside), street, left=False),
+        _Head(_signal(number + 1, kind, (pocket,), pocket, middle), street, left=True),
+    ]
+
+
+def _signal(number: int, kind: SignalKind, rules: Sequence[Lane], beside: Lane, aside: float) -> Signal:
+    """A signal to the right of the end of a lane; it faces the cars that come."""
+    x, y = beside.position(beside.length, aside)
+    return Signal(
+        id=number,
+        kind=kind,
+        position=(float(x), float(y), float(beside.points[-1, 2]) + SIGNAL_HEIGHT),
+        heading=wrap(beside.heading_at(beside.length) + math.pi),
+        lanes=tuple(lane.id for lane in rules),
+    )
+
+
+def _programmes(
+    layout: Layout,
+    heads: Mapping[str, Sequence[_Head]],
+    town: tuple[Sequence[Lane], Sequence[LaneLink], Sequence[Junction]],
+) -> tuple[LightProgramme, ...]:
+    """Written programmes, and derived ones where nothing is written, in the order of the junctions."""
+    ids = {junction.name: junction.id for junction in layout.plan.junctions.values()}
+    written = {ids[p.junction]: _written(p, ids[p.junction], heads[p.junction]) for p in layout.plan.lights if p.phases}
+    offsets = {ids[p.junction]: p.offset for p in layout.plan.lights if p.offset}
+    lit = [head.signal for p in layout.plan.lights if not p.phases for head in heads[p.junction]]
+    derived = derive_programmes(*town, sorted(lit, key=lambda signal: signal.id)) if lit else ()
+    programmes = written | {
+        programme.junction_id: replace(programme, offset=offsets.get(programme.junction_id, programme.offset))
+        for programme in derived
+    }
+    return tuple(programmes[junction] for junction in sorted(programmes))
+
+
+def _written(plan: LightsPlan, junction_id: int, heads: Sequence[_Head]) -> LightProgramme:
+    """The programme of written phases, with yellow and a clearance between them for the lights that change."""
+    greens = [_greens(plan, phase, heads) for phase in plan.phases]
+    for head in heads:
+        if not any(head.signal.id in green for green in greens):
+            which = "left-turn lane" if head.left else "light"
+            plan.entry.fail(f"the {which} of {head.street.name!r} never has green; add its street to a phase")
+    phases: list[LightPhase] = []
+    for phase, green, after in zip(plan.phases, greens, (*greens[1:], greens[0]), strict=True):
+        phases.append(LightPhase(duration=phase.seconds, green=green))
+        stay = tuple(signal for signal in green if signal in after)
+        if len(stay) < len(green):
+            yellow = tuple(signal for signal in green if signal not in after)
+            fastest = max(head.street.speed for head in heads if head.signal.id in yellow) / 3.6
+            phases.append(LightPhase(duration=yellow_time(fastest), green=stay, yellow=yellow))
+            phases.append(LightPhase(duration=CLEARANCE_TIME, green=stay))
+    return LightProgramme(
+        junction_id=junction_id,
+        signals=tuple(head.signal.id for head in heads),
+        phases=tuple(phases),
+        offset=plan.offset,
+    )
+
+
+def _greens(plan: LightsPlan, phase: GreenPlan, heads: Sequence[_Head]) -> tuple[int, ...]:
+    """Ids of the signals that are green in a phase."""
+    for name in (*phase.streets, *phase.left_only):
+        left_only = name in phase.left_only
+        if not any(head.street.name == name and (head.left or not left_only) for head in heads):
+            what = "left-turn lane" if left_only else "approach"
+            plan.entry.fail(f"a phase gives green to {name!r}, which has no {what} here; name another street")
+    return tuple(
+        head.signal.id
+        for head in heads
+        if (head.street.name in phase.streets and head.street.name not in phase.left_only)
+        or (head.left and head.street.name in phase.left_only)
+    )
+
+
+# --- Places for landmarks that the plan names, each reached from the street beside it --------------------------------
+
+FARTHEST_SITE = 25.0
+"""A landmark stands at most this far from the lane at its kerb [m]."""
+_SPACING = 1.0
+"""Distance between the places on lanes that are compared [m]."""
+_STOP_ROOM = 1.0
+"""A waypoint is this far from the ends of its lane, at least [m]."""
+
+
+def place_sites(places: Sequence[tuple[Point, Entry]], lanes: Sequence[Lane]) -> tuple[Site, ...]:
+    """Finds the nearest lane at a kerb for each place.
+
+    Raises:
+        TownError: a place is too far from every street, on a road, or nearest to a junction.
+    """
+    points, owner = [], []
+    for lane in lanes:
+        stations = np.linspace(0.0, lane.length, max(2, int(lane.length / _SPACING) + 2))
+        points.append(np.column_stack([np.interp(stations, lane.stations, lane.points[:, k]) for k in (0, 1)]))
+        owner.append(np.full(len(stations), lane.id))
+    tree, owners = cKDTree(np.concatenate(points)), np.concatenate(owner)
+    outermost: dict[tuple[int, bool], int] = {}
+    for lane in lanes:
+        side = lane.road_id, lane.lane_id > 0
+        outermost[side] = max(outermost.get(side, 0), abs(lane.lane_id))
+    sites: list[Site] = []
+    for place, entry in places:
+        lane = lanes[int(owners[tree.query(place)[1]])]
+        station, aside = lane.project(np.array(place))
+        kerb = abs(lane.lane_id) == outermost[lane.road_id, lane.lane_id > 0] and not lane.in_junction
+        _check(entry, lane, station, aside, kerb=kerb)
+        x, y = lane.position(station)
+        sites.append(
+            Site(
+                id=len(sites),
+                lane=lane.id,
+                station=station,
+                position=(float(place[0]), float(place[1])),
+                waypoint=(float(x), float(y)),
+                street=lane.street,
+            )
+        )
+    return tuple(sites)
+
+
+def _check(entry: Entry, lane: Lane, station: float, aside: float, *, kerb: bool) -> None:
+    if abs(aside) > FARTHEST_SITE:
+        entry.fail(f"it is {abs(aside):.1f} m from the nearest street; {FARTHEST_SITE:g} m are possible: move it")
+    if abs(aside) < lane.width_at(station) / 2.0 + 0.5:
+        entry.fail("it stands on the road; move it aside")
+    if not kerb or aside < 0.0 or not _STOP_ROOM <= station <= lane.length - _STOP_ROOM:
+        what = "a junction" if lane.in_junction or kerb and aside > 0.0 else "a median"
+        entry.fail(f"the nearest place to stop for it would be {what}; move it to the side of a street")

@@ -1,0 +1,263 @@
+"""Plane curves made of straight lines and circular arcs: exact offsets, cuts and connections, sampled at the end.
+
+Same frame as the town: x east, y south, headings clockwise, curvature positive where the curve bends to the right.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from dorothie_gym.maps.model import Array
+
+Point: TypeAlias = tuple[float, float]
+Pose: TypeAlias = tuple[float, float, float]
+"""x, y [m], heading [rad]."""
+
+CHORD_ERROR = 0.01
+"""Largest distance between a sampled curve and the true one [m]."""
+CURVE_SPACING, LINE_SPACING = 2.0, 20.0
+"""Largest distance between samples on arcs and on straights [m]."""
+LINE_GUARD = 1.0
+"""A straight has samples this close to its ends [m], so that headings taken from samples do not smear into it."""
+CLOSEST = 0.1
+"""Samples are not closer than this [m]: where ends are joined, a rounding error must not turn the last step."""
+_STRAIGHT = 1e-9  # [1/m] curvatures below this are lines; at 1 km they are 0.5 mm off
+_TINY = 1e-6  # [m] pieces shorter than this are left out
+
+
+def wrap(angle: float) -> float:
+    """The same angle in [-pi, pi) [rad]."""
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A line or an arc: where it starts [m, m, rad], how long it is [m], and its curvature [1/m]."""
+
+    x: float
+    y: float
+    heading: float
+    length: float
+    curvature: float = 0.0
+
+    def at(self, s: float) -> Pose:
+        """Pose at a distance along the piece [m]."""
+        heading = self.heading + self.curvature * s
+        if abs(self.curvature) < _STRAIGHT:
+            return self.x + s * math.cos(self.heading), self.y + s * math.sin(self.heading), heading
+        return (
+            self.x + (math.sin(heading) - math.sin(self.heading)) / self.curvature,
+            self.y - (math.cos(heading) - math.cos(self.heading)) / self.curvature,
+            heading,
+        )
+
+    def reversed(self) -> Piece:
+        """The same piece, driven the other way."""
+        x, y, heading = self.at(self.length)
+        return Piece(x, y, heading + math.pi, self.length, -self.curvature)
+
+    def offset(self, right: float) -> Piece:
+        """The parallel piece a distance to the right [m]; the distance must be smaller than the radius on that side."""
+        scale = 1.0 - self.curvature * right
+        x = self.x - right * math.sin(self.heading)
+        y = self.y + right * math.cos(self.heading)
+        return Piece(x, y, self.heading, self.length * scale, self.curvature / scale)
+
+    def points(self, s: Array) -> Array:
+        """Places (n, 2) [m] at distances (n,) along the piece [m]."""
+        if abs(self.curvature) < _STRAIGHT:
+            return np.column_stack((self.x + s * math.cos(self.heading), self.y + s * math.sin(self.heading)))
+        heading = self.heading + self.curvature * s
+        x = self.x + (np.sin(heading) - math.sin(self.heading)) / self.curvature
+        y = self.y - (np.cos(heading) - math.cos(self.heading)) / self.curvature
+        return np.column_stack((x, y))
+
+    def samples(self, line_spacing: float) -> Array:
+        """Distances (n,) along the piece [m], both ends included, close enough together for the spacings above."""
+        if abs(self.curvature) >= _STRAIGHT:
+            spacing = min(CURVE_SPACING, math.sqrt(8.0 * CHORD_ERROR / abs(self.curvature)))
+            return np.linspace(0.0, self.length, max(3, math.ceil(self.length / spacing) + 1))
+        if self.length <= 3.0 * LINE_GUARD:
+            return np.array([0.0, self.length / 2.0, self.length])
+        inner = self.length - 2.0 * LINE_GUARD
+        steps = np.linspace(LINE_GUARD, self.length - LINE_GUARD, math.ceil(inner / line_spacing) + 1)
+        return np.concatenate(([0.0], steps, [self.length]))
+
+
+@dataclass(frozen=True)
+class Path:
+    """Pieces one after the other, each starting where the one before ends and with its heading."""
+
+    pieces: tuple[Piece, ...]
+
+    @property
+    def length(self) -> float:
+        """Length of the path [m]."""
+        return sum(piece.length for piece in self.pieces)
+
+    @property
+    def start(self) -> Pose:
+        """Pose at the start."""
+        return self.pieces[0].at(0.0)
+
+    @property
+    def end(self) -> Pose:
+        """Pose at the end."""
+        return self.pieces[-1].at(self.pieces[-1].length)
+
+    @property
+    def smallest_radius(self) -> float:
+        """Radius of the tightest arc [m], infinite where there is none."""
+        return 1.0 / max(max((abs(piece.curvature) for piece in self.pieces), default=0.0), 1e-12)
+
+    def part(self, start: float, end: float) -> Path:
+        """What lies between two distances along the path [m]."""
+        pieces, begin = [], 0.0
+        for piece in self.pieces:
+            low, high = max(start - begin, 0.0), min(end - begin, piece.length)
+            if high - low > _TINY:
+                pieces.append(Piece(*piece.at(low), high - low, piece.curvature))
+            begin += piece.length
+        return Path(tuple(pieces))
+
+    def sample(self, right: float = 0.0, *, line_spacing: float = LINE_SPACING) -> tuple[Array, Array]:
+        """Points on the parallel path a distance to the right, its ends included.
+
+        Args:
+            right: distance [m]; it must be smaller than every radius on that side.
+            line_spacing: largest distance between points on straights [m].
+
+        Returns:
+            The points (n, 2), and how far along this path each of them lies (n,) [m].
+        """
+        points, stations, begin = [], [], 0.0
+        for k, piece in enumerate(self.pieces):
+            beside = piece.offset(right)
+            s = beside.samples(line_spacing)[min(k, 1) :]
+            points.append(beside.points(s))
+            stations.append(begin + s * (piece.length / beside.length))
+            begin += piece.length
+        table = np.column_stack((np.concatenate(points), np.concatenate(stations)))
+        table = table[_apart(table[:, :2])]
+        return table[:, :2], table[:, 2]
+
+    def every(self, spacing: float, right: float = 0.0) -> tuple[Array, Array]:
+        """The same as `sample`, at points that are nowhere further apart than `spacing` on this path [m]."""
+        points, stations, begin = [], [], 0.0
+        for piece in self.pieces:
+            s = np.linspace(0.0, piece.length, math.ceil(piece.length / spacing) + 1)
+            beside = piece.offset(right)
+            points.append(beside.points(s * (beside.length / piece.length)))
+            stations.append(begin + s)
+            begin += piece.length
+        return np.concatenate(points), np.concatenate(stations)
+
+
+def _apart(points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Which of points (n, 2) to keep so that none but the ends follows close on the one before it."""
+    close = np.hypot(*np.diff(points, axis=0).T) < CLOSEST
+    keep = np.concatenate(([True], ~close))
+    keep[-1] = True
+    if close[-1] and len(points) > 2:
+        keep[-2] = False
+    return keep
+
+
+def line(a: Point, b: Point) -> Piece:
+    """The straight from one point to another."""
+    return Piece(a[0], a[1], math.atan2(b[1] - a[1], b[0] - a[0]), math.dist(a, b))
+
+
+def turn_at(a: Point, b: Point, c: Point) -> float:
+    """Change of heading at the middle one of three points [rad], positive to the right."""
+    return wrap(line(b, c).heading - line(a, b).heading)
+
+
+def rounded(points: Sequence[Point], radii: Sequence[float]) -> Path:
+    """The polyline through `points` with each inner point replaced by an arc.
+
+    Args:
+        points: at least two, no two successive ones equal [m].
+        radii: radius of the arc at each inner point [m]; the arcs must fit into the legs.
+    """
+    pieces: list[Piece] = []
+    here = points[0]
+    for k, radius in enumerate(radii, start=1):
+        turn = turn_at(points[k - 1], points[k], points[k + 1])
+        tangent = radius * math.tan(abs(turn) / 2.0)
+        leg = line(here, points[k])
+        pieces.append(Piece(leg.x, leg.y, leg.heading, leg.length - tangent))
+        x, y, heading = pieces[-1].at(pieces[-1].length)
+        pieces.append(Piece(x, y, heading, radius * abs(turn), math.copysign(1.0 / radius, turn)))
+        here = pieces[-1].at(pieces[-1].length)[:2]
+    pieces.append(line(here, points[-1]))
+    return Path(tuple(piece for piece in pieces if piece.length > _TINY))
+
+
+def bend_stations(points: Sequence[Point], radii: Sequence[float]) -> list[float]:
+    """How far along the `rounded` polyline the middles of its bends lie [m]."""
+    stations, here = list[float](), 0.0
+    shortened = 0.0  # what the bend before takes of the leg
+    for k, radius in enumerate(radii, start=1):
+        turn = abs(turn_at(points[k - 1], points[k], points[k + 1]))
+        tangent = radius * math.tan(turn / 2.0)
+        here += math.dist(points[k - 1], points[k]) - shortened - tangent
+        stations.append(here + radius * turn / 2.0)
+        here, shortened = here + radius * turn, tangent
+    return stations
+
+
+def connect(entry: Pose, exit_: Pose) -> Path:
+    """A smooth way from one pose to another: line-arc-line where it exists, else two arcs.
+
+    No way that turns to one side only is gentler than the one with a single arc; two arcs may be, but where there is
+    one they swing out to the other side first.
+    """
+    return _fillet(entry, exit_) or _biarc(entry, exit_)
+
+
+def _fillet(entry: Pose, exit_: Pose) -> Path | None:
+    """One arc between the lines through the two poses, if they meet ahead of the first and behind the second."""
+    turn = wrap(exit_[2] - entry[2])
+    if abs(math.sin(turn)) < 1e-3:  # as good as parallel
+        return None
+    dx, dy = exit_[0] - entry[0], exit_[1] - entry[1]
+    before = (dx * math.sin(exit_[2]) - dy * math.cos(exit_[2])) / math.sin(turn)
+    after = (dy * math.cos(entry[2]) - dx * math.sin(entry[2])) / math.sin(turn)
+    if min(before, after) < _TINY:
+        return None
+    corner = (entry[0] + before * math.cos(entry[2]), entry[1] + before * math.sin(entry[2]))
+    radius = min(before, after) / math.tan(abs(turn) / 2.0)
+    return rounded((entry[:2], corner, exit_[:2]), (radius,))
+
+
+def _biarc(entry: Pose, exit_: Pose) -> Path:
+    """Two arcs with equal tangent lengths (Bolton, "Biarc curves", Computer-Aided Design 7(2), 1975)."""
+    dx, dy = exit_[0] - entry[0], exit_[1] - entry[1]
+    tx, ty, ux, uy = math.cos(entry[2]), math.sin(entry[2]), math.cos(exit_[2]), math.sin(exit_[2])
+    along, bend, square = dx * (tx + ux) + dy * (ty + uy), 2.0 * (1.0 - tx * ux - ty * uy), dx * dx + dy * dy
+    if bend < 1e-9:
+        tangent = square / (2.0 * along)
+    else:
+        tangent = (-along + math.sqrt(along * along + bend * square)) / bend
+    middle = (
+        (entry[0] + exit_[0] + tangent * (tx - ux)) / 2.0,
+        (entry[1] + exit_[1] + tangent * (ty - uy)) / 2.0,
+    )
+    first = _arc_to(entry, middle)
+    second = _arc_to(first.at(first.length), exit_[:2])
+    return Path((first, second))
+
+
+def _arc_to(start: Pose, end: Point) -> Piece:
+    """The arc that leaves a pose and ends in a point."""
+    chord = line(start[:2], end)
+    half = wrap(chord.heading - start[2])
+    if abs(half) < 1e-9:
+        return Piece(*start, chord.length)
+    return Piece(*start, chord.length * half / math.sin(half), 2.0 * math.sin(half) / chord.length)

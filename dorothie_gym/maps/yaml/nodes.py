@@ -1,0 +1,282 @@
+"""Typed access to YAML nodes, where every mistake names the file, the line, the key and what to do."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+import yaml
+
+from dorothie_gym.maps.errors import TownError
+
+_NULL, _BOOL, _MERGE = (f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "merge"))
+_PLAIN_NUMBER = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?")
+"""What counts as a number: YAML 1.1 also reads 017 as 15, 12:30 as 750 and 1_0 as 10, which nobody means here."""
+_LISTED, _LONGEST = 12, 60
+"""How many known names a message lists, and how many characters of a value it shows."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A place in a YAML file.
+
+    Attributes:
+        source: the file, for messages.
+        element: what the place is called in messages ("street 'High Street'").
+        node: what stands there.
+    """
+
+    source: str
+    element: str
+    node: yaml.Node
+
+    @property
+    def line(self) -> int:
+        """Line in the file, counted from 1."""
+        return int(self.node.start_mark.line) + 1
+
+    def fail(self, reason: str) -> NoReturn:
+        """Raises the `TownError` of this place."""
+        raise TownError(self.source, f"line {self.line}, {self.element}", reason)
+
+    def named(self, element: str) -> Entry:
+        """The same place under another name."""
+        return Entry(self.source, element, self.node)
+
+    def _child(self, node: yaml.Node, element: str) -> Entry:
+        return Entry(self.source, element, node)
+
+    @property
+    def is_mapping(self) -> bool:
+        """Whether keys and values stand here."""
+        return isinstance(self.node, yaml.MappingNode)
+
+    @property
+    def is_sequence(self) -> bool:
+        """Whether a list stands here."""
+        return isinstance(self.node, yaml.SequenceNode)
+
+    def items(self, expected: str) -> list[tuple[Entry, Entry]]:
+        """Keys and values, in the order of the file; `expected` says in messages what should stand here."""
+        if not isinstance(self.node, yaml.MappingNode):
+            self.fail(f"this must be {expected}, not {self.shown()}")
+        pairs, seen = [], dict[str, int]()
+        for key_node, value in self.node.value:
+            key = self._child(key_node, self.element)
+            if key_node.tag == _MERGE:
+                key.fail("merge keys (<<) are not read; write the keys out")
+            name = key.text("a name before the colon")
+            if name in seen:
+                key.fail(f"{name!r} is there twice (first in line {seen[name]}); rename or remove one")
+            seen[name] = key.line
+            pairs.append((key, self._child(value, f"{self.element}, {name}")))
+        return pairs
+
+    def fields(self, allowed: Collection[str], required: Collection[str]) -> dict[str, Entry]:
+        """Values of a mapping with known keys."""
+        found = {}
+        for key, value in self.items(f"keys and values ({', '.join(allowed)})"):
+            name = key.text("a name")
+            if name not in allowed:
+                guess = closest(name, allowed)
+                advice = f"did you mean {guess!r}?" if guess else "remove it"
+                key.fail(f"unknown key {name!r}; known keys are {', '.join(allowed)}; {advice}")
+            found[name] = value
+        for name in required:
+            if name not in found:
+                self.fail(f"the key {name!r} is missing; add it")
+        return found
+
+    def elements(self, expected: str) -> list[Entry]:
+        """Elements of a list; `expected` says in messages what should stand here."""
+        if not isinstance(self.node, yaml.SequenceNode):
+            self.fail(f"this must be {expected}, not {self.shown()}")
+        return [self._child(node, self.element) for node in self.node.value]
+
+    def names(self, expected: str) -> list[Entry]:
+        """Elements of a list of names, which may be one name short of its brackets by mistake."""
+        if isinstance(self.node, yaml.ScalarNode) and self.node.value.strip():
+            self.fail(f"this must be {expected}, not {self.shown()}; put it into brackets: [{self.node.value}]")
+        return self.elements(expected)
+
+    def pair(self, expected: str) -> tuple[Entry, Entry]:
+        """Elements of a list of two."""
+        elements = self.elements(expected)
+        if len(elements) != 2:
+            self.fail(f"this must be {expected}, not a list of {len(elements)}")
+        return elements[0], elements[1]
+
+    def text(self, expected: str) -> str:
+        """A text of one line as it is written, without spaces around it: `No` or `12` are fine as names."""
+        node = self.node
+        if not isinstance(node, yaml.ScalarNode):
+            self.fail(f"this must be {expected}, not {self.shown()}")
+        value = str(node.value).strip()
+        if not value:
+            self.fail(f"this must be {expected}, not {self.shown()}; write one")
+        if node.tag == _NULL:
+            self.fail(f"this must be {expected}; {value} is YAML's word for nothing: put it into quotes, '{value}'")
+        if not value.isprintable():
+            self.fail(f"this must be {expected} on a single line of plain characters, not {self.shown()}")
+        return value
+
+    def choice(self, known: Collection[str], what: str, expected: str) -> str:
+        """One of the known names; `what` is what is named (junction, street)."""
+        name = self.text(expected)
+        if name not in known:
+            guess = closest(name, known)
+            advice = f"; did you mean {guess!r}?" if guess else ""
+            self.fail(f"unknown {what} {name!r}; known are {listed(known)}{advice}")
+        return name
+
+    def number(self, low: float, high: float, unit: str) -> float:
+        """A number in [low, high], in plain decimal digits."""
+        expected = f"a number of {unit} from {low:g} to {high:g}"
+        node = self.node
+        if not isinstance(node, yaml.ScalarNode) or not str(node.value).strip():
+            self.fail(f"this must be {expected}, not {self.shown()}")
+        value = str(node.value)
+        if not _PLAIN_NUMBER.fullmatch(value):
+            digits = "; write it in plain decimal digits (12.5)" if value[:1] in set("+-.0123456789") else ""
+            self.fail(f"this must be {expected}, not {self.shown()}{digits}")
+        if node.style:  # None or '' (libyaml) where it is plain
+            self.fail(f"this must be {expected}, not a text; remove the quotes around {value}")
+        if not low <= float(value) <= high:
+            self.fail(f"this must be {expected}, not {self.shown()}")
+        return float(value) + 0.0  # -0.0 is 0.0
+
+    def whole(self, low: int, high: int, what: str) -> int:
+        """A whole number in [low, high] of what is counted."""
+        value = self.number(low, high, what)
+        if not value.is_integer():
+            self.fail(f"this must be a whole number of {what} from {low} to {high}, not {self.shown()}")
+        return int(value)
+
+    def boolean(self) -> bool:
+        """True or false, in any of YAML's spellings."""
+        node = self.node
+        if not isinstance(node, yaml.ScalarNode) or node.tag != _BOOL:
+            self.fail(f"this must be true or false, not {self.shown()}")
+        return str(node.value).lower() in ("true", "yes", "on")
+
+    def shown(self) -> str:
+        """What stands here, for messages."""
+        if self.is_mapping:
+            return "keys and values"
+        if self.is_sequence:
+            return f"a list of {len(self.node.value)}"
+        value = str(self.node.value)
+        if self.node.tag == _NULL or not value.strip():
+            return "nothing"
+        return repr(value if len(value) <= _LONGEST else f"{value[:_LONGEST]}...")
+
+
+def closest(name: str, known: Iterable[str]) -> str | None:
+    """The known name that is most like `name`, whatever its capitals, or None where none comes near."""
+    by_folded = {other.casefold(): other for other in known}
+    found = difflib.get_close_matches(name.casefold(), list(by_folded), n=1)
+    return by_folded[found[0]] if found else None
+
+
+def listed(names: Collection[str]) -> str:
+    """Names in a row for a message, the first dozen of them."""
+    if not names:
+        return "none"
+    rest = len(names) - _LISTED
+    return ", ".join(list(names)[:_LISTED]) + (f" and {rest} more" if rest > 0 else "")
+
+
+# --- A town file as text: found, decoded and parsed, or refused with the line and what to do -------------------------
+
+LARGEST_FILE = 1_000_000
+"""A file with more bytes is no town: a city of 500 lanes takes 10 kB."""
+DEEPEST = 20
+"""Lists within lists; the town language needs 7. libyaml overflows the stack of the process where they are many."""
+_UNPRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")
+"""Characters that YAML does not allow (YAML 1.1, section 4.1.1), and byte order marks in the middle of a file."""
+_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+"""libyaml's where PyYAML has it: the same lines in the marks, 15 times faster (16 ms instead of 300 ms for 60 kB)."""
+
+
+def read_nodes(path: Path) -> Entry:
+    """The top of a YAML file.
+
+    Raises:
+        TownError: the file cannot be read, is no text, is empty or is not YAML.
+    """
+    source = str(path)
+    text = _text(path, source)
+    found = _UNPRINTABLE.search(text)
+    if found:
+        _fail(source, text.count("\n", 0, found.start()), f"is not YAML: character {found[0]!r} is in it; remove it")
+    try:
+        _check_events(text, source)
+        node = yaml.compose(text, Loader=_LOADER)
+    except yaml.MarkedYAMLError as error:
+        _explain(error, text, source)
+    if node is None or (isinstance(node, yaml.ScalarNode) and not node.value):
+        raise TownError(source, "file", "is empty; give it junctions and streets")
+    return Entry(source, "town", node)
+
+
+def _fail(source: str, line: int, reason: str) -> NoReturn:
+    """Raises the error of a line, which is counted from 0 as YAML's marks are."""
+    raise TownError(source, f"line {line + 1}", reason)
+
+
+def _text(path: Path, source: str) -> str:
+    try:
+        if path.exists() and not path.is_file():  # a pipe would wait for ever
+            what = "a directory" if path.is_dir() else "no regular file"
+            raise TownError(source, "file", f"cannot be read: it is {what}; name a town file (.yaml)")
+        if path.stat().st_size > LARGEST_FILE:
+            raise TownError(source, "file", f"is larger than {LARGEST_FILE // 1000} kB; name a town file (.yaml)")
+        data = path.read_bytes()
+    except OSError as error:
+        raise TownError(source, "file", f"cannot be read ({error.strerror}); check the path") from error
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start)
+        _fail(source, line, f"is not UTF-8 text (byte {error.start} of the file); save the file as UTF-8")
+
+
+def _check_events(text: str, source: str) -> None:
+    """Refuses what would hang or crash the composer, or hide a mistake: depth, aliases, further documents."""
+    depth, documents = 0, 0
+    for event in yaml.parse(text, Loader=_LOADER):
+        line = event.start_mark.line if event.start_mark else 0
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+            if depth > DEEPEST:
+                _fail(source, line, f"lists are nested more than {DEEPEST} deep; check the brackets")
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        elif isinstance(event, yaml.AliasEvent):
+            _fail(source, line, f"the alias *{event.anchor} stands for text elsewhere; write the text out instead")
+        elif isinstance(event, yaml.DocumentStartEvent):
+            documents += 1
+            if documents > 1:
+                _fail(source, line, "a second document starts here ('---'); keep one town in a file")
+
+
+def _explain(error: yaml.MarkedYAMLError, text: str, source: str) -> NoReturn:
+    """Raises a parser's error in words of the file."""
+    lines = text.splitlines() or [""]
+    mark = error.problem_mark or error.context_mark
+    line = min(mark.line if mark else 0, len(lines) - 1)
+    context = str(error.context or "")
+    if error.context_mark and ("flow" in context or "quoted" in context):
+        what = "the quote" if "quoted" in context else "the bracket"
+        comma = "" if "quoted" in context else ", or a comma is missing after it"
+        reason = f"is not YAML: {what} that opens here is not closed before line {line + 1}{comma}"
+        line = min(error.context_mark.line, len(lines) - 1)
+    elif "\t" in lines[line][: len(lines[line]) - len(lines[line].lstrip())]:
+        reason = "is not YAML: the line is indented with a tab; use spaces"
+    else:
+        reason = f"is not YAML ({error.problem}); check brackets, colons and indents here and in the line above"
+    raise TownError(source, f"line {line + 1}", reason) from error

@@ -1,0 +1,287 @@
+"""The town language: what a YAML town may say, read into a checked plan.
+
+The whole language is told in docs/towns.md. What is checked here needs no geometry: keys, types, ranges, names, and
+whether things that are named together go together; whether it all fits into its place is the layout's question.
+
+A village::
+
+    name: village                  # optional, else the file's name
+    speed: 40                      # km/h, optional
+    junctions:                     # metres, x east, y south
+      green: [0, 0]
+      pond: [150, 0]
+    streets:                       # through junctions and plain points, which bend the street
+      High Street: [green, pond]
+      Mill Lane: {through: [green, [0, 90], [150, 90], pond], speed: 30, width: 3.25, radius: 30}
+      Back Lane: [green, [0, -90], [150, -90], pond]
+    lights: [green]
+    crosswalks: [[pond, High Street]]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TypeAlias
+
+from dorothie_gym.maps.yaml.geometry import Point
+from dorothie_gym.maps.yaml.nodes import Entry, listed, read_nodes
+from dorothie_gym.maps.yaml.plan import Bend, GreenPlan, JunctionPlan, LightsPlan, RoundaboutPlan, StreetPlan, TownPlan
+from dorothie_gym.maps.yaml.streets import (
+    StreetDefaults,
+    approaches,
+    lane_width,
+    pavement,
+    point,
+    read_street,
+    speed,
+    told,
+)
+
+LIGHTS_KEYS = ("at", "offset", "phases")
+PHASE_KEYS = ("green", "left", "seconds")
+SECONDS = (3.0, 300.0)
+"""Length of a phase [s]."""
+OFFSET = (0.0, 600.0)
+"""Start of a programme [s]."""
+
+Junctions: TypeAlias = Mapping[str, JunctionPlan]
+Pairs: TypeAlias = tuple[tuple[str, StreetPlan], ...]
+
+
+def read_lights(entry: Entry, junctions: Junctions, streets: Sequence[StreetPlan]) -> tuple[LightsPlan, ...]:
+    """Reads the traffic lights, each a junction's name or a mapping.
+
+    Raises:
+        TownError: with the line and what to do.
+    """
+    lights: dict[str, LightsPlan] = {}
+    for element in entry.names("a list of junctions"):
+        plan = _lights(element, junctions, streets)
+        if plan.junction in lights:
+            first = lights[plan.junction].entry.line
+            element.fail(f"{plan.junction!r} is there twice (first in line {first}); remove one")
+        lights[plan.junction] = plan
+    return tuple(lights.values())
+
+
+def read_signs(
+    stops: Entry | None,
+    yields: Entry | None,
+    junctions: Junctions,
+    streets: Sequence[StreetPlan],
+    lights: Sequence[LightsPlan],
+) -> tuple[Pairs, Pairs]:
+    """Reads the stop signs and the yield signs.
+
+    Raises:
+        TownError: with the line and what to do.
+    """
+    lit = {plan.junction: plan.entry.line for plan in lights}
+    found: tuple[Pairs, ...] = ()
+    for entry in (stops, yields):
+        pairs = _pairs(entry, junctions, streets) if entry else ()
+        for element, name, street in pairs:
+            if junctions[name].roundabout:
+                element.fail(f"the entries of roundabout {name!r} have yield signs by themselves; remove this one")
+            if name in lit:
+                element.fail(f"{name!r} has lights (line {lit[name]}); remove this sign or the lights")
+            if not approaches(street, name):
+                element.fail(f"{street.name!r} only leaves {name!r} (it is one-way); remove the sign or name another")
+            if found and (name, street) in found[0]:
+                element.fail(f"{street.name!r} has a stop sign at {name!r} already; remove one of the two")
+        found += (tuple((name, street) for _, name, street in pairs),)
+    return found[0], found[1]
+
+
+def read_crosswalks(entry: Entry, junctions: Junctions, streets: Sequence[StreetPlan]) -> Pairs:
+    """Reads the crosswalks.
+
+    Raises:
+        TownError: with the line and what to do.
+    """
+    pairs = _pairs(entry, junctions, streets)
+    for element, _, street in pairs:
+        if street.ramp:
+            element.fail(f"{street.name!r} is a ramp, which nobody crosses on foot; remove it or name another street")
+    return tuple((name, street) for _, name, street in pairs)
+
+
+def _pairs(
+    entry: Entry, junctions: Junctions, streets: Sequence[StreetPlan]
+) -> tuple[tuple[Entry, str, StreetPlan], ...]:
+    """Pairs [junction, street] and where they are written."""
+    by_name = {street.name: street for street in streets}
+    found: dict[tuple[str, str], Entry] = {}
+    for element in entry.elements("a list of [junction, street]"):
+        first, second = element.pair("[junction, street], each pair in its own brackets")
+        name = first.choice(junctions, "junction", "the name of a junction")
+        street = second.choice(by_name, "street", "the name of a street")
+        if name not in by_name[street].course:
+            here = [other.name for other in streets if name in other.course]
+            second.fail(f"{street!r} does not run through {name!r}; name a street that does: {listed(here)}")
+        if (name, street) in found:
+            element.fail(f"it is there twice (first in line {found[name, street].line}); remove one")
+        found[name, street] = element
+    return tuple((element, name, by_name[street]) for (name, street), element in found.items())
+
+
+def _lights(entry: Entry, junctions: Junctions, streets: Sequence[StreetPlan]) -> LightsPlan:
+    fields = entry.fields(LIGHTS_KEYS, required=("at",)) if entry.is_mapping else {}
+    at = fields.get("at", entry).named(entry.element)
+    name = at.choice(junctions, "junction", "the name of a junction")
+    if junctions[name].roundabout:
+        at.fail(f"{name!r} is a roundabout, which has no lights but yield signs; remove it here")
+    offset = fields["offset"].number(*OFFSET, "seconds") if "offset" in fields else 0.0
+    phases = _phases(fields["phases"], name, streets) if "phases" in fields else ()
+    return LightsPlan(junction=name, phases=phases, offset=offset, entry=entry)
+
+
+def _phases(entry: Entry, junction: str, streets: Sequence[StreetPlan]) -> tuple[GreenPlan, ...]:
+    entry = entry.named(f"lights at {junction!r}")
+    here = {street.name: street for street in streets if junction in street.course}
+    phases = tuple(
+        _phase(element, junction, here, streets) for element in entry.elements("a list of phases {green, seconds}")
+    )
+    if not phases:
+        entry.fail("there is no phase; add one, or remove the key to have them laid out")
+    waiting = [
+        name
+        for name, street in here.items()
+        if approaches(street, junction) and not any(name in phase.streets for phase in phases)
+    ]
+    if waiting:
+        entry.fail(f"{waiting[0]!r} never gets green; name it in the 'green' of a phase")
+    return phases
+
+
+def _phase(entry: Entry, junction: str, here: Mapping[str, StreetPlan], streets: Sequence[StreetPlan]) -> GreenPlan:
+    fields = entry.fields(PHASE_KEYS, required=("seconds",))
+    green = _green(fields["green"], junction, here, streets) if "green" in fields else ()
+    left = _green(fields["left"], junction, here, streets) if "left" in fields else ()
+    if not green and not left:
+        entry.fail("the phase names no street; add 'green: [...]' or 'left: [...]'")
+    for name in left:
+        if junction not in here[name].turn_lanes:
+            fields["left"].fail(
+                f"{name!r} has no turn lane at {junction!r}; add it to the 'turn_lanes' of the street,"
+                " or name the street in 'green'"
+            )
+        if name in green:
+            fields["left"].fail(
+                f"{name!r} is in the 'green' of this phase already, turn lanes included; remove it here"
+            )
+    return GreenPlan(streets=green, left_only=left, seconds=fields["seconds"].number(*SECONDS, "seconds"))
+
+
+def _green(
+    entry: Entry, junction: str, here: Mapping[str, StreetPlan], streets: Sequence[StreetPlan]
+) -> tuple[str, ...]:
+    found: list[str] = []
+    for element in entry.names("a list of streets"):
+        name = element.choice([street.name for street in streets], "street", "the name of a street")
+        if name not in here:
+            element.fail(f"{name!r} does not run through {junction!r}; name a street that does: {listed(list(here))}")
+        if not approaches(here[name], junction):
+            element.fail(f"{name!r} only leaves {junction!r} (it is one-way) and needs no green; remove it")
+        if name in found:
+            element.fail(f"{name!r} is there twice; remove one")
+        found.append(name)
+    return tuple(found)
+
+
+# --- The town language: what a YAML town may say, read into a checked plan -------------------------------------------
+
+TOWN_KEYS = (
+    "name", "speed", "width", "sidewalk", "junctions", "streets", "lights", "stops", "yields", "crosswalks", "sites",
+)  # fmt: skip
+JUNCTION_KEYS = ("at", "roundabout", "lanes", "speed")
+ROUNDABOUT_SPEED = 30.0
+"""Speed limit on a roundabout where none is given [km/h], if the town's own is not lower."""
+ROUNDABOUT_RADIUS = (8.0, 150.0)
+"""Radius of a ring's middle line [m]."""
+ROUNDABOUT_LANES = (1, 3)
+
+
+def read_plan(path: Path) -> TownPlan:
+    """Reads a town file.
+
+    Raises:
+        TownError: with the file, the line, the element, and what to do.
+    """
+    top = read_nodes(path)
+    fields = {key: value.named(key) for key, value in top.fields(TOWN_KEYS, required=("junctions", "streets")).items()}
+    defaults = StreetDefaults()
+    for key, read in (("speed", speed), ("width", lane_width), ("sidewalk", pavement)):
+        if key in fields:
+            defaults = defaults.replaced(key, read(fields[key]))
+    junctions = _junctions(fields["junctions"], defaults)
+    streets = tuple(
+        read_street(k, key, value, junctions, defaults)
+        for k, (key, value) in enumerate(fields["streets"].items("streets by name, each a list of junctions"))
+    )
+    if not streets:
+        fields["streets"].fail("there is no street; add one")
+    lights = read_lights(fields["lights"], junctions, streets) if "lights" in fields else ()
+    stops, yields = read_signs(fields.get("stops"), fields.get("yields"), junctions, streets, lights)
+    return TownPlan(
+        name=fields["name"].text("a name") if "name" in fields else path.stem,
+        junctions=junctions,
+        streets=streets,
+        lights=lights,
+        stops=stops,
+        yields=yields,
+        crosswalks=read_crosswalks(fields["crosswalks"], junctions, streets) if "crosswalks" in fields else (),
+        sites=_sites(fields["sites"]) if "sites" in fields else (),
+    )
+
+
+def _junctions(entry: Entry, defaults: StreetDefaults) -> dict[str, JunctionPlan]:
+    junctions: dict[str, JunctionPlan] = {}
+    for k, (key, value) in enumerate(entry.items("junctions by name, each [x, y]")):
+        name = key.text("a name")
+        here = key.named(f"junction {name!r}")
+        place, roundabout = _junction(value.named(here.element), defaults)
+        height = place.height or 0.0
+        for other in junctions.values():
+            if (other.centre, other.height) == (place.at, height):
+                here.fail(f"it is at the same place as {other.name!r} (line {other.entry.line}); move or remove one")
+        junctions[name] = JunctionPlan(
+            id=k, name=name, centre=place.at, height=height, roundabout=roundabout, entry=here
+        )
+    if not junctions:
+        entry.fail("there is no junction; add one")
+    return junctions
+
+
+def _junction(entry: Entry, defaults: StreetDefaults) -> tuple[Bend, RoundaboutPlan | None]:
+    """Where a junction is, and its ring."""
+    if not entry.is_mapping:
+        return point(entry), None
+    element = entry.element
+    fields = entry.fields(JUNCTION_KEYS, required=("at",))
+    place = point(fields["at"])
+    if "roundabout" not in fields:
+        for key in ("lanes", "speed"):
+            if key in fields:
+                fields[key].named(element).fail(f"{key!r} is for roundabouts; remove it, or add 'roundabout: 30'")
+        return place, None
+    lanes, limit = fields.get("lanes"), fields.get("speed")
+    return place, RoundaboutPlan(
+        radius=fields["roundabout"].number(*ROUNDABOUT_RADIUS, "metres"),
+        lanes=lanes.whole(*ROUNDABOUT_LANES, "lanes") if lanes else 1,
+        speed=speed(limit) if limit else min(ROUNDABOUT_SPEED, defaults.speed),
+    )
+
+
+def _sites(entry: Entry) -> tuple[tuple[Point, Entry], ...]:
+    sites: dict[Point, Entry] = {}
+    for element in entry.elements("a list of points [x, y] in metres"):
+        bend = point(element, flat=True)
+        place = bend.at
+        if place in sites:
+            element.fail(f"{told(bend)} is there twice (first in line {sites[place].line}); remove one")
+        sites[place] = element
+    if not sites:
+        entry.fail("there is no site; add one, or remove the key to have them laid out")
+    return tuple(sites.items())

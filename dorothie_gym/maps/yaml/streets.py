@@ -1,0 +1,188 @@
+"""The `streets` of a town file: courses through junctions and points, lanes, medians, turn lanes and ramps."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from dorothie_gym.maps.yaml.nodes import Entry
+from dorothie_gym.maps.yaml.plan import Bend, JunctionPlan, Step, StreetPlan
+
+STREET_KEYS = (
+    "through", "lanes", "one_way", "ramp", "median", "turn_lanes", "speed", "width", "radius", "sidewalk",
+)  # fmt: skip
+SPEED = (5.0, 130.0)
+"""Speed limits [km/h]."""
+WIDTH = (2.5, 6.0)
+"""Of a lane [m]."""
+SIDEWALK = (0.0, 10.0)
+"""Of a pavement [m]."""
+MEDIAN = (0.0, 50.0)
+"""Between the directions [m]."""
+LANES = (1, 4)
+"""In one direction."""
+RADIUS = (1.0, 20_000.0)
+"""Of a street's bends [m]."""
+FAR = 20_000.0
+"""Coordinates are not larger than this [m]."""
+HEIGHT = (-500.0, 9000.0)
+"""From the shore of the Dead Sea to the top of Everest [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StreetDefaults:
+    """What a street has where neither it nor the town says otherwise: speed limit [km/h], widths [m]."""
+
+    speed: float = 40.0
+    width: float = 3.5
+    sidewalk: float = 2.0
+
+    def replaced(self, key: str, value: float) -> StreetDefaults:
+        """The same but for one value."""
+        return dataclasses.replace(self, **{key: value})
+
+
+def speed(entry: Entry) -> float:
+    """A speed limit [km/h]."""
+    return entry.number(*SPEED, "km/h")
+
+
+def lane_width(entry: Entry) -> float:
+    """The width of a lane [m]."""
+    return entry.number(*WIDTH, "metres")
+
+
+def pavement(entry: Entry) -> float:
+    """The width of a pavement [m]."""
+    return entry.number(*SIDEWALK, "metres")
+
+
+def point(entry: Entry, *, flat: bool = False) -> Bend:
+    """A point [x, y] or, if not `flat`, [x, y, height] [m]."""
+    expected = "a point [x, y] in metres" if flat else "a point [x, y] or [x, y, height] in metres"
+    numbers = entry.elements(expected)
+    if len(numbers) not in ((2,) if flat else (2, 3)):
+        entry.fail(f"this must be {expected}, not {entry.shown()}")
+    x, y = (number.number(-FAR, FAR, "metres") for number in numbers[:2])
+    return Bend(at=(x, y), height=numbers[2].number(*HEIGHT, "metres of height") if len(numbers) == 3 else None)
+
+
+def read_street(
+    k: int, key: Entry, value: Entry, junctions: Mapping[str, JunctionPlan], defaults: StreetDefaults
+) -> StreetPlan:
+    """Reads the street with number `k`.
+
+    Raises:
+        TownError: with the line, the street and what to do.
+    """
+    name = key.text("a name")
+    here = key.named(f"street {name!r}")
+    if name in junctions and junctions[name].roundabout:
+        here.fail("the ring of the roundabout of this name is a street of that name already; give this one another")
+    value = value.named(here.element)
+    fields = value.fields(STREET_KEYS, required=("through",)) if value.is_mapping else {}
+    course = _course(fields.get("through", value).named(here.element), junctions)
+    ramp = "ramp" in fields and fields["ramp"].boolean()
+    forward, backward = _lanes(fields, ramp=ramp)
+    width = lane_width(fields["width"]) if "width" in fields else defaults.width
+    median = fields["median"].number(*MEDIAN, "metres") if "median" in fields else 0.0
+    if not backward and median:
+        fields["median"].fail("a median keeps two directions apart and this street has one; remove it")
+    turn_lanes: tuple[str, ...] = ()
+    if "turn_lanes" in fields:
+        turn_lanes = _turn_lanes(fields["turn_lanes"], course, junctions)
+        _check_room(fields["turn_lanes"], backward=backward, median=median, width=width)
+    return StreetPlan(
+        id=k,
+        name=name,
+        course=course,
+        forward=forward,
+        backward=backward,
+        median=median,
+        turn_lanes=turn_lanes,
+        ramp=ramp,
+        speed=speed(fields["speed"]) if "speed" in fields else defaults.speed,
+        width=width,
+        radius=fields["radius"].number(*RADIUS, "metres") if "radius" in fields else None,
+        sidewalk=pavement(fields["sidewalk"]) if "sidewalk" in fields else 0.0 if ramp else defaults.sidewalk,
+        entry=here,
+    )
+
+
+def approaches(street: StreetPlan, junction: str) -> bool:
+    """Whether a direction of the street leads to the junction (a one-way street only leaves the one it starts at)."""
+    return junction in street.course[1:] or (street.backward > 0 and junction in street.course[:-1])
+
+
+def _course(entry: Entry, junctions: Mapping[str, JunctionPlan]) -> tuple[Step, ...]:
+    course: list[Step] = []
+    for element in entry.elements("a list of junctions and points that it runs through"):
+        step: Step = (
+            point(element)
+            if element.is_sequence
+            else element.choice(junctions, "junction", "the name of a junction or a point [x, y]")
+        )
+        if course and course[-1] == step:
+            element.fail(f"{told(step)} comes twice in a row; remove one")
+        course.append(step)
+    if len(course) < 2:
+        entry.fail("it runs nowhere; name at least the two junctions where it starts and ends")
+    for end, where in ((course[0], "starts"), (course[-1], "ends")):
+        if not isinstance(end, str):
+            entry.fail(f"it {where} at {told(end)}, which is no junction: dead ends are not supported; name a junction")
+    return tuple(course)
+
+
+def told(step: Step) -> str:
+    """A step of a course, for messages."""
+    return repr(step) if isinstance(step, str) else f"[{step.at[0]:g}, {step.at[1]:g}]"
+
+
+def _lanes(fields: Mapping[str, Entry], *, ramp: bool) -> tuple[int, int]:
+    """Lanes along the course and against it."""
+    one_way = fields["one_way"].boolean() if "one_way" in fields else ramp
+    if ramp and not one_way:
+        fields["one_way"].fail("a ramp has one direction; remove this key, or the key 'ramp'")
+    lanes = fields.get("lanes")
+    if lanes is None:
+        return 1, 0 if one_way else 1
+    if not lanes.is_sequence:
+        count = lanes.whole(*LANES, "lanes in one direction")
+        return count, 0 if one_way else count
+    if one_way:
+        kind = "a ramp" if ramp else "a one-way street"
+        lanes.fail(
+            f"{kind} has no lanes backward; write one number, or remove the key '{'ramp' if ramp else 'one_way'}'"
+        )
+    forward, backward = (
+        count.whole(*LANES, "lanes in one direction (a street with one direction: one_way: true)")
+        for count in lanes.pair("a number of lanes, or [forward, backward]")
+    )
+    return forward, backward
+
+
+def _turn_lanes(entry: Entry, course: tuple[Step, ...], junctions: Mapping[str, JunctionPlan]) -> tuple[str, ...]:
+    found: list[str] = []
+    on_course = list(dict.fromkeys(step for step in course if isinstance(step, str)))
+    for element in entry.names("a list of junctions"):
+        name = element.choice(junctions, "junction", "the name of a junction")
+        if name not in on_course:
+            element.fail(f"the street does not run through {name!r}; it does through {', '.join(on_course)}")
+        if junctions[name].roundabout:
+            element.fail(f"{name!r} is a roundabout, where nobody turns left; remove it here")
+        if name in found:
+            element.fail(f"{name!r} is there twice; remove one")
+        found.append(name)
+    return tuple(found)
+
+
+def _check_room(entry: Entry, *, backward: int, median: float, width: float) -> None:
+    """Turn lanes lie in the median."""
+    if not backward:
+        entry.fail("a one-way street has no median for turn lanes; remove them, or the key 'one_way' or 'ramp'")
+    if median < width:
+        entry.fail(
+            f"turn lanes lie in the median, which is {median:g} m wide and the lanes are {width:g} m;"
+            f" write 'median: {width:g}' or more"
+        )

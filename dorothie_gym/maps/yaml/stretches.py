@@ -1,0 +1,186 @@
+"""Streets cut into stretches at the crossings that they run through."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from dorothie_gym.maps.yaml.geometry import Piece, Point, line
+from dorothie_gym.maps.yaml.plan import Bend, JunctionPlan, StreetPlan, TownPlan
+
+
+@dataclass(frozen=True, eq=False)
+class CrossSection:
+    """The cross-section of a street, seen along its course; offsets are positive to the right [m].
+
+    A two-way street has its median in the middle of the line, a one-way street the middle of its lanes.
+    """
+
+    street: StreetPlan
+
+    @cached_property
+    def forward(self) -> tuple[float, ...]:
+        """Offsets of the lanes along the course, innermost first [m]."""
+        street = self.street
+        inner = street.median / 2.0 if street.backward else -street.forward * street.width / 2.0
+        return tuple(inner + (k + 0.5) * street.width for k in range(street.forward))
+
+    @cached_property
+    def backward(self) -> tuple[float, ...]:
+        """Offsets of the lanes against the course, innermost first [m]."""
+        street = self.street
+        return tuple(-street.median / 2.0 - (k + 0.5) * street.width for k in range(street.backward))
+
+    @property
+    def right(self) -> float:
+        """Distance from the line to the edge of the road on its right [m]."""
+        return self.forward[-1] + self.street.width / 2.0
+
+    @property
+    def left(self) -> float:
+        """Distance from the line to the edge of the road on its left [m]."""
+        return self.street.width / 2.0 - (self.backward[-1] if self.backward else self.forward[0])
+
+    @property
+    def pocket(self) -> float:
+        """Offset of the left-turn lane that opens in the median for the lanes along the course [m]."""
+        return (self.street.median - self.street.width) / 2.0
+
+    def edge(self, to_the_right: bool) -> float:
+        """Distance from the line to the edge of the road on one side [m]."""
+        return self.right if to_the_right else self.left
+
+    def side(self, to_the_right: bool) -> float:
+        """Distance from the line to the outer end of the pavement on one side [m]."""
+        return self.edge(to_the_right) + self.street.sidewalk
+
+    def tightest(self, to_the_right: bool, lane_radius: float) -> float:
+        """Radius that the line needs in a bend to one side so that the lane inside still has `lane_radius` [m]."""
+        edge = self.edge(to_the_right)
+        # The pavement needs a little radius of its own, too.
+        return max(lane_radius + edge - self.street.width / 2.0, edge + max(self.street.sidewalk, 0.5) + 0.5)
+
+
+# --- Streets cut into stretches at the crossings that they run through -----------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Crossing:
+    """Where stretches meet: a junction, or the place where one street meets the ring of a roundabout.
+
+    Attributes:
+        id: of the town's junction.
+        name: of the junction; on a ring with a number ("circus/1").
+        centre: [m].
+        height: [m].
+        plan: the junction as it is written.
+    """
+
+    id: int
+    name: str
+    centre: Point
+    height: float
+    plan: JunctionPlan
+
+    @property
+    def on_ring(self) -> bool:
+        """Whether it is a part of a roundabout."""
+        return self.plan.roundabout is not None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stretch:
+    """A piece of street from one crossing to the next.
+
+    Attributes:
+        street: the street it belongs to.
+        section: its lanes.
+        start, end: crossings.
+        corners: polyline from centre to centre [m]; on a ring its two ends.
+        heights: of the corners, None where the height follows on [m].
+        arc: the piece of a ring that it is, from centre to centre, or None.
+    """
+
+    street: StreetPlan
+    section: CrossSection
+    start: Crossing
+    end: Crossing
+    corners: tuple[Point, ...]
+    heights: tuple[float | None, ...]
+    arc: Piece | None = None
+
+    def label(self) -> str:
+        """What it is called in messages."""
+        return f"between {self.start.name!r} and {self.end.name!r}"
+
+    def crossing(self, at_start: bool) -> Crossing:
+        """The crossing at one of its ends."""
+        return self.start if at_start else self.end
+
+    def leg(self, at_start: bool) -> Piece:
+        """Its first piece, seen from the crossing at one of its ends outwards."""
+        if self.arc is not None:
+            return self.arc if at_start else self.arc.reversed()
+        return line(*self.corners[:2]) if at_start else line(self.corners[-1], self.corners[-2])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """A stretch before roundabouts are laid out: its street, its two junctions, and the points between."""
+
+    street: StreetPlan
+    start: JunctionPlan
+    end: JunctionPlan
+    bends: tuple[Bend, ...]
+
+    def junction(self, at_start: bool) -> JunctionPlan:
+        """The junction at one of its ends."""
+        return self.start if at_start else self.end
+
+    def towards(self, at_start: bool) -> Point:
+        """The point next to the junction at one of its ends [m]."""
+        points = [self.start.centre, *(bend.at for bend in self.bends), self.end.centre]
+        return points[1] if at_start else points[-2]
+
+
+def split(plan: TownPlan) -> list[Run]:
+    """Cuts the streets of a plan at their junctions.
+
+    Raises:
+        TownError: two points of a course are as good as the same.
+    """
+    return [run for street in plan.streets for run in _runs(street, plan.junctions)]
+
+
+def _runs(street: StreetPlan, junctions: Mapping[str, JunctionPlan]) -> list[Run]:
+    runs, bends = list[Run](), list[Bend]()
+    start = junctions[str(street.course[0])]
+    for step in street.course[1:]:
+        if isinstance(step, Bend):
+            bends.append(step)
+            continue
+        end = junctions[step]
+        runs.append(Run(street=street, start=start, end=end, bends=tuple(bends)))
+        _check_points(runs[-1])
+        start, bends = end, []
+    return runs
+
+
+def _check_points(run: Run) -> None:
+    points = [run.start.centre, *(bend.at for bend in run.bends), run.end.centre]
+    for a, b in zip(points, points[1:], strict=False):
+        if abs(a[0] - b[0]) + abs(a[1] - b[1]) < 1.0:
+            run.street.entry.fail(f"points {list(a)} and {list(b)} of its course are less than 1 m apart; remove one")
+
+
+def stretch_of(run: Run, start: Crossing, end: Crossing) -> Stretch:
+    """The stretch of a run between two crossings."""
+    return Stretch(
+        street=run.street,
+        section=CrossSection(run.street),
+        start=start,
+        end=end,
+        corners=(start.centre, *(bend.at for bend in run.bends), end.centre),
+        heights=(start.height, *(bend.height for bend in run.bends), end.height),
+    )

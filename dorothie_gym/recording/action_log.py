@@ -1,0 +1,82 @@
+"""`actions.jsonl`: what the roles decided, from which a session can be played again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.recording.file_names import ACTIONS_FILE, MAX_EVENTS, MAX_FRAME
+from dorothie_gym.recording.json_io import Fields, canonical, from_line, read_lines, to_line
+
+_ROLES: Final = {role.value: role for role in AGENT_ROLES}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Decision:
+    """What the roles decided at a frame.
+
+    Attributes:
+        frame: the frame at which they decided; what comes of it begins with the next one.
+        actions: by role, the fields of its action that differ from those of an action that does nothing (JSON types).
+            Of an array of 0 and 1 the places that hold 1, of another array its numbers, zeros at the end left out.
+            Roles that did nothing are left out.
+    """
+
+    frame: int
+    actions: Mapping[Role, Mapping[str, Any]]
+
+
+def encode_decision(decision: Decision) -> str:
+    """Returns the decision as JSON on one line; raises `SessionError` where an action holds more than JSON."""
+    where = f"decision at frame {decision.frame}"
+    if not 0 <= decision.frame < MAX_FRAME:
+        raise SessionError(f"{where}: frames are in 0..{MAX_FRAME - 1}")
+    actions = {
+        role.value: canonical(decision.actions[role], f"{where}: {role}")
+        for role in AGENT_ROLES
+        if role in decision.actions
+    }
+    return to_line({"frame": canonical(decision.frame, where), **actions})
+
+
+def decode_decision(line: str, where: str) -> Decision:
+    """Reads what `encode_decision` returned; raises `SessionError`, beginning with `where`, naming the field."""
+    fields = Fields(from_line(line, where), where)
+    frame = fields.integer("frame", 0)
+    if frame >= MAX_FRAME:
+        raise fields.error("frame", f"below {MAX_FRAME}")
+    actions = {}
+    for name in fields.others(("frame",)):
+        if name not in _ROLES:
+            raise SessionError(f"{where}: field {name!r} is none of {', '.join(_ROLES)}")
+        actions[_ROLES[name]] = fields.mapping(name)
+    return Decision(frame=frame, actions=actions)
+
+
+def read_decisions(folder: Path) -> tuple[tuple[Decision, ...] | None, bool]:
+    """Reads the decisions of a session, and tells whether the last line is torn.
+
+    Returns:
+        The decisions, frames rising; None where they were not recorded.
+
+    Raises:
+        SessionError: a line is damaged, or the frames do not rise.
+    """
+    path = folder / ACTIONS_FILE
+    if not path.exists():
+        return None, False
+    lines, torn = read_lines(path, MAX_EVENTS)
+    decisions = tuple(decode_decision(line, f"{path}, line {number}") for number, line in enumerate(lines, start=1))
+    check_order(decisions, str(path))
+    return decisions, torn
+
+
+def check_order(decisions: Sequence[Decision], where: str) -> None:
+    """Does nothing if the frames of decisions rise; raises `SessionError`, beginning with `where`, if they do not."""
+    for number, (before, after) in enumerate(zip(decisions, decisions[1:], strict=False), start=2):
+        if after.frame <= before.frame:
+            raise SessionError(f"{where}, line {number}: frame {after.frame} after {before.frame}; frames must rise")

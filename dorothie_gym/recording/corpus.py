@@ -1,0 +1,317 @@
+"""A corpus: a folder of sessions, divided into folds."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final, Self
+
+from dorothie_gym.ontology import ExceptionKind, OntologyError, parse_exception
+from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.recording.events import Event, EventType, decode_event
+from dorothie_gym.recording.export import export_tables
+from dorothie_gym.recording.file_names import EVENTS_FILE
+from dorothie_gym.recording.folder import read_session_file
+from dorothie_gym.recording.json_io import Fields, decode_text, from_line, read_bytes, to_page, write_atomically
+from dorothie_gym.recording.reading import layout_of, read_session, session_folders, sign_of
+from dorothie_gym.recording.sdn import SignVote
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.splits import FOLDS, Fold, check_fold, fold_of_folder
+from dorothie_gym.recording.version import parse_version
+
+MANIFEST_FILE: Final = "manifest.json"
+MANIFEST_VERSION: Final = "1.0"
+
+
+def manifest_row(session: Session, folder: Path, root: Path) -> dict[str, Any]:
+    """Returns the row of a session: path within the corpus, fold, town, counts, hash of its content.
+
+    Args:
+        session: the session.
+        folder: where it lies.
+        root: folder of the corpus.
+    """
+    fold = fold_of_folder(folder)
+    return {
+        "path": _relative(folder, root),
+        "fold": None if fold is None else fold.value,
+        "town": session.header.town,
+        "seed": session.header.seed,
+        "complete": session.complete,
+        "events": len(session.events),
+        "frames": len(session.trajectory),
+        "sha256": session.digest,
+    }
+
+
+def write_manifest(root: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
+    """Writes the manifest of a corpus, rows by path, with a hash of them all; whole or not at all.
+
+    Returns:
+        Its path.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    ordered = sorted(rows, key=lambda row: str(row["path"]))
+    page = {"version": MANIFEST_VERSION, "sha256": _digest(ordered), "sessions": [dict(row) for row in ordered]}
+    write_atomically(root / MANIFEST_FILE, to_page(page))
+    return root / MANIFEST_FILE
+
+
+def read_manifest(root: Path) -> dict[str, str]:
+    """Returns the hash of each session by its path within the corpus.
+
+    Raises:
+        SessionError: there is no manifest, it is damaged, or of a newer version.
+    """
+    path = root / MANIFEST_FILE
+    if not path.is_file():
+        raise SessionError(f"{path}: is missing; write it with Corpus.write_manifest")
+    fields = Fields(from_line(decode_text(read_bytes(path), str(path)), str(path)), str(path))
+    if parse_version(fields.text("version"), str(path))[0] != 1:
+        raise fields.error("version", "1.x")
+    rows = [{"path": row.text("path"), "sha256": row.text("sha256")} for row in fields.objects("sessions")]
+    if _digest(rows) != fields.text("sha256"):
+        raise SessionError(f"{path}: its rows do not fit its own hash; it was changed or is damaged")
+    return {row["path"]: row["sha256"] for row in rows}
+
+
+def verify_manifest(root: Path, sessions: Mapping[Path, Callable[[], Session]]) -> tuple[str, ...]:
+    """Returns how a corpus differs from its manifest, a sentence each.
+
+    Args:
+        root: folder of the corpus.
+        sessions: the sessions that were found, by folder, and what reads each. No path of the manifest is opened.
+
+    Raises:
+        SessionError: there is no manifest, or it is damaged.
+    """
+    expected = read_manifest(root)
+    faults = []
+    found = {_relative(folder, root): load for folder, load in sessions.items()}
+    for path in sorted(expected.keys() - found.keys()):
+        faults.append(f"{path}: is missing")
+    for path, load in sorted(found.items()):
+        if path not in expected:
+            faults.append(f"{path}: is not in the manifest")
+            continue
+        try:
+            digest = load().digest
+        except SessionError as error:
+            faults.append(f"{path}: cannot be read ({error})")
+            continue
+        if digest != expected[path]:
+            faults.append(f"{path}: its content was changed")
+    return tuple(faults)
+
+
+def _relative(folder: Path, root: Path) -> str:
+    return folder.absolute().relative_to(root.absolute()).as_posix()
+
+
+def _digest(rows: Sequence[Mapping[str, Any]]) -> str:
+    lines = (f"{row['sha256']}  {row['path']}\n" for row in rows)
+    return hashlib.sha256("".join(lines).encode("utf-8", "surrogateescape")).hexdigest()
+
+
+# --- A corpus: a folder of sessions, divided into folds --------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class CorpusEntry:
+    """A session of a corpus, not read yet.
+
+    Attributes:
+        path: its folder.
+        maps: folder with the maps of SDN's towns.
+        sign: what settles the sign of angles of SDN's sessions.
+    """
+
+    path: Path
+    maps: Path | None = None
+    sign: SignVote | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the session."""
+        return self.path.name
+
+    @property
+    def fold(self) -> Fold | None:
+        """The fold that the session lies in; None outside of folds."""
+        return fold_of_folder(self.path)
+
+    def load(self) -> Session:
+        """Reads the session; raises `SessionError` where it cannot be read."""
+        return read_session(self.path, maps=self.maps, sign=self.sign)
+
+    @cached_property
+    def town(self) -> str:
+        """Name of the session's town."""
+        if layout_of(self.path) == "native":
+            return read_session_file(self.path).header.town
+        return self.load().header.town
+
+    @cached_property
+    def exceptions(self) -> frozenset[ExceptionKind]:
+        """Kinds of exceptions that occur in the session."""
+        if layout_of(self.path) != "native":
+            return _kinds(self.load().events)
+        path = self.path / EVENTS_FILE
+        lines = read_bytes(path).split(b"\n")[:-1] if path.exists() else []
+        found = (line for line in lines if b'"Exception"' in line)
+        return _kinds(decode_event(decode_text(line, str(path)), str(path)) for line in found)
+
+
+class Corpus:
+    """Sessions, read one at a time.
+
+    Args:
+        root: folder of the corpus.
+        entries: its sessions.
+    """
+
+    def __init__(self, root: Path, entries: Sequence[CorpusEntry]) -> None:
+        self.root = root
+        self.entries = tuple(entries)
+
+    @classmethod
+    def load(cls, path: Path | str, *, maps: Path | str | None = None) -> Self:
+        """Finds the sessions in a folder and in its folds (`train`, `val/seen`, `val/unseen`, ...), of any layout.
+
+        Args:
+            path: the folder.
+            maps: folder with the maps of SDN's towns (`Town01.xodr`, ...).
+
+        Raises:
+            SessionError: there is no such folder, or it holds no session.
+        """
+        folders = session_folders(path)
+        sign = sign_of(folders)
+        where = None if maps is None else Path(maps)
+        return cls(Path(path), [CorpusEntry(folder, where, sign) for folder in folders])
+
+    def __len__(self) -> int:
+        """Number of sessions."""
+        return len(self.entries)
+
+    def __iter__(self) -> Iterator[Session]:
+        """Yields the sessions, each read when it is its turn; raises `SessionError` for one that cannot be read."""
+        return (entry.load() for entry in self.entries)
+
+    @property
+    def folds(self) -> Mapping[Fold, int]:
+        """Number of sessions of each fold that has any."""
+        counts = {fold: sum(entry.fold is fold for entry in self.entries) for fold in (*FOLDS, Fold.VAL, Fold.TEST)}
+        return {fold: count for fold, count in counts.items() if count}
+
+    def filter(
+        self,
+        *,
+        fold: Fold | str | None = None,
+        town: str | None = None,
+        exception: ExceptionKind | str | None = None,
+    ) -> Self:
+        """Returns the corpus of the sessions that fit everything given.
+
+        Args:
+            fold: a fold, or several at once: "val", "test", "seen", "unseen".
+            town: name of the town.
+            exception: a kind that occurs, "environmental" or "task" for any of them, "none" for sessions without.
+
+        Raises:
+            SessionError: the fold or the kind is unknown, or a session cannot be read.
+        """
+        entries: Sequence[CorpusEntry] = self.entries
+        if fold is not None:
+            wanted = check_fold(fold)
+            entries = [entry for entry in entries if entry.fold is not None and entry.fold.matches(wanted)]
+        if town is not None:
+            entries = [entry for entry in entries if entry.town == town]
+        if exception is not None:
+            entries = [entry for entry in entries if _fits(entry.exceptions, exception)]
+        return type(self)(self.root, entries)
+
+    def write_manifest(self) -> Path:
+        """Writes `manifest.json` into the corpus: every session with the hash of its content.
+
+        Returns:
+            Its path.
+
+        Raises:
+            SessionError: a session cannot be read.
+            OSError: the file cannot be written.
+        """
+        return write_manifest(self.root, [manifest_row(entry.load(), entry.path, self.root) for entry in self.entries])
+
+    def verify(self) -> tuple[str, ...]:
+        """Returns how the corpus differs from its `manifest.json`, a sentence each; none: it is what it was.
+
+        Raises:
+            SessionError: there is no manifest, or it is damaged.
+        """
+        return verify_manifest(self.root, {entry.path: entry.load for entry in self.entries})
+
+    def export(self, path: Path | str) -> tuple[Path, Path]:
+        """Writes the tables `utterances.parquet` and `decision_points.parquet` into a folder.
+
+        Returns:
+            Their paths; for their columns see `docs/session-format.md`.
+
+        Raises:
+            SessionError: a session cannot be read.
+            OSError: the folder cannot be written.
+        """
+        return export_tables(((entry.fold, entry.load()) for entry in self.entries), Path(path))
+
+
+def _fits(kinds: frozenset[ExceptionKind], wanted: ExceptionKind | str) -> bool:
+    if wanted == "none":
+        return not kinds
+    if wanted == "environmental":
+        return any(kind.is_environmental for kind in kinds)
+    if wanted == "task":
+        return any(kind.is_task for kind in kinds)
+    try:
+        return (wanted if isinstance(wanted, ExceptionKind) else parse_exception(wanted)) in kinds
+    except OntologyError as error:
+        raise SessionError(str(error)) from None
+
+
+def _kinds(events: Iterator[Event] | Sequence[Event]) -> frozenset[ExceptionKind]:
+    """Kinds of exceptions among events; what is none that we know is passed over."""
+    kinds = set()
+    for event in events:
+        if event.type is EventType.EXCEPTION:
+            name = str(event.data.get("kind")).upper()
+            if name in ExceptionKind.__members__:
+                kinds.add(ExceptionKind[name])
+    return frozenset(kinds)
+
+
+def load_sessions(path: Path | str) -> tuple[Session, ...]:
+    """Returns the sessions in a folder, by name; raises `SessionError` for the first that cannot be read."""
+    return tuple(Corpus.load(path))
+
+
+def load_readable(path: Path | str) -> tuple[tuple[Session, ...], dict[str, str]]:
+    """Returns the sessions in a folder, by name, and for each that cannot be read its name and the reason."""
+    sessions: list[Session] = []
+    unreadable: dict[str, str] = {}
+    for entry in Corpus.load(path).entries:
+        try:
+            sessions.append(entry.load())
+        except SessionError as error:
+            unreadable[entry.name] = str(error)
+    return tuple(sessions), unreadable
+
+
+def split_by_name(sessions: Sequence[Session]) -> tuple[tuple[Session, ...], tuple[Session, ...]]:
+    """Returns the first half of the sessions by name, to train on, and the second (the larger if odd), to test on."""
+    ordered = sorted(sessions, key=lambda session: session.name)
+    middle = len(ordered) // 2
+    return tuple(ordered[:middle]), tuple(ordered[middle:])

@@ -1,0 +1,384 @@
+"""What happens in a session, one event at a time."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from dorothie_gym.ontology import (
+    DialogueAct,
+    ObjectClass,
+    OntologyError,
+    PhysicalAction,
+    Role,
+    parse_act,
+    parse_physical_action,
+)
+from dorothie_gym.recording.errors import SessionError, shown
+from dorothie_gym.recording.file_names import MAX_FRAME
+from dorothie_gym.recording.json_io import Fields, canonical, from_line, to_line
+from dorothie_gym.sim.config import FRAME_RATE
+
+
+class EventType(enum.StrEnum):
+    """Kinds of events and what their `data` holds (JSON types only)."""
+
+    DIALOGUE_MOVE = "DialogueMove"
+    """One act: utterance (number), text (of the whole utterance), span (this act's words), move, slots
+    ({slot label: [value labels]}), exchange (number or null), start and end [s]; where they are known, transaction
+    (number) and recognised (what a speech recogniser heard of the whole utterance)."""
+    PHYSICAL_ACTION = "PhysicalAction"
+    """Of the Co-Wizard, that changed something: action (label), angle (degrees, positive left, or null), up (or
+    null)."""
+    BELIEF_UPDATE = "BeliefUpdate"
+    """Mental action: action (label) and its arguments (junctions, landmarks, landmark, status, x, y)."""
+    EXCEPTION = "Exception"
+    """Of the Ad-Wizard, that took effect: kind (lower-case name) and its arguments; of a task exception the subgoal and
+    its landmark, by label and by row of the header's landmarks (row)."""
+    MESSAGE = "Message"
+    """From the Ad-Wizard to the participant: text."""
+    REFUSAL = "Refusal"
+    """A well-formed action that was not carried out: action, reason."""
+    HAZARD_STOP = "HazardStop"
+    """The car begins to brake for something ahead: reason (object class label), distance [m]."""
+    HAZARD_END = "HazardEnd"
+    """The car goes on: reason, seconds."""
+    SUBGOAL = "Subgoal"
+    """A subgoal changes: subgoal (number), landmark (label), status (label), and cause (arrival, trigger, ...)."""
+    COLLISION = "Collision"
+    """The car touches something: other (class label), key (number of what is touched; a thing keeps it while it is
+    there), lane, station [m], x, y [m] (where the car is), own_fault (bool), speed [m/s]. Older recordings lack place
+    and key."""
+    RED_LIGHT = "RedLight"
+    """The car passes a red light: lane (that it leaves), station, x, y [m], key (id of the signal), other (class label
+    of the signal)."""
+    STOP_SIGN = "StopSign"
+    """The car passes a stop sign without standing before it: as RED_LIGHT."""
+    OFF_ROAD = "OffRoad"
+    """The car leaves the road: lane (the nearest), station, x, y [m]; key and other are null."""
+    WRONG_WAY = "WrongWay"
+    """The car drives against the traffic: lane (that it is on), station, x, y [m]; key and other are null."""
+    END = "End"
+    """The session is over: success (bool), reason."""
+    OTHER = "Other"
+    """Of a type that this version has no name for: the type's name is in `Event.extra`, the data is kept as it is."""
+
+
+INFRACTIONS = (
+    EventType.COLLISION, EventType.RED_LIGHT, EventType.STOP_SIGN, EventType.OFF_ROAD, EventType.WRONG_WAY,
+)  # fmt: skip
+"""Events that tell of a breach of the rules of the road."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Event:
+    """Something that happened.
+
+    Attributes:
+        frame: physics frame at 30 Hz at which it happened (a dialogue move: at which its utterance was over).
+        type: kind of event.
+        source: who did it; the car itself is `Role.AGENT`.
+        flagged: whether it is a point of the benchmark (dialogue moves of the participant and the Co-Wizard,
+            navigation actions of the Co-Wizard).
+        data: JSON-able details, see `EventType`.
+        extra: further fields of the event, kept as they are (JSON types).
+    """
+
+    frame: int
+    type: EventType
+    source: Role
+    flagged: bool = False
+    data: Mapping[str, Any] = field(default_factory=dict)
+    extra: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def type_name(self) -> str:
+        """Name of the type in a file; of an event of another version or corpus, the name that it has there."""
+        return str(self.extra.get("type", self.type.value)) if self.type is EventType.OTHER else self.type.value
+
+    @property
+    def time(self) -> float:
+        """Seconds since the start of the session."""
+        return self.frame / FRAME_RATE
+
+
+# --- Events read as what they are: moves, utterances, physical actions -----------------------------------------------
+
+_OBJECT_CLASSES = {kind.label: kind for kind in ObjectClass}
+_PLACE_FIELDS = ("lane", "station", "x", "y", "key", "other")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MoveRecord:
+    """One dialogue move.
+
+    Attributes:
+        index: number of its event in the session.
+        frame: frame at which its utterance was over.
+        speaker: who spoke.
+        utterance: number of its utterance.
+        text: words of the whole utterance.
+        span: words of this move.
+        act: move and slots.
+        exchange: number of the exchange, None where unknown.
+        start, end: when the utterance began and was over [s].
+        flagged: whether it is a point of the benchmark.
+        transaction: number of the transaction, None where unknown.
+        recognised: what a speech recogniser heard of the whole utterance, None where there was none.
+    """
+
+    index: int
+    frame: int
+    speaker: Role
+    utterance: int
+    text: str
+    span: str
+    act: DialogueAct
+    exchange: int | None
+    start: float
+    end: float
+    flagged: bool
+    transaction: int | None = None
+    recognised: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ActionRecord:
+    """One physical action.
+
+    Attributes:
+        index: number of its event in the session.
+        frame: when it was done.
+        source: who did it.
+        action: the action.
+        angle: its argument [degrees, positive left]; None where it has none or the recording does not know it.
+        up: direction of a change of speed or light, None for other actions.
+        flagged: whether it is a point of the benchmark.
+    """
+
+    index: int
+    frame: int
+    source: Role
+    action: PhysicalAction
+    angle: float | None
+    up: bool | None
+    flagged: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class InfractionRecord:
+    """One breach of the rules of the road.
+
+    Attributes:
+        index: number of its event in the session.
+        frame: when it happened.
+        type: which rule: one of `events.INFRACTIONS`.
+        lane: where it happened, None where the recording does not know it; `station` likewise.
+        station: distance along the lane [m].
+        x: of the car [m], or None; `y` likewise.
+        key: number of the counterpart (of a body, or of a light or sign), None where there is none.
+        other: class of the counterpart, None where there is none.
+        own_fault: of a collision: whether the car ran into it; True for the others.
+    """
+
+    index: int
+    frame: int
+    type: EventType
+    lane: int | None
+    station: float | None
+    x: float | None
+    y: float | None
+    key: int | None
+    other: ObjectClass | None
+    own_fault: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class UtteranceRecord:
+    """The moves of one utterance, in order of their spans."""
+
+    number: int
+    speaker: Role
+    text: str
+    start: float
+    end: float
+    moves: tuple[MoveRecord, ...]
+
+
+def move_record(event: Event, index: int, where: str = "event") -> MoveRecord:
+    """Returns the move that an event of type `DIALOGUE_MOVE` holds; raises `SessionError` naming the field."""
+    data = Fields(event.data, f"{where}, data")
+    return MoveRecord(
+        index=index,
+        frame=event.frame,
+        speaker=event.source,
+        utterance=data.integer("utterance", 0),
+        text=data.text("text"),
+        span=data.text("span"),
+        act=_act(data),
+        exchange=data.optional("exchange", data.integer),
+        start=data.number("start"),
+        end=data.number("end"),
+        flagged=event.flagged,
+        transaction=data.if_given("transaction", data.integer),
+        recognised=data.if_given("recognised", data.text),
+    )
+
+
+def action_record(event: Event, index: int, where: str = "event") -> ActionRecord:
+    """Returns the action that an event of type `PHYSICAL_ACTION` holds; raises `SessionError` naming the field."""
+    data = Fields(event.data, f"{where}, data")
+    try:
+        action = parse_physical_action(data.text("action"))
+    except OntologyError as error:
+        raise SessionError(f"{data.where}: field 'action': {error}") from None
+    return ActionRecord(
+        index=index,
+        frame=event.frame,
+        source=event.source,
+        action=action,
+        angle=data.optional("angle", data.number),
+        up=data.optional("up", data.flag),
+        flagged=event.flagged,
+    )
+
+
+def infraction_record(event: Event, index: int, where: str = "event") -> InfractionRecord:
+    """Returns the breach that an event of `INFRACTIONS` tells of; raises `SessionError` naming the field."""
+    data = Fields({**dict.fromkeys(_PLACE_FIELDS), **event.data}, f"{where}, data")
+    other = data.optional("other", data.text)
+    if other is not None and other not in _OBJECT_CLASSES:
+        raise data.error("other", "the label of an object class")
+    collision = event.type is EventType.COLLISION
+    place = data.integer if not collision else lambda name: data.optional(name, data.integer)
+    number = data.number if not collision else lambda name: data.optional(name, data.number)
+    return InfractionRecord(
+        index=index,
+        frame=event.frame,
+        type=event.type,
+        lane=place("lane"),
+        station=number("station"),
+        x=number("x"),
+        y=number("y"),
+        key=data.optional("key", data.integer),
+        other=None if other is None else _OBJECT_CLASSES[other],
+        own_fault=data.flag("own_fault") if collision else True,
+    )
+
+
+def utterance_records(moves: Iterable[MoveRecord]) -> tuple[UtteranceRecord, ...]:
+    """Returns the utterances that the moves belong to, in order of their first move."""
+    groups: dict[tuple[Role, int], list[MoveRecord]] = {}
+    for move in moves:
+        groups.setdefault((move.speaker, move.utterance), []).append(move)
+    return tuple(
+        UtteranceRecord(
+            number=group[0].utterance,
+            speaker=group[0].speaker,
+            text=group[0].text,
+            start=group[0].start,
+            end=group[0].end,
+            moves=tuple(group),
+        )
+        for group in groups.values()
+    )
+
+
+def check_event(event: Event, where: str = "event") -> None:
+    """Does nothing if the event holds what its type says; raises `SessionError` naming the field otherwise."""
+    if event.type is EventType.DIALOGUE_MOVE:
+        move_record(event, 0, where)
+    elif event.type is EventType.PHYSICAL_ACTION:
+        action_record(event, 0, where)
+    elif event.type in INFRACTIONS:
+        infraction_record(event, 0, where)
+
+
+def _act(data: Fields) -> DialogueAct:
+    slots = data.mapping("slots")
+    for slot, values in slots.items():
+        if not isinstance(values, list | tuple) or not all(isinstance(value, str) for value in values):
+            raise SessionError(f"{data.where}: field 'slots.{slot}' is {shown(values)}; it must be a list of texts")
+    return _parse(data.text("move"), slots, data.where)
+
+
+def _parse(move: str, slots: Mapping[str, Any], where: str) -> DialogueAct:
+    try:
+        return parse_act(move, slots)
+    except OntologyError as error:
+        raise SessionError(f"{where}: fields 'move' and 'slots': {error}") from None
+
+
+# --- An event as one line of `events.jsonl` --------------------------------------------------------------------------
+
+EVENT_FIELDS: Final = ("frame", "type", "source", "flagged", "data")
+"""Fields of a line that are not the event's `extra`."""
+
+_TYPES: Final = {kind.value: kind for kind in EventType}
+_ROLES: Final = {role.value: role for role in Role}
+
+
+def encode_event(event: Event, *, check: bool = True) -> str:
+    """Returns the event as JSON on one line, keys always in the same order.
+
+    Args:
+        event: the event.
+        check: whether its data is checked; what was read was checked then.
+
+    Raises:
+        SessionError: its data is not what its type says, or cannot be written; the message names the field.
+    """
+    where = f"event {event.type.value} at frame {event.frame}"
+    extra = canonical(event.extra, f"{where}: extra")
+    values = {
+        "frame": canonical(event.frame, f"{where}: frame"),
+        "type": event.type_name,
+        "source": event.source.value,
+        "flagged": canonical(event.flagged, f"{where}: flagged"),
+        "data": canonical(event.data, f"{where}: data"),
+    }
+    known = ("type",) if event.type is EventType.OTHER else ()
+    clash = sorted(set(extra) & set(EVENT_FIELDS) - set(known))
+    if clash:
+        raise SessionError(f"{where}: extra has {clash[0]!r}, which is a field of its own")
+    if check:
+        event_of(values, where)  # what cannot be read back must not be written
+    return to_line({**values, **{name: value for name, value in extra.items() if name not in known}})
+
+
+def decode_event(line: str, where: str) -> Event:
+    """Reads what `encode_event` returned; raises `SessionError`, beginning with `where`, naming the field."""
+    return event_of(from_line(line, where), where)
+
+
+def event_of(values: Mapping[str, Any], where: str) -> Event:
+    """Returns the event of a line's fields.
+
+    A type that this version does not know gives an event of type `OTHER`, and fields that it does not know its `extra`.
+
+    Raises:
+        SessionError: a field is missing or wrong; the message begins with `where` and names it.
+    """
+    fields = Fields(values, where)
+    frame = fields.integer("frame", 0)
+    if frame >= MAX_FRAME:
+        raise fields.error("frame", f"below {MAX_FRAME}")
+    name, source = fields.text("type"), fields.text("source")
+    if source not in _ROLES:
+        raise fields.error("source", f"one of {', '.join(_ROLES)}")
+    kind = _TYPES.get(name, EventType.OTHER)
+    extra = fields.others(EVENT_FIELDS) if len(values) > len(EVENT_FIELDS) else {}
+    if kind is EventType.OTHER and name != kind.value:
+        extra = {"type": name, **extra}
+    event = Event(
+        frame=frame,
+        type=kind,
+        source=_ROLES[source],
+        flagged=fields.flag("flagged"),
+        data=fields.mapping("data"),
+        extra=extra,
+    )
+    check_event(event, where)
+    return event

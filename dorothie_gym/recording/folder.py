@@ -1,0 +1,307 @@
+"""Reading the folder of a session, whatever version it has and at whatever moment it was cut off."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.recording.action_log import Decision, encode_decision, read_decisions
+from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.recording.events import Event, EventType, decode_event, encode_event
+from dorothie_gym.recording.file_names import (
+    ACTIONS_FILE,
+    EVENTS_FILE,
+    FRAMES_FILE,
+    HEADER_FILE,
+    JOURNAL_FILE,
+    MAX_EVENTS,
+    PART,
+    PICTURES_FOLDER,
+    SUMMARY_FILE,
+    TRAJECTORY_FILE,
+    SessionState,
+)
+from dorothie_gym.recording.frames import read_frames, read_journal, write_frames
+from dorothie_gym.recording.header import SessionHeader
+from dorothie_gym.recording.json_io import (
+    Fields,
+    canonical,
+    decode_text,
+    from_line,
+    read_bytes,
+    read_lines,
+    to_line,
+    to_page,
+    write_atomically,
+)
+from dorothie_gym.recording.surroundings import Scene
+from dorothie_gym.recording.trajectory import TRAJECTORY_DTYPE, Trajectory, check_rising
+from dorothie_gym.recording.validation import ReadReport
+from dorothie_gym.recording.version1 import read_summary, read_trajectory
+
+if TYPE_CHECKING:
+    from dorothie_gym.recording.session import Session
+
+
+@dataclass(frozen=True, kw_only=True)
+class SessionFile:
+    """What the file says.
+
+    Attributes:
+        header: what was known before the session began.
+        outcome: how it ended; None where it did not.
+        events: number of events of a session that is over.
+        frames: number of its frames.
+    """
+
+    header: SessionHeader
+    outcome: Mapping[str, Any] | None = None
+    events: int = 0
+    frames: int = 0
+
+    def write(self, folder: Path) -> None:
+        """Writes the file whole or not at all; raises `SessionError` where the outcome is more than JSON."""
+        over = self.outcome is not None
+        page = {
+            **self.header.to_json(),
+            "outcome": canonical(self.outcome, "outcome") if over else None,
+            "counts": {"events": self.events, "frames": self.frames} if over else None,
+        }
+        write_atomically(folder / HEADER_FILE, to_page(page))
+
+
+def read_session_file(folder: Path) -> SessionFile:
+    """Reads the file; raises `SessionError` naming file and field, and where there is none."""
+    path = folder / HEADER_FILE
+    if not path.is_file():
+        raise SessionError(f"{folder}: no session here (there is no {HEADER_FILE})")
+    fields = Fields(from_line(decode_text(read_bytes(path), str(path)), str(path)), str(path))
+    header = SessionHeader.from_json(fields.others(("outcome", "counts")), str(path))
+    outcome = fields.if_given("outcome", fields.mapping)
+    if outcome is None:
+        return SessionFile(header=header)
+    counts = Fields(fields.mapping("counts"), f"{path}, counts")
+    return SessionFile(
+        header=header, outcome=outcome, events=counts.integer("events", 0), frames=counts.integer("frames", 0)
+    )
+
+
+def is_version1(folder: Path) -> bool:
+    """Whether the folder has the files of version 1 and none of today's."""
+    ours = any((folder / name).exists() for name in (FRAMES_FILE, JOURNAL_FILE))
+    return not ours and any((folder / name).exists() for name in (TRAJECTORY_FILE, SUMMARY_FILE))
+
+
+def session_state(folder: Path | str) -> SessionState:
+    """Returns how far a folder has come; a session that is finished was written whole.
+
+    Raises:
+        SessionError: the header is damaged.
+    """
+    folder = Path(folder)
+    if not (folder / HEADER_FILE).is_file():
+        return SessionState.ABSENT
+    if is_version1(folder):
+        return SessionState.FINISHED if (folder / SUMMARY_FILE).is_file() else SessionState.PARTIAL
+    whole = all((folder / name).is_file() for name in (EVENTS_FILE, FRAMES_FILE))
+    over = read_session_file(folder).outcome is not None
+    return SessionState.FINISHED if whole and over else SessionState.PARTIAL
+
+
+# --- Reading the folder of a session, whatever version it has and at whatever moment it was cut off ------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class FolderContent:
+    """What the folder of a session holds; attributes as those of `Session`."""
+
+    header: SessionHeader
+    events: tuple[Event, ...]
+    trajectory: Trajectory
+    scene: Scene
+    summary: Mapping[str, Any] | None
+    complete: bool
+    report: ReadReport
+    pictures: Mapping[int, Path]
+    decisions: tuple[Decision, ...] | None = None
+
+
+def read_folder(folder: Path) -> FolderContent:
+    """Reads a folder; raises `SessionError` naming file, line and field where there is no session or a damaged one."""
+    if is_version1(folder):
+        return _read_version1(folder)
+    file = read_session_file(folder)
+    report = ReadReport()
+    events, events_torn = _read_events(folder / EVENTS_FILE)
+    decisions, decisions_torn = read_decisions(folder)
+    trajectory, scene, frames_whole = _read_frames(folder, file.outcome is not None, report)
+    whole = file.outcome is not None and (file.events, file.frames) == (len(events), len(trajectory))
+    _note_unknown(file.header, events, report)
+    return FolderContent(
+        header=file.header,
+        events=events,
+        trajectory=trajectory,
+        scene=scene,
+        summary=file.outcome,
+        complete=whole and frames_whole and not events_torn and not decisions_torn,
+        report=report,
+        pictures=_pictures(folder / PICTURES_FOLDER),
+        decisions=decisions,
+    )
+
+
+def _read_version1(folder: Path) -> FolderContent:
+    header = read_session_file(folder).header
+    report = ReadReport(layout="native-1")
+    events, events_torn = _read_events(folder / EVENTS_FILE)
+    trajectory, whole = read_trajectory(folder)
+    ending = read_summary(folder)
+    counted = ending is not None and ending[1:] == (len(events), len(trajectory))
+    _note_unknown(header, events, report)
+    return FolderContent(
+        header=header,
+        events=events,
+        trajectory=trajectory,
+        scene=Scene(),
+        summary=ending[0] if ending else None,
+        complete=whole and counted and not events_torn,
+        report=report,
+        pictures=MappingProxyType({}),
+    )
+
+
+def _read_events(path: Path) -> tuple[tuple[Event, ...], bool]:
+    lines, torn = read_lines(path, MAX_EVENTS)
+    return tuple(decode_event(line, f"{path}, line {number}") for number, line in enumerate(lines, start=1)), torn
+
+
+def _read_frames(folder: Path, over: bool, report: ReadReport) -> tuple[Trajectory, Scene, bool]:
+    """Returns the frames and whether they were written whole."""
+    journal = folder / JOURNAL_FILE
+    if journal.exists() and not over:
+        trajectory, scene = read_journal(journal)
+        check_rising(trajectory["frame"], -1, str(journal))
+        return trajectory, scene, False
+    if (folder / FRAMES_FILE).exists():
+        return *read_frames(folder / FRAMES_FILE, report), True
+    if over:
+        raise SessionError(f"{folder / FRAMES_FILE}: is missing, though the session is over")
+    return np.empty(0, dtype=TRAJECTORY_DTYPE), Scene(), False
+
+
+def _note_unknown(header: SessionHeader, events: tuple[Event, ...], report: ReadReport) -> None:
+    for name in header.extra:
+        report.keep(f"session.json: field {name!r}")
+    for event in events:
+        if event.type is EventType.OTHER:
+            report.keep(f"{EVENTS_FILE}: type {event.type_name!r}")
+        for name in event.extra:
+            if name != "type" or event.type is not EventType.OTHER:
+                report.keep(f"{EVENTS_FILE}: field {name!r} of {event.type_name}")
+
+
+def _pictures(folder: Path) -> Mapping[int, Path]:
+    """Pictures by frame."""
+    if not folder.is_dir():
+        return MappingProxyType({})
+    found = {int(path.stem): path for path in folder.glob("*.png") if path.stem.isdecimal() and len(path.stem) <= 10}
+    return MappingProxyType(dict(sorted(found.items())))
+
+
+# --- Writing a whole session at once ---------------------------------------------------------------------------------
+
+
+@contextmanager
+def new_folder(folder: Path) -> Iterator[Path]:
+    """Gives a folder to fill, which takes its name when the block is left, and is gone when the block fails.
+
+    Raises:
+        SessionError: there is something of that name already.
+    """
+    if os.path.lexists(folder) and not (folder.is_dir() and not folder.is_symlink() and not any(folder.iterdir())):
+        raise SessionError(f"{folder}: exists already; choose another name, or remove it first")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    part = Path(tempfile.mkdtemp(prefix=f".{folder.name[:80]}.", suffix=PART, dir=folder.parent))
+    try:
+        part.chmod(0o755)  # temporary folders are closed to everybody else
+        yield part
+        part.rename(folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def save_folder(session: Session, folder: Path) -> Path:
+    """Writes a session into a new folder; see `Session.save`."""
+    with new_folder(folder) as part:
+        lines = [encode_event(event) + "\n" for event in session.events]
+        (part / EVENTS_FILE).write_text("".join(lines), encoding="utf-8", newline="\n")
+        if session.decisions is not None:
+            lines = [encode_decision(decision) + "\n" for decision in session.decisions]
+            (part / ACTIONS_FILE).write_text("".join(lines), encoding="utf-8", newline="\n")
+        write_frames(part / FRAMES_FILE, session.trajectory, session.scene)
+        if session.pictures:
+            (part / PICTURES_FOLDER).mkdir()
+            for frame, picture in session.pictures.items():
+                shutil.copyfile(picture, part / PICTURES_FOLDER / picture_name(frame))
+        outcome = session.summary if session.complete else None
+        file = SessionFile(
+            header=session.header, outcome=outcome, events=len(session.events), frames=len(session.trajectory)
+        )
+        file.write(part)
+    return folder
+
+
+def picture_name(frame: int) -> str:
+    """Returns the name of the picture of a frame."""
+    return f"{frame:06d}.png"
+
+
+# --- A hash of what a session holds, whatever the libraries that packed its files ------------------------------------
+
+
+def digest_of(session: Session) -> str:
+    """Returns the SHA-256 of a session's content: header, outcome, events, decisions and every number of its frames.
+
+    Its name, its pictures and the report of its reader do not count.
+    """
+    content = hashlib.sha256()
+
+    def take(name: str, data: bytes) -> None:
+        content.update(f"{name}:{len(data)}\n".encode())
+        content.update(data)
+
+    take("header", to_line(session.header.to_json()).encode())
+    take("outcome", to_line(canonical(session.summary if session.complete else None, "outcome")).encode())
+    take("events", "\n".join(encode_event(event, check=False) for event in session.events).encode())
+    if session.decisions is not None:
+        take("decisions", "\n".join(map(encode_decision, session.decisions)).encode())
+    for name in session.trajectory.dtype.names or ():
+        take(name, _bytes(session.trajectory[name]))
+    scene = session.scene
+    for name, table in (("actors", scene.actors), ("lights", scene.lights), ("weather", scene.weather)):
+        take(f"{name} frames", _bytes(table.frames))
+        take(f"{name} offsets", _bytes(table.offsets))
+        for column in table.rows.dtype.names or ():
+            take(f"{name} {column}", _bytes(table.rows[column]))
+    for name in sorted(scene.columns):
+        take(f"column {name}", _bytes(scene.columns[name]))
+    return content.hexdigest()
+
+
+def _bytes(values: NDArray[Any]) -> bytes:
+    if values.dtype.kind not in "biuf":
+        return to_line(canonical(values.tolist(), "column")).encode()
+    if values.dtype.kind == "f":
+        values = np.where(np.isnan(values), np.nan, values)  # one pattern of bits for what is not known
+    return np.ascontiguousarray(values.astype(values.dtype.newbyteorder("<"))).tobytes()

@@ -1,0 +1,221 @@
+"""What is known of a session before it begins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, NotRequired, TypedDict
+
+from dorothie_gym import __version__
+from dorothie_gym.ontology import OntologyError, parse_landmark, parse_street
+from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.recording.json_io import Fields, canonical
+from dorothie_gym.recording.trajectory import NO_LANE
+from dorothie_gym.recording.version import FORMAT_VERSION, OLD_VERSION, parse_version
+
+NATIVE: Final = "dorothie_gym"
+"""Source of the sessions that this package plays."""
+
+
+class LandmarkRow(TypedDict):
+    """A landmark of the town.
+
+    `name` is its label; `lane` (-1: unknown) and `station` [m] are of its waypoint; `x` and `y` [m] where it stands;
+    `street` the number of its street (-1: none); `hidden` whether the Co-Wizard does not know where it is; `extra`
+    further fields, kept as they are (JSON types).
+    """
+
+    name: str
+    lane: int
+    station: float
+    x: float
+    y: float
+    street: int
+    hidden: bool
+    extra: NotRequired[Mapping[str, Any]]
+
+
+class SubgoalRow(TypedDict):
+    """A subgoal of the storyboard: `landmark` is a row of the landmarks, `after` holds numbers of subgoals.
+
+    `extra` holds further fields, kept as they are (JSON types).
+    """
+
+    description: str
+    landmark: int
+    after: Sequence[int]
+    trigger: bool
+    delete: bool
+    change: str | None
+    extra: NotRequired[Mapping[str, Any]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SessionHeader:
+    """Town, storyboard, seed and configuration of a session. It holds no wall-clock time: equal runs, equal bytes.
+
+    Attributes:
+        town: name of the town.
+        storyboard: name of the storyboard's template; empty where it is not known.
+        seed: seed of the session; None where there was none (a session of another corpus).
+        decision_frequency: decisions of the agents a second [Hz].
+        street_names: label of the name of each street of the town.
+        landmarks: everything that stands in the town.
+        subgoals: the tasks, those to be triggered included.
+        story: what the participant reads.
+        departure: lane (-1: unknown) and station [m] where the car starts.
+        config: configuration of the environment (JSON types).
+        format_version: version of the layout, "major.minor".
+        package_version: version of the package that wrote it.
+        source: where the session comes from: this package, or "sdn" and its layout ("sdn-release").
+        extra: further fields, kept as they are (JSON types): those of a newer minor version, or of another corpus.
+
+    Raises:
+        SessionError: a field is not as described; the message names it.
+    """
+
+    town: str
+    storyboard: str
+    seed: int | None
+    decision_frequency: float
+    street_names: Sequence[str]
+    landmarks: Sequence[LandmarkRow]
+    subgoals: Sequence[SubgoalRow]
+    story: str
+    departure: tuple[int, float]
+    config: Mapping[str, Any] = field(default_factory=dict)
+    format_version: str = FORMAT_VERSION
+    package_version: str = __version__
+    source: str = NATIVE
+    extra: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Checks the fields, and turns sequences into tuples so that a header equals what is read back."""
+        plain = Fields(canonical({name: getattr(self, name) for name in (*_NAMES, "extra")}, "header"), "header")
+        parse_version(plain.text("format_version"), plain.where)
+        for name in ("town", "storyboard", "story", "package_version", "source"):
+            plain.text(name)
+        plain.optional("seed", plain.integer)
+        if plain.number("decision_frequency") <= 0:
+            raise plain.error("decision_frequency", "a positive number")
+        object.__setattr__(self, "street_names", _streets(plain))
+        landmarks = tuple(_landmark(row) for row in plain.objects("landmarks"))
+        object.__setattr__(self, "landmarks", landmarks)
+        object.__setattr__(self, "subgoals", tuple(_subgoal(row, len(landmarks)) for row in plain.objects("subgoals")))
+        object.__setattr__(self, "departure", _departure(plain))
+        for name in ("config", "extra"):
+            object.__setattr__(self, name, dict(plain.mapping(name)))
+        clash = sorted(set(self.extra) & {*_NAMES, *RESERVED_NAMES})
+        if clash:
+            raise SessionError(f"{plain.where}: extra has {clash[0]!r}, which is a field of its own")
+
+    def to_json(self) -> dict[str, Any]:
+        """Returns the header in JSON types, fields always in the same order."""
+        fields: dict[str, Any] = {name: canonical(getattr(self, name), f"header.{name}") for name in _NAMES}
+        lane, station = self.departure
+        extra = canonical(self.extra, "header.extra")
+        return {**fields, "departure": {"lane": lane, "station": station}, **extra}
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any], where: str = "header") -> SessionHeader:
+        """Reads what `to_json` returned; fields that this version does not know become `extra`.
+
+        Args:
+            values: the JSON object.
+            where: name of the file, for messages.
+
+        Raises:
+            SessionError: a field is missing or wrong; the message names the file and the field.
+        """
+        fields = Fields({"source": NATIVE, **values}, where)
+        major, minor = parse_version(fields.anything("format_version"), where)
+        departure = Fields(fields.mapping("departure"), f"{where}, departure")
+        place = (departure.integer("lane", NO_LANE), departure.number("station"))
+        given = {name: fields.anything(name) for name in _NAMES}
+        # What is read of an old folder is written as a folder of today.
+        version = FORMAT_VERSION if f"{major}.{minor}" == OLD_VERSION else f"{major}.{minor}"
+        extra = fields.others((*_NAMES, *RESERVED_NAMES))
+        try:
+            return cls(**{**given, "format_version": version, "departure": place, "extra": extra})
+        except SessionError as error:
+            raise SessionError(f"{where}: {error}") from None
+
+
+RESERVED_NAMES: Final = ("outcome", "counts")
+"""Fields of `session.json` that are not the header's."""
+
+_NAMES: Final = (
+    "format_version",
+    "package_version",
+    "source",
+    "town",
+    "storyboard",
+    "seed",
+    "decision_frequency",
+    "street_names",
+    "landmarks",
+    "subgoals",
+    "story",
+    "departure",
+    "config",
+)
+
+
+def _streets(fields: Fields) -> tuple[str, ...]:
+    names = fields.texts("street_names")
+    for name in names:
+        try:
+            parse_street(name)
+        except OntologyError as error:
+            raise SessionError(f"{fields.where}: field 'street_names': {error}") from None
+    return names
+
+
+def _departure(fields: Fields) -> tuple[int, float]:
+    place = fields.anything("departure")
+    if not isinstance(place, list) or len(place) != 2:
+        raise fields.error("departure", "a lane and a station")
+    parts = Fields({"lane": place[0], "station": place[1]}, f"{fields.where}, departure")
+    return parts.integer("lane", NO_LANE), parts.number("station")
+
+
+def _landmark(row: Fields) -> LandmarkRow:
+    name = row.text("name")
+    try:
+        parse_landmark(name)
+    except OntologyError as error:
+        raise SessionError(f"{row.where}: field 'name': {error}") from None
+    landmark = LandmarkRow(
+        name=name,
+        lane=row.integer("lane", NO_LANE),
+        station=row.number("station"),
+        x=row.number("x"),
+        y=row.number("y"),
+        street=row.integer("street", -1),
+        hidden=row.flag("hidden"),
+    )
+    if extra := _extra(row, LandmarkRow.__required_keys__):
+        landmark["extra"] = extra
+    return landmark
+
+
+def _extra(row: Fields, known: frozenset[str]) -> dict[str, Any]:
+    """What a row holds beside the fields that are known, those that were put into `extra` among it."""
+    return {**(row.if_given("extra", row.mapping) or {}), **row.others({*known, "extra"})}
+
+
+def _subgoal(row: Fields, landmarks: int) -> SubgoalRow:
+    landmark = row.integer("landmark", 0)
+    if landmark >= landmarks:
+        raise row.error("landmark", f"a row of the {landmarks} landmarks")
+    subgoal = SubgoalRow(
+        description=row.text("description"),
+        landmark=landmark,
+        after=row.integers("after"),
+        trigger=row.flag("trigger"),
+        delete=row.flag("delete"),
+        change=row.optional("change", row.text),
+    )
+    if extra := _extra(row, SubgoalRow.__required_keys__):
+        subgoal["extra"] = extra
+    return subgoal

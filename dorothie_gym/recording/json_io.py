@@ -1,0 +1,261 @@
+"""JSON that comes out byte for byte the same for the same content, and JSON of others that is read with care."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+from collections.abc import Callable, Collection, Mapping
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+import numpy as np
+
+from dorothie_gym.recording.errors import SessionError, shown
+from dorothie_gym.recording.file_names import MAX_TEXT_FILE, PART
+
+MAX_DEPTH: Final = 40
+"""Levels of nesting that a session may hold."""
+
+
+def canonical(value: Any, where: str, depth: int = MAX_DEPTH) -> Any:
+    """Returns `value` in plain JSON types: mappings as dicts with sorted keys, tuples as lists, numpy as Python.
+
+    Args:
+        value: what is to be written.
+        where: name of the field, for the message of an error.
+        depth: levels of nesting that are still allowed.
+
+    Raises:
+        SessionError: something in it has no place in JSON (a number that is not finite, a key that is not a text), or
+            it is nested too deeply.
+    """
+    if isinstance(value, np.generic):
+        value = value.item()
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, str):
+        return _canonical_text(value, where)
+    if isinstance(value, int):
+        return int(value)
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise SessionError(f"{where} is {value}; a session holds finite numbers only")
+        return float(value)
+    if depth == 0:
+        raise SessionError(f"{where[:80]}... is nested more than {MAX_DEPTH} levels deep")
+    if isinstance(value, Mapping):
+        return _canonical_mapping(value, where, depth - 1)
+    if isinstance(value, list | tuple):
+        return [canonical(item, f"{where}[{index}]", depth - 1) for index, item in enumerate(value)]
+    raise SessionError(f"{where} is a {type(value).__name__}; a session holds JSON types only")
+
+
+def _canonical_text(value: str, where: str) -> str:
+    if not value.isascii():
+        try:
+            value.encode("utf-8")
+        except UnicodeEncodeError as error:
+            message = f"{where} cannot be written in UTF-8 ({error.reason} at character {error.start})"
+            raise SessionError(message) from None
+    return str(value)  # a member of a StrEnum becomes its text
+
+
+def _canonical_mapping(value: Mapping[Any, Any], where: str, depth: int) -> dict[str, Any]:
+    for key in value:
+        if not isinstance(key, str):
+            raise SessionError(f"{where} has the key {key!r}; keys must be texts")
+    return {_canonical_text(key, where): canonical(value[key], f"{where}.{key}", depth) for key in sorted(value)}
+
+
+def to_line(value: Any) -> str:
+    """Returns canonical JSON on one line, without its end."""
+    return json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+
+
+def to_page(value: Any) -> str:
+    """Returns canonical JSON on several lines, for people, with its end."""
+    return json.dumps(value, ensure_ascii=False, allow_nan=False, indent=1) + "\n"
+
+
+def from_line(text: str, where: str) -> dict[str, Any]:
+    """Returns the JSON object that `text` holds.
+
+    Raises:
+        SessionError: it holds none, or a number that is not finite; the message begins with `where`.
+    """
+    try:
+        value = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
+    except ValueError as error:
+        raise SessionError(f"{where}: not JSON ({error})") from None
+    except RecursionError:
+        raise SessionError(f"{where}: the JSON is nested too deeply to be read") from None
+    if not isinstance(value, dict):
+        raise SessionError(f"{where}: a JSON object is expected, not {type(value).__name__}")
+    return value
+
+
+def _refuse_constant(name: str) -> float:
+    raise ValueError(f"{name} is no number")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text[:30]} is too large a number")
+    return value
+
+
+def read_bytes(path: Path, limit: int = MAX_TEXT_FILE) -> bytes:
+    """Returns what a regular file, or a link to one, holds.
+
+    Raises:
+        SessionError: it is no regular file (a pipe would block for ever), or larger than `limit`.
+        OSError: it cannot be read.
+    """
+    if not path.is_file():
+        kind = "is not a regular file" if os.path.lexists(path) else "is missing"
+        raise SessionError(f"{path}: {kind}")
+    with path.open("rb") as file:
+        content = file.read(limit + 1)
+    if len(content) > limit:
+        raise SessionError(f"{path}: is larger than {limit >> 20} MiB, which no session needs; it is not read")
+    return content
+
+
+def decode_text(content: bytes, where: str) -> str:
+    """Returns the text of bytes in UTF-8; raises `SessionError` beginning with `where` for others."""
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise SessionError(f"{where}: not UTF-8 at byte {error.start}") from None
+
+
+def write_atomically(path: Path, content: str | bytes) -> None:
+    """Writes a file whole or not at all: readers never see a part of it, even when the process dies."""
+    temporary = path.with_name(path.name + PART)
+    temporary.unlink(missing_ok=True)  # whatever stands there, a link to somewhere else included
+    data = content.encode("utf-8") if isinstance(content, str) else content
+    with temporary.open("xb") as file:
+        file.write(data)
+    os.replace(temporary, path)
+
+
+# --- Reading named fields of a JSON object with one clear message for each that is wrong -----------------------------
+
+_T = TypeVar("_T")
+
+_LARGEST = sys.float_info.max
+"""A whole number of JSON may be larger, and is no float then."""
+
+
+class Fields:
+    """The fields of one JSON object.
+
+    Each method returns a field in its type and raises `SessionError` where it is missing or of another type.
+
+    Args:
+        values: the object.
+        where: file and line, the beginning of every message.
+    """
+
+    def __init__(self, values: Mapping[str, Any], where: str) -> None:
+        self._values = values
+        self.where = where
+
+    def integer(self, name: str, minimum: int | None = None) -> int:
+        """A whole number, at least `minimum`."""
+        value = self.anything(name)
+        if isinstance(value, bool) or not isinstance(value, int) or (minimum is not None and value < minimum):
+            raise self.error(name, "a whole number" + ("" if minimum is None else f" of at least {minimum}"))
+        return value
+
+    def number(self, name: str) -> float:
+        """A finite number."""
+        value = self.anything(name)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _LARGEST:
+            raise self.error(name, "a finite number")
+        return float(value)
+
+    def text(self, name: str) -> str:
+        """A text."""
+        value = self.anything(name)
+        if not isinstance(value, str):
+            raise self.error(name, "a text")
+        return value
+
+    def flag(self, name: str) -> bool:
+        """True or false."""
+        value = self.anything(name)
+        if not isinstance(value, bool):
+            raise self.error(name, "true or false")
+        return value
+
+    def mapping(self, name: str) -> Mapping[str, Any]:
+        """An object."""
+        value = self.anything(name)
+        if not isinstance(value, Mapping):
+            raise self.error(name, "an object")
+        return value
+
+    def texts(self, name: str) -> tuple[str, ...]:
+        """A list of texts."""
+        value = self.anything(name)
+        if not isinstance(value, list | tuple) or not all(isinstance(item, str) for item in value):
+            raise self.error(name, "a list of texts")
+        return tuple(value)
+
+    def integers(self, name: str) -> tuple[int, ...]:
+        """A list of whole numbers."""
+        value = self.anything(name)
+        if not isinstance(value, list | tuple) or not all(type(item) is int for item in value):
+            raise self.error(name, "a list of whole numbers")
+        return tuple(value)
+
+    def objects(self, name: str) -> tuple[Fields, ...]:
+        """A list of objects."""
+        value = self.anything(name)
+        if not isinstance(value, list | tuple) or not all(isinstance(item, Mapping) for item in value):
+            raise self.error(name, "a list of objects")
+        return tuple(Fields(item, f"{self.where}, {name}[{index}]") for index, item in enumerate(value))
+
+    def optional(self, name: str, read: Callable[[str], _T]) -> _T | None:
+        """None where the field is null, else what `read` (one of the methods above) makes of it."""
+        return None if self.anything(name) is None else read(name)
+
+    def error(self, name: str, expected: str) -> SessionError:
+        """The error for a field that is not what is expected."""
+        return SessionError(f"{self.where}: field {name!r} is {shown(self._values[name])}; it must be {expected}")
+
+    def if_given(self, name: str, read: Callable[[str], _T]) -> _T | None:
+        """None where the field is missing or null, else what `read` makes of it."""
+        return read(name) if self._values.get(name) is not None else None
+
+    def others(self, known: Collection[str]) -> dict[str, Any]:
+        """The fields whose names are not known."""
+        return {name: value for name, value in self._values.items() if name not in known}
+
+    def anything(self, name: str) -> Any:
+        """Whatever the field holds."""
+        if name not in self._values:
+            raise SessionError(f"{self.where}: field {name!r} is missing")
+        return self._values[name]
+
+
+# --- Files of lines, of which the last may be torn -------------------------------------------------------------------
+
+
+def read_lines(path: Path, limit: int) -> tuple[list[str], bool]:
+    """Returns the complete lines of a file, and whether anything is missing: a torn last line, or the file.
+
+    Raises:
+        SessionError: more than `limit` lines, a line that is not UTF-8, or no regular file.
+    """
+    if not path.exists():
+        return [], True
+    content = read_bytes(path)
+    if content.count(b"\n") > limit:
+        raise SessionError(f"{path}: holds more than {limit} lines, which no session does; it is not read")
+    *lines, rest = content.split(b"\n")
+    return [decode_text(line, f"{path}, line {number}") for number, line in enumerate(lines, start=1)], bool(rest)

@@ -1,0 +1,206 @@
+"""What of the recorded surroundings could be perceived from the car.
+
+As the environment shows it to the roles: everything within sight all around, which is 80 m on a clear day and less in
+fog, rain and darkness (`dorothie_gym.sim.sensing.visibility`; headlights count where they are recorded as on).
+What the environment adds by chance is left out: glimpses beyond the sight, and errors of place. A traffic light can be
+read within sight by whoever comes towards it. Relative to the car as it was when the surroundings were recorded.
+"""
+
+from __future__ import annotations
+
+import enum
+import functools
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.maps import Town
+from dorothie_gym.ontology import OntologyError, PhysicalAction, WeatherParameter
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.surroundings import Scene, SceneTable
+from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT
+from dorothie_gym.sim.weather import Weather
+
+Array: TypeAlias = NDArray[np.float64]
+Switches: TypeAlias = Sequence[tuple[int, bool]]
+"""Frames at which the head lights were switched, and whether on."""
+
+
+class ObjectKind(enum.IntEnum):
+    """What an object is: the first five as `ActorKind`, the others a traffic light by what it shows."""
+
+    OTHER = 0
+    VEHICLE = 1
+    CYCLIST = 2
+    PEDESTRIAN = 3
+    PROP = 4
+    LIGHT_GREEN = 5
+    LIGHT_YELLOW = 6
+    LIGHT_RED = 7
+
+
+OBJECT_VALUES: Final = ("distance", "bearing", "ahead", "aside", "heading", "speed", "length", "width")
+"""Columns of `Objects.values`: distance [m], bearing [degrees, positive left of where the car looks], the same place in
+metres ahead and to the left, heading relative to the car's [degrees, positive left], speed [m/s], length and width
+[m]; of a light distance, bearing and place are those of its stop line, and the rest is 0."""
+
+MOST_OBJECTS: Final = 64
+"""Objects of a look that are kept, the nearest: more than any batch takes."""
+
+FACING: Final = 90.0
+"""A light is seen by whoever drives in the direction of the lane that it rules, up to this much aslant [degrees]."""
+
+
+def perceived(
+    scene: Scene, pose: Array, frames: NDArray[np.int64], switches: Switches, town: Town | None
+) -> Iterator[tuple[int, NDArray[np.int64], Array]]:
+    """Yields for each look the frame (int), kinds (k,) and values (k, 8) of what was perceived, the nearest first.
+
+    Args:
+        scene: what was recorded around the car.
+        pose: (n, 3) x, y [m], heading [degrees, clockwise] of the car.
+        frames: (n,) frames of the poses, rising; those of the scene are among them.
+        switches: of the head lights, which are off at first.
+        town: the town, if it is known: it tells where the lights are.
+    """
+    looks = scene.actors.frames
+    at = pose[np.searchsorted(frames, looks)].reshape(-1, 3)
+    sight = _sights(scene.weather, switches, looks)
+    actors, lights = _actors(scene.actors, at), _lights(scene, looks, at, town)
+    owner = np.concatenate([actors[0], lights[0]])
+    kind = np.concatenate([actors[1], lights[1]])
+    values = np.concatenate([actors[2], lights[2]])
+    seen = values[:, 0] <= sight[owner]
+    owner, kind, values = owner[seen], kind[seen], values[seen]
+    order = np.lexsort((kind, values[:, 0], owner))
+    kind, values = kind[order], values[order]
+    ends = np.cumsum(np.bincount(owner, minlength=len(looks)))
+    for look, (frame, stop) in enumerate(zip(looks.tolist(), ends.tolist(), strict=True)):
+        start = int(ends[look - 1]) if look else 0
+        chosen = slice(start, min(stop, start + MOST_OBJECTS))
+        yield frame, kind[chosen], values[chosen]
+
+
+def last_perceived(session: Session, frame: int, town: Town | None) -> tuple[NDArray[np.int64], Array]:
+    """Returns kinds (k,) and values (k, 8) of the last look before a frame; nothing (k = 0) where there was none.
+
+    Args:
+        session: the session, as far as it has come.
+        frame: looks of this frame and later ones do not count.
+        town: as of `perceived`.
+    """
+    scene, trajectory = session.scene, session.trajectory
+    look = _last(scene.actors, frame - 1)
+    row = int(np.searchsorted(trajectory["frame"], look.frames[0])) if len(look) else len(trajectory)
+    if row == len(trajectory):
+        return np.empty(0, dtype=np.int64), np.empty((0, len(OBJECT_VALUES)))
+    there = trajectory[row : row + 1]
+    pose = np.stack([there["x"], there["y"], np.degrees(there["heading"])], axis=1)
+    now = int(look.frames[0])
+    scene = Scene(actors=look, lights=_last(scene.lights, now), weather=_last(scene.weather, now))
+    (_, kinds, values), *_ = perceived(scene, pose, look.frames, light_switches(session), town)
+    return kinds, values
+
+
+def light_switches(session: Session) -> Switches:
+    """Returns the frames at which the head lights were switched, and whether on."""
+    switched = [act for act in session.physical_actions if act.action is PhysicalAction.LIGHT_CHANGE]
+    return [(act.frame, bool(act.up)) for act in switched]
+
+
+def _last(table: SceneTable, frame: int) -> SceneTable:
+    """The last record at a frame or before, alone."""
+    k = int(np.searchsorted(table.frames, frame, side="right")) - 1
+    if k < 0:
+        return SceneTable(table.frames[:0], table.offsets[:1], table.rows[:0])
+    start, stop = int(table.offsets[k]), int(table.offsets[k + 1])
+    return SceneTable(table.frames[k : k + 1], np.array([0, stop - start]), table.rows[start:stop])
+
+
+def _actors(table: SceneTable, at: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    """Look, kind and values of every recorded actor."""
+    owner = np.repeat(np.arange(len(table)), np.diff(table.offsets))
+    rows = table.rows
+    values = np.zeros((len(rows), len(OBJECT_VALUES)))
+    values[:, :4] = _relative(np.stack([rows["x"], rows["y"]], axis=1), at[owner])
+    values[:, 4] = _wrap(at[owner, 2] - np.degrees(rows["heading"]))
+    for column, name in enumerate(("speed", "length", "width"), start=5):
+        values[:, column] = rows[name]
+    return owner, rows["kind"].astype(np.int64), values
+
+
+def _lights(
+    scene: Scene, looks: NDArray[np.int64], at: Array, town: Town | None
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    """Look, kind and values of the lights that the car comes towards."""
+    table, lines = scene.lights, {} if town is None else stop_lines(town)
+    record = np.searchsorted(table.frames, looks, side="right") - 1  # the last before each look
+    sizes = np.where(record >= 0, np.diff(table.offsets, append=table.offsets[-1:])[record], 0) if len(table) else None
+    if sizes is None or not lines:
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty((0, len(OBJECT_VALUES)))
+    owner = np.repeat(np.arange(len(looks)), sizes)
+    first = np.cumsum(sizes) - sizes
+    rows = table.rows[np.arange(len(owner)) - first[owner] + table.offsets[record][owner]]
+    numbers = np.array(sorted(lines))
+    place = np.searchsorted(numbers, rows["signal"]).clip(max=len(numbers) - 1)
+    line = np.array([lines[number] for number in numbers.tolist()])[place]  # (m, 3)
+    values = np.zeros((len(rows), len(OBJECT_VALUES)))
+    values[:, :4] = _relative(line[:, :2], at[owner])
+    aslant = np.abs(_wrap(at[owner, 2] - line[:, 2]))
+    shown = (numbers[place] == rows["signal"]) & (aslant < FACING) & (values[:, 2] > 0.0)
+    return owner[shown], ObjectKind.LIGHT_GREEN + rows["state"][shown].astype(np.int64), values[shown]
+
+
+@functools.lru_cache(maxsize=16)
+def stop_lines(town: Town) -> Mapping[int, tuple[float, float, float]]:
+    """Returns where each light's first lane ends, by the light's id: x, y [m], heading [degrees, clockwise]."""
+    lit = {signal for programme in town.programmes for signal in programme.signals}
+    lines = {}
+    for signal in town.signals:
+        if signal.id in lit and signal.lanes:
+            lane = town.lanes[signal.lanes[0]]
+            lines[signal.id] = (*lane.points[-1, :2].tolist(), float(np.degrees(lane.headings[-1])))
+    return MappingProxyType(lines)
+
+
+def _relative(places: Array, at: Array) -> Array:
+    """Distance [m], bearing [degrees, positive left], metres ahead and to the left (m, 4) of places from poses."""
+    dx, dy = (places - at[:, :2]).T
+    heading = np.radians(at[:, 2])
+    ahead = np.cos(heading) * dx + np.sin(heading) * dy
+    left = np.sin(heading) * dx - np.cos(heading) * dy  # y points south: left of east is north
+    return np.stack([np.hypot(ahead, left), np.degrees(np.arctan2(left, ahead)), ahead, left], axis=1)
+
+
+def _wrap(degrees: Array) -> Array:
+    return (degrees + 180.0) % 360.0 - 180.0
+
+
+def _sights(weather: SceneTable, switches: Switches, looks: NDArray[np.int64]) -> Array:
+    """How far things were seen at each look [m]."""
+    record = np.searchsorted(weather.frames, looks, side="right") - 1
+    lamps = np.zeros(len(looks), dtype=np.bool_)
+    for frame, on in switches:
+        lamps[looks >= frame] = on
+    found = np.full(len(looks), CLEAR_SIGHT)
+    if len(weather):
+        distinct, which = np.unique(weather.rows, return_inverse=True)
+        for number, on in {*zip(which[record[record >= 0]].tolist(), lamps[record >= 0].tolist(), strict=True)}:
+            chosen = (record >= 0) & (which[record] == number) & (lamps == on)
+            found[chosen] = _sight(tuple(distinct[number].tolist()), on)
+    return found
+
+
+@functools.lru_cache(maxsize=4096)
+def _sight(values: tuple[float, ...], lamps: bool) -> float:
+    """Sight in a weather [m]; parameters beyond their range, which other corpora may have, count as a clear day's."""
+    weather = Weather()
+    for parameter, value in zip(WeatherParameter, values, strict=True):
+        try:
+            weather.set(parameter, value)
+        except OntologyError:
+            continue
+    return weather.sight(lights=lamps)

@@ -1,0 +1,320 @@
+"""SDN's log of events as events of a session."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from dorothie_gym.ontology import (
+    LANE_SWITCH_LEFT,
+    LANE_SWITCH_RIGHT,
+    NAVIGATION_ACTIONS,
+    ArgumentKind,
+    MentalAction,
+    OntologyError,
+    PhysicalAction,
+    Role,
+    parse_goal_status,
+    parse_landmark,
+    parse_mental_action,
+    parse_physical_action,
+    parse_role,
+)
+from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.recording.events import Event, EventType, check_event
+from dorothie_gym.recording.sdn.files import FRAMES_EACH, MORE, OURS, Row, frame_of, more_of, number_of, plain, whole_of
+from dorothie_gym.recording.sdn.moves import MoveReader, read_speech
+from dorothie_gym.recording.validation import ReadReport
+
+RIGHT: Final = 2
+"""Value of a LaneSwitch to the right; 1 and 3 are left (spec: sdn-format)."""
+
+LEFT: Final = 3
+"""Value of a LaneSwitch to the left that we write: the published code makes +90 degrees of it."""
+
+_ON: Final = {"on": True, "off": False, "true": True, "false": False, "1": True, "0": False}
+
+
+@dataclass
+class DeedReader:
+    """Turns the values of rows into the data of actions and beliefs.
+
+    Attributes:
+        report: is told what is unknown.
+        lane_switches: which values of LaneSwitch occurred, and how often.
+        roads: of JTurns that name a road: number of the JTurn, counted from 0, and the road.
+        turns: number of JTurns read so far.
+    """
+
+    report: ReadReport
+    lane_switches: Counter[str] = field(default_factory=Counter)
+    roads: dict[int, int] = field(default_factory=dict)
+    turns: int = 0
+
+    def physical(self, val: Row) -> dict[str, Any]:
+        """Returns the data of a physical action, a JTurn's angle as the file has it.
+
+        Raises:
+            OntologyError: the action is unknown.
+        """
+        name = val.get("act")
+        number = whole_of(name) if not isinstance(name, str) or name.isdecimal() else None
+        if number is not None and number in PhysicalAction._value2member_map_:
+            action = PhysicalAction(number)
+        else:
+            action = parse_physical_action(str(name))
+        angle: float | None = None
+        up: bool | None = None
+        kind, value = action.argument, val.get("slot_val")
+        if kind is ArgumentKind.ANGLE:
+            angle = self._turn(val)
+        elif kind is ArgumentKind.SIDE:
+            angle = self._side(value)
+        elif kind is ArgumentKind.SPEED_STEP:
+            step = number_of(value)
+            up = None if not step else step > 0
+        elif kind is ArgumentKind.SWITCH:
+            up = value if isinstance(value, bool) else _ON.get(str(value).strip().casefold())
+        if kind is not ArgumentKind.NONE and angle is None and up is None:
+            self.report.miss(f"argument of {action.label}")
+        return {"action": action.label, "angle": angle, "up": up}
+
+    def belief(self, val: Row) -> dict[str, Any]:
+        """Returns the data of a belief update; arguments that are not understood are kept beside it.
+
+        Raises:
+            OntologyError: the update is unknown.
+        """
+        action = parse_mental_action(str(val.get("act")))
+        value = val.get("slot_val")
+        arguments: dict[str, Any] | None = {}
+        if action is MentalAction.PLAN_UPDATE:
+            arguments = plan_of(value)
+        elif action is MentalAction.GOAL_UPDATE:
+            arguments = goals_of(value)
+        elif action is MentalAction.STATUS_UPDATE:
+            arguments = _status_of(value)
+        elif action is MentalAction.KNOWLEDGE_UPDATE:
+            arguments = _guess_of(value)
+        if arguments is None:
+            self.report.keep(f"argument of {action.label}")
+            return {"action": action.label, "sdn": plain(dict(val))}
+        return {"action": action.label, **arguments}
+
+    def _turn(self, val: Row) -> float | None:
+        turn = self.turns
+        self.turns += 1
+        value = val.get("slot_val")
+        if str(val.get("slot_type")).strip().casefold() == "roadid":
+            road = whole_of(value)
+            if road is not None:
+                self.roads[turn] = road
+            return None
+        angle = number_of(value)
+        return None if angle is None else (angle + 180.0) % 360.0 - 180.0
+
+    def _side(self, value: Any) -> float | None:
+        number = whole_of(value)
+        self.lane_switches[str(value)[:20]] += 1
+        if number is None or number not in (1, RIGHT, LEFT):
+            return None
+        return LANE_SWITCH_RIGHT if number == RIGHT else LANE_SWITCH_LEFT
+
+
+def plan_of(value: Any) -> dict[str, Any] | None:
+    """Returns the junctions of a plan; None where the value holds none."""
+    items = value if isinstance(value, list) else [value]
+    junctions = [whole_of(item) for item in items]
+    return None if None in junctions else {"junctions": junctions}
+
+
+def goals_of(value: Any) -> dict[str, Any] | None:
+    """Returns the landmarks of goals; None where the value holds none."""
+    items = value if isinstance(value, list) else [value]
+    try:
+        return {"landmarks": [parse_landmark(item).label for item in items]}
+    except OntologyError:
+        return None
+
+
+def _status_of(value: Any) -> dict[str, Any] | None:
+    if isinstance(value, Mapping):
+        value = [value.get("landmark"), value.get("status")]
+    if not isinstance(value, list) or len(value) != 2:
+        return None
+    try:
+        return {"landmark": parse_landmark(value[0]).label, "status": parse_goal_status(value[1]).label}
+    except OntologyError:
+        return None
+
+
+def _guess_of(value: Any) -> dict[str, Any] | None:
+    if isinstance(value, Mapping):
+        landmark = value.get("landmark")
+        value = [value.get("x"), value.get("y"), *([] if landmark is None else [landmark])]
+    if not isinstance(value, list) or len(value) not in (2, 3):
+        return None
+    x, y = number_of(value[0]), number_of(value[1])
+    if x is None or y is None:
+        return None
+    guess: dict[str, Any] = {"x": x, "y": y}
+    if len(value) == 3 and isinstance(value[2], str):
+        try:
+            guess["landmark"] = parse_landmark(value[2]).label
+        except OntologyError:
+            return None
+    return guess
+
+
+# --- SDN's log of events as events of a session ----------------------------------------------------------------------
+
+_KINDS: Final = {
+    "dialoguemove": EventType.DIALOGUE_MOVE,
+    "dialogue": EventType.DIALOGUE_MOVE,
+    "physicalaction": EventType.PHYSICAL_ACTION,
+    "physical": EventType.PHYSICAL_ACTION,
+    "beliefupdate": EventType.BELIEF_UPDATE,
+    "planning": EventType.BELIEF_UPDATE,
+}
+_NATIVE: Final = {kind.value.casefold(): kind for kind in EventType} | {"exception": EventType.EXCEPTION}
+
+_FIELDS: Final = {
+    "frame", "type", "from", "to", "flag", "act", "val", "utterance", "utterance_gt", "utterance_filename", MORE,
+}  # fmt: skip
+
+SPEECH: Final = "speech"
+
+FOREIGN: Final = "sdn:"
+"""Before the type of a row that is kept as it is."""
+
+
+def sorted_rows(rows: Sequence[Row], name: str, report: ReadReport) -> list[Row]:
+    """Returns the rows that have a frame and a type, in the order of their frames; the others are left out."""
+    usable = [row for row in rows if frame_of(row) is not None and isinstance(row.get("type"), str)]
+    report.repair(f"{name}: rows without a frame or a type were left out", len(rows) - len(usable))
+    frames = [frame_of(row) or 0 for row in usable]
+    report.repair(
+        f"{name}: rows were out of order by frame, and were put in order",
+        sum(later < earlier for earlier, later in zip(frames, frames[1:], strict=False)),
+    )
+    return sorted(usable, key=lambda row: frame_of(row) or 0)
+
+
+class LogReader:
+    """Reads the rows of a log.
+
+    Args:
+        rows: the rows, sorted.
+        first_frame: frame (10 Hz) at which the session begins.
+        name: name of the file, for the report.
+        report: is told what is missing, unknown or put right.
+        audio: whether the files of speech are named in the events; ours, which do not exist, are not.
+    """
+
+    def __init__(
+        self, rows: Sequence[Row], first_frame: int, name: str, report: ReadReport, *, audio: bool = True
+    ) -> None:
+        self._rows = rows
+        self._first = first_frame
+        self._name = name
+        self._report = report
+        self.deeds = DeedReader(report)
+        speech = read_speech((row for row in rows if _type(row) == SPEECH), report, role_of)
+        self._moves = MoveReader(speech, first_frame, report, audio=audio)
+        if speech:
+            report.facts["stretches_of_speech"] = len(speech)
+
+    def events(self) -> list[Event]:
+        """Returns the events, in the order of the rows."""
+        return [self._event(row) for row in self._rows if _type(row) != SPEECH]
+
+    def _event(self, row: Row) -> Event:
+        frame, kind = frame_of(row) or 0, _KINDS.get(_type(row))
+        try:
+            if isinstance(row.get(OURS), Mapping):
+                return self._ours(row, frame)
+            source = role_of(row)
+            if kind is None or source is None:
+                raise OntologyError(f"type {row['type']!r} or from {row.get('from')!r} is unknown")
+            data, flagged = self._read(kind, row, frame, source)
+            data.update(self._rest(row, kind.value))
+            extra = row.get(MORE) if isinstance(row.get(MORE), Mapping) else {}
+            time = self._time(frame)
+            event = Event(frame=time, type=kind, source=source, flagged=flagged, data=data, extra=plain(extra))
+            check_event(event, "")
+        except (OntologyError, SessionError) as error:
+            return self._unknown(row, frame, str(error))
+        return event
+
+    def _read(self, kind: EventType, row: Row, frame: int, source: Role) -> tuple[dict[str, Any], bool]:
+        """Data of a row, and whether it is a point of the benchmark."""
+        val = row.get("val")
+        val = val if isinstance(val, Mapping) else {}
+        if kind is EventType.DIALOGUE_MOVE:
+            is_sample = "act" not in row and "act" in val
+            data = self._moves.sample(row, val, frame, source) if is_sample else self._moves.release(row, frame, source)
+            return data, self._flag(row, source in (Role.PARTICIPANT, Role.CO_WIZARD))
+        if kind is EventType.PHYSICAL_ACTION:
+            data = {**self.deeds.physical(val), **more_of(val)}
+            navigates = parse_physical_action(data["action"]) in NAVIGATION_ACTIONS
+            return data, self._flag(row, source is Role.CO_WIZARD and navigates)
+        return {**self.deeds.belief(val), **more_of(val)}, self._flag(row, False)
+
+    def _flag(self, row: Row, otherwise: bool) -> bool:
+        if "flag" not in row:
+            self._report.miss(f"{self._name}: flag (taken from the kind of event)")
+            return otherwise
+        return str(row["flag"]).strip().casefold() in ("true", "1", "1.0")
+
+    def _rest(self, row: Row, kind: str) -> dict[str, Any]:
+        """What a row has beside the known fields."""
+        rest = {name: value for name, value in row.items() if name not in _FIELDS}
+        for name in rest:
+            self._report.keep(f"{self._name}: field {str(name)!r} of {kind}")
+        return {"sdn": plain(rest)} if rest else {}
+
+    def _ours(self, row: Row, frame: int) -> Event:
+        """An event of our own that the layout has no form for."""
+        ours = row[OURS]
+        name = str(plain(row["type"])).strip()
+        kind = _NATIVE.get(name.casefold(), EventType.OTHER)
+        extra = ours.get("extra") if isinstance(ours.get("extra"), Mapping) else {}
+        event = Event(
+            frame=self._time(frame),
+            type=kind,
+            source=role_of(row) or Role.AGENT,
+            flagged=bool(row.get("flag")),
+            data=plain(row["val"]) if isinstance(row.get("val"), Mapping) else {},
+            extra={**({"type": name} if kind is EventType.OTHER else {}), **plain(extra)},
+        )
+        check_event(event, f"{self._name}, frame {frame}")
+        return event
+
+    def _unknown(self, row: Row, frame: int, reason: str) -> Event:
+        name = str(plain(row["type"])).strip()[:80]
+        self._report.keep(f"{self._name}: row of type {name!r} ({reason.strip(': ')[:120]})")
+        rest = {key: value for key, value in row.items() if key not in ("frame", "type")}
+        return Event(
+            frame=self._time(frame),
+            type=EventType.OTHER,
+            source=role_of(row) or Role.AGENT,
+            data=plain(rest),
+            extra={"type": FOREIGN + name},
+        )
+
+    def _time(self, frame: int) -> int:
+        return FRAMES_EACH * max(frame - self._first, 0)
+
+
+def role_of(row: Row) -> Role | None:
+    """Returns who a row comes from; None where the name is unknown."""
+    try:
+        return parse_role(row["from"].strip())
+    except (KeyError, AttributeError, OntologyError):
+        return None
+
+
+def _type(row: Row) -> str:
+    return str(row["type"]).strip().casefold()

@@ -1,0 +1,247 @@
+"""Reading files of others: rows of JSON and CSV, whatever they hold, in bounded memory."""
+
+from __future__ import annotations
+
+import enum
+import json
+import math
+import re
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, TypeAlias
+
+from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.recording.file_names import MAX_EVENTS, MAX_FRAME
+from dorothie_gym.recording.json_io import MAX_DEPTH, decode_text, read_bytes
+from dorothie_gym.recording.validation import ReadReport
+
+FRAMES_EACH: Final = 3
+"""Our frames (30 Hz) in one of SDN's (10 Hz)."""
+
+SDN_RATE: Final = 10.0
+"""SDN's frames a second."""
+
+CONFIG_FILE: Final = "config.json"
+LOG_FILE: Final = "annotated_log.json"
+PLAN_FILE: Final = "plan.json"
+DETAILED_PLAN_FILE: Final = "detailed_plan.json"
+PLACES_FILE: Final = "trajectory.csv"
+AD_WIZARD_FILE: Final = "ad_wizardlog.csv"
+GAMELOG_FILE: Final = "gamelog.json"
+TASK_FILE: Final = "task.json"
+DIALOG_FILE: Final = "dialog_log.json"
+SCENE_FILE: Final = "dorothie_gym_scene.parquet"
+"""What was around the car, which the layout has no place for: a file of ours, laid out as `frames.parquet`."""
+
+OURS: Final = "dorothie_gym"
+"""Field of `config.json`, and of rows of the log, that holds what only our sessions have."""
+
+
+MORE: Final = "more"
+"""Field of a row, of its act or of its value that holds further fields of our events."""
+
+
+class SdnLayout(enum.StrEnum):
+    """A layout."""
+
+    RELEASE = "release"
+    SAMPLE = "sample"
+    HUB = "hub"
+
+
+_LOGS: Final = {SdnLayout.RELEASE: LOG_FILE, SdnLayout.SAMPLE: GAMELOG_FILE, SdnLayout.HUB: DIALOG_FILE}
+
+_FILES: Final = {
+    SdnLayout.RELEASE: (CONFIG_FILE, LOG_FILE, PLAN_FILE, DETAILED_PLAN_FILE, PLACES_FILE, AD_WIZARD_FILE, SCENE_FILE),
+    SdnLayout.SAMPLE: (CONFIG_FILE, GAMELOG_FILE, TASK_FILE, PLACES_FILE),
+    SdnLayout.HUB: (DIALOG_FILE,),
+}
+
+
+def detect_layout(folder: Path) -> SdnLayout | None:
+    """Returns the layout of a folder; None where it holds no SDN session."""
+    return next((layout for layout, name in _LOGS.items() if (folder / name).is_file()), None)
+
+
+def log_file(layout: SdnLayout) -> str:
+    """Returns the name of the file with the events."""
+    return _LOGS[layout]
+
+
+def expected_files(layout: SdnLayout) -> tuple[str, ...]:
+    """Returns the names of the files that are read."""
+    return _FILES[layout]
+
+
+# --- Reading files of others: rows of JSON and CSV, whatever they hold, in bounded memory ----------------------------
+
+Row: TypeAlias = Mapping[str, Any]
+
+_SPACE: Final = re.compile(r"[ \t\n\r]*")
+
+APOSTROPHE: Final = "\u2019"
+"""Stands for an apostrophe in SDN's transcripts."""
+
+
+def read_json(path: Path, report: ReadReport) -> Any:
+    """Returns what a JSON file holds; NaN and infinite numbers become null, which is noted.
+
+    Of a file with an object on each line it returns the list of them.
+
+    Raises:
+        SessionError: it is not JSON, or too large, or nested too deeply; the message names the file and the place.
+    """
+    text = _text(path)
+    if not text.strip():
+        raise SessionError(f"{path}: is empty")
+    if text.lstrip().startswith("["):
+        return read_list(path, report, text)
+    value, place = _decode(text, _skip(text, 0), path, "", report)
+    place = _skip(text, place)
+    if place == len(text):
+        return value
+    items = [value]
+    while place < len(text):
+        _check_count(len(items), path)
+        item, place = _decode(text, place, path, f", item {len(items)}", report)
+        items.append(item)
+        place = _skip(text, place)
+    report.repair(f"{path.name}: a row on each line was read as a list")
+    return items
+
+
+def read_list(path: Path, report: ReadReport, text: str | None = None) -> list[Any]:
+    """Returns the items of the JSON list that a file holds, read one by one so that a huge one is refused early.
+
+    Raises:
+        SessionError: as `read_json`, or it holds no list, or more than `MAX_EVENTS` items.
+    """
+    text = _text(path) if text is None else text
+    place = _skip(text, 0)
+    if text[place : place + 1] != "[":
+        raise SessionError(f"{path}: a JSON list is expected" + ("" if text.strip() else ", the file is empty"))
+    items: list[Any] = []
+    place = _skip(text, place + 1)
+    while text[place : place + 1] != "]":
+        _check_count(len(items), path)
+        item, place = _decode(text, place, path, f", item {len(items)}", report)
+        items.append(item)
+        place = _skip(text, place)
+        if text[place : place + 1] == ",":
+            place = _skip(text, place + 1)
+        elif text[place : place + 1] != "]":
+            line = text.count("\n", 0, place) + 1
+            raise SessionError(f"{path}, line {line}, after item {len(items) - 1}: the list is cut off or damaged")
+    if text[place + 1 :].strip():
+        report.repair(f"{path.name}: text after the end of the list was left out")
+    return items
+
+
+def _check_count(count: int, path: Path) -> None:
+    if count >= MAX_EVENTS:
+        raise SessionError(f"{path}: holds more than {MAX_EVENTS} items, which no session does; it is not read")
+
+
+def read_rows(path: Path, report: ReadReport) -> list[Row]:
+    """Returns the objects of the JSON list that a file holds; other items are left out, which is noted."""
+    return objects(read_list(path, report), path.name, report)
+
+
+def objects(items: list[Any], name: str, report: ReadReport) -> list[Row]:
+    """Returns the objects among the items; others are left out, which is noted."""
+    rows = [item for item in items if isinstance(item, Mapping)]
+    report.repair(f"{name}: items that are no objects were left out", len(items) - len(rows))
+    return rows
+
+
+def read_csv(path: Path, limit: int) -> list[list[str]]:
+    """Returns the fields of each line, without the spaces around them; empty lines are empty lists.
+
+    Raises:
+        SessionError: it is not UTF-8, or too large.
+    """
+    text = _text(path).replace("\r\n", "\n").replace("\r", "\n").replace("\0", "")
+    if text.count("\n") > limit:
+        raise SessionError(f"{path}: holds more than {limit} lines, which no session does; it is not read")
+    return [[part.strip() for part in line.split(",")] if line.strip() else [] for line in text.split("\n")]
+
+
+def number_of(value: Any) -> float | None:
+    """Returns the finite number that a field holds, as a number or as text; None where it holds none."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        return None
+    try:
+        number = float(value)
+    except (ValueError, OverflowError):
+        return None
+    return number if math.isfinite(number) else None
+
+
+def whole_of(value: Any) -> int | None:
+    """Returns the whole number, below 2^53 either way, that a field holds; None where it holds none."""
+    number = number_of(value)
+    return int(number) if number is not None and number == int(number) and abs(number) < 2**53 else None
+
+
+def frame_of(row: Row) -> int | None:
+    """Returns the frame (10 Hz) of a row; None where it has none that could be one."""
+    frame = whole_of(row.get("frame"))
+    return frame if frame is not None and 0 <= frame < MAX_FRAME else None
+
+
+def transcript_of(value: Any, report: ReadReport) -> str | None:
+    """Returns a transcript with plain apostrophes, or None where there is none."""
+    if not isinstance(value, str):
+        return None
+    if APOSTROPHE in value:
+        report.repair("transcripts: U+2019 was read as an apostrophe")
+    return str(plain(value.replace(APOSTROPHE, "'").strip()))
+
+
+def plain(value: Any, depth: int = MAX_DEPTH - 8) -> Any:
+    """Returns what a session can keep of a JSON value: texts in UTF-8, no infinite numbers, no endless nesting."""
+    if isinstance(value, str):
+        return value.encode("utf-8", "replace").decode("utf-8")
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, list | tuple):
+        return [plain(item, depth - 1) for item in value] if depth else "..."
+    if isinstance(value, Mapping):
+        return {str(plain(key)): plain(item, depth - 1) for key, item in value.items()} if depth else "..."
+    return value
+
+
+def more_of(values: Row) -> dict[str, Any]:
+    """Returns the further fields of our events that our writer put beside those of the layout."""
+    more = values.get(MORE)
+    return dict(plain(more)) if isinstance(more, Mapping) else {}
+
+
+def _text(path: Path) -> str:
+    return decode_text(read_bytes(path), str(path)).removeprefix("\ufeff")
+
+
+def _skip(text: str, place: int) -> int:
+    match = _SPACE.match(text, place)
+    return match.end() if match else place
+
+
+def _decode(text: str, place: int, path: Path, item: str, report: ReadReport) -> tuple[Any, int]:
+    bad: Counter[str] = Counter()
+
+    def note(name: str) -> None:
+        bad[name] += 1
+
+    decoder = json.JSONDecoder(parse_constant=note)
+    try:
+        value, end = decoder.raw_decode(text, place)
+    except json.JSONDecodeError as error:
+        raise SessionError(f"{path}, line {error.lineno}{item}: not JSON ({error.msg}); is the file cut off?") from None
+    except ValueError as error:  # a number of more digits than Python reads
+        raise SessionError(f"{path}{item}: not readable ({error})") from None
+    except RecursionError:
+        raise SessionError(f"{path}{item}: the JSON is nested too deeply to be read") from None
+    for name, count in bad.items():
+        report.repair(f"{path.name}: {name} was read as unknown", count)
+    return value, end

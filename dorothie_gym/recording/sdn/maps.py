@@ -1,0 +1,96 @@
+"""The town of an SDN session, where it can be loaded: lanes by OpenDRIVE's numbers, and angles of turns by road."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from dorothie_gym.maps import NO_STREET, Town, load_town, town_names
+from dorothie_gym.recording.trajectory import NO_LANE
+
+_NAME: Final = re.compile(r"\w{1,60}")
+_SUFFIXES: Final = (".xodr", ".yaml", ".yml")
+
+FAR: Final = 10.0
+"""A place farther from every lane than this is on none [m]."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place in the town: lane (-1: none), distance along it [m], street (-1: none)."""
+
+    lane: int = NO_LANE
+    station: float = 0.0
+    street: int = NO_STREET
+
+
+def find_town(name: str, maps: Path | None) -> Town | None:
+    """Returns the town of that name: one that is shipped, or the file `<name>.xodr` or `.yaml` in a folder of maps.
+
+    Raises:
+        TownError: the file is at fault.
+    """
+    if not _NAME.fullmatch(name):  # what a file says is no path
+        return None
+    if name in town_names():
+        return load_town(name)
+    candidates = [] if maps is None else [maps / f"{name}{suffix}" for suffix in _SUFFIXES]
+    return next((load_town(path) for path in candidates if path.is_file()), None)
+
+
+class SdnMap:
+    """Looks places up in a town, which may not be known.
+
+    Args:
+        town: the town, or None: then nothing is found.
+    """
+
+    def __init__(self, town: Town | None) -> None:
+        self.town = town
+        self._by_ids: dict[tuple[int, int], list[int]] = defaultdict(list)
+        for lane in town.lanes if town is not None else ():
+            self._by_ids[lane.road_id, lane.lane_id].append(lane.id)
+
+    def locate(self, x: float, y: float, road: int | None = None, lane: int | None = None) -> Place:
+        """Returns the place closest to (x, y) [m], on the lanes of the given numbers where the town has them."""
+        if self.town is None:
+            return Place()
+        known = self._by_ids.get((road, lane)) if road is not None and lane is not None else None
+        position = np.array([x, y])
+        found = [(*self.town.lanes[k].project(position), k) for k in known or range(len(self.town.lanes))]
+        station, lateral, number = min(found, key=lambda item: (abs(item[1]), item[2]))
+        if known is None and abs(lateral) > FAR:
+            return Place()
+        return Place(number, station, self.town.lanes[number].street)
+
+    def lane_of(self, x: float, y: float, road: int, lane: int) -> int:
+        """Returns the lane of the given numbers at (x, y), or -1; quick, for every frame."""
+        known = self._by_ids.get((road, lane), ())
+        if len(known) == 1:
+            return known[0]
+        return self.locate(x, y, road, lane).lane if known else NO_LANE
+
+    def turn_angle(self, lane: int, road: int) -> float | None:
+        """Returns the angle [degrees, positive left] of the way from a lane into a road, through one junction.
+
+        Args:
+            lane: where the car is.
+            road: number of the road that it is to turn into, or of the connecting road that leads there.
+        """
+        town = self.town
+        if town is None or lane < 0:
+            return None
+        for _ in range(len(town.lanes)):  # along the road to the junction
+            exits = town.exits(lane)
+            for way in exits:
+                if road in (town.lanes[way.lane].road_id, town.lanes[way.connector].road_id):
+                    return float(way.angle)
+            if len(exits) != 1 or exits[0].junction_id >= 0:
+                return None
+            lane = exits[0].lane
+        return None

@@ -1,0 +1,215 @@
+"""What is said in SDN's logs, as dialogue moves: several moves of one utterance come as several rows."""
+
+from __future__ import annotations
+
+import bisect
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from dorothie_gym.ontology import DialogueAct, OntologyError, Role, parse_act, parse_move, parse_slot_value
+from dorothie_gym.ontology import parse_slot as slot_of
+from dorothie_gym.recording.sdn.files import (
+    MORE,
+    SDN_RATE,
+    Row,
+    frame_of,
+    more_of,
+    number_of,
+    plain,
+    transcript_of,
+    whole_of,
+)
+from dorothie_gym.recording.validation import ReadReport
+
+WORDS_A_SECOND: Final = 2.5
+"""Pace of speech where the log does not say how long an utterance took (spec: design, Time)."""
+
+NEAR: Final = 20
+"""Frames (10 Hz) between a stretch of speech and a move that belongs to it."""
+
+AT_ONCE: Final = 50
+"""Stretches of one speaker that are looked at for a move, those that began last."""
+
+_ACT_FIELDS: Final = {"move", "slots", "exchange", "transaction", "span", "utterance", "start", "end", MORE}
+
+
+@dataclass(frozen=True)
+class Speech:
+    """A stretch of speech: who, the audio's file name, first and last frame (10 Hz)."""
+
+    speaker: Role
+    file: str
+    start: int
+    end: int
+
+
+class MoveReader:
+    """Turns rows into the data of dialogue moves, in the order of their frames.
+
+    Args:
+        speech: the stretches of speech of the session.
+        first_frame: frame (10 Hz) at which the session begins.
+        report: is told what is missing, unknown or guessed.
+        audio: whether the files of speech are named in the data.
+    """
+
+    def __init__(self, speech: Iterable[Speech], first_frame: int, report: ReadReport, *, audio: bool = True) -> None:
+        self._audio = audio
+        self._files = {stretch.file: stretch for stretch in speech}
+        self._by_speaker: dict[Role, list[Speech]] = defaultdict(list)
+        for stretch in sorted(self._files.values(), key=lambda each: (each.start, each.file)):
+            self._by_speaker[stretch.speaker].append(stretch)
+        self._first = first_frame
+        self._report = report
+        self._last: tuple[Any, ...] | None = None
+        self._number = -1
+        self._exchange = -1
+        self._transaction = -1
+        self._open = {"exchange": False, "transaction": False}
+
+    def release(self, row: Row, frame: int, speaker: Role) -> dict[str, Any]:
+        """Returns the data of a row of the release layout; raises `OntologyError` where its move is unknown."""
+        given = row.get("act")
+        act: Row = given if isinstance(given, Mapping) else {"move": given}
+        text = transcript_of(row.get("utterance_gt"), self._report)
+        recognised = transcript_of(row.get("utterance"), self._report)
+        if text is None:
+            self._report.miss("utterance_gt (the recogniser's transcript stands in for it)")
+            text = recognised or ""
+        data = self._said(row, act, frame, speaker, text)
+        if recognised is not None:
+            data["recognised"] = recognised
+        else:
+            self._report.miss("utterance (the recogniser's transcript)")
+        if (transaction := whole_of(act.get("transaction"))) is not None:
+            data["transaction"] = transaction
+        rest = {name: plain(value) for name, value in act.items() if name not in _ACT_FIELDS}
+        for name in rest:
+            self._report.keep(f"act: field {str(name)!r}")
+        if rest:
+            data["sdn_act"] = plain(rest)
+        return data
+
+    def sample(self, row: Row, val: Row, frame: int, speaker: Role) -> dict[str, Any]:
+        """Returns the data of a row of the sample layout, whose exchanges and transactions are marked by their ends."""
+        for name, mark in (("exchange", "g"), ("transaction", "t")):
+            if val.get(f"is_so{mark}") is True:
+                self._open[name] = True
+                setattr(self, f"_{name}", getattr(self, f"_{name}") + 1)
+        text = transcript_of(val.get("utterance"), self._report) or ""
+        act: dict[str, Any] = {"move": val.get("act"), "slots": slots_of(val.get("slot_type"), val.get("slot_val"))}
+        data = self._said(row, act, frame, speaker, text)
+        data["exchange"] = self._exchange if self._open["exchange"] else None
+        if self._open["transaction"]:
+            data["transaction"] = self._transaction
+        for name, mark in (("exchange", "g"), ("transaction", "t")):
+            if val.get(f"is_eo{mark}") is True:
+                self._open[name] = False
+        return data
+
+    def _said(self, row: Row, act: Row, frame: int, speaker: Role, text: str) -> dict[str, Any]:
+        parsed = self._parse(act)
+        stretch = self._stretch(row, frame, speaker)
+        file = stretch.file if stretch is not None else None
+        given = whole_of(act.get("utterance"))
+        same = (speaker, given) if given is not None else (speaker, text, frame if file is None else file)
+        if same != self._last:
+            self._number += 1
+            self._last = same
+        start, end = self._times(act, stretch, frame, text)
+        span = transcript_of(act.get("span"), self._report)
+        data = {
+            "utterance": self._number,
+            "text": str(plain(text)),
+            "span": str(plain(text if span is None else span)),
+            "move": parsed.move.label,
+            "slots": parsed.slot_labels(),
+            "exchange": whole_of(act.get("exchange")),
+            "start": start,
+            "end": end,
+        }
+        if file is not None and self._audio:
+            data["audio"] = str(plain(file))
+        return {**data, **more_of(act)}
+
+    def _parse(self, act: Row) -> DialogueAct:
+        move, slots = act.get("move"), act.get("slots")
+        slots = slots if isinstance(slots, Mapping) else {}
+        try:
+            return parse_act(str(move), slots)
+        except (OntologyError, TypeError):
+            parse_move(str(move))
+        known: dict[str, list[str]] = {}
+        for slot, values in slots.items():
+            for value in values if isinstance(values, list) else [values]:
+                if _is_known(slot, value):
+                    known.setdefault(slot, []).append(value)
+                else:
+                    self._report.keep(f"slot value {str(slot)[:40]}={str(value)[:40]} (left out)")
+        return parse_act(str(move), known)
+
+    def _stretch(self, row: Row, frame: int, speaker: Role) -> Speech | None:
+        file = row.get("utterance_filename")
+        if isinstance(file, str) and file in self._files:
+            return self._files[file]
+        own = self._by_speaker[speaker]
+        begun = bisect.bisect_right(own, frame + NEAR, key=lambda stretch: stretch.start)
+        near = [
+            (max(stretch.start - frame, frame - stretch.end, 0), -stretch.start, stretch.file)
+            for stretch in own[max(begun - AT_ONCE, 0) : begun]
+        ]
+        best = min(near, default=None)
+        return self._files[best[2]] if best is not None and best[0] <= NEAR else None
+
+    def _times(self, act: Row, stretch: Speech | None, frame: int, text: str) -> tuple[float, float]:
+        start, end = number_of(act.get("start")), number_of(act.get("end"))
+        if start is not None and end is not None:
+            return start, end
+        if stretch is not None:
+            return (stretch.start - self._first) / SDN_RATE, (stretch.end - self._first) / SDN_RATE
+        self._report.repair("times of utterances without audio were guessed from their words")
+        over = (frame - self._first) / SDN_RATE
+        return round(over - max(len(text.split()), 1) / WORDS_A_SECOND, 3), over
+
+
+def read_speech(rows: Iterable[Row], report: ReadReport, speaker_of: Any) -> tuple[Speech, ...]:
+    """Returns the stretches of speech; the log has a row for every frame of each."""
+    found: dict[str, Speech] = {}
+    for row in rows:
+        file, frame = row.get("utterance_filename"), frame_of(row)
+        speaker = speaker_of(row)
+        if not isinstance(file, str) or frame is None or speaker is None:
+            report.repair("rows of speech without frame, speaker or file were left out")
+            continue
+        start, end = whole_of(row.get("start_frame")), whole_of(row.get("end_frame"))
+        before = found.get(file, Speech(speaker, file, frame, frame))
+        found[file] = Speech(
+            before.speaker,
+            file,
+            min(before.start, frame if start is None else start),
+            max(before.end, frame if end is None else end),
+        )
+    return tuple(sorted(found.values(), key=lambda stretch: (stretch.start, stretch.file)))
+
+
+def slots_of(types: Any, values: Any) -> dict[str, list[Any]]:
+    """Returns slots of the sample layout: one type and value, or lists of both."""
+    names = types if isinstance(types, list) else [types]
+    given = values if isinstance(values, list) and len(names) > 1 else [values]
+    slots: dict[str, list[Any]] = {}
+    for k, name in enumerate(names):
+        if not isinstance(name, str) or not name.strip():
+            continue
+        value = given[k] if k < len(given) else None
+        slots.setdefault(name, []).extend(value if isinstance(value, list) else [value])
+    return {name: [value for value in found if isinstance(value, str)] for name, found in slots.items()}
+
+
+def _is_known(slot: Any, value: Any) -> bool:
+    try:
+        parse_slot_value(slot_of(slot), value)
+    except (OntologyError, TypeError, AttributeError):
+        return False
+    return True

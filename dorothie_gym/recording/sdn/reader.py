@@ -1,0 +1,193 @@
+"""Reading an SDN session, whatever its layout, into a `Session`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.recording.events import Event
+from dorothie_gym.recording.file_names import MAX_FRAME
+from dorothie_gym.recording.header import SessionHeader
+from dorothie_gym.recording.sdn.config import header_of, town_of
+from dorothie_gym.recording.sdn.event_log import LogReader, sorted_rows
+from dorothie_gym.recording.sdn.files import (
+    CONFIG_FILE,
+    OURS,
+    PLACES_FILE,
+    SCENE_FILE,
+    TASK_FILE,
+    Row,
+    SdnLayout,
+    detect_layout,
+    expected_files,
+    frame_of,
+    log_file,
+    objects,
+    read_json,
+    whole_of,
+)
+from dorothie_gym.recording.sdn.maps import SdnMap, find_town
+from dorothie_gym.recording.sdn.plan_files import ViewReader
+from dorothie_gym.recording.sdn.trajectory import Places, read_places, read_scene, trajectory_of_places
+from dorothie_gym.recording.sdn.turn_angles import SignVote, vote, with_roads, with_sign
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.validation import ReadReport
+
+FROM_START: Final = 600
+"""A `start_frame` farther before the first row than this is of another clock [frames at 10 Hz]."""
+
+
+@dataclass(frozen=True)
+class RawSession:
+    """What the files hold, angles of JTurns with the sign that they have there."""
+
+    layout: SdnLayout
+    config: Row
+    task: Row
+    header: SessionHeader
+    events: list[Event]
+    places: Places
+    first_frame: int
+    place: SdnMap
+    report: ReadReport
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether this package wrote it."""
+        return isinstance(self.config.get(OURS), Mapping)
+
+
+def read_sdn(path: Path | str, *, maps: Path | str | None = None, sign: SignVote | None = None) -> Session:
+    """Reads the folder of an SDN session: release, sample or hub layout (`docs/session-format.md`).
+
+    Nothing but JSON and CSV is opened; `.pkl` files never are. `Session.report` names what was not understood, is
+    missing or was put right.
+
+    Args:
+        path: the folder.
+        maps: folder with the towns' maps (`Town01.xodr`, ...), for lanes and for angles of turns into a road.
+        sign: what settles the sign of angles; from the session alone where it is None (see `settle_sign`).
+
+    Raises:
+        SessionError: there is no SDN session, or a file of it cannot be read; the message names file and place.
+        TownError: the town's map is at fault.
+        OSError: a file cannot be read.
+    """
+    folder = Path(path)
+    raw = raw_session(folder, None if maps is None else Path(maps))
+    report = raw.report
+    own = vote(raw.events, raw.places, raw.first_frame)
+    settled = own if sign is None else sign
+    if raw.is_ours:
+        settled = SignVote()  # which is positive left
+    else:
+        report.facts["turn_angles"] = settled.to_json()
+    trajectory, scene = trajectory_of_places(raw.places, raw.first_frame, raw.place)
+    if raw.is_ours:
+        scene = read_scene(folder / SCENE_FILE, scene, trajectory, report)
+    header = raw.header
+    if header.departure[0] < 0 and len(trajectory) and raw.place.town is not None:
+        found = raw.place.locate(float(trajectory["x"][0]), float(trajectory["y"][0]))
+        header = replace(header, departure=(found.lane, found.station))
+    ending = raw.config.get(OURS)
+    outcome = ending.get("outcome") if isinstance(ending, Mapping) else None
+    return Session(
+        header=header,
+        events=tuple(with_sign(raw.events, settled)),
+        trajectory=trajectory,
+        summary=outcome if isinstance(outcome, Mapping) else {},
+        complete=outcome is not None or not isinstance(ending, Mapping),
+        name=folder.resolve().name,
+        scene=scene,
+        report=report,
+    )
+
+
+def raw_session(folder: Path, maps: Path | None) -> RawSession:
+    """Reads the files of a session; see `read_sdn`."""
+    layout = detect_layout(folder)
+    if layout is None:
+        raise SessionError(f"{folder}: no SDN session here (none of its logs is there)")
+    report = ReadReport(layout=str(layout))
+    config = _object(folder, CONFIG_FILE, report) if CONFIG_FILE in expected_files(layout) else {}
+    task = _object(folder, TASK_FILE, report) if TASK_FILE in expected_files(layout) else {}
+    name = log_file(layout)
+    rows, around = _log_rows(folder / name, report)
+    config = {**around, **config}
+    rows = sorted_rows(rows, name, report)
+    is_driven = layout is not SdnLayout.HUB or (folder / PLACES_FILE).exists()
+    places = read_places(folder / PLACES_FILE, report if is_driven else ReadReport())
+    first = _first_frame(config, rows, places)
+    town = town_of(config)
+    place = SdnMap(find_town(town, maps))
+    if place.town is None:
+        report.miss(f"map of {town or 'the town'!r} (lanes, and angles of turns into a road, are unknown)")
+    header = header_of(config, task, layout, place, first, report)
+    ours = isinstance(config.get(OURS), Mapping)
+    log = LogReader(rows, first, name, report, audio=not ours)
+    events, unknown = with_roads(log.events(), log.deeds.roads, places, first, place)
+    if log.deeds.roads:
+        report.facts["turns_into_a_road"] = {"found": len(log.deeds.roads) - unknown, "unknown": unknown}
+    if log.deeds.lane_switches:
+        report.facts["lane_switch_values"] = dict(sorted(log.deeds.lane_switches.items()))
+    if layout is SdnLayout.RELEASE and not ours:  # our log holds all that the other files show
+        more, header = ViewReader(folder, first, report).events(events, header)
+        events = sorted([*events, *more], key=lambda event: event.frame)
+    _note_files(folder, layout, report)
+    return RawSession(layout, config, task, header, events, places, first, place, report)
+
+
+def _object(folder: Path, name: str, report: ReadReport) -> Row:
+    """What a file with one JSON object holds; empty where it is missing."""
+    if not (folder / name).is_file():
+        report.miss(name)
+        return {}
+    value = read_json(folder / name, report)
+    if not isinstance(value, Mapping):
+        raise SessionError(f"{folder / name}: a JSON object is expected")
+    return value
+
+
+def _log_rows(path: Path, report: ReadReport) -> tuple[list[Row], Row]:
+    """Returns the rows of a log, and what stands around them where it is no plain list (as the hub's may be).
+
+    Rows are the objects that have a field 'frame', or that stand in a list with such: of the list, if the file holds
+    one, else in the fields of its object.
+    """
+    value = read_json(path, report)
+    if isinstance(value, list):
+        return objects(value, path.name, report), {}
+    if not isinstance(value, Mapping):
+        raise SessionError(f"{path}: a JSON list of events is expected")
+    rows: list[Row] = []
+    around: dict[str, Any] = {}
+    for name, items in value.items():
+        given = items if isinstance(items, list) else [items]
+        found = objects(given, path.name, ReadReport())
+        if any("frame" in row for row in found):
+            rows += found
+        else:
+            around[name] = items
+    if not rows:
+        raise SessionError(f"{path}: holds no list of events (rows with a field 'frame')")
+    return rows, around
+
+
+def _first_frame(config: Row, rows: list[Row], places: Places) -> int:
+    """The frame (10 Hz) that a session begins at."""
+    seen = [frame_of(row) or 0 for row in rows[:1]] + places.frames[:1].tolist()
+    first = min(seen, default=0)
+    given = whole_of(config.get("start_frame"))
+    if given is not None and 0 <= given < MAX_FRAME and 0 <= first - given <= FROM_START:
+        return given
+    return first
+
+
+def _note_files(folder: Path, layout: SdnLayout, report: ReadReport) -> None:
+    """Notes what lies in the folder and is not read."""
+    left = sorted(path.name for path in folder.iterdir() if path.name not in expected_files(layout))
+    if left:
+        report.facts["files_not_read"] = ", ".join(name[:60] for name in left[:20]) + ("..." if len(left) > 20 else "")

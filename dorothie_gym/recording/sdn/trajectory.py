@@ -1,0 +1,216 @@
+"""`trajectory.csv` of SDN: where the car was, ten times a second."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.recording.file_names import MAX_FRAME, MAX_FRAMES
+from dorothie_gym.recording.frames import read_frames, write_frames
+from dorothie_gym.recording.sdn.files import FRAMES_EACH, SDN_RATE, number_of, read_csv
+from dorothie_gym.recording.sdn.maps import SdnMap
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.surroundings import Scene, SceneTable
+from dorothie_gym.recording.trajectory import NO_LANE, TRAJECTORY_DTYPE, Trajectory
+from dorothie_gym.recording.validation import ReadReport
+
+COLUMNS: Final = ("frame", "x", "y", "yaw", "junction_id", "road_id", "lane_id")
+"""The columns of the layout; those after `yaw` may be missing."""
+
+_NEEDED: Final = COLUMNS[:4]
+_IDS: Final = COLUMNS[4:]
+
+FARTHEST: Final = 1e9
+"""A number of a place or a yaw beyond this is none [m, degrees]."""
+
+MOVED: Final = 0.2
+"""A car that got this far from one frame to the next [m] drove where it looked."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where the car was.
+
+    Attributes:
+        frames: (n,) int64, 10 Hz, rising.
+        x: (n,) [m].
+        y: (n,) [m].
+        heading: (n,) [rad, clockwise].
+        ids: junction, road and lane in OpenDRIVE's numbers, each (n,) int64; -1 in `junction_id` is none.
+        further: other columns of the file, each (n,) float64.
+    """
+
+    frames: NDArray[np.int64]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    heading: NDArray[np.float64]
+    ids: dict[str, NDArray[np.int64]]
+    further: dict[str, NDArray[np.float64]]
+
+
+def read_places(path: Path, report: ReadReport) -> Places:
+    """Reads the file.
+
+    It ends at a second header line; rows with a number missing are left out, rows out of order put in order, of several
+    rows of a frame the first is taken.
+
+    Raises:
+        SessionError: it has no header line, or not the first four columns, or is too large, or not UTF-8.
+    """
+    if not path.is_file():
+        report.miss(path.name)
+        return _places(np.empty((0, len(COLUMNS))), list(COLUMNS))
+    lines = read_csv(path, MAX_FRAMES)
+    start = next((k for k, line in enumerate(lines) if line), len(lines))
+    names = [name.casefold() for name in lines[start]] if start < len(lines) else []
+    for name in _NEEDED:
+        if name not in names:
+            shown = ", ".join(names)[:100]
+            raise SessionError(f"{path}, line {start + 1}: the columns are {shown!r}; {name!r} is missing")
+    for name in names:
+        if name not in COLUMNS:
+            report.keep(f"{path.name}: column {name[:40]!r}")
+    for name in _IDS:
+        if name not in names:
+            report.miss(f"{path.name}: column {name!r}")
+    return _places(_numbers(path, lines, start + 1, names, report), names)
+
+
+def _numbers(path: Path, lines: list[list[str]], start: int, names: list[str], report: ReadReport) -> NDArray[Any]:
+    rows: list[list[float]] = []
+    needed = [names.index(name) for name in _NEEDED]
+    bad = 0
+    for number, line in enumerate(lines[start:], start=start + 1):
+        if line and line[0].casefold() == names[0]:
+            left = sum(bool(rest) for rest in lines[number:])
+            report.repair(f"{path.name}: ends at a second header (line {number}); {left} lines after it were left out")
+            break
+        if not line:
+            continue
+        values = [number_of(text) for text in line]
+        row = [math.nan if value is None else value for value in values[: len(names)]]
+        row += [math.nan] * (len(names) - len(row))
+        frame = row[needed[0]]
+        if any(not abs(row[k]) <= FARTHEST for k in needed[1:]) or not 0 <= frame < MAX_FRAME or frame != int(frame):
+            bad += 1
+        else:
+            rows.append(row)
+    report.repair(f"{path.name}: rows without frame or place were left out", bad)
+    table = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
+    frames = table[:, needed[0]]
+    if np.any(np.diff(frames) < 0):
+        report.repair(f"{path.name}: rows were out of order by frame, and were put in order")
+        table = table[np.argsort(frames, kind="stable")]
+    again = np.flatnonzero(np.diff(table[:, needed[0]], prepend=-1.0) == 0)
+    report.repair(f"{path.name}: of several rows of a frame the first was taken", len(again))
+    return np.delete(table, again, axis=0)
+
+
+def _places(table: NDArray[np.float64], names: list[str]) -> Places:
+    columns = {name: table[:, k] for k, name in enumerate(names)}
+    x, y, yaw = columns["x"], columns["y"], columns["yaw"]
+    missing = np.full(len(table), -1.0)
+    ids = {
+        name: np.nan_to_num(columns.get(name, missing), nan=-1.0, posinf=-1.0, neginf=-1.0).clip(-(2**40), 2**40)
+        for name in _IDS
+    }
+    return Places(
+        frames=columns["frame"].astype(np.int64),
+        x=x,
+        y=y,
+        heading=yaw if _is_radians(x, y, yaw) else np.radians(yaw),
+        ids={name: values.astype(np.int64) for name, values in ids.items()},
+        further={name: values for name, values in columns.items() if name not in COLUMNS},
+    )
+
+
+def _is_radians(x: NDArray[np.float64], y: NDArray[np.float64], yaw: NDArray[np.float64]) -> bool:
+    """Whether yaw is in radians and not in degrees: what fits the way that the car went."""
+    dx, dy = np.diff(x), np.diff(y)
+    moved = np.hypot(dx, dy) > MOVED
+    if not np.any(moved) or np.any(np.abs(yaw) > 2 * np.pi):
+        return False
+    course, looked = np.arctan2(dy, dx)[moved], yaw[:-1][moved]
+    return bool(np.mean(np.cos(looked - course)) > np.mean(np.cos(np.radians(looked) - course)))
+
+
+def trajectory_of_places(places: Places, first_frame: int, place: SdnMap) -> tuple[Trajectory, Scene]:
+    """Returns places as a trajectory in frames of 30 Hz, speed from the way, controls unknown, ids as further columns.
+
+    Args:
+        places: where the car was.
+        first_frame: frame (10 Hz) at which the session begins.
+        place: the town: it knows the lanes.
+    """
+    count = len(places.frames)
+    trajectory = np.zeros(count, dtype=TRAJECTORY_DTYPE)
+    trajectory["frame"] = FRAMES_EACH * (places.frames - first_frame)
+    trajectory["x"], trajectory["y"], trajectory["heading"] = places.x, places.y, places.heading
+    for name in ("throttle", "steer", "brake"):
+        trajectory[name] = np.nan
+    if count > 1:
+        # Over the time before, never after: a state must not tell where the car goes next.
+        way = np.hypot(np.diff(places.x), np.diff(places.y))
+        trajectory["speed"][1:] = way / (np.diff(places.frames) / SDN_RATE)
+    roads, lanes = places.ids["road_id"].tolist(), places.ids["lane_id"].tolist()
+    if place.town is None:
+        trajectory["lane"] = NO_LANE
+    else:
+        each = zip(places.x.tolist(), places.y.tolist(), roads, lanes, strict=True)
+        trajectory["lane"] = [place.lane_of(*row) for row in each]
+    return trajectory, Scene(columns={**places.ids, **places.further})
+
+
+# --- What was around the car, kept in a file of ours beside those of SDN's release layout ----------------------------
+
+
+def write_scene(path: Path, session: Session) -> None:
+    """Writes what was recorded around the car at frames of 10 Hz; no file where nothing was.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    trajectory = session.trajectory[session.trajectory["frame"] % FRAMES_EACH == 0]
+    scene = scene_at(session.scene, trajectory)
+    if any(map(len, (scene.actors, scene.lights, scene.weather))):
+        write_frames(path, trajectory, scene)
+
+
+def read_scene(path: Path, scene: Scene, trajectory: Trajectory, report: ReadReport) -> Scene:
+    """Returns a scene with what the file holds of the frames of a trajectory.
+
+    Args:
+        path: the file, which may be missing.
+        scene: what the layout's own files tell.
+        trajectory: the frames that there are.
+        report: is told what is not understood.
+
+    Raises:
+        SessionError: the file is damaged; the message names it.
+    """
+    if not path.is_file():
+        return scene
+    _, around = read_frames(path, report)
+    around = scene_at(around, trajectory)
+    return replace(scene, actors=around.actors, lights=around.lights, weather=around.weather)
+
+
+def scene_at(scene: Scene, trajectory: Trajectory) -> Scene:
+    """Returns what was recorded at the frames of a trajectory, without further columns."""
+    frames = trajectory["frame"]
+    return Scene(
+        actors=_kept(scene.actors, frames), lights=_kept(scene.lights, frames), weather=_kept(scene.weather, frames)
+    )
+
+
+def _kept(table: SceneTable, frames: np.ndarray[tuple[int], np.dtype[np.int64]]) -> SceneTable:
+    kept = np.isin(table.frames, frames)
+    sizes = np.diff(table.offsets)
+    offsets = np.concatenate(([0], np.cumsum(sizes[kept]))).astype(np.int64)
+    return SceneTable(table.frames[kept], offsets, table.rows[np.repeat(kept, sizes)])

@@ -1,0 +1,158 @@
+"""Which way a positive angle of a JTurn points, settled by where the car went; and angles of turns into a road."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from dorothie_gym.maps.model import wrap_degrees
+from dorothie_gym.ontology import PhysicalAction
+from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.recording.events import Event, EventType
+from dorothie_gym.recording.sdn.files import FRAMES_EACH
+from dorothie_gym.recording.sdn.maps import SdnMap
+from dorothie_gym.recording.sdn.trajectory import Places
+
+SHARP: Final = 30.0
+"""Angles and turns from here to `BLUNT` tell left from right [degrees]."""
+
+BLUNT: Final = 150.0
+
+SOON: Final = 600
+"""Frames (10 Hz) within which the junction that a JTurn is meant for comes."""
+
+
+@dataclass(frozen=True)
+class SignVote:
+    """How many JTurns speak for either sign: the car then turned to the side that the sign says.
+
+    Attributes:
+        left: for "positive is left", our convention.
+        right: for "positive is right".
+    """
+
+    left: int = 0
+    right: int = 0
+
+    def __add__(self, other: SignVote) -> SignVote:
+        """Returns both votes together."""
+        return SignVote(self.left + other.left, self.right + other.right)
+
+    @property
+    def positive_left(self) -> bool:
+        """Whether positive angles point to the left; so it is taken where nothing speaks for either side."""
+        return self.left >= self.right
+
+    def to_json(self) -> dict[str, Any]:
+        """Returns sign, agreement (share of the turns that speak for it, or null) and number of turns."""
+        total = self.left + self.right
+        return {
+            "positive": "left" if self.positive_left else "right",
+            "agreement": round(max(self.left, self.right) / total, 3) if total else None,
+            "turns": total,
+        }
+
+
+def vote(events: Sequence[Event], places: Places, first_frame: int) -> SignVote:
+    """Returns what the JTurns of a session, angles as in the file, say about the sign."""
+    result = SignVote()
+    for event in events:
+        if not _is_turn(event) or event.data["angle"] is None or not SHARP <= abs(event.data["angle"]) <= BLUNT:
+            continue
+        turned = _turn_after(places, event.frame // FRAMES_EACH + first_frame)
+        if turned is not None and SHARP <= abs(turned) <= BLUNT:
+            agrees = (event.data["angle"] > 0) == (turned > 0)
+            result += SignVote(left=1) if agrees else SignVote(right=1)
+    return result
+
+
+def _turn_after(places: Places, frame: int) -> float | None:
+    """Angle of the car's way through the next junction [degrees, positive left]; None where there is none."""
+    start = int(np.searchsorted(places.frames, frame))
+    end = int(np.searchsorted(places.frames, frame + SOON))
+    inside = places.ids["junction_id"][start:] >= 0
+    if not inside[: end - start].any():
+        return None
+    first = start + int(np.argmax(inside))
+    outside = ~inside[first - start :]
+    if not outside.any():
+        return None
+    last = first + int(np.argmax(outside))
+    return wrap_degrees(float(np.degrees(places.heading[max(first - 1, 0)] - places.heading[last])))
+
+
+def with_sign(events: Sequence[Event], sign: SignVote) -> list[Event]:
+    """Returns the events with the angles of JTurns in our convention, positive left."""
+    if sign.positive_left:
+        return list(events)
+    return [_turned(event, wrap_degrees(-event.data["angle"])) if _has_angle(event) else event for event in events]
+
+
+def with_roads(
+    events: Sequence[Event], roads: dict[int, int], places: Places, first_frame: int, place: SdnMap
+) -> tuple[list[Event], int]:
+    """Gives the JTurns that name a road their angles.
+
+    Args:
+        events: the events.
+        roads: number of the JTurn among the JTurns, and the road.
+        places: where the car was.
+        first_frame: frame (10 Hz) at which the session begins.
+        place: the town.
+
+    Returns:
+        The events, and the number of JTurns whose angle stays unknown.
+    """
+    result, number, unknown = [], -1, 0
+    for event in events:
+        number += _is_turn(event)
+        if _is_turn(event) and number in roads:
+            lane = _lane_at(places, event.frame // FRAMES_EACH + first_frame, place)
+            angle = place.turn_angle(lane, roads[number])
+            unknown += angle is None
+            event = _turned(event, angle, road=roads[number])
+        result.append(event)
+    return result, unknown
+
+
+def settle_sign(folders: Iterable[Path | str]) -> SignVote:
+    """Returns what the JTurns of the SDN sessions in these folders, together, say about the sign.
+
+    Sessions that cannot be read are passed over: whoever reads them is told. Those that this package wrote have no
+    voice: their angles are positive to the left anyway.
+    """
+    from dorothie_gym.recording.sdn.reader import raw_session
+
+    result = SignVote()
+    for folder in folders:
+        try:
+            raw = raw_session(Path(folder), None)
+        except SessionError:
+            continue
+        if not raw.is_ours:
+            result += vote(raw.events, raw.places, raw.first_frame)
+    return result
+
+
+def _lane_at(places: Places, frame: int, place: SdnMap) -> int:
+    if not len(places.frames):
+        return -1
+    k = max(int(np.searchsorted(places.frames, frame, side="right")) - 1, 0)
+    ids = (int(places.ids["road_id"][k]), int(places.ids["lane_id"][k]))
+    return place.locate(float(places.x[k]), float(places.y[k]), *ids).lane
+
+
+def _is_turn(event: Event) -> bool:
+    return event.type is EventType.PHYSICAL_ACTION and event.data["action"] == PhysicalAction.J_TURN.label
+
+
+def _has_angle(event: Event) -> bool:
+    return _is_turn(event) and event.data["angle"] is not None and "road" not in event.data
+
+
+def _turned(event: Event, angle: float | None, **more: Any) -> Event:
+    return replace(event, data={**event.data, "angle": angle, **more})

@@ -1,0 +1,202 @@
+"""What was around the car: other road users, traffic lights, weather, decision by decision."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final, Self, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.maps import LightColour
+from dorothie_gym.ontology import WeatherParameter
+from dorothie_gym.recording.errors import SessionError
+
+Rows: TypeAlias = NDArray[np.void]
+"""Structured array."""
+
+
+class ActorKind(enum.IntEnum):
+    """What moves, or stands, around the car. Files have the names in lower case."""
+
+    OTHER = 0
+    VEHICLE = 1
+    CYCLIST = 2
+    PEDESTRIAN = 3
+    PROP = 4
+
+
+LIGHT_STATES: Final = (LightColour.GREEN, LightColour.YELLOW, LightColour.RED)
+"""What the numbers in the column `state` of lights mean."""
+
+_STATE_NUMBERS: Final[dict[str, int]] = {str(colour): number for number, colour in enumerate(LIGHT_STATES)}
+
+ACTOR_DTYPE: Final = np.dtype(
+    [
+        ("key", np.int64),
+        ("kind", np.int64),  # as wide as the others, so that rows can be seen as plain numbers
+        *((name, np.float64) for name in ("x", "y", "heading", "speed", "length", "width")),
+    ]
+)
+"""Number that the actor keeps while it is there, `ActorKind`, middle [m], heading [rad], speed [m/s], size [m]."""
+
+_ACTOR_COLUMNS: Final = ACTOR_DTYPE.names or ()
+
+LIGHT_DTYPE: Final = np.dtype([("signal", np.int64), ("state", np.int8)])
+"""Id of the town's signal, and number in `LIGHT_STATES`."""
+
+WEATHER_DTYPE: Final = np.dtype([(str(parameter), np.float64) for parameter in WeatherParameter])
+"""The ten parameters, in the ontology's units."""
+
+_WEATHER_NAMES: Final = frozenset(WEATHER_DTYPE.names or ())
+
+
+@dataclass(frozen=True, eq=False)
+class SceneTable:
+    """Rows that were recorded at some frames: none, one or several a frame.
+
+    Attributes:
+        frames: the frames (k,) int64 at which something was recorded, rising.
+        offsets: (k + 1,) int64: the rows of frame `frames[i]` are `rows[offsets[i]:offsets[i + 1]]`.
+        rows: structured array (m,).
+    """
+
+    frames: NDArray[np.int64]
+    offsets: NDArray[np.int64]
+    rows: Rows
+
+    @classmethod
+    def empty(cls, dtype: np.dtype[Any]) -> Self:
+        """Returns a table of what was never recorded."""
+        return cls(np.empty(0, dtype=np.int64), np.zeros(1, dtype=np.int64), np.empty(0, dtype=dtype))
+
+    def __len__(self) -> int:
+        """Number of frames at which something was recorded."""
+        return len(self.frames)
+
+    def at(self, frame: int) -> Rows | None:
+        """Returns the rows of the last record at `frame` or before it; None before the first."""
+        k = int(np.searchsorted(self.frames, frame, side="right")) - 1
+        return None if k < 0 else self.rows[self.offsets[k] : self.offsets[k + 1]]
+
+    def equals(self, other: SceneTable) -> bool:
+        """Whether two tables hold the same."""
+        return (
+            np.array_equal(self.frames, other.frames)
+            and np.array_equal(self.offsets, other.offsets)
+            and self.rows.dtype == other.rows.dtype
+            and self.rows.tobytes() == other.rows.tobytes()
+        )
+
+
+def _nothing(dtype: np.dtype[Any]) -> Any:
+    return field(default_factory=lambda: SceneTable.empty(dtype))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Scene:
+    """What was around the car; everything may be missing.
+
+    Attributes:
+        actors: rows of `ACTOR_DTYPE`.
+        lights: rows of `LIGHT_DTYPE`.
+        weather: one row of `WEATHER_DTYPE` a record.
+        columns: further columns of the frames, each (n,) beside the trajectory: those of a newer minor version, or of
+            another corpus (`road_id`, `lane_id`, `junction_id`).
+    """
+
+    actors: SceneTable = _nothing(ACTOR_DTYPE)
+    lights: SceneTable = _nothing(LIGHT_DTYPE)
+    weather: SceneTable = _nothing(WEATHER_DTYPE)
+    columns: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+
+    def equals(self, other: Scene) -> bool:
+        """Whether two scenes hold the same."""
+        return (
+            self.actors.equals(other.actors)
+            and self.lights.equals(other.lights)
+            and self.weather.equals(other.weather)
+            and self.columns.keys() == other.columns.keys()
+            and all(np.array_equal(column, other.columns[name]) for name, column in self.columns.items())
+        )
+
+
+def actor_rows(actors: Rows | Mapping[str, Any]) -> Rows:
+    """Returns actors as rows of `ACTOR_DTYPE`.
+
+    Args:
+        actors: such rows, or a mapping of the eight columns; `kind` as `ActorKind`, its number or its name.
+
+    Raises:
+        SessionError: a column is missing, or of another length or type, or holds what is not finite.
+    """
+    if isinstance(actors, Mapping):
+        actors = _from_columns(actors)
+    if actors.dtype != ACTOR_DTYPE or actors.ndim != 1:
+        raise SessionError(f"actors have type {actors.dtype} and shape {actors.shape}; it must be {ACTOR_DTYPE}, (n,)")
+    actors = np.ascontiguousarray(actors)
+    finite = np.isfinite(actors.view(np.float64).reshape(-1, len(_ACTOR_COLUMNS))[:, 2:])
+    if not finite.all():
+        name = _ACTOR_COLUMNS[2 + int(np.argmin(finite.all(axis=0)))]
+        raise SessionError(f"actors: field {name!r} has a value that is not finite")
+    kinds = actors["kind"]
+    if len(kinds) and not 0 <= kinds.min() <= kinds.max() < len(ActorKind):
+        raise SessionError(f"actors: field 'kind' must be one of {', '.join(kind.name.lower() for kind in ActorKind)}")
+    return actors
+
+
+def _from_columns(columns: Mapping[str, Any]) -> Rows:
+    if set(columns) != set(_ACTOR_COLUMNS):
+        raise SessionError(f"actors have the columns {', '.join(columns)}; they must be {', '.join(_ACTOR_COLUMNS)}")
+    rows = np.empty(len(columns["key"]), dtype=ACTOR_DTYPE)
+    for name in _ACTOR_COLUMNS:
+        values = [_kind(kind) for kind in columns[name]] if name == "kind" else columns[name]
+        try:
+            rows[name] = values
+        except (TypeError, ValueError) as error:
+            raise SessionError(f"actors: field {name!r}: {error}") from None
+    return rows
+
+
+def _kind(kind: ActorKind | int | str) -> int:
+    if isinstance(kind, str):
+        if kind.upper() not in ActorKind.__members__:
+            known = ", ".join(member.name.lower() for member in ActorKind)
+            raise SessionError(f"actors: field 'kind' is {kind!r}; it must be one of {known}")
+        return ActorKind[kind.upper()]
+    return int(kind)
+
+
+def light_rows(lights: Mapping[int, LightColour | str]) -> Rows:
+    """Returns the states of lights by id of their signal as rows of `LIGHT_DTYPE`, by id.
+
+    Raises:
+        SessionError: an id is no whole number, or a state no colour of a light.
+    """
+    rows = np.empty(len(lights), dtype=LIGHT_DTYPE)
+    try:
+        signals = sorted(lights)
+        rows["signal"] = signals
+        rows["state"] = [_STATE_NUMBERS[lights[signal]] for signal in signals]
+    except (KeyError, TypeError, ValueError, OverflowError):
+        states = ", ".join(f"signal {signal!r} is {str(state)!r}" for signal, state in lights.items())
+        raise SessionError(f"lights: {states[:300]}; ids are whole numbers, states {', '.join(LIGHT_STATES)}") from None
+    return rows
+
+
+def weather_rows(weather: Mapping[Any, float]) -> Rows:
+    """Returns the ten parameters as one row of `WEATHER_DTYPE`.
+
+    Raises:
+        SessionError: there are others than the ten, or a value is not finite.
+    """
+    values = {str(name): value for name, value in weather.items()}
+    if values.keys() != _WEATHER_NAMES:
+        raise SessionError(f"weather has {', '.join(sorted(values))}; it must have {', '.join(WeatherParameter)}")
+    for name, value in values.items():
+        if not math.isfinite(value):
+            raise SessionError(f"weather: field {name!r} is {value}; it must be finite")
+    return np.array([tuple(values[name] for name in WEATHER_DTYPE.names or ())], dtype=WEATHER_DTYPE)

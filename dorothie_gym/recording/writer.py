@@ -1,0 +1,224 @@
+"""Writing a session while it happens."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.maps import LightColour
+from dorothie_gym.ontology import Role
+from dorothie_gym.recording.action_log import Decision, encode_decision
+from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.recording.events import Event, encode_event
+from dorothie_gym.recording.file_names import (
+    ACTIONS_FILE,
+    EVENTS_FILE,
+    FRAMES_FILE,
+    HEADER_FILE,
+    JOURNAL_FILE,
+    MAX_FRAME,
+    PART,
+    PICTURES_FOLDER,
+    SESSION_FILES,
+)
+from dorothie_gym.recording.folder import SessionFile, picture_name
+from dorothie_gym.recording.frames import ACTORS, CAR, LIGHTS, WEATHER, encode_block, read_journal, write_frames
+from dorothie_gym.recording.header import SessionHeader
+from dorothie_gym.recording.json_io import canonical, write_atomically
+from dorothie_gym.recording.surroundings import Rows, actor_rows, light_rows, weather_rows
+from dorothie_gym.recording.trajectory import check_rising, checked_rows
+
+
+class SessionWriter:
+    """Appends what happens to the folder of a session; what was appended survives the death of the process.
+
+    Whatever moment the process dies at, the folder is a session that is finished, or one that is not and that loads up
+    to what was appended last (`session_state` tells which), or, before the header was written, none. Actors, lights
+    and weather may be missing altogether, or be handed over at some frames only.
+
+    Args:
+        folder: folder of the session, made if need be.
+        header: what is known of the session before it begins.
+        overwrite: whether a session that the folder holds already is deleted.
+
+    Raises:
+        SessionError: the folder holds a session already and `overwrite` is False.
+        OSError: the folder cannot be written.
+    """
+
+    def __init__(self, folder: Path | str, header: SessionHeader, *, overwrite: bool = False) -> None:
+        self.folder = Path(folder)
+        self.header = header
+        self._prepare(overwrite)
+        SessionFile(header=header).write(self.folder)
+        self._events = (self.folder / EVENTS_FILE).open("xb")
+        self._journal = (self.folder / JOURNAL_FILE).open("xb")
+        self._decisions: IO[bytes] | None = None
+        self._event_count = 0
+        self._last_frame = -1
+        self._frames: set[float] = set()
+        self._lights: tuple[Mapping[int, LightColour | str], Rows] | None = None
+        self._weather: tuple[Mapping[Any, float], Rows] | None = None
+        self._recorded = {ACTORS: -1, LIGHTS: -1, WEATHER: -1}
+        self._last_decision = -1
+
+    def append(self, events: Iterable[Event] = (), frames: NDArray[np.float64] | None = None) -> None:
+        """Appends a batch of events and frames and hands it to the operating system.
+
+        Args:
+            events: what happened.
+            frames: (n, 9) float64, see `TRAJECTORY_COLUMNS`; frames must rise.
+
+        Raises:
+            SessionError: an event or a row cannot be written; nothing of the batch is then.
+        """
+        self._check_open("nothing can be appended")
+        lines = [encode_event(event) for event in events]
+        rows = None if frames is None else self._checked(frames)
+        if lines:
+            self._events.write(("\n".join(lines) + "\n").encode("utf-8"))
+            self._events.flush()
+            self._event_count += len(lines)
+        if rows is not None and len(rows):
+            self._write(CAR, int(rows[0, 0]), rows)
+            self._frames.update(rows[:, 0].tolist())
+            self._last_frame = int(rows[-1, 0])
+
+    def add_frames(self, frames: NDArray[np.float64]) -> None:
+        """Appends frames of the car, (n, 9) float64 as in `TRAJECTORY_COLUMNS`; raises `SessionError` as `append`."""
+        self.append((), frames)
+
+    def add_decision(self, frame: int, actions: Mapping[Role, Mapping[str, Any]]) -> None:
+        """Appends what the roles decided at a frame, see `Decision`; nothing is written where nobody did anything.
+
+        From the first call on the session is one whose decisions are recorded.
+
+        Raises:
+            SessionError: an action cannot be written, or the frame is not above that of the decision before.
+        """
+        self._check_open("nothing can be appended")
+        if frame <= self._last_decision:
+            raise SessionError(f"{self.folder}: a decision at frame {frame} after {self._last_decision}")
+        line = encode_decision(Decision(frame=frame, actions=actions)) if actions else ""
+        if self._decisions is None:
+            self._decisions = (self.folder / ACTIONS_FILE).open("xb")
+        if line:
+            self._decisions.write((line + "\n").encode("utf-8"))
+            self._decisions.flush()
+        self._last_decision = frame
+
+    def add_actors(self, frame: int, actors: Rows | Mapping[str, Any]) -> None:
+        """Appends the actors around the car at a frame: rows of `ACTOR_DTYPE`, or a mapping of its columns.
+
+        Raises:
+            SessionError: they are of another form, or the frame was not appended before, or has actors already.
+        """
+        self._add(ACTORS, frame, actor_rows(actors))
+
+    def add_lights(self, frame: int, lights: Mapping[int, LightColour | str]) -> None:
+        """Appends what each traffic light shows at a frame, by id of its signal; raises `SessionError` as above."""
+        if self._lights is None or self._lights[0] != lights:  # they seldom change
+            self._lights = dict(lights), light_rows(lights)
+        self._add(LIGHTS, frame, self._lights[1])
+
+    def add_weather(self, frame: int, weather: Mapping[Any, float]) -> None:
+        """Appends the ten weather parameters at a frame; raises `SessionError` as above."""
+        if self._weather is None or self._weather[0] != weather:
+            self._weather = dict(weather), weather_rows(weather)
+        self._add(WEATHER, frame, self._weather[1])
+
+    def add_picture(self, frame: int, png: bytes) -> None:
+        """Writes a picture (PNG) of a frame.
+
+        Raises:
+            SessionError: it is no PNG, or the frame is none.
+        """
+        self._check_open("no picture can be added")
+        if not png.startswith(b"\x89PNG\r\n\x1a\n"):
+            raise SessionError(f"{self.folder}: the picture of frame {frame} is no PNG")
+        if not 0 <= frame < MAX_FRAME:
+            raise SessionError(f"{self.folder}: a picture of frame {frame}; frames are 0 or above")
+        pictures = self.folder / PICTURES_FOLDER
+        pictures.mkdir(exist_ok=True)
+        write_atomically(pictures / picture_name(frame), png)
+
+    def finish(self, outcome: Mapping[str, Any]) -> None:
+        """Writes how the session ended, which makes it complete, and closes it.
+
+        The journal is folded into `frames.parquet`, and goes; last of all the outcome enters `session.json`, at once.
+
+        Raises:
+            SessionError: the outcome holds what JSON cannot, or the session is closed already.
+        """
+        self._check_open("it cannot be finished")
+        outcome = canonical(outcome, "outcome")
+        self.close()
+        trajectory, scene = read_journal(self.folder / JOURNAL_FILE)
+        write_frames(self.folder / FRAMES_FILE, trajectory, scene)
+        (self.folder / JOURNAL_FILE).unlink()
+        file = SessionFile(header=self.header, outcome=outcome, events=self._event_count, frames=len(trajectory))
+        file.write(self.folder)
+
+    def close(self) -> None:
+        """Closes the files; a session that was not finished stays incomplete. May be called again."""
+        self._events.close()
+        self._journal.close()
+        if self._decisions is not None:
+            self._decisions.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _prepare(self, overwrite: bool) -> None:
+        self.folder.mkdir(parents=True, exist_ok=True)
+        names = (*SESSION_FILES, *(name + PART for name in SESSION_FILES))
+        present = [name for name in names if _stands(self.folder / name)]
+        if present and not overwrite and present != [HEADER_FILE + PART]:  # that one died before there was a session
+            raise SessionError(
+                f"{self.folder}: holds a session already ({', '.join(present)}); choose another folder or overwrite it"
+            )
+        # The header goes first: from then on, whenever the process dies, the folder holds no session with parts of two.
+        for name in present:
+            (self.folder / name).unlink()
+        if overwrite and (self.folder / PICTURES_FOLDER).is_dir():
+            shutil.rmtree(self.folder / PICTURES_FOLDER)
+
+    def _check_open(self, consequence: str) -> None:
+        if self._events.closed:
+            raise SessionError(f"{self.folder}: the session is closed; {consequence}")
+
+    def _checked(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
+        rows = checked_rows(frames)
+        check_rising(rows[:, 0], self._last_frame, str(self.folder))
+        if len(rows) and rows[-1, 0] >= MAX_FRAME:
+            raise SessionError(f"{self.folder}: frame {rows[-1, 0]:.0f}; frames are below {MAX_FRAME}")
+        return rows
+
+    def _add(self, kind: bytes, frame: int, rows: Rows) -> None:
+        self._check_open("nothing can be appended")
+        if frame not in self._frames:
+            raise SessionError(f"{self.folder}: frame {frame} was not appended; append the frames of the car first")
+        if frame <= self._recorded[kind]:
+            raise SessionError(f"{self.folder}: frame {frame} after {self._recorded[kind]}; frames must rise")
+        self._write(kind, int(frame), rows)
+        self._recorded[kind] = int(frame)
+
+    def _write(self, kind: bytes, frame: int, rows: NDArray[Any]) -> None:
+        self._journal.write(encode_block(kind, frame, rows))
+        self._journal.flush()
+
+
+def _stands(path: Path) -> bool:
+    """Whether there is something of that name, a link to nowhere included."""
+    return path.exists() or path.is_symlink()

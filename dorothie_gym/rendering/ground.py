@@ -1,0 +1,216 @@
+"""What the road network encloses: blocks between streets, and the asphalt inside junctions that no lane covers."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, label
+
+from dorothie_gym.maps.model import Array, Town
+from dorothie_gym.rendering import palette
+from dorothie_gym.rendering.palette import Colour
+from dorothie_gym.rendering.shapes import Shape, disc, ribbon, simplified, strokes
+
+# Larger holes between connectors are islands (the middle of a roundabout), not asphalt [m2].
+_LARGEST_HOLE = 160.0
+_CLOSING = 2.5  # [m]
+_MOUTH = 6.0  # [m] of the lanes before and behind a junction that its asphalt meets
+_INSET = 0.1  # [m] that lanes are drawn narrower by: a grid makes everything wider
+_SMOOTHING = 5
+_RIM = 2.6  # [m]
+_BLOCK_SCALE = 1.0  # [px/m]: the edges of blocks lie under roads, so a metre is fine enough
+_HOLE_SCALE = 4.0
+_TREE_SPACING = 13.0  # [m]
+_SLIVER = 500.0  # [m2]
+_SMALLEST_PARK = 1500.0  # [m2]
+
+
+def town_bounds(town: Town, margin: float = 0.0) -> tuple[float, float, float, float]:
+    """Smallest x, y and largest x, y [m] of all lanes, widened by a margin [m]."""
+    points = np.concatenate([lane.points[:, :2] for lane in town.lanes])
+    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """A piece of ground that polygons leave free.
+
+    Attributes:
+        mask: a `pygame.mask.Mask` of it.
+        low: world position (2,) of the mask's corner [m].
+        scale: of the mask [px/m].
+        outside: whether it reaches the border.
+    """
+
+    mask: Any
+    low: Array
+    scale: float
+    outside: bool
+
+    @property
+    def area(self) -> float:
+        """Its area [m2]."""
+        return float(self.mask.count()) / self.scale**2
+
+    @property
+    def outline(self) -> Array:
+        """Its outline (n, 2) [m]."""
+        return _outline(self.mask, self.low, self.scale)
+
+
+def _free(outlines: Sequence[Array], scale: float, border: float) -> list[_Piece]:
+    """What polygons (n, 2) [m] leave free inside a frame that is wider than they are by a border [m]."""
+    import pygame
+
+    surface, low = _painted(outlines, scale, border)
+    free = pygame.mask.from_surface(surface)
+    free.invert()
+    frame = pygame.mask.Mask(surface.get_size(), fill=True)
+    frame.erase(pygame.mask.Mask(np.maximum(np.array(surface.get_size()) - 2, 0).tolist(), fill=True), (1, 1))
+    return [
+        _Piece(mask, low, scale, mask.overlap(frame, (0, 0)) is not None)
+        for mask in free.connected_components(minimum=1)
+    ]
+
+
+def junction_areas(town: Town) -> list[Array]:
+    """Outlines (n, 2) [m] of the asphalt of junctions: their connectors and mouths, and the gaps between them.
+
+    Gaps narrower than five metres are closed, and so are holes; larger holes stay free, as the middle of a roundabout.
+    """
+    return [outline for junction in town.junctions for outline in _closed(town, junction.connectors)]
+
+
+def _closed(town: Town, connectors: Sequence[int]) -> Iterator[Array]:
+    import pygame
+
+    lanes = [town.lanes[k] for k in connectors]
+    outlines = [ribbon(lane, -_INSET) for lane in lanes]
+    for lane in dict.fromkeys(k for c in connectors for k in town.predecessors(c)):
+        if not (mouth := town.lanes[lane]).in_junction:
+            outlines.append(ribbon(mouth, -_INSET, max(0.0, mouth.length - _MOUTH)))
+    for lane in dict.fromkeys(link.target for c in connectors for link in town.successors(c)):
+        if not (mouth := town.lanes[lane]).in_junction:
+            outlines.append(ribbon(mouth, -_INSET, 0.0, min(mouth.length, _MOUTH)))
+    if not outlines:
+        return
+    surface, low = _painted(outlines, _HOLE_SCALE, 2.0 * _CLOSING)
+    solid = pygame.surfarray.array_alpha(surface) > 0
+    # Closing: grown by a radius, then shrunk by it, which only fills what is narrower than twice the radius.
+    radius = _CLOSING * _HOLE_SCALE
+    grown = distance_transform_edt(~solid) <= radius
+    solid |= distance_transform_edt(grown) > radius
+    for hole in _pieces(~solid):
+        if hole.mask.count() < _LARGEST_HOLE * _HOLE_SCALE**2 and not hole.outside:
+            solid |= hole.array
+    for piece in _pieces(solid):
+        yield simplified(smooth_outline(_outline(piece.mask, low, _HOLE_SCALE), _SMOOTHING), 0.03)
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A connected part of a grid: as a `pygame.mask.Mask`, as cells (width, height), and whether it is at the rim."""
+
+    mask: Any
+    array: NDArray[np.bool_]
+    outside: bool
+
+
+def _pieces(cells: NDArray[np.bool_]) -> Iterator[_Part]:
+    import pygame
+
+    numbers, count = label(cells)
+    for k in range(1, count + 1):
+        array = numbers == k
+        rim = array[0].any() or array[-1].any() or array[:, 0].any() or array[:, -1].any()
+        shown = pygame.Surface(array.shape, pygame.SRCALPHA, 32)
+        alpha = pygame.surfarray.pixels_alpha(shown)
+        alpha[:] = array * np.uint8(255)
+        del alpha  # unlocks the surface
+        yield _Part(pygame.mask.from_surface(shown), array, bool(rim))
+
+
+def _outline(mask: Any, low: Array, scale: float) -> Array:
+    """Outline (n, 2) [m] of a mask; a small disc where it is too small to have one."""
+    line = np.array(mask.outline(), dtype=float).reshape(-1, 2)
+    if len(line) < 4:
+        return disc(np.array(mask.centroid()) / scale + low, 1.0 / scale, 8)
+    return np.asarray((line + 0.5) / scale + low)
+
+
+def smooth_outline(outline: Array, size: int) -> Array:
+    """A closed outline (n, 2) without the steps of the grid it was taken from: a running mean over `size` points."""
+    if len(outline) <= 2 * size:
+        return outline
+    around = np.concatenate((outline[-(size // 2) :], outline, outline[: size // 2]))
+    kernel = np.full(size, 1.0 / size)
+    return np.stack([np.convolve(around[:, k], kernel, mode="valid") for k in (0, 1)], axis=-1)
+
+
+def _painted(outlines: Sequence[Array], scale: float, border: float) -> tuple[Any, Array]:
+    """Polygons (n, 2) [m] on a transparent surface that is wider than they are by a border [m], and its corner [m]."""
+    import pygame
+
+    points = np.concatenate(outlines)
+    low, high = points.min(axis=0) - border, points.max(axis=0) + border
+    width, height = (int(n) for n in np.ceil((high - low) * scale))
+    surface = pygame.Surface((width, height), pygame.SRCALPHA, 32)
+    for outline in outlines:
+        pygame.draw.polygon(surface, (255, 255, 255, 255), ((outline - low) * scale).tolist())
+    return surface, low
+
+
+def landscape(town: Town, border: float) -> list[Shape]:
+    """What lies between and around the streets: blocks, parks with trees, and the country.
+
+    The scenery is made up, from the town's name alone; nothing drives into it.
+
+    Args:
+        town: whose streets.
+        border: how far the country reaches beyond the streets [m].
+    """
+    pieces = _free([ribbon(lane, 0.5) for lane in town.lanes], _BLOCK_SCALE, border)
+    rng = np.random.default_rng(zlib.crc32(town.name.encode()))
+    inner = sorted((p for p in pieces if not p.outside and p.area > 12.0), key=lambda p: -p.area)
+    shapes = []
+    for rank, piece in enumerate(inner):
+        # Every third large block is a park; slivers (medians, islands) are grass.
+        park = piece.area < _SLIVER or (piece.area > _SMALLEST_PARK and rank % 3 == 1)
+        colour = palette.PARK if park else palette.BLOCK
+        outline = simplified(smooth_outline(piece.outline, 5), 0.3)
+        shapes.append(Shape(outline, colour))
+        # The grid is coarse: what it leaves of the ground beside the road's edge is covered by a broad rim.
+        shapes += [Shape(part, colour) for part in strokes(np.concatenate((outline, outline[:1])), _RIM)]
+        if park and piece.area > _SMALLEST_PARK:
+            shapes += _trees(town, piece, rng, 0.8, palette.TREE)
+    for piece in pieces:
+        if piece.outside and piece.area > _SMALLEST_PARK:
+            shapes += _trees(town, piece, rng, 0.3, palette.COUNTRY_TREE)
+    return shapes
+
+
+def _trees(town: Town, piece: _Piece, rng: np.random.Generator, share: float, colour: Colour) -> Iterator[Shape]:
+    """Trees on a jittered grid inside a piece of ground, well away from its edge and from landmark sites."""
+    size = np.array(piece.mask.get_size())
+    grid = np.stack(np.meshgrid(*(np.arange(0.0, n / piece.scale, _TREE_SPACING) for n in size)), axis=-1).reshape(
+        -1, 2
+    )
+    centres = piece.low + grid + rng.uniform(-4.5, 4.5, grid.shape)
+    radii = rng.uniform(1.6, 3.4, len(grid))
+    wanted = rng.random(len(grid)) < share
+    rings = centres[:, None] + (radii[:, None, None] + 5.0) * disc((0.0, 0.0), 1.0, 12)  # (n, 12, 2)
+    pixels = ((rings - piece.low) * piece.scale).astype(int)
+    inside = ((pixels >= 0) & (pixels < size)).all(axis=(1, 2))
+    wanted &= inside
+    for k in np.flatnonzero(wanted).tolist():
+        wanted[k] = all(piece.mask.get_at(pixel) for pixel in pixels[k].tolist())
+    for site in town.sites:
+        wanted &= np.hypot(*(centres - np.array(site.position)).T) > radii + 6.0
+    for k in np.flatnonzero(wanted).tolist():
+        yield Shape(disc(centres[k], float(radii[k])), colour)

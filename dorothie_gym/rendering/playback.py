@@ -1,0 +1,215 @@
+"""A recorded session as scenes that can be drawn, whoever recorded it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from dorothie_gym.maps import Town
+from dorothie_gym.ontology import DialogueAct, PhysicalAction, Role, parse_landmark
+from dorothie_gym.recording import FRAME_RATE, ActorKind, EventType, Session
+from dorothie_gym.recording.header import LandmarkRow
+from dorothie_gym.rendering.scene import Actor, CarView, Line, Pin, Scene, State
+
+_KINDS: Final = {
+    int(ActorKind.VEHICLE): "vehicle",
+    int(ActorKind.CYCLIST): "cyclist",
+    int(ActorKind.PEDESTRIAN): "pedestrian",
+    int(ActorKind.PROP): "prop",
+    int(ActorKind.OTHER): "prop",
+}
+
+_STATES: Final[dict[str, State]] = {
+    "complete": "complete", "abandoned": "abandoned", "ongoing": "ongoing", "pending": "pending",
+}  # fmt: skip
+
+_TRAIL: Final = 0.5
+"""Time between two points of the way driven [s]."""
+
+
+class Playback:
+    """Shows a session at any of its frames.
+
+    Args:
+        session: what was recorded.
+        town: where it happened.
+    """
+
+    def __init__(self, session: Session, town: Town) -> None:
+        self._session, self._town = session, town
+        self._lines = _lines(session)
+        self._waypoints = [_waypoint(row, town) for row in session.header.landmarks]
+        rows = session.trajectory
+        self._first_frame = int(rows["frame"][0]) if len(rows) else 0
+        step = max(round(_TRAIL * FRAME_RATE), 1)
+        self._trail_frames = rows["frame"][::step]
+        self._trail = np.stack([rows["x"][::step], rows["y"][::step]], axis=1)
+
+    @property
+    def last_frame(self) -> int:
+        """The last frame at which anything was recorded."""
+        return round(self._session.duration * FRAME_RATE)
+
+    def scenes(self, frames_per_second: float) -> Iterator[Scene]:
+        """Yields so many scenes for each second of the session, from its first frame with the car in it to its last."""
+        for k in range(self.count(frames_per_second)):
+            yield self.scene(self._first_frame + round(k * FRAME_RATE / frames_per_second))
+
+    def count(self, frames_per_second: float) -> int:
+        """Returns how many scenes that are."""
+        return math.floor((self.last_frame - self._first_frame) * frames_per_second / FRAME_RATE) + 1
+
+    def scene(self, frame: int) -> Scene:
+        """Returns the session at a frame (30 Hz)."""
+        header, time = self._session.header, frame / FRAME_RATE
+        goals = self._goals(frame)
+        states = {header.subgoals[i]["landmark"]: state for i, (_, state) in goals.items()}
+        weather = self._session.scene.weather.at(frame)
+        car = self._car(frame)
+        driven = int(np.searchsorted(self._trail_frames, frame, side="right"))
+        return Scene(
+            time=time,
+            town=self._town,
+            car=car,
+            street_names=self._street_names(),
+            trail=np.concatenate((self._trail[:driven], [[car.x, car.y]])),
+            others=self._others(frame),
+            landmarks=[
+                Pin(
+                    label=parse_landmark(row["name"]).label,
+                    x=row["x"],
+                    y=row["y"],
+                    waypoint=waypoint,
+                    state=states.get(k, "none"),
+                    hidden=row["hidden"],
+                )
+                for k, (row, waypoint) in enumerate(zip(header.landmarks, self._waypoints, strict=True))
+            ],
+            subgoals=list(goals.values()),
+            utterances=[line for line in self._lines if line.time <= time],
+            notes=self._notes(frame),
+            weather={} if weather is None else {name: float(weather[name][0]) for name in weather.dtype.names or ()},
+            caption=header.storyboard,
+        )
+
+    def _street_names(self) -> list[str] | None:
+        """Names of the town's streets; None where the recording names others."""
+        names = list(self._session.header.street_names)
+        return names if len(names) == len(self._town.streets) else None
+
+    def _car(self, frame: int) -> CarView:
+        rows = self._session.trajectory
+        if not len(rows):
+            lane, station = self._session.header.departure
+            known = 0 <= lane < len(self._town.lanes)
+            x, y = self._town.lanes[lane].position(station) if known else (0.0, 0.0)
+            return CarView(x=float(x), y=float(y), heading=0.0)
+        row = rows[max(int(np.searchsorted(rows["frame"], frame, side="right")) - 1, 0)]
+        lights = [
+            action.up
+            for action in self._session.physical_actions
+            if action.action is PhysicalAction.LIGHT_CHANGE and action.frame <= frame
+        ]
+        return CarView(
+            x=float(row["x"]),
+            y=float(row["y"]),
+            heading=float(row["heading"]),
+            speed=float(np.nan_to_num(row["speed"])),
+            lights=bool(lights and lights[-1]),
+        )
+
+    def _others(self, frame: int) -> list[Actor]:
+        """Who was around, on the straight way between where they were recorded."""
+        table = self._session.scene.actors
+        k = int(np.searchsorted(table.frames, frame, side="right")) - 1
+        if k < 0:
+            return []
+        here = table.rows[table.offsets[k] : table.offsets[k + 1]]
+        share, after = 0.0, {}
+        if k + 1 < len(table):
+            share = (frame - int(table.frames[k])) / int(table.frames[k + 1] - table.frames[k])
+            after = {int(row["key"]): row for row in table.rows[table.offsets[k + 1] : table.offsets[k + 2]]}
+        return [_actor(row, after.get(int(row["key"]), row), share) for row in here]
+
+    def _goals(self, frame: int) -> dict[int, tuple[str, State]]:
+        """Words and state of the subgoals that are tasks at a frame, by number."""
+        subgoals = self._session.header.subgoals
+        told: dict[int, tuple[str, str]] = {}
+        for event in self._session.of_type(EventType.SUBGOAL):
+            number = event.data.get("subgoal")
+            if event.frame <= frame and isinstance(number, int) and 0 <= number < len(subgoals):
+                told[number] = str(event.data.get("status", "")).lower(), str(event.data.get("cause", ""))
+        reached = {number for number, (status, _) in told.items() if status == "complete"}
+        goals: dict[int, tuple[str, State]] = {}
+        for number, row in enumerate(subgoals):
+            status, cause = told.get(number, ("", ""))
+            if row["trigger"] and not status:
+                continue
+            state = _STATES.get(status, "pending")
+            changed = row["change"] if "change" in cause else None
+            goals[number] = changed or row["description"], state
+        live = [number for number, (_, state) in goals.items() if state != "abandoned"]
+        for number in live:
+            if number not in reached:
+                before = live[:-1] if number == live[-1] else [k for k in subgoals[number]["after"] if k in live]
+                goals[number] = goals[number][0], "ongoing" if reached.issuperset(before) else "pending"
+        return goals
+
+    def _notes(self, frame: int) -> list[str]:
+        hazard = ""
+        faults: dict[str, bool] = {}
+        for event in self._session.of_type(EventType.HAZARD_STOP, EventType.HAZARD_END, EventType.EXCEPTION):
+            if event.frame > frame:
+                break
+            if event.type is EventType.EXCEPTION:
+                if "sensor" in event.data:
+                    faults[str(event.data["sensor"])] = bool(event.data.get("on"))
+            else:
+                hazard = str(event.data.get("reason", "")) if event.type is EventType.HAZARD_STOP else ""
+        notes = [f"Hazard stop: {hazard}"] if hazard else []
+        return notes + [f"Sensor fault: {sensor}" for sensor, on in faults.items() if on]
+
+
+def _actor(row: np.void, after: np.void, share: float) -> Actor:
+    turn = (float(after["heading"] - row["heading"]) + math.pi) % (2 * math.pi) - math.pi
+    return Actor(
+        kind=_KINDS[int(row["kind"])],  # type: ignore[arg-type]
+        x=float(row["x"] + share * (after["x"] - row["x"])),
+        y=float(row["y"] + share * (after["y"] - row["y"])),
+        heading=float(row["heading"]) + share * turn,
+        length=float(row["length"]),
+        width=float(row["width"]),
+    )
+
+
+def _waypoint(row: LandmarkRow, town: Town) -> tuple[float, float]:
+    """Where to stop for a landmark: on its lane, or where it stands if that is not known."""
+    if not 0 <= row["lane"] < len(town.lanes):
+        return row["x"], row["y"]
+    x, y = town.lanes[row["lane"]].position(row["station"])
+    return float(x), float(y)
+
+
+def _lines(session: Session) -> list[Line]:
+    """Everything that is said, in order of time."""
+    lines = [
+        Line(
+            time=said.start,
+            speaker=said.speaker,
+            text=said.text,
+            acts=" ".join(_short(move.act) for move in said.moves),
+        )
+        for said in session.utterances()
+    ]
+    lines += [
+        Line(time=event.time, speaker=Role.AD_WIZARD, text=str(event.data.get("text", "")))
+        for event in session.of_type(EventType.MESSAGE)
+    ]
+    return sorted(lines, key=lambda line: line.time)
+
+
+def _short(act: DialogueAct) -> str:
+    return str(act).removesuffix("()")

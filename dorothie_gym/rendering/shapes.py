@@ -1,0 +1,236 @@
+"""Polygons in world coordinates: outlines of lanes, strokes, discs, dashes, arrows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.maps.model import Array, Lane, Town
+from dorothie_gym.rendering.palette import Colour
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A filled polygon: its corners (n, 2) [m] and its colour; for paint on a road the height that lies at [m]."""
+
+    points: Array
+    colour: Colour
+    height: float = 0.0
+
+    @cached_property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Smallest x, y and largest x, y [m]."""
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+def right_of(headings: Array) -> Array:
+    """Unit vectors (n, 2) to the right of headings (n,) [rad]."""
+    return np.stack((-np.sin(headings), np.cos(headings)), axis=-1)
+
+
+def sample(lane: Lane, start: float, end: float, step: float) -> Array:
+    """Stations (n,) [m] from start to end, both included, at most a step apart; n >= 2."""
+    return np.linspace(start, end, max(2, int(np.ceil((end - start) / step)) + 1))
+
+
+def side_line(lane: Lane, stations: Array, lateral: Array | float) -> Array:
+    """Points (n, 2) [m] at stations (n,) along a lane, `lateral` (n,) [m] to its right."""
+    headings = np.interp(stations, lane.stations, lane.headings)
+    x = np.interp(stations, lane.stations, lane.points[:, 0])
+    y = np.interp(stations, lane.stations, lane.points[:, 1])
+    return np.stack((x, y), axis=-1) + np.broadcast_to(lateral, stations.shape)[:, None] * right_of(headings)
+
+
+def widths_at(lane: Lane, stations: Array) -> Array:
+    """Widths (n,) [m] of a lane at stations (n,)."""
+    return np.asarray(np.interp(stations, lane.stations, lane.widths))
+
+
+def sparse_stations(lane: Lane, start: float = 0.0, end: float | None = None) -> Array:
+    """Stations (n,) that suffice to draw a lane: more where it bends or widens, few where it is straight."""
+    end = lane.length if end is None else end
+    fine = sample(lane, start, end, 1.0)
+    headings = np.interp(fine, lane.stations, lane.headings)
+    widths = widths_at(lane, fine)
+    # A degree and a half of turning, a decimetre of width or 40 m, whichever comes first.
+    amount = np.abs(np.diff(headings)) / 0.026 + np.abs(np.diff(widths)) / 0.1 + np.diff(fine) / 40.0
+    total = np.concatenate(([0.0], np.cumsum(amount)))
+    keep = np.flatnonzero(np.diff(np.floor(total)) > 0) + 1
+    return np.asarray(fine[np.unique(np.concatenate(([0], keep, [len(fine) - 1])))])
+
+
+def ribbon(lane: Lane, margin: float = 0.0, start: float = 0.0, end: float | None = None) -> Array:
+    """Outline (n, 2) [m] of a lane, or of a stretch of it, widened by a margin on both sides."""
+    stations = sparse_stations(lane, start, end)
+    half = widths_at(lane, stations) / 2.0 + margin
+    return np.concatenate((side_line(lane, stations, half), side_line(lane, stations, -half)[::-1]))
+
+
+def disc(centre: Sequence[float] | Array, radius: float, corners: int = 20) -> Array:
+    """A circle (corners, 2) [m]."""
+    angles = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False)
+    return np.asarray(centre, dtype=float)[:2] + radius * np.stack((np.cos(angles), np.sin(angles)), axis=-1)
+
+
+def stroke(line: Array, width: float) -> Array:
+    """Outline of a line (n, 2) [m] drawn with a pen of a width [m] and butt ends."""
+    steps = np.diff(line, axis=0)
+    if len(steps) == 1:  # most strokes are straight
+        (along, aside), length = steps[0], math.hypot(*steps[0])
+        side = np.array([-aside, along]) * (width / 2.0 / length if length > 0.0 else 0.0)
+        return np.stack((line[0] + side, line[1] + side, line[1] - side, line[0] - side))
+    angle = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    headings = np.concatenate((angle[:1], (angle[:-1] + angle[1:]) / 2.0, angle[-1:]))
+    side = right_of(headings) * width / 2.0
+    return np.concatenate((line + side, (line - side)[::-1]))
+
+
+def polyline_stations(line: Array) -> Array:
+    """Distances (n,) [m] from the start of a line (n, k) to its points, in the plane."""
+    return np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))))
+
+
+def polyline_length(line: Array) -> float:
+    """Length [m] of a line (n, k) in the plane."""
+    return float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum())
+
+
+def cut(line: Array, pieces: Sequence[tuple[float, float]], step: float = 2.0) -> list[Array]:
+    """Parts (n, k) of a line (m, k) in space or in the plane, given by where they start and end along it [m]."""
+    stations = polyline_stations(line)
+    parts = []
+    for start, end in pieces:
+        s = np.linspace(start, end, max(2, int(np.ceil((end - start) / step)) + 1))
+        parts.append(np.stack([np.interp(s, stations, column) for column in line.T], axis=-1))
+    return parts
+
+
+def dash_pattern(total: float, dash: float, gap: float) -> list[tuple[float, float]]:
+    """Where dashes start and end along a line of a length [m], cut so that it starts and ends with half a gap."""
+    if total < dash:
+        return []
+    count = max(1, round(total / (dash + gap)))
+    period = total / count
+    share = dash / (dash + gap) * period
+    return [(k * period + (period - share) / 2.0, k * period + (period + share) / 2.0) for k in range(count)]
+
+
+def place(points: Array, origin: Array, heading: float) -> Array:
+    """Points given as (forward, right) [m] seen from an origin with a heading, in world coordinates (n, 2)."""
+    forward = np.array([np.cos(heading), np.sin(heading)])
+    right = np.array([-np.sin(heading), np.cos(heading)])
+    return np.asarray(origin + points[:, :1] * forward + points[:, 1:] * right)
+
+
+def zebra(outline: Array, bar: float = 0.5, gap: float = 0.55) -> list[Array]:
+    """Bars of a marked crossing, across its long axis; the outline is any convex polygon (n, 2) [m]."""
+    corners = outline[:-1] if np.allclose(outline[0], outline[-1]) else outline
+    centre = corners.mean(axis=0)
+    edges = np.roll(corners, -1, axis=0) - corners
+    longest = edges[int(np.argmax(np.hypot(*edges.T)))]
+    along = longest / np.hypot(*longest)
+    across = np.array([-along[1], along[0]])
+    u, v = (corners - centre) @ along, (corners - centre) @ across
+    start, end, half = u.min() + gap / 2, u.max() - gap / 2, (v.max() - v.min()) / 2.0
+    count = max(1, int((end - start + gap) // (bar + gap)))
+    period = (end - start + gap) / count
+    bars = []
+    for k in range(count):
+        a = start + k * period
+        quad = np.array([[a, -half], [a + bar, -half], [a + bar, half], [a, half]])
+        bars.append(centre + quad[:, :1] * along + quad[:, 1:] * across)
+    return bars
+
+
+def strokes(line: Array, width: float, segments: int = 8) -> Iterator[Array]:
+    """Outlines of a line (n, 2) [m] in short pieces: one that crosses itself would have holes as a single polygon."""
+    for k in range(0, len(line) - 1, segments):
+        yield stroke(line[k : k + segments + 1], width)
+
+
+def simplified(line: Array, tolerance: float) -> Array:
+    """A line (n, 2) with fewer points, none of those left out further from it than a tolerance (Douglas, Peucker)."""
+    keep = np.zeros(len(line), dtype=bool)
+    keep[[0, -1]] = True
+    todo = [(0, len(line) - 1)]
+    while todo:
+        a, b = todo.pop()
+        if b - a < 2:
+            continue
+        along = line[b] - line[a]
+        offset = line[a + 1 : b] - line[a]
+        length = float(np.hypot(*along))
+        if length < 1e-9:
+            away = np.hypot(*offset.T)
+        else:
+            away = np.abs(offset[:, 0] * along[1] - offset[:, 1] * along[0]) / length
+        far = int(np.argmax(away))
+        if away[far] > tolerance:
+            middle = a + 1 + far
+            keep[middle] = True
+            todo += [(a, middle), (middle, b)]
+    return np.asarray(line[keep])
+
+
+def longer(path: Array, more: float) -> Array:
+    """A path (n, 2) that goes on straight at both ends by a length."""
+    first, last = path[0] - path[1], path[-1] - path[-2]
+    ends = path[0] + first / np.hypot(*first) * more, path[-1] + last / np.hypot(*last) * more
+    return np.concatenate((ends[0][None], path, ends[1][None]))
+
+
+# --- All lanes of a town cut into samples, so that questions about what lies beside or above them are arr ------------
+
+STEP = 2.0  # [m] between samples, at most
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Places on lanes, lane after lane and along each.
+
+    Attributes:
+        lane: index of the lane (n,).
+        station: distance along it (n,) [m].
+        heading: (n,) [rad].
+        half_width: of the lane (n,) [m].
+        centre: on its centre line (n, 3) [m].
+        bounds: of each lane, its first sample and the one after its last (lanes, 2).
+    """
+
+    lane: NDArray[np.int64]
+    station: Array
+    heading: Array
+    half_width: Array
+    centre: Array
+    bounds: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, town: Town) -> Samples:
+        """Samples every lane of a town about every two metres, its ends included."""
+        columns: list[list[Array]] = [[], [], [], []]
+        owners, bounds, count = [], [], 0
+        for lane in town.lanes:
+            s = sample(lane, 0.0, lane.length, STEP)
+            xyz = np.column_stack((side_line(lane, s, 0.0), np.interp(s, lane.stations, lane.points[:, 2])))
+            heading = np.interp(s, lane.stations, lane.headings)
+            for column, value in zip(columns, (s, heading, widths_at(lane, s) / 2.0, xyz), strict=True):
+                column.append(value)
+            owners.append(np.full(len(s), lane.id, dtype=np.int64))
+            bounds.append((count, count + len(s)))
+            count += len(s)
+        station, heading, half, centre = (np.concatenate(column) for column in columns)
+        return cls(np.concatenate(owners), station, heading, half, centre, np.array(bounds, dtype=np.int64))
+
+    def edge(self, sign: float) -> Array:
+        """Points (n, 2) [m] on the right (+1) or left (-1) edges."""
+        return np.asarray(self.centre[:, :2] + sign * self.half_width[:, None] * right_of(self.heading))
+
+    def of_lanes(self, wanted: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Indices of the samples of the lanes that are wanted (lanes,)."""
+        return np.flatnonzero(wanted[self.lane])

@@ -1,0 +1,408 @@
+"""Where the names of streets go: along the road, upright, clear of junctions and of each other."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from dorothie_gym.maps.model import Array, Lane
+from dorothie_gym.rendering.borders import Border
+from dorothie_gym.rendering.map_layers import Plan
+from dorothie_gym.rendering.markings import ARROW_LENGTH
+from dorothie_gym.rendering.medians import pocket_places
+from dorothie_gym.rendering.shapes import sample, side_line
+from dorothie_gym.rendering.street_axes import Axis, across_junctions, beside_axes, street_axes
+from dorothie_gym.rendering.text import font
+
+
+class Level(enum.IntEnum):
+    """What a name has to keep clear of: less and less, but always of bridges, pins and signs."""
+
+    ALL = 0
+    ARROWS_HIDDEN = 1
+    JUNCTIONS_TOUCHED = 2
+    JUNCTIONS_CROSSED = 3
+    FIXED_ALONE = 4
+    OFF_ROAD = 5
+
+
+_NARROW = 0.4  # of a junction's width still counts on the third level
+_OTHER_ROAD = 1.5  # [m] between the heights of two roads that cross
+_ISLAND = 2.0  # [m], half the width of the hatching before a turn lane
+_CELL = 8  # nearest circles that are looked at
+
+
+class Obstacles:
+    """Circles [px] that names keep clear of, by kind and by level."""
+
+    def __init__(self, plan: Plan, scale: float, origin: Array, fixed: Array) -> None:
+        """Finds them on a plan; `fixed` are circles (n, 3) [px] that count on all levels."""
+        lanes = plan.town.lanes
+
+        def circles(rows: Iterable[tuple[Lane, float, float]], widen: float = 1.0) -> Array:
+            out = [np.zeros((0, 4))]
+            for lane, start, end in rows:
+                s = sample(lane, start, end, 2.0)
+                points = (side_line(lane, s, 0.0) - origin) * scale
+                radius = np.interp(s, lane.stations, lane.widths) / 2.0 * scale * widen
+                out.append(np.column_stack((points, radius, np.interp(s, lane.stations, lane.points[:, 2]))))
+            return np.concatenate(out)
+
+        # Over and under bridges no name of the other road may go: their circles have heights, (n, 4).
+        self._bridges = _Circles(circles((lanes[p.lane], p.start, p.end) for p in plan.stretches))
+        tunnels = circles((lanes[p.lane], p.start, p.end) for p in plan.stretches if p.level < 0)[:, :3]
+        junctions = circles(((lane, 0.0, lane.length) for lane in lanes if lane.in_junction), 0.9)[:, :3]
+        islands = (pocket_places(plan.town, plan.pockets).reshape(-1, 2) - origin) * scale
+        arrows = np.concatenate(
+            (
+                circles(_arrow_stretches(plan), 0.6)[:, :3],
+                np.column_stack((islands, np.full(len(islands), _ISLAND * scale))),
+            )
+        )
+        bars = circles(_stop_stretches(plan), 0.6)[:, :3]
+        crossings = [_around((crossing.outline - origin) * scale) for crossing in plan.town.crosswalks]
+        paint = np.concatenate((fixed, tunnels, bars, np.array(crossings).reshape(-1, 3)))
+        self._levels = {
+            Level.ALL: (paint, arrows, junctions),
+            Level.ARROWS_HIDDEN: (paint, junctions),
+            Level.JUNCTIONS_TOUCHED: (paint, junctions * np.array([1.0, 1.0, _NARROW])),
+            Level.JUNCTIONS_CROSSED: (paint, arrows),
+            Level.FIXED_ALONE: (fixed,),
+            Level.OFF_ROAD: (fixed, circles((lane, 0.0, lane.length) for lane in lanes)[:, :3]),
+        }
+        self._circles: dict[Level, _Circles] = {}
+
+    def clearance(self, axis: Axis, level: Level) -> Array:
+        """Distance (n,) [px] from the points of an axis to the nearest obstacle of a level."""
+        if level not in axis.clear:
+            if level not in self._circles:
+                self._circles[level] = _Circles(np.concatenate(self._levels[level]))
+            free = self._circles[level].clearance(axis)
+            axis.clear[level] = free if axis.beside else np.minimum(free, self._bridges.clearance(axis))
+        return axis.clear[level]
+
+
+class _Circles:
+    """Circles (n, 3) [px], or those (n, 4) of roads whose heights matter, as a tree."""
+
+    def __init__(self, circles: Array) -> None:
+        self._rows = circles
+        self._tree = cKDTree(circles[:, :2]) if len(circles) else None
+
+    def clearance(self, axis: Axis) -> Array:
+        """Distance (n,) [px] to the nearest circle that is in the way."""
+        if self._tree is None:
+            return np.full(len(axis.line), np.inf)
+        found = self._tree.query(axis.line, k=min(_CELL, len(self._rows)))
+        distance, index = (np.reshape(row, (len(axis.line), -1)) for row in found)
+        free = distance - self._rows[index, 2]
+        if self._rows.shape[1] > 3:
+            free = np.where(np.abs(self._rows[index, 3] - axis.height[:, None]) > _OTHER_ROAD, free, np.inf)
+        return np.asarray(free.min(axis=1))
+
+
+def _arrow_stretches(plan: Plan) -> Iterator[tuple[Lane, float, float]]:
+    """Stretches of lanes that arrows take."""
+    for arrow in plan.arrows if plan.detail.arrows else ():
+        lane = plan.town.lanes[arrow.lane]
+        yield lane, arrow.station, min(arrow.station + ARROW_LENGTH, lane.length)
+
+
+def _stop_stretches(plan: Plan) -> Iterator[tuple[Lane, float, float]]:
+    """Stretches of lanes that stop lines take."""
+    for number in plan.ruled:
+        lane = plan.town.lanes[number]
+        yield lane, max(0.0, plan.stops.get(number, 0.0) - 1.0), lane.length
+
+
+def _around(outline: Array) -> Array:
+    """A circle (3,) around most of a crossing: where it lies across a road, that road's width is enough."""
+    centre = outline.mean(axis=0)
+    return np.array([*centre, 0.8 * np.hypot(*(outline - centre).T).max()])
+
+
+# --- Where the names of streets go: along the road, upright, clear of junctions and of each other --------------------
+
+_TIGHTEST = 2.2  # sizes of type: the smallest radius that letters still stand well on
+_ROOM = 0.72  # of the road's width that a row of type may take
+_ROOM_OF_ROWS = 0.9  # and that two of them may take
+ROW_HEIGHT = 1.0
+"""From row to row, times the size of the type."""
+
+_HALF = 0.62  # of a name's height that is kept free on either side of its line
+_LONGER = 1.08  # times a name's length of road is taken
+_POINTS = 24
+_SHARES = (1.0, 0.85, 0.72, 0.6, 0.5, 0.42)  # of the largest type
+_REPEATED = 0.8  # times its size a name may be set again where there is less room
+_TINY = 0.8  # times the smallest type, rather than no name
+_ASIDE = 3.0  # [m] between the road's edge and a name beside it: the pavement
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Manner:
+    """How a name may be set.
+
+    Attributes:
+        size: of the type [px].
+        level: what it keeps clear of.
+        forced: whether it may be higher than the road is broad.
+        across: whether it may go across a junction.
+        bent: how much its line may turn [rad].
+        rows: that the name is broken into.
+    """
+
+    size: int
+    level: Level
+    forced: bool = False
+    across: bool = False
+    bent: float = 0.9
+    rows: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Label:
+    """A name as it stands on the map.
+
+    Attributes:
+        text: the name.
+        street: index of the street.
+        size: height of the type [px].
+        path: points (n, 2) [px] along which it is set, from its first letter to its last.
+        beside: whether it stands on the ground beside the road, there being no room on it.
+        rows: the name as it is broken into rows, their middle being on the path.
+    """
+
+    text: str
+    street: int
+    size: int
+    path: Array
+    beside: bool
+    rows: tuple[str, ...]
+
+    @property
+    def half(self) -> float:
+        """What is kept free on either side of the path [px]."""
+        return _half(self.size, len(self.rows))
+
+    def row_paths(self) -> list[Array]:
+        """The path of each row (n, 2) [px]."""
+        steps = np.gradient(self.path, axis=0)
+        down = np.stack((-steps[:, 1], steps[:, 0]), axis=-1) / np.hypot(*steps.T)[:, None]
+        middle = (len(self.rows) - 1) / 2.0
+        return [self.path + (k - middle) * ROW_HEIGHT * self.size * down for k in range(len(self.rows))]
+
+
+@dataclass
+class LabelPlacer:
+    """Sets the names of a town's streets.
+
+    Attributes:
+        names: by street index; empty for streets that have none.
+        scale: [px/m].
+        origin: world position of pixel (0, 0) [m].
+        frame: left, top, right and bottom [px] that names stay inside.
+        sizes: largest and smallest type [px].
+        spacing: smallest distance between two settings of the same name [px].
+        farthest: distance beyond which a name is set again even over arrows [px].
+        placed: the names set so far.
+        missing: names of streets on and beside which there is no room at all.
+    """
+
+    names: Sequence[str]
+    scale: float
+    origin: Array
+    frame: tuple[int, int, int, int]
+    sizes: tuple[int, int] = (20, 11)
+    spacing: float = 420.0
+    farthest: float = 1400.0
+    placed: list[Label] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
+
+    def place(self, plan: Plan, fixed: Array) -> list[Label]:
+        """Sets every name at least once where its street can be seen, and again where it is long.
+
+        Streets with the least room come first. A name first gives way to all markings, then hides arrows, then gets
+        smaller, goes on across a junction and at last stands beside the road.
+
+        Args:
+            plan: what is painted.
+            fixed: circles (n, 3) [px] that no name may touch: x, y, radius.
+        """
+        lines = plan.borders.lines
+        self._obstacles = Obstacles(plan, self.scale, self.origin, fixed)
+        self._axes = street_axes(plan.borders, self.scale, self.origin)
+        self._own: dict[int, list[Axis]] = {k: [] for k, name in enumerate(self.names) if name}
+        for axis in self._axes:
+            if axis.street in self._own:
+                self._own[axis.street].append(axis)
+        order = sorted(self._own, key=lambda k: (sum(axis.length for axis in self._own[k]), k))
+        self.placed, self.missing = [], []
+        for street in order:
+            if not self._set_first(street) and not self._set_beside(street, lines):
+                self.missing.append(self.names[street])
+        for street in order:
+            self._repeat(street)
+        return self.placed
+
+    def _set_first(self, street: int) -> bool:
+        large, small = self.sizes
+        tiny = round(_TINY * small)
+        sizes = list(dict.fromkeys(max(small, round(share * large)) for share in _SHARES))
+        # Broad streets have large names; each size is tried on the road's free stretches, then over its arrows.
+        manners = [
+            _Manner(size=size, level=level)
+            for part in (sizes[:2], sizes[2:4], sizes[4:])
+            for level in (Level.ALL, Level.ARROWS_HIDDEN)
+            for size in part
+        ]
+        manners += [
+            _Manner(size=size, level=level, rows=2, bent=0.3)
+            for size in sizes
+            for level in (Level.ALL, Level.ARROWS_HIDDEN)
+        ]
+        manners += [
+            _Manner(size=size, level=level, forced=True, bent=bent)
+            for size, bent in ((small, 0.9), (small, 1.8), (tiny, 1.8))
+            for level in (Level.ALL, Level.ARROWS_HIDDEN)
+        ]
+        manners += [
+            _Manner(size=small, level=Level.JUNCTIONS_TOUCHED, forced=True, bent=1.2),
+            _Manner(size=small, level=Level.JUNCTIONS_CROSSED, forced=True, across=True, bent=0.3),
+            _Manner(size=tiny, level=Level.JUNCTIONS_TOUCHED, forced=True, bent=1.8),
+        ]
+        return any(self._set(street, manner) for manner in manners)
+
+    def _set(self, street: int, manner: _Manner, spacing: float = 0.0) -> bool:
+        axes: Iterable[Axis] = self._own[street]
+        if manner.across:
+            # Names set before are not known to axes made just now.
+            axes = sorted(across_junctions(self._own[street], self.scale), key=lambda axis: -axis.length)
+            self._tell(axes)
+        return self._set_on(axes, manner, spacing)
+
+    def _set_beside(self, street: int, lines: Sequence[Border]) -> bool:
+        small = self.sizes[1]
+        for size, level in (
+            (small, Level.OFF_ROAD),
+            (round(_TINY * small), Level.OFF_ROAD),
+            (small, Level.FIXED_ALONE),
+        ):
+            more = font(size, bold=True).size(self.names[street])[0] * _LONGER / 2.0
+            axes = list(beside_axes(lines, street, self.scale, self.origin, _ASIDE * self.scale + _HALF * size, more))
+            self._tell(axes)
+            if self._set_on(axes, _Manner(size=size, level=level, forced=True), 0.0):
+                return True
+        return False
+
+    def _repeat(self, street: int) -> None:
+        first = next((label for label in self.placed if label.street == street), None)
+        if first is None or first.beside:
+            return
+        large, small = first.size, max(self.sizes[1], round(_REPEATED * first.size))
+        forced, rows = first.size <= self.sizes[1] and len(first.rows) == 1, len(first.rows)
+        for size in dict.fromkeys((large, small)):
+            while self._set(street, _Manner(size=size, level=Level.ALL, forced=forced, rows=rows), self.spacing):
+                pass
+        farthest = max(self.farthest, self.spacing)
+        for size in dict.fromkeys((large, small, self.sizes[1])):
+            while self._set(street, _Manner(size=size, level=Level.ARROWS_HIDDEN, forced=forced, rows=rows), farthest):
+                pass
+
+    def _tell(self, axes: Iterable[Axis]) -> None:
+        """Tells axes of the names set so far."""
+        for label in self.placed:
+            places = cKDTree(label.path)
+            for axis in axes:
+                axis.keep_off(places, label.half)
+
+    def _set_on(self, axes: Iterable[Axis], manner: _Manner, spacing: float) -> bool:
+        """Sets a name on the first of some axes on which there is room for it; tells whether there is one."""
+        for axis in axes:
+            text = self.names[axis.street]
+            rows = _broken(text, manner)
+            if len(rows) != manner.rows:
+                return False
+            width = max(font(manner.size, bold=True).size(row)[0] for row in rows) * _LONGER
+            path = self._window(axis, width, manner, spacing)
+            if path is None:
+                continue
+            label = Label(text, axis.street, manner.size, _upright(path), axis.beside, rows)
+            self.placed.append(label)
+            places = cKDTree(label.path)
+            for other in self._axes:
+                other.keep_off(places, label.half)
+            return True
+        return False
+
+    def _window(self, axis: Axis, width: float, manner: _Manner, spacing: float) -> Array | None:
+        """The best place on an axis: straight, and near the middle of the stretch that is free."""
+        count = int(np.ceil(width / axis.step)) + 1
+        if count > len(axis.line):
+            return None
+        size = manner.size
+        ok = np.minimum(self._obstacles.clearance(axis, manner.level), axis.taken) >= _half(size, manner.rows)
+        if not manner.forced:
+            room = _ROOM if manner.rows == 1 else _ROOM_OF_ROWS / (1.0 + ROW_HEIGHT)
+            ok &= axis.room * room >= size
+        left, top, right, bottom = self.frame
+        inside = (axis.line > np.array([left, top]) + size) & (axis.line < np.array([right, bottom]) - size)
+        ok &= inside.all(axis=1)
+        ok &= np.abs(np.gradient(axis.heading, axis.step)) < 1.0 / (_TIGHTEST * size)
+        starts = np.flatnonzero(sliding_window_view(ok, count).all(axis=1))
+        if not len(starts):
+            return None
+        turned = sliding_window_view(axis.heading, count)[starts]
+        bent = turned.max(axis=1) - turned.min(axis=1)
+        middle = axis.line[starts + count // 2]
+        good = bent <= manner.bent
+        same = np.array([label.path.mean(axis=0) for label in self.placed if label.street == axis.street]).reshape(
+            -1, 2
+        )
+        if len(same) and spacing:
+            good &= np.hypot(*(middle[:, None] - same).transpose(2, 0, 1)).min(axis=1) >= spacing
+        if not good.any():
+            return None
+        centred = np.abs(starts - _middle_of_run(starts)) * axis.step
+        cost = np.where(good, centred / self.spacing + 1.2 * bent, np.inf)
+        first = int(starts[int(np.argmin(cost))])
+        return axis.along(first * axis.step + 0.5 * (width - width / _LONGER), width / _LONGER, _POINTS)
+
+
+def _half(size: int, rows: int) -> float:
+    return size * (_HALF + (rows - 1) * ROW_HEIGHT / 2.0)
+
+
+def _broken(text: str, manner: _Manner) -> tuple[str, ...]:
+    """A name in one row, or broken between two words so that the longer row is as short as may be."""
+    parts = text.split()
+    if manner.rows == 1 or len(parts) < 2:
+        return (text,)
+    choices = [(" ".join(parts[:k]), " ".join(parts[k:])) for k in range(1, len(parts))]
+    face = font(manner.size, bold=True)
+    return min(choices, key=lambda rows: max(face.size(row)[0] for row in rows))
+
+
+def _middle_of_run(starts: NDArray[np.int64]) -> Array:
+    """For each of ascending integers (n,), the middle of the run of successive ones that it belongs to."""
+    cuts = np.flatnonzero(np.diff(starts) > 1) + 1
+    return np.concatenate([np.full(len(run), (run[0] + run[-1]) / 2.0) for run in np.split(starts, cuts)])
+
+
+def _upright(path: Array) -> Array:
+    """The path in the direction in which text on it can be read: to the right, and straight upwards."""
+    across = path[-1] - path[0]
+    backwards = across[0] < -0.02 * abs(across[1]) or (abs(across[0]) <= 0.02 * abs(across[1]) and across[1] > 0)
+    return path[::-1] if backwards else path
+
+
+def covering(labels: Iterable[Label]) -> Iterator[tuple[float, float, float]]:
+    """Circles (x, y, radius) [px] that cover names."""
+    for label in labels:
+        for x, y in label.path.tolist():
+            yield x, y, label.half

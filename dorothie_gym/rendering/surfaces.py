@@ -1,0 +1,257 @@
+"""What is built: pavements, kerbs, asphalt, planted medians, lay-bys, bridges and tunnels."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from dorothie_gym.maps.model import Array, Lane, Site, Town
+from dorothie_gym.rendering import palette
+from dorothie_gym.rendering.borders import Border, BorderKind
+from dorothie_gym.rendering.ground import junction_areas
+from dorothie_gym.rendering.levels import Places, Stretch, cuttings
+from dorothie_gym.rendering.medians import Pocket, flat_strip, held, medians, pocket_grounds
+from dorothie_gym.rendering.palette import Colour
+from dorothie_gym.rendering.shapes import Samples, Shape, cut, disc, polyline_length, ribbon, side_line, strokes
+from dorothie_gym.rendering.tunnels import portals, tunnel_floors, walls
+
+_EDGE = 0.15  # [m]
+_WIDEST_WALK = 4.0  # [m] that is drawn: squares that a map calls pavements would hide the ground
+_WIDEST_VERGE = 4.5  # [m]
+_CORNER = 6.0  # [m] between a junction and the pavements that go on around it
+_AROUND = 45  # [m] from the end of a pavement to where another one takes over
+_BESIDE = 0.1  # [m] between the edge of the road and a pavement
+_FROM_ARM = 16.0  # [m] from the end of an arm's pavement to where the ring's goes on
+_LARGEST_RING = 80.0  # [m], its radius
+_LONGEST_ARC = 120.0  # [m] from arm to arm
+_SAME_LEVEL = 1.5  # [m]
+_JOINED = 4  # segments of an outline that are drawn at once
+
+
+def sidewalks(town: Town, areas: Sequence[Array], lines: Sequence[Border]) -> Iterator[Shape]:
+    """The pavements, around roundabouts those that go on from its arms, and around corners what joins them."""
+    walks = [(walk.points[:, :2], min(walk.width, _WIDEST_WALK)) for walk in town.sidewalks]
+    walks += list(_around_rings(walks, lines))
+    corners = list(_corners(walks, areas))
+    for wider, colour in ((_EDGE, palette.SIDEWALK_EDGE), (0.0, palette.SIDEWALK)):
+        for line, width in corners:
+            yield from rim(line, width + wider, colour)
+        for line, narrow in walks:
+            width = narrow + 2.0 * wider
+            yield from (Shape(piece, colour) for piece in strokes(line, width))
+            yield from (Shape(disc(end, width / 2.0), colour) for end in (line[0], line[-1]))
+
+
+def _around_rings(walks: Sequence[tuple[Array, float]], lines: Iterable[Border]) -> Iterator[tuple[Array, float]]:
+    """Pavements outside the ring of a roundabout, where none is known, between those of its arms."""
+    tree = cKDTree(np.concatenate([line[[0, -1]] for line, _ in walks]))
+    every = cKDTree(np.concatenate([line for line, _ in walks]))
+    for line in lines:
+        length = polyline_length(line.points)
+        if line.kind is not BorderKind.EDGE or line.sign < 0 or length > _LONGEST_ARC:
+            continue
+        turns = float(line.heading[0] - line.heading[-1]) / length  # to the left: traffic goes around on the right
+        near, where = (np.asarray(row) for row in tree.query(line.points[[0, -1], :2]))
+        if turns < 1.0 / _LARGEST_RING or (near > _FROM_ARM).any():
+            continue
+        width = min(walks[int(k) // 2][1] for k in where)
+        middle = line.shifted(-_BESIDE - width / 2.0)
+        if float(every.query(middle[len(middle) // 2])[0]) > width:
+            yield middle, width
+
+
+def _corners(walks: Sequence[tuple[Array, float]], areas: Sequence[Array]) -> Iterator[tuple[Array, float]]:
+    """Parts (n, 2) [m] of the outlines of junctions between ends of pavements, and how far those reach from them."""
+    ends = np.concatenate([line[[0, -1]] for line, _ in walks])
+    half = np.repeat([width / 2.0 for _, width in walks], 2)
+    for outline in areas:
+        closed = np.concatenate((outline, outline[:1]))
+        ring = cut(closed, [(0.0, polyline_length(closed))], 1.0)[0][:-1]
+        away, where = (np.asarray(row) for row in cKDTree(ring).query(ends))
+        near = np.flatnonzero(away < _CORNER)
+        near = near[np.argsort(where[near], kind="stable")]
+        for k, after in zip(near.tolist(), np.roll(near, -1).tolist(), strict=True):
+            count = int(where[after] - where[k]) % len(ring)
+            if 1 <= count <= _AROUND:
+                part = ring[np.arange(where[k], where[k] + count + 1) % len(ring)]
+                yield part, float((away + half)[[k, after]].mean())
+
+
+def verges(town: Town, lines: Iterable[Border]) -> Iterator[Shape]:
+    """What lies between a kerb and a pavement that does not touch it, paved as well."""
+    walks = [(walk, cut(walk.points, [(0.0, polyline_length(walk.points))], 1.0)[0]) for walk in town.sidewalks]
+    places = np.concatenate([points for _, points in walks])
+    tree = cKDTree(places[:, :2])
+    half = np.concatenate([np.full(len(points), min(walk.width, _WIDEST_WALK) / 2.0) for walk, points in walks])
+    for line in lines:
+        if line.kind is not BorderKind.EDGE:
+            continue
+        near, where = tree.query(line.points[:, :2])
+        gap = near - half[where]
+        outer = line.shifted(-np.clip(gap + 0.5, 0.0, _WIDEST_VERGE + 0.5))
+        beside = (gap < _WIDEST_VERGE) & (np.abs(places[where, 2] - line.points[:, 2]) < _SAME_LEVEL)
+        for run in np.split(np.arange(len(gap)), np.flatnonzero(np.diff(beside.astype(int)) != 0) + 1):
+            if beside[run[0]] and len(run) > 1:
+                for k in range(run[0], run[-1], 8):
+                    part = slice(k, min(k + 9, run[-1] + 1))
+                    yield Shape(np.concatenate((line.points[part, :2], outer[part][::-1])), palette.SIDEWALK)
+
+
+def rim(outline: Array, margin: float, colour: Colour) -> Iterator[Shape]:
+    """What lies along an outline (n, 2) [m], as far as a margin [m] from it."""
+    yield from (Shape(piece, colour) for piece in strokes(outline, 2.0 * margin, _JOINED))
+    yield from (Shape(disc(point, margin, 16), colour) for point in (*outline[::_JOINED], outline[-1]))
+
+
+# --- What is built: pavements, kerbs, asphalt, planted medians, lay-bys, bridges and tunnels -------------------------
+
+_KERB = 0.45  # [m]
+_VERGE = 1.6  # [m] of pavement made up beside the roads of a town that knows of none
+_JOINT = 0.05  # [m]
+_BAY_DEPTH = 2.3  # [m]
+_BAY_LENGTH = 6.0  # [m] without its tapered ends
+_BAY_TAPER = 2.2  # [m]
+_BEFORE_PORTAL = 4.0  # [m] of asphalt between a median and the mouth of a tunnel
+_FURTHER = 6.0  # [m] of asphalt beyond a bridge: lanes side by side do not start theirs at the same place
+
+
+def streets(
+    town: Town, samples: Samples, lines: Sequence[Border], parts: Sequence[Stretch], turn_lanes: Sequence[Pocket]
+) -> Iterator[Shape]:
+    """Everything on the ground, from the pavements to the medians; what lies in tunnels comes first.
+
+    Args:
+        town: whose streets.
+        samples: of its lanes.
+        lines: what lies beside them.
+        parts: bridges and tunnels.
+        turn_lanes: the beginnings of turn lanes.
+    """
+    tunnels = [part for part in parts if part.level < 0]
+    covered = Places(samples, tunnels)
+    yield from walls(lines, Places(samples, cuttings(town, tunnels)), covered)
+    yield from tunnel_floors(town, tunnels, lines, covered)
+    pieces = list(_open_pieces(town, tunnels))
+    areas = junction_areas(town)
+    if town.sidewalks:
+        yield from sidewalks(town, areas, lines)
+        yield from verges(town, lines)
+    else:
+        yield from _layer(town, pieces, areas, _VERGE, palette.SIDEWALK)
+    yield from _layer(town, pieces, areas, _KERB, palette.KERB)
+    yield from _bays(town, samples)
+    for outline in areas:
+        yield Shape(outline, palette.ROAD)
+    yield from _layer(town, pieces, [], 0.0, palette.ROAD)
+    for line in lines:
+        if line.kind in (BorderKind.LANE, BorderKind.CENTRE):
+            # Lanes side by side may lie a little apart.
+            middle = line.shifted(-line.gap / 2.0)
+            for run in held(line, covered, wanted=False):
+                yield from (Shape(piece, palette.ROAD) for piece in strokes(middle[run], 1.0))
+    yield from pocket_grounds(town, turn_lanes)
+    # Grass goes on below the ends of bridges: those of lanes side by side are not at the same place.
+    shorter = [_longer(part, -_FURTHER) for part in parts if part.level > 0]
+    yield from medians(lines, Places(samples, [*shorter, *(_longer(part, _BEFORE_PORTAL) for part in tunnels)]))
+    yield from portals(town, tunnels)
+
+
+def _longer(part: Stretch, more: float) -> Stretch:
+    """A stretch that begins and ends so much further out [m]."""
+    return replace(part, start=part.start - more, end=part.end + more)
+
+
+def deck(town: Town, parts: Sequence[Stretch], lines: Iterable[Border], places: Places) -> Iterator[Shape]:
+    """The bridges of one level: their shadow on what lies below, the parapets, and the asphalt.
+
+    Args:
+        town: whose lanes.
+        parts: the stretches of that level.
+        lines: borders; between two bridges side by side there is concrete.
+        places: what lies on the stretches.
+    """
+    between = [(line, run) for line in lines if line.kind is BorderKind.MEDIAN for run in held(line, places)]
+    layers = (
+        (1.9, 0.0, palette.BRIDGE_SHADOW),
+        (1.05, 0.0, palette.BRIDGE_EDGE),
+        (0.75, 0.0, palette.BRIDGE_PARAPET),
+        (0.25, 0.0, palette.KERB),
+        (0.05, _FURTHER, palette.ROAD),
+    )
+    for margin, further, colour in layers:
+        if colour == palette.KERB:
+            for line, run in between:
+                yield from (Shape(piece, palette.MEDIAN_KERB) for piece in flat_strip(line, run))
+        for part in parts:
+            lane = town.lanes[part.lane]
+            reach = max(0.0, part.start - further), min(lane.length, part.end + further)
+            if reach[1] - reach[0] > 0.5:
+                yield Shape(ribbon(lane, margin, *reach), colour)
+
+
+def _open_pieces(town: Town, tunnels: Sequence[Stretch]) -> Iterator[tuple[Lane, float, float]]:
+    """Lanes, or what of them lies not in tunnels."""
+    hidden: dict[int, list[Stretch]] = defaultdict(list)
+    for part in tunnels:
+        hidden[part.lane].append(part)
+    for lane in town.lanes:
+        start = 0.0
+        for part in hidden[lane.id]:
+            if part.start - start > 0.5:
+                yield lane, start, part.start
+            start = part.end
+        if lane.length - start > (0.5 if start else 0.0):
+            yield lane, start, lane.length
+
+
+def _layer(
+    town: Town, pieces: Iterable[tuple[Lane, float, float]], areas: Sequence[Array], margin: float, colour: Colour
+) -> Iterator[Shape]:
+    """All roads and junctions, wider by a margin [m] on either side."""
+    for lane, start, end in pieces:
+        wider = _JOINT if lane.in_junction and not margin else 0.0
+        yield Shape(ribbon(lane, margin + wider, start, end), colour)
+        for s in {start, end} & {0.0, lane.length}:  # rounded joints, but none at the mouths of tunnels
+            yield Shape(disc(lane.position(s), lane.width_at(s) / 2.0 + margin), colour)
+    for outline in areas:
+        yield Shape(outline, colour)
+        if margin:
+            yield from rim(np.concatenate((outline, outline[:1])), margin, colour)
+
+
+def _bays(town: Town, samples: Samples) -> Iterator[Shape]:
+    """A lay-by at every landmark site where there is room beside the lane, and a path from it to the site."""
+    tree = cKDTree(samples.centre[:, :2])
+    for site in town.sites:
+        lane = town.lanes[site.lane]
+        door = np.array(site.waypoint)
+        yield from (Shape(piece, palette.SIDEWALK) for piece in strokes(np.array([door, site.position]), 1.4))
+        yield Shape(disc(site.position, 2.3), palette.SIDEWALK)
+        outline = bay_outline(lane, site)
+        if outline is None:
+            continue
+        near, where = tree.query(outline[2:-2])
+        if (near < samples.half_width[where] + 0.2).any():
+            continue
+        yield from (Shape(piece, palette.KERB) for piece in strokes(outline, 2.0 * _KERB))
+        yield Shape(outline, palette.BAY)
+
+
+def bay_outline(lane: Lane, site: Site) -> Array | None:
+    """Outline (n, 2) [m] of the lay-by beside a lane at a site, or None where the lane is too short for one.
+
+    Its first and last points are on the lane; all others are beyond its edge.
+    """
+    half = _BAY_LENGTH / 2.0 + _BAY_TAPER
+    if lane.length < 2.0 * half + 1.0:
+        return None
+    middle = float(np.clip(site.station, half + 0.5, lane.length - half - 0.5))
+    side = 1.0 if lane.project(np.array(site.position))[1] >= 0 else -1.0
+    s = middle + np.array([-half, -half, *np.linspace(-_BAY_LENGTH / 2.0, _BAY_LENGTH / 2.0, 5), half, half])
+    depth = np.array([-0.3, 0.05, *([_BAY_DEPTH] * 5), 0.05, -0.3])
+    edge = np.interp(s, lane.stations, lane.widths) / 2.0
+    return side_line(lane, s, side * (edge + depth))

@@ -1,0 +1,118 @@
+"""A small corpus that is played once and kept: what there is to read when nobody has given a folder of sessions."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from dorothie_gym import __version__
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.recording import FORMAT_VERSION
+from dorothie_gym.rollout.corpus_generation import generate_corpus
+
+CACHE_VARIABLE = "DOROTHIE_GYM_CACHE"
+"""The environment variable that names the folder in which sessions are kept."""
+
+SESSIONS = 20
+"""Sessions of the corpus: the fewest of which each fold has one, as many as a leak test wants, some minutes to play."""
+
+SEED = 0
+
+CONFIG = EnvConfig()
+
+_LOG = logging.getLogger(__name__)
+
+
+class CacheError(RuntimeError):
+    """The folder in which sessions are kept cannot be written; the message says what to set."""
+
+
+def cache_folder() -> Path:
+    """Returns the folder in which sessions are kept, which need not exist.
+
+    `DOROTHIE_GYM_CACHE`, else `dorothie_gym` in `XDG_CACHE_HOME`, else `~/.cache/dorothie_gym`.
+    """
+    if chosen := os.environ.get(CACHE_VARIABLE):
+        return Path(chosen).expanduser()
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path("~/.cache").expanduser()) / "dorothie_gym"
+
+
+def default_corpus(*, sessions: int | None = None, seed: int = SEED, config: EnvConfig | None = None) -> Path:
+    """Returns a folder with a corpus of the scripted roles; plays it the first time, with a progress bar on stderr.
+
+    Its folds and towns are shared out as the paper's. It is kept in the user's cache under the version of the package
+    and what it was made from, so that another version plays its own. The folder appears when all sessions are played:
+    nobody ever reads a part of it.
+
+    Args:
+        sessions: how many; `SESSIONS` where None.
+        seed: of the corpus.
+        config: of the environment; `CONFIG` where None.
+
+    Raises:
+        CacheError: the cache cannot be written.
+        ValueError: no sessions, or a negative seed.
+    """
+    config = CONFIG if config is None else config
+    sessions = SESSIONS if sessions is None else sessions
+    key = {"format": FORMAT_VERSION, "sessions": sessions, "seed": seed, "config": asdict(config)}
+    digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:12]
+    folder = cache_folder() / f"corpus-{__version__}-{digest}"
+    if folder.is_dir():
+        return folder
+    with _told_what_to_set(folder.parent):
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        part = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", suffix=".part", dir=folder.parent))
+        try:
+            _play(part, sessions, seed, config)
+            _publish(part, folder)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+    return folder
+
+
+def _play(folder: Path, sessions: int, seed: int, config: EnvConfig) -> None:
+    console = Console(stderr=True)
+    _LOG.info("playing %d sessions, which are kept in %s", sessions, folder.parent)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as progress:
+        bar = progress.add_task("Playing a small corpus, once", total=sessions)
+
+        def advance(done: int, _: int) -> None:
+            progress.update(bar, completed=done)
+
+        # One process: several need a main module that can be imported, which not every caller has.
+        generate_corpus(folder, sessions=sessions, seed=seed, config=config, on_session=advance)
+
+
+def _publish(part: Path, folder: Path) -> None:
+    """Gives the finished folder its name, unless another process was faster with the same sessions."""
+    part.chmod(0o755)  # temporary folders are closed to everybody else
+    try:
+        part.rename(folder)
+    except OSError:
+        if not folder.is_dir():
+            raise
+
+
+@contextmanager
+def _told_what_to_set(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise CacheError(
+            f"{folder}: sessions cannot be kept here ({error.strerror or error}); "
+            f"set {CACHE_VARIABLE} to a folder that can be written, or give a folder of sessions"
+        ) from error

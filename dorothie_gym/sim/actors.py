@@ -1,0 +1,151 @@
+"""Everybody and everything on the road besides the car: traffic, pedestrians, props."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from dorothie_gym.maps.model import Array
+from dorothie_gym.ontology import PropKind
+from dorothie_gym.sim.bodies import Bodies, Pedestrian, Prop, TrafficVehicle
+from dorothie_gym.sim.pedestrians.pacing import (
+    KERB,
+)
+from dorothie_gym.sim.population import (
+    SPEEDS,
+    add_prop,
+    add_street_walker,
+    add_vehicle,
+    move_prop,
+    populate,
+    remove_prop,
+)
+from dorothie_gym.sim.road import TownRoad
+from dorothie_gym.sim.state.records import NOBODY, Kind, Walk
+from dorothie_gym.sim.state.town_arrays import TownArrays
+from dorothie_gym.sim.state.world_arrays import WorldArrays, grown
+from dorothie_gym.sim.traffic.parameters import CYCLIST_SHARE, CYCLIST_SPEEDS
+from dorothie_gym.sim.traffic.respawn import is_free
+
+MORE = 8
+"""Places that are made for more vehicles or pedestrians when all are taken."""
+
+
+class Actors:
+    """Traffic, pedestrians and props of a world.
+
+    Attributes:
+        arrays: the state of all bodies, the car the first of the vehicles; replaced by a bigger one when more come.
+    """
+
+    def __init__(self, road: TownRoad, town: TownArrays, arrays: WorldArrays, *, seed: np.random.SeedSequence) -> None:
+        """Takes over the arrays of a world in which the car is there already.
+
+        Args:
+            road: of the town.
+            town: its arrays.
+            arrays: of the world.
+            seed: of places, kinds and speeds of those who come.
+        """
+        self.arrays = arrays
+        self._road, self._town_arrays, self._town = road, town, road.network.town
+        self._bodies = Bodies(road, self)
+        self._rng = np.random.default_rng(seed)
+        self._present_of: WorldArrays | None = None
+        self._present = np.zeros(0, dtype=np.bool_)
+
+    @property
+    def vehicles(self) -> list[TrafficVehicle]:
+        """Traffic, cyclists among it."""
+        return self._bodies.vehicles()
+
+    @property
+    def pedestrians(self) -> list[Pedestrian]:
+        """People on foot."""
+        return self._bodies.pedestrians()
+
+    @property
+    def props(self) -> list[Prop]:
+        """Things placed by the Ad-Wizard, in the order in which they came."""
+        if not self.has_props:
+            return []
+        return sorted(self._bodies.props(), key=lambda prop: int(prop.key))
+
+    @property
+    def has_props(self) -> bool:
+        """Whether there is any prop."""
+        if self._present_of is not self.arrays:
+            self._present_of, self._present = self.arrays, self.arrays.props.view(np.ndarray)["present"]
+        return len(self._present) > 0 and bool(self._present.any())
+
+    # --- coming and going -------------------------------------------------------------------------------------------
+
+    def populate(self, *, vehicles: int, pedestrians: int) -> None:
+        """Brings traffic and pedestrians to random places, as many as fit."""
+        self._make_room(vehicles=vehicles, pedestrians=pedestrians)
+        populate(
+            self._road.network, self._town_arrays, self.arrays,
+            seed=int(self._rng.integers(1 << 62)), vehicles=vehicles, pedestrians=pedestrians,
+        )  # fmt: skip
+
+    def add_vehicle(self, lane: int, station: float, *, distance: float) -> bool:
+        """Puts a vehicle, or a cyclist, on a lane if there is room and the car is farther than `distance` [m]."""
+        town = self._town_arrays
+        if not is_free(town, self.arrays, lane, float(station), int(NOBODY), float(distance)):
+            return False
+        cycles = bool(town.lanes[lane].right < 0 and town.lanes[lane].cycling) and self._rng.random() < CYCLIST_SHARE
+        kind, speeds = (Kind.CYCLIST, CYCLIST_SPEEDS) if cycles else (Kind.CAR, SPEEDS)
+        self._make_room(vehicles=1)
+        add_vehicle(town, self.arrays, lane, station, kind=kind, desired=float(self._rng.uniform(*speeds)))
+        return True
+
+    def add_pedestrian(self, lane: int, station: float) -> bool:
+        """Puts a pedestrian beside a lane, or to the right of those beside it, if nobody is there.
+
+        Such pedestrians keep to the street where they are, and cross it anywhere.
+        """
+        self._make_room(pedestrians=1)
+        found = add_street_walker(self._road.network, self._town_arrays, self.arrays, lane, station)
+        return found is not None
+
+    def kerb(self, lane: int, station: float) -> Array:
+        """Where a pedestrian stands beside a lane (2,) [m]; `lane` is the rightmost one of its direction."""
+        town_lane = self._town.lanes[lane]
+        place: Array = town_lane.position(station, town_lane.width_at(station) / 2 + KERB)
+        return place
+
+    def add_prop(self, kind: PropKind, lane: int, station: float) -> Prop:
+        """Puts a prop on a lane; whether it may stand there is the caller's business.
+
+        Args:
+            kind: of prop.
+            lane: it stands on.
+            station: distance along the lane [m].
+        """
+        self._make_room(props=1)
+        row = add_prop(self._road.network, self._town_arrays, self.arrays, kind, lane, station)
+        return self._bodies.prop(row)
+
+    def move_prop(self, prop: Prop, lane: int, station: float) -> None:
+        """Puts a prop on another place; it stays the same."""
+        move_prop(self._road.network, self._town_arrays, self.arrays, prop.row, lane, station)
+
+    def remove_prop(self, prop: Prop) -> None:
+        """Takes a prop away."""
+        remove_prop(self._town_arrays, self.arrays, prop.row)
+
+    def _make_room(self, *, vehicles: int = 0, pedestrians: int = 0, props: int = 0) -> None:
+        """Replaces the arrays by bigger ones if so many more do not fit."""
+        state = self.arrays
+        free = (
+            int((state.vehicles.kind == Kind.EMPTY).sum()), int((state.pedestrians.state == Walk.EMPTY).sum()),
+            int((~state.props.present).sum()),
+        )  # fmt: skip
+        missing = [max(n - there, 0) for n, there in zip((vehicles, pedestrians, props), free, strict=True)]
+        if any(missing):
+            more = [math.ceil(n / MORE) * MORE for n in missing]
+            self.arrays = grown(
+                self._town_arrays, state, vehicles=len(state.vehicles) + more[0],
+                pedestrians=len(state.pedestrians) + more[1], props=len(state.props) + more[2],
+            )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Many worlds of one town stepped together by several threads."""

@@ -1,0 +1,444 @@
+"""`Town-v0` many times over: what `gymnasium.make_vec` makes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from highway_env.envs.common.action import ContinuousAction, DiscreteMetaAction, action_factory
+from highway_env.envs.common.observation import KinematicObservation
+from highway_env.road.lane import AbstractLane
+from highway_env.utils import lmap
+from highway_env.vehicle.kinematics import Vehicle
+from numpy.typing import NDArray
+
+from dorothie_gym.maps import load_town
+from dorothie_gym.maps.model import Array
+from dorothie_gym.sim.batch.egos import (
+    FASTER,
+    FEATURES,
+    HELM,
+    IDLE,
+    LEFT,
+    NOTHING,
+    OUTCOME,
+    RIGHT,
+    SLOWER,
+    Egos,
+    View,
+    begin_one,
+    lanes_beside,
+    play_share,
+)
+from dorothie_gym.sim.batch.worlds import VectorWorld
+from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.population import add_vehicle, free_places
+from dorothie_gym.sim.state.records import Kind, Records
+from dorothie_gym.sim.state.town_arrays import town_arrays
+from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
+from dorothie_gym.sim.town_env import SEEDS, TownEnv, finite, populate_around
+
+_CODES = {"LANE_LEFT": LEFT, "IDLE": IDLE, "LANE_RIGHT": RIGHT, "FASTER": FASTER, "SLOWER": SLOWER}
+
+
+class Actions:
+    """What egos are told.
+
+    Attributes:
+        space: of the actions of one.
+        speeds: that an ego of meta actions may hold [m/s]; empty for continuous actions.
+    """
+
+    def __init__(self, config: Mapping[str, Any]) -> None:
+        """Read highway-env's setting `action`; raises `ValueError` for what only plain environments can do."""
+        if config.get("type") not in ("DiscreteMetaAction", "ContinuousAction"):
+            raise _sync_only("action", f"type {config.get('type')!r}")
+        self._stock = action_factory(None, dict(config))
+        self.space: spaces.Space[Any] = self._stock.space()
+        self.speeds: Array = np.zeros(0)
+        self._codes: NDArray[np.int32] = np.zeros(0, dtype=np.int32)
+        self._discrete = isinstance(self._stock, DiscreteMetaAction)
+        if self._discrete:
+            self._read_speeds()
+        else:
+            self._read_ranges()
+
+    def _read_speeds(self) -> None:
+        self.speeds = np.array(self._stock.target_speeds, dtype=np.float64)
+        if self.speeds.ndim != 1 or len(self.speeds) < 2 or self.speeds[0] == self.speeds[-1]:
+            raise ValueError(f"action: target_speeds must be two or more speeds, not {self._stock.target_speeds}")
+        self._codes = np.array([_CODES[self._stock.actions[k]] for k in range(len(self._stock.actions))], np.int32)
+
+    def _read_ranges(self) -> None:
+        stock: ContinuousAction = self._stock
+        if stock.dynamical:
+            raise _sync_only("action", "dynamical")
+        if stock.speed_range and max(map(abs, stock.speed_range)) > Vehicle.MAX_SPEED:
+            raise _sync_only("action", f"a speed_range beyond {Vehicle.MAX_SPEED} m/s")
+
+    def read(self, actions: NDArray[Any], space: spaces.Space[Any], helms: Records) -> NDArray[np.int32]:
+        """Codes (n,) of meta actions; continuous actions are written to the helms, and are no meta actions.
+
+        Args:
+            actions: (n, ...) one for each ego.
+            space: of the actions of all.
+            helms: `meta.HELM` of each ego.
+
+        Raises:
+            ValueError: actions of the wrong shape, or that do not exist.
+        """
+        if actions.shape != space.shape:
+            raise ValueError(f"actions must have the shape {space.shape}, not {actions.shape}")
+        if self._discrete:
+            if not np.issubdtype(actions.dtype, np.integer) or actions.min() < 0 or actions.max() >= len(self._codes):
+                raise ValueError(f"actions must be integers from 0 to {len(self._codes) - 1}, not {actions}")
+            codes: NDArray[np.int32] = self._codes[actions]
+            return codes
+        stock: ContinuousAction = self._stock
+        wanted = np.clip(actions, -1, 1) if stock.clip else actions
+        helms.acceleration = lmap(wanted[:, 0], [-1, 1], stock.acceleration_range) if stock.longitudinal else 0.0
+        helms.steering = lmap(wanted[:, -1], [-1, 1], stock.steering_range) if stock.lateral else 0.0
+        return np.full(len(actions), NOTHING, dtype=np.int32)
+
+    def limit(self, helm: Records) -> None:
+        """Tells an ego of the range of its speeds."""
+        if not self._discrete and self._stock.speed_range:
+            helm.lowest, helm.highest = self._stock.speed_range
+
+
+class Kinematics:
+    """What egos observe.
+
+    Attributes:
+        space: of the observations of one.
+        view: what its columns are, and how they are filled.
+        shuffled: whether the rows of others are in random order.
+    """
+
+    def __init__(self, config: Mapping[str, Any]) -> None:
+        """Read highway-env's setting `observation`; raises `ValueError` for what only plain environments can do."""
+        if config.get("type") != "Kinematics":
+            raise _sync_only("observation", f"type {config.get('type')!r}")
+        self._stock = KinematicObservation(None, **config)
+        unknown = [feature for feature in self._stock.features if feature not in FEATURES]
+        if unknown:
+            raise _sync_only("observation", f"features {', '.join(unknown)}")
+        if self._stock.vehicles_count < 1:
+            raise ValueError(f"observation: vehicles_count must be at least 1, not {self._stock.vehicles_count}")
+        if self._stock.order not in ("sorted", "shuffled"):
+            raise ValueError(f"observation: order must be 'sorted' or 'shuffled', not {self._stock.order!r}")
+        self.space: spaces.Box = self._stock.space()
+        self.shuffled = self._stock.order == "shuffled"
+        codes = np.array([FEATURES[feature] for feature in self._stock.features], dtype=np.int32)
+        self.view = View(
+            codes,
+            absolute=bool(self._stock.absolute),
+            ordered=not self.shuffled,
+            behind=bool(self._stock.see_behind),
+            clip=bool(self._stock.clip),
+            walkers=bool(self._stock.include_obstacles),
+        )
+
+    def ranges(self, lanes: int) -> Array:
+        """(f, 2) values of each feature that are shown as -1 and 1, NaN where values are shown as they are.
+
+        Args:
+            lanes: how many there are on the road where the ego begins: highway-env's unit of `y`.
+        """
+        found = np.full((len(self._stock.features), 2), np.nan)
+        if self._stock.normalize:
+            far, fast, wide = 5.0 * Vehicle.MAX_SPEED, 2.0 * Vehicle.MAX_SPEED, AbstractLane.DEFAULT_WIDTH * lanes
+            usual = {"x": (-far, far), "y": (-wide, wide), "vx": (-fast, fast), "vy": (-fast, fast)}
+            for name, limits in (self._stock.features_range or usual).items():
+                found[[feature == name for feature in self._stock.features]] = limits
+        return found
+
+
+def _sync_only(setting: str, what: str) -> ValueError:
+    return ValueError(
+        f"{setting}: {what} is not compiled for many environments at once; "
+        'gymnasium.make_vec(..., vectorization_mode="sync") runs the plain environments with it'
+    )
+
+
+# --- `Town-v0` many times over: what `gymnasium.make_vec` makes of it ------------------------------------------------
+
+
+class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
+    """`TownEnv` many times over, each with a world of its own, in one compiled call per step and thread.
+
+    ## Description
+    Vehicles, rewards and episode ends are those of `TownEnv`; the ego is highway-env's `MDPVehicle` (or, with
+    `ContinuousAction`, its `Vehicle`), written anew for the arrays. An environment depends on its own seed and actions
+    only: not on the others, its place among them, or the number of threads.
+
+    ## Observation Space
+    `Kinematics` with the features presence, x, y, vx, vy, heading, cos_h and sin_h, and highway-env's options.
+
+    ## Action Space
+    `DiscreteMetaAction` or `ContinuousAction` (not `dynamical`), with highway-env's options.
+
+    ## Rewards
+    As `TownEnv`; `infos["rewards"]` has the terms.
+
+    ## Episode End
+    As `TownEnv`. What follows says `metadata["autoreset_mode"]`: by default an environment that ended is reset by the
+    next step, whose action it ignores.
+
+    ## Arguments
+    `num_envs`: how many; `config`: see `TownEnv`; `threads`: how many at most, by default one per processor;
+    `autoreset_mode`: gymnasium's; `options["reset_mask"]` of `reset` resets some only.
+
+    ## Version History
+    - v0: first version.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        config: dict[str, Any] | None = None,
+        render_mode: str | None = None,
+        threads: int | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+    ) -> None:
+        """Make environments, to be reset before they are used.
+
+        Raises:
+            ValueError: `config` asks for something that only the plain environments can do; they run side by side with
+                `vectorization_mode="sync"`.
+        """
+        if render_mode is not None:
+            raise ValueError(f'{render_mode=}: many towns are not drawn; vectorization_mode="sync" can')
+        self.num_envs = num_envs
+        self.metadata = {**self.metadata, "autoreset_mode": AutoresetMode(autoreset_mode)}
+        self.config = {**TownEnv.default_config(), **(config or {})}
+        self._actions, self._kinematics = Actions(self.config["action"]), Kinematics(self.config["observation"])
+        self.single_action_space = self._actions.space
+        self.single_observation_space = finite(self._kinematics.space)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._network = TownNetwork(load_town(self.config["town"]))
+        self._town = town_arrays(self._network)
+        self._worlds = VectorWorld(self._town, self._empty(0), num_envs, threads=threads)
+        self._egos = self._make_egos()
+        self._shown = np.zeros_like(self._egos.observations)
+        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._seeds: list[int] = [-1] * num_envs
+        self._elapsed = np.zeros(num_envs)
+        self._over = np.ones(num_envs, dtype=np.bool_)
+        self._begun = np.zeros(num_envs, dtype=np.bool_)
+
+    def _make_egos(self) -> Egos:
+        shape = (self.num_envs, *self._kinematics.space.shape)
+        return Egos(
+            lanes_beside(self._network),
+            self._actions.speeds,
+            np.zeros(1, dtype=np.int64),
+            np.zeros((self.num_envs, 1, 4)),
+            np.zeros(self.num_envs, dtype=HELM).view(np.recarray),
+            np.zeros((self.num_envs, shape[2], 2)),
+            np.zeros(shape[:2], dtype=np.int32),
+            np.zeros(shape[:2]),
+            np.zeros(shape, dtype=np.float32),
+            np.zeros(self.num_envs, dtype=OUTCOME).view(np.recarray),
+        )
+
+    # --- gymnasium's interface --------------------------------------------------------------------------------------
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begins new episodes.
+
+        Args:
+            seed: of the first environment; the others have the numbers that follow. Or one for each.
+            options: `reset_mask`, a bool array (num_envs,): which environments, by default all.
+
+        Returns:
+            Observations (num_envs, vehicles, features) and infos, of all environments and of those that begin.
+
+        Raises:
+            ValueError: not one seed for each environment, a mask of the wrong shape or type, or other options.
+        """
+        options = dict(options or {})
+        mask = options.pop("reset_mask", None)
+        if options:
+            raise ValueError(f'options {sorted(options)} are understood with vectorization_mode="sync" only')
+        if mask is None:
+            mask = np.ones(self.num_envs, dtype=np.bool_)
+        if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
+            raise ValueError(f"reset_mask must be a bool array of the shape ({self.num_envs},)")
+        seeds = self._seeds_of(seed)
+        for i in np.flatnonzero(mask):
+            self._begin(int(i), seeds[int(i)])
+        return self._observe(mask), self._infos(mask, np.zeros(self.action_space.shape or (), self.action_space.dtype))
+
+    def step(
+        self, actions: NDArray[Any]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """Plays a decision in every environment.
+
+        Args:
+            actions: (num_envs, ...) one for each.
+
+        Returns:
+            Observations (num_envs, vehicles, features), rewards, terminations and truncations (num_envs,), infos.
+
+        Raises:
+            ValueError: actions that are not of the action space, or environments that were never reset (or are over,
+                where the autoreset mode leaves resets to the caller).
+        """
+        actions = np.asarray(actions)
+        mode = self.metadata["autoreset_mode"]
+        if not self._begun.all():
+            raise ValueError("reset the environments before the first step")
+        if mode is AutoresetMode.DISABLED and self._over.any():
+            raise ValueError(f"the environments {np.flatnonzero(self._over)} are over: reset them with a reset_mask")
+        codes = self._actions.read(actions, self.action_space, self._egos.helms)
+        again, everywhere = self._over.copy(), np.ones(self.num_envs, dtype=np.bool_)
+        self._play(codes, ~again)
+        self._begin_all(again)
+        rewards = np.where(again, 0.0, sum(self._terms().values()))
+        terminations = ~again & self._egos.outcomes.crashed
+        truncations = ~again & (self._elapsed >= self.config["duration"])
+        self._over = terminations | truncations
+        observations, infos = self._observe(everywhere), self._infos(everywhere, _without(actions, again))
+        if mode is AutoresetMode.SAME_STEP and self._over.any():
+            observations, infos = self._begin_at_once(observations, actions)
+        return observations, rewards, terminations, truncations, infos
+
+    def _seeds_of(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, (int, np.integer)):
+            return [int(seed) + i for i in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise ValueError(f"{len(seed)} seeds for {self.num_envs} environments")
+        return seed
+
+    def _begin_at_once(
+        self, last: NDArray[np.float32], actions: NDArray[Any]
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Resets what is over, and tells of how it ended and began: observations and infos of mode `SAME_STEP`."""
+        over = self._over.copy()
+        final = np.full(self.num_envs, None, dtype=object)
+        for i in np.flatnonzero(over):
+            final[i] = last[i]
+        ended = self._infos(over, actions)
+        self._begin_all(over)
+        infos = self._infos(np.ones(self.num_envs, dtype=np.bool_), _without(actions, over))
+        infos |= {"final_obs": final, "_final_obs": over, "final_info": ended, "_final_info": over.copy()}
+        return self._observe(over), infos
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Lets the threads go."""
+        self._worlds.close()
+
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """The environments' generators."""
+        return tuple(self._generator(i) for i in range(self.num_envs))
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The environments' seeds."""
+        return tuple(self._seeds[i] for i, _ in enumerate(self.np_random))
+
+    @property
+    def threads(self) -> int:
+        """How many threads work."""
+        return self._worlds.threads
+
+    def world(self, number: int) -> WorldArrays:
+        """The world of an environment; its first vehicle is the ego."""
+        return self._worlds.world(number)
+
+    # --- episodes ---------------------------------------------------------------------------------------------------
+
+    def _play(self, codes: NDArray[np.int32], playing: NDArray[np.bool_]) -> None:
+        frequency, decisions = self.config["simulation_frequency"], self.config["policy_frequency"]
+        self._worlds.share(
+            play_share, self._town, self._worlds.arrays, self._kinematics.view, self._egos, codes, playing,
+            int(frequency // decisions), 1.0 / frequency,
+        )  # fmt: skip
+        self._elapsed += 1.0 / decisions
+
+    def _begin(self, i: int, seed: int | None) -> None:
+        """Begins an episode of one environment."""
+        if seed is not None:
+            self._generators[i], self._seeds[i] = seeding.np_random(seed)
+        rng = self._generator(i)
+        # in the order in which `TownEnv` draws, so that a seed is the same town there
+        world = self._empty(int(rng.integers(SEEDS)))
+        lane, station = free_places(self._network.town, rng, 2)[0]
+        add_vehicle(self._town, world, lane, station, kind=Kind.EGO, desired=0.0)
+        world.vehicles.key[0] = world.clock.keys[0] = 0
+        vehicles, pedestrians = int(self.config["vehicles"]), int(self.config["pedestrians"])
+        populate_around(self._network, world, rng, vehicles=vehicles, pedestrians=pedestrians)
+        self._worlds.put(i, world)
+        road = self._network.index_of(int(world.vehicles[0].lane))
+        self._egos.ranges[i] = self._kinematics.ranges(len(self._network.all_side_lanes(road)))
+        begin_one(i, self._town, self._worlds.arrays, self._kinematics.view, self._egos)
+        self._actions.limit(self._egos.helms[i])
+        self._elapsed[i], self._over[i], self._begun[i] = 0.0, False, True
+
+    def _begin_all(self, mask: NDArray[np.bool_]) -> None:
+        for i in np.flatnonzero(mask):
+            self._begin(int(i), None)
+
+    def _empty(self, seed: int) -> WorldArrays:
+        vehicles, pedestrians = int(self.config["vehicles"]), int(self.config["pedestrians"])
+        return empty_world(self._town, vehicles=1 + vehicles, pedestrians=pedestrians, props=0, seed=seed)
+
+    def _generator(self, i: int) -> np.random.Generator:
+        found = self._generators[i]
+        if found is None:
+            found, self._seeds[i] = seeding.np_random()
+            self._generators[i] = found
+        return found
+
+    def _observe(self, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+        """What all environments show; those of the mask anew."""
+        self._shown[mask] = self._egos.observations[mask]
+        if self._kinematics.shuffled:
+            for i in np.flatnonzero(mask):
+                self._generator(int(i)).shuffle(self._shown[i, 1:])
+        return self._shown.copy()
+
+    def _terms(self) -> dict[str, NDArray[np.float64]]:
+        outcomes = self._egos.outcomes
+        return {
+            "progress": np.clip(outcomes.along / self.config["reward_speed"], 0.0, 1.0),
+            "collision": self.config["collision_reward"] * outcomes.crashed.astype(np.float64),
+        }
+
+    def _infos(self, mask: NDArray[np.bool_], actions: NDArray[Any]) -> dict[str, Any]:
+        """What `SyncVectorEnv` tells of plain environments, of those of a mask."""
+        outcomes = self._egos.outcomes
+        values: dict[str, Any] = {"speed": outcomes.speed, "crashed": outcomes.crashed, "action": actions}
+        infos: dict[str, Any] = {"rewards": _with_masks(self._terms(), mask), "_rewards": mask.copy()}
+        return {**_with_masks(values, mask), **infos}
+
+
+def _with_masks(values: dict[str, NDArray[Any]], mask: NDArray[np.bool_]) -> dict[str, Any]:
+    """Values of the environments of a mask, zeros elsewhere, each with the mask under its name with an underscore."""
+    infos: dict[str, Any] = {}
+    for name, value in values.items():
+        infos[name] = np.zeros_like(value)
+        infos[name][mask] = value[mask]
+        infos[f"_{name}"] = mask.copy()
+    return infos
+
+
+def _without(actions: NDArray[Any], mask: NDArray[np.bool_]) -> NDArray[Any]:
+    """A copy of the actions with zeros for those of a mask, who took none."""
+    taken = actions.copy()
+    taken[mask] = 0
+    return taken

@@ -1,0 +1,197 @@
+"""Many worlds of one town in one set of arrays: every array of `WorldArrays` with a leading axis of worlds."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from dorothie_gym.compilation import WITHOUT_COUNTS, concurrent
+from dorothie_gym.maps.model import Array
+from dorothie_gym.sim.batch.thread_pool import Crew
+from dorothie_gym.sim.batch.work_queue import take, turns_of
+from dorothie_gym.sim.state.town_arrays import TownArrays
+from dorothie_gym.sim.state.world_arrays import WorldArrays
+from dorothie_gym.sim.step import step
+
+WOVEN_IN = {**WITHOUT_COUNTS, "forceinline": True}
+
+
+def stacked(world: WorldArrays, count: int) -> WorldArrays:
+    """A batch of copies of a world; its arrays have the shapes (count, ...)."""
+    batch = WorldArrays(*(_room(np.asarray(array), count, isinstance(array, np.recarray)) for array in world))
+    for number in range(count):
+        put(batch, number, world)
+    return batch
+
+
+def _room(array: NDArray[Any], count: int, records: bool) -> Any:
+    room = np.zeros((count, *array.shape), dtype=array.dtype)
+    return room.view(np.recarray) if records else room
+
+
+def put(batch: WorldArrays, number: int, world: WorldArrays) -> None:
+    """Makes a world of a batch the same as another world, byte by byte.
+
+    Raises:
+        ValueError: the other world has room for other numbers of bodies.
+    """
+    for name, row, array in zip(WorldArrays._fields, world_of(batch, number), world, strict=True):
+        if row.shape != array.shape:
+            raise ValueError(f"the worlds of this batch have {name} of the shape {row.shape}, this one {array.shape}")
+        # as bytes, since NumPy leaves out those between the fields of records
+        np.copyto(np.asarray(row).view(np.uint8), np.asarray(array).view(np.uint8))
+
+
+def world_of(batch: WorldArrays, number: int) -> WorldArrays:
+    """A world of a batch: views of its arrays, of the same types as those of a world that stands alone."""
+    return WorldArrays(*_rows(batch, number))
+
+
+def _rows(arrays: tuple[Any, ...], number: int) -> tuple[Any, ...]:
+    return tuple(array[number] for array in arrays)
+
+
+@overload(world_of, jit_options=WOVEN_IN)
+def _compiled_world_of(batch: Any, number: int) -> Any:
+    def one(batch: Any, number: int) -> Any:
+        return WorldArrays(*_rows(batch, number))
+
+    return one
+
+
+@overload(_rows, jit_options=WOVEN_IN)
+def _compiled_rows(arrays: Any, number: int) -> Any:
+    # the items of a tuple are of several types: numba takes them one by one when it compiles
+    def last(arrays: Any, number: int) -> Any:
+        return (arrays[0][number],)
+
+    def first_and_others(arrays: Any, number: int) -> Any:
+        return (arrays[0][number], *_rows(arrays[1:], number))
+
+    return last if len(arrays) == 1 else first_and_others
+
+
+@concurrent
+def step_share(
+    turns: NDArray[Any],
+    home: int,
+    town: TownArrays,
+    batch: WorldArrays,
+    substeps: int,
+    dt: float,
+    acceleration: Array,
+    steering: Array,
+) -> None:
+    """Lets worlds of a batch go on, each as `step` does, as long as there are any whose turn has not come.
+
+    Args:
+        turns: numbers of the worlds, see `turns.take`; shared by all threads that work on the batch.
+        home: number of the block that is this thread's own.
+        town: arrays of the town.
+        batch: arrays of all worlds.
+        substeps: how many.
+        dt: time of each [s].
+        acceleration: (worlds,) of each world's vehicles of the kind `Kind.EGO` [m/s^2].
+        steering: (worlds,) angle of their front wheels, positive to the right [rad].
+    """
+    number = take(turns, home)
+    while number >= 0:
+        step(town, world_of(batch, number), substeps, dt, acceleration[number], steering[number])
+        number = take(turns, home)
+
+
+# --- Many worlds of one town, stepped by several threads -------------------------------------------------------------
+
+
+class VectorWorld:
+    """Worlds of one town in one set of arrays; every thread steps a share of them in one compiled call.
+
+    A thread has a block of worlds of its own, which stay in its processor's cache; when it is done with them it takes
+    those that others have not come to: who wakes up late, or gets worlds with much traffic, does fewer.
+    What happens in a world depends on its own arrays only: not on the other worlds, its place among them, or the
+    threads. Threads share nothing that is written to, and hold the interpreter's lock between calls only.
+
+    Attributes:
+        town: arrays of the town.
+        arrays: arrays of all worlds, those of a single one with a leading axis: `arrays.vehicles[b]`.
+        threads: how many threads work, the caller's included.
+    """
+
+    def __init__(self, town: TownArrays, world: WorldArrays, worlds: int, *, threads: int | None = None) -> None:
+        """Make copies of a world, each to be replaced by `put`.
+
+        Args:
+            town: arrays of the town.
+            world: a world of it; the others have room for as many bodies.
+            worlds: how many.
+            threads: how many threads at most, by default as many as there are processors for this process.
+
+        Raises:
+            ValueError: there is not at least one world and one thread.
+        """
+        if worlds < 1:
+            raise ValueError(f"worlds must be at least 1, not {worlds}")
+        if threads is not None and threads < 1:
+            raise ValueError(f"threads must be at least 1, or None for one per processor, not {threads}")
+        self.town = town
+        self.arrays = stacked(world, worlds)
+        self.threads = min(threads or available_processors(), worlds)
+        self._crew = Crew(self.threads - 1)
+
+    def __len__(self) -> int:
+        return len(self.arrays.clock)
+
+    def world(self, number: int) -> WorldArrays:
+        """A world as views of the arrays of all; raises `IndexError` if there is no such world."""
+        return world_of(self.arrays, range(len(self))[number])
+
+    def put(self, number: int, world: WorldArrays) -> None:
+        """Makes one of the worlds the same as another world, which has room for as many bodies."""
+        put(self.arrays, range(len(self))[number], world)
+
+    def step(self, substeps: int, dt: float, acceleration: Array | float = 0.0, steering: Array | float = 0.0) -> None:
+        """Lets all worlds go on, as `kernel.step` does with one.
+
+        Args:
+            substeps: how many.
+            dt: time of each [s].
+            acceleration: (worlds,) or one for all: of vehicles of the kind `Kind.EGO` [m/s^2].
+            steering: (worlds,) or one for all: angle of their front wheels, positive to the right [rad].
+
+        Raises:
+            ValueError: the actions do not fit the number of worlds.
+        """
+        actions = (self._one_each("acceleration", acceleration), self._one_each("steering", steering))
+        self.share(step_share, self.town, self.arrays, substeps, float(dt), *actions)
+
+    def _one_each(self, name: str, value: Array | float) -> Array:
+        values = np.asarray(value, dtype=np.float64)
+        if values.shape not in ((), (len(self),)):
+            raise ValueError(f"{name} must be one number or {len(self)} numbers, not of the shape {values.shape}")
+        return np.array(np.broadcast_to(values, len(self)))
+
+    def share(self, work: Callable[..., None], *arguments: Any) -> None:
+        """Calls `work(turns, home, *arguments)` in every thread, and waits for all of them.
+
+        Args:
+            work: works on the worlds whose numbers it takes (`kernel.turns`) until there is none left.
+            arguments: for it.
+        """
+        turns = turns_of(len(self), self.threads)
+        self._crew.do(work, lambda home: (turns, home, *arguments))
+
+    def close(self) -> None:
+        """Lets the threads go; the worlds cannot be stepped any more."""
+        self._crew.close()
+
+
+def available_processors() -> int:
+    """How many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

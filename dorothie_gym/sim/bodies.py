@@ -1,0 +1,343 @@
+"""Everybody in the kernel's arrays as highway-env's objects: vehicles, pedestrians and props that own nothing.
+
+A view keeps its holder, which has the arrays, and its row. What highway-env reads and writes as attributes it reads and
+writes there: `vehicle.speed` is `holder.arrays.vehicles[row].speed`. So highway-env's observations, viewer and planners
+see what the compiled loops made of the world, and nobody copies states to and fro.
+
+By itself a `TrafficVehicle` is highway-env's `IDMVehicle` in full: `act` and `step` are stock, on the arrays. A road
+that is stepped by the kernel does not call them; who copies a vehicle to predict its way does. Parameters that
+highway-env keeps in the vehicle (`DELTA`, `POLITENESS`, ...) do not reach the kernel.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from highway_env.vehicle.behavior import IDMVehicle
+from highway_env.vehicle.objects import Obstacle, RoadObject
+
+from dorothie_gym.maps.model import Array
+from dorothie_gym.ontology import PropKind
+from dorothie_gym.sim.collisions import WALKER_SIZE
+from dorothie_gym.sim.network.lane import PolylineLane
+from dorothie_gym.sim.network.network import LaneIndex, Route
+from dorothie_gym.sim.state.record_views import Holder, Row, field, heading_field
+from dorothie_gym.sim.state.records import PEDESTRIAN, PROP, VEHICLE, Kind, Walk
+from dorothie_gym.sim.state.town_arrays import town_arrays
+from dorothie_gym.sim.step import find
+from dorothie_gym.sim.traffic.parameters import PLANNED
+from dorothie_gym.sim.traffic.route import extend, take
+from dorothie_gym.sim.traffic.vehicle_models import slip_of, steering_angle
+
+_KIND_OF_SIZE = {(kind.length, kind.width): kind for kind in PropKind}
+if len(_KIND_OF_SIZE) != len(PropKind):
+    raise ImportError("two kinds of props have the same size, by which their views tell them apart")
+
+
+class TrafficVehicle(Row, IDMVehicle):
+    """A vehicle of the traffic, as highway-env's.
+
+    Attributes:
+        key: tells it apart from other bodies; who was towed comes back with another one.
+        kind: `Kind`.
+        height: of the road under it [m].
+        lane_id: closest lane, its id in the town; `station` [m] along it.
+        target_speed: speed that it likes [m/s].
+        standing: how long it has been standing, its light not being red [s].
+        odometer: way driven [m].
+    """
+
+    RECORDS = "vehicles"
+    DTYPE = VEHICLE
+    prediction_type = "constant_steering"
+    enable_lane_change = True
+
+    heading = heading_field(VEHICLE)
+    cos, sin = field(VEHICLE, "cos"), field(VEHICLE, "sin")
+    speed = field(VEHICLE, "speed")
+    height = field(VEHICLE, "height")
+    LENGTH, WIDTH = field(VEHICLE, "length"), field(VEHICLE, "width")
+    diagonal = field(VEHICLE, "radius", lambda radius: 2.0 * radius)
+    crashed = field(VEHICLE, "crashed")
+    target_speed = field(VEHICLE, "desired")
+    timer = field(VEHICLE, "timer")
+    standing = field(VEHICLE, "standing")
+    odometer = field(VEHICLE, "odometer")
+    key = field(VEHICLE, "key")
+    kind = field(VEHICLE, "kind", Kind)
+    lane_id = field(VEHICLE, "lane")
+    station, lateral = field(VEHICLE, "own_station"), field(VEHICLE, "own_lateral")
+    _followed, _planned = field(VEHICLE, "plan"), field(VEHICLE, "planned")
+
+    def __init__(self, road: Any, holder: Holder, row: int) -> None:
+        """Looks at a row of `holder.arrays.vehicles`; `road` is a `TownRoad` of the same town."""
+        super().__init__(road, holder, row)
+        self.log: list[Any] = []
+        self.history: deque[Any] = deque(maxlen=self.HISTORY_SIZE)
+        self._history_of = -1
+
+    @classmethod
+    def create_from(cls, vehicle: Any) -> IDMVehicle:
+        """A vehicle of highway-env's own in the same state, which owns it."""
+        twin = IDMVehicle.create_from(vehicle)
+        twin.LENGTH, twin.WIDTH, twin.diagonal = vehicle.LENGTH, vehicle.WIDTH, vehicle.diagonal
+        return twin
+
+    @property
+    def lane_index(self) -> LaneIndex:
+        """Where the network lists the closest lane."""
+        index: LaneIndex = self.road.network.index_of(self.lane_id)
+        return index
+
+    @lane_index.setter
+    def lane_index(self, index: LaneIndex) -> None:
+        self.lane = self.road.network.get_lane(index)
+
+    @property
+    def lane(self) -> PolylineLane:
+        """The closest lane."""
+        lane: PolylineLane = self.road.network.lane_of(self.lane_id)
+        return lane
+
+    @lane.setter
+    def lane(self, lane: PolylineLane) -> None:
+        self.lane_id = lane.town_lane.id
+        self.station, self.lateral = lane.local_coordinates(self.position)
+
+    @property
+    def target_lane_index(self) -> LaneIndex:
+        """The lane that it follows; another one than the next of its route makes it plan anew."""
+        index: LaneIndex = self.road.network.index_of(self._followed)
+        return index
+
+    @target_lane_index.setter
+    def target_lane_index(self, index: LaneIndex) -> None:
+        record, lane = self.record, self.road.network.lane_id(index)
+        planned = self._planned
+        if planned > 1 and record.plan[1] == lane:
+            self._plan(record.plan[1:planned].tolist())
+        elif record.plan[0] != lane:
+            take(town_arrays(self.road.network), record, lane)
+
+    @property
+    def route(self) -> Route:
+        """The lanes that it is going to drive, the one that it follows first."""
+        network = self.road.network
+        return [network.index_of(lane) for lane in self.record.plan[: self._planned].tolist()]
+
+    @route.setter
+    def route(self, route: Route | None) -> None:
+        network = self.road.network
+        lanes = [self._followed]
+        rest = list(route or ())
+        while rest and len(lanes) < PLANNED:
+            here = network.index_of(lanes[-1])
+            if rest[0][:2] == here[:2]:
+                rest.pop(0)
+            onward = network.along_route(network.successors(here), rest)
+            if not onward:
+                break  # drawn at random from here on, as highway-env does where a route does not fit the road
+            lanes.append(network.lane_id(onward[0]))
+        self._plan(lanes)
+
+    def _plan(self, lanes: Sequence[int]) -> None:
+        """Follows some lanes, each a continuation of the one before, and plans on from there."""
+        town, record = town_arrays(self.road.network), self.record
+        moves_on = lanes[0] != record.plan[0]
+        record.plan[: len(lanes)] = lanes
+        record.planned = len(lanes)
+        if moves_on:
+            find(town, record)
+        extend(town, record)
+
+    @property
+    def destination(self) -> Array:
+        """Where the last lane of its route ends (2,) [m]."""
+        lane = self.road.network.lane_of(self.memory()[1][_PLAN + self._planned - 1])
+        end: Array = lane.position(lane.length)
+        return end
+
+    @property
+    def destination_direction(self) -> Array:
+        """Direction to its destination (2,) of length 1, or zeros where it is there."""
+        away = self.destination - self.position
+        far = math.hypot(*away)
+        return away / far if far > 0.0 else np.zeros(2)
+
+    def on_lane(self) -> tuple[float, float]:
+        """Station and distance to the right on the closest lane [m]."""
+        return self.station, self.lateral
+
+    @property
+    def action(self) -> dict[str, float]:
+        """What it does: `acceleration` [m/s^2] and `steering`, the angle of its front wheels [rad]."""
+        record = self.record
+        return {"acceleration": float(record.acceleration), "steering": float(steering_angle(record.slip))}
+
+    @action.setter
+    def action(self, action: dict[str, float]) -> None:
+        record = self.record
+        record.acceleration, record.slip = action["acceleration"], slip_of(float(action["steering"]))
+
+    def clip_actions(self) -> None:
+        """Limits what it does, as highway-env; there the action is changed in place."""
+        action = self.action
+        if self.crashed:
+            action = {"acceleration": -self.speed, "steering": 0.0}
+        if self.speed > self.MAX_SPEED:
+            action["acceleration"] = min(action["acceleration"], self.MAX_SPEED - self.speed)
+        elif self.speed < self.MIN_SPEED:
+            action["acceleration"] = max(action["acceleration"], self.MIN_SPEED - self.speed)
+        self.action = action
+
+    def on_state_update(self) -> None:
+        """Finds the closest lane, and the place on the lane that it follows; to be called after it was moved."""
+        find(town_arrays(self.road.network), self.record)
+        if self.road.record_history:
+            self.remember()
+
+    def remember(self) -> None:
+        """Keeps its state for display; of who was towed nothing is kept."""
+        if self.key != self._history_of:
+            self.history.clear()
+            self._history_of = self.key
+        self.history.appendleft(self.create_from(self))
+
+
+_PLAN = VEHICLE.fields["plan"][1] // 4  # type: ignore[index]
+"""Where the plan begins in the integers of a row."""
+
+
+class Cyclist(TrafficVehicle):
+    """A cyclist: a narrow, slow vehicle that keeps to the right."""
+
+
+class _Thing(Row):
+    """What is on the road but no vehicle: it has no lane of its own, and highway-env never moves it."""
+
+    height: Any
+
+    @property
+    def lane_index(self) -> LaneIndex:
+        """Where the network lists the closest lane of its height."""
+        index: LaneIndex = self.road.network.get_closest_lane_index(self.position, self.heading, height=self.height)
+        return index
+
+    @property
+    def lane(self) -> PolylineLane:
+        """The closest lane."""
+        lane: PolylineLane = self.road.network.get_lane(self.lane_index)
+        return lane
+
+
+class Pedestrian(_Thing, RoadObject):
+    """Somebody on foot, as an object on highway-env's road.
+
+    Attributes:
+        key: tells it apart from other bodies.
+        state: `Walk`.
+        height: of the ground under it [m].
+    """
+
+    RECORDS = "pedestrians"
+    DTYPE = PEDESTRIAN
+    LENGTH = WIDTH = WALKER_SIZE
+    diagonal = math.hypot(WALKER_SIZE, WALKER_SIZE)
+
+    heading = heading_field(PEDESTRIAN)
+    cos, sin = field(PEDESTRIAN, "cos"), field(PEDESTRIAN, "sin")
+    speed = field(PEDESTRIAN, "speed")
+    height = field(PEDESTRIAN, "height")
+    crashed = field(PEDESTRIAN, "crashed")
+    odometer = field(PEDESTRIAN, "odometer")
+    key = field(PEDESTRIAN, "key")
+    state = field(PEDESTRIAN, "state", Walk)
+
+    def __init__(self, road: Any, holder: Holder, row: int) -> None:
+        """Looks at a row of `holder.arrays.pedestrians`; `road` is a `TownRoad` of the same town."""
+        super().__init__(road, holder, row)
+
+    @property
+    def lane_id(self) -> int:
+        """The closest lane, its id in the town."""
+        return int(self.lane.town_lane.id)
+
+    @property
+    def station(self) -> float:
+        """Where it is along the closest lane [m]."""
+        return self.on_lane()[0]
+
+
+class Prop(_Thing, Obstacle):
+    """A thing that the Ad-Wizard put on the road, across its lane.
+
+    Attributes:
+        key: tells it apart from other bodies.
+        height: of the road under it [m].
+        lane_id: lane that it stands on; `station` [m] along it.
+        crashed: highway-env's mark that somebody ran into it; the kernel keeps none for props.
+    """
+
+    RECORDS = "props"
+    DTYPE = PROP
+    speed = 0.0
+    crashed = False
+
+    heading = heading_field(PROP)
+    cos, sin = field(PROP, "cos"), field(PROP, "sin")
+    height = field(PROP, "height")
+    LENGTH, WIDTH = field(PROP, "length"), field(PROP, "width")
+    diagonal = field(PROP, "radius", lambda radius: 2.0 * radius)
+    key = field(PROP, "key")
+    lane_id, station = field(PROP, "lane"), field(PROP, "station")
+
+    def __init__(self, road: Any, holder: Holder, row: int) -> None:
+        """Looks at a row of `holder.arrays.props`; `road` is a `TownRoad` of the same town."""
+        super().__init__(road, holder, row)
+
+    @property
+    def kind(self) -> PropKind:
+        """What it is."""
+        return _KIND_OF_SIZE[self.LENGTH, self.WIDTH]
+
+
+class Bodies:
+    """The views of a world, each made when it is asked for first."""
+
+    def __init__(self, road: Any, holder: Holder) -> None:
+        """Shows the arrays of a holder on a road of the same town."""
+        self._road, self._holder = road, holder
+        self._made: dict[tuple[type[Row], int], Any] = {}
+
+    def vehicles(self) -> list[TrafficVehicle]:
+        """Traffic, cyclists among it, in the order of the rows; whoever is driven from outside is not among it."""
+        kinds = np.asarray(self._holder.arrays.vehicles)["kind"].tolist()
+        return [self._view(_CLASSES[kind], row) for row, kind in enumerate(kinds) if kind in _CLASSES]
+
+    def pedestrians(self) -> list[Pedestrian]:
+        """People on foot, in the order of the rows."""
+        states = np.asarray(self._holder.arrays.pedestrians)["state"].tolist()
+        return [self._view(Pedestrian, row) for row, state in enumerate(states) if state != Walk.EMPTY]
+
+    def prop(self, row: int) -> Prop:
+        """The prop in a row."""
+        view: Prop = self._view(Prop, row)
+        return view
+
+    def props(self) -> list[Prop]:
+        """Props, in the order of the rows."""
+        present = np.asarray(self._holder.arrays.props)["present"].tolist()
+        return [self._view(Prop, row) for row, here in enumerate(present) if here]
+
+    def _view(self, kind: type[Row], row: int) -> Any:
+        view = self._made.get((kind, row))
+        if view is None:
+            view = self._made[kind, row] = kind(self._road, self._holder, row)
+        return view
+
+
+_CLASSES: dict[int, type[TrafficVehicle]] = {int(Kind.CAR): TrafficVehicle, int(Kind.CYCLIST): Cyclist}

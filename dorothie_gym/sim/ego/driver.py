@@ -1,0 +1,175 @@
+"""Tells the compiled world (`kernel.guiding`) which way the car goes, and how fast it may be there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dorothie_gym.maps.model import Array
+from dorothie_gym.ontology import SPEED_STEP
+from dorothie_gym.sim.ego.limits import KMH, LATERAL_ACCELERATION, PROFILE_BRAKING, Control
+from dorothie_gym.sim.ego.path import Path
+from dorothie_gym.sim.ego.path_tracking import find_sides
+from dorothie_gym.sim.ego.planner import U_TURN_SPEED, LocalPlanner
+from dorothie_gym.sim.ego.vehicle import CarRecord
+from dorothie_gym.sim.state.records import plain
+from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CAR_WIDTH
+
+END_GAP = 0.8
+"""Room left between the nose of a waiting car and the end of its lane [m]."""
+
+MIN_CRUISE, MAX_CRUISE = 5.0, 90.0
+"""Range of the cruise speed [km/h]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GoalAhead:
+    """A place where the car is expected to stop: its lane and the distance along it [m]."""
+
+    lane: int
+    station: float
+
+
+BEHIND, AHEAD = 12.0, 150.0
+"""Stretch of path that the compiled world is told at least, behind and ahead of the car [m]."""
+
+
+def speed_profile(path: Path, stop_at: float | None) -> Array:
+    """Speed that curves, limits and the end of a path allow at each of its points (n,) [m/s].
+
+    Args:
+        path: the path.
+        stop_at: where the car has to stop [m], or None.
+    """
+    bend = np.convolve(np.pad(np.abs(path.curvatures), 1, mode="edge"), np.full(3, 1 / 3), mode="valid")
+    squared = np.minimum(path.limits**2, LATERAL_ACCELERATION / np.maximum(bend, 1e-4))
+    if path.manoeuvre.any():
+        tight = path.manoeuvre & (bend > 0.1)
+        squared = np.where(tight, np.minimum(squared, U_TURN_SPEED**2), squared)
+    if stop_at is not None:
+        squared = np.where(path.s >= stop_at, 0.0, squared)
+    # v^2 may grow by 2 a ds towards the past: a running minimum from the end
+    slope = 2 * PROFILE_BRAKING * path.s
+    squared = np.minimum.accumulate((squared + slope)[::-1])[::-1] - slope
+    speeds: Array = np.sqrt(np.maximum(squared, 0.0))
+    return speeds
+
+
+def write_path(arrays: Any, path: Path, s: float, speeds: Array) -> float:
+    """Writes the stretch of a path around a place into the arrays of a world.
+
+    Args:
+        arrays: `kernel.WorldArrays` of a world with a driven car.
+        path: the path.
+        s: where the car is on it [m].
+        speeds: allowed at its points (n,) [m/s].
+
+    Returns:
+        Where the stretch ends [m].
+    """
+    car, table = plain(arrays.car)[0], plain(arrays.path)
+    first = path.index_at(s - BEHIND)
+    cut = slice(first, first + len(table))
+    lanes, headings = path.lanes[cut], path.headings[cut]
+    rows = table[: len(lanes)]
+    rows["s"], rows["x"], rows["y"] = path.s[cut], path.points[cut, 0], path.points[cut, 1]
+    rows["heading"], rows["cos"], rows["sin"] = headings, np.cos(headings), np.sin(headings)
+    rows["height"], rows["station"], rows["speed"] = path.heights[cut], path.stations[cut], speeds[cut]
+    rows["lane"], rows["manoeuvre"] = lanes, path.manoeuvre[cut]
+    find_sides(arrays.path, len(lanes), CAR_LENGTH, CAR_WIDTH)
+    starts = np.concatenate(([0], 1 + np.flatnonzero(lanes[1:] != lanes[:-1])))[: len(car["run_lane"])]
+    car["runs"], car["run"] = len(starts), -1
+    car["run_lane"][: len(starts)], car["run_first"][: len(starts)] = lanes[starts], starts
+    car["points"], car["at"], car["s"] = len(lanes), path.index_at(s) - first, s
+    return float(path.s[cut][-1])
+
+
+class Driver:
+    """Lays the planner's path, the goals and the wishes of the Co-Wizard before the compiled world.
+
+    Attributes:
+        planner: the car's local planner.
+        cruise: desired speed [km/h].
+        goals: places where the car is expected to stop; it comes up to them slowly.
+        manual: what pedals and steering wheel are told by somebody else; None lets the car drive itself.
+    """
+
+    def __init__(self, planner: LocalPlanner, *, length: float, cruise: float = 40.0) -> None:
+        self.planner = planner
+        self.cruise = cruise
+        self.goals: Sequence[GoalAhead] = ()
+        self.manual: Control | None = None
+        self._length = length
+        self._told: Path | None = None
+        self._told_until = 0.0
+        self._speeds: Array = np.zeros(0)
+
+    def change_cruise(self, up: bool) -> str | None:
+        """Changes the cruise speed by 5 km/h; returns the reason if that cannot be."""
+        wanted = self.cruise + (SPEED_STEP if up else -SPEED_STEP)
+        if not MIN_CRUISE <= wanted <= MAX_CRUISE:
+            return f"the cruise speed stays within {MIN_CRUISE:.0f} and {MAX_CRUISE:.0f} km/h"
+        self.cruise = wanted
+        return None
+
+    def set_goals(self, goals: Sequence[GoalAhead]) -> None:
+        """Sets where the car is expected to stop."""
+        self.goals = tuple(goals)
+        self._told = None
+
+    def brief(self, arrays: Any, record: CarRecord) -> None:
+        """Writes what the car is to do into the arrays of a world, before it is stepped.
+
+        Args:
+            arrays: `kernel.WorldArrays`.
+            record: what drives the car in them.
+        """
+        planner = self.planner
+        if planner.path is not self._told:
+            self._tell(arrays, anew=True)
+        elif self._told_until < min(planner.s + AHEAD, planner.path.length):
+            self._tell(arrays, anew=False)
+        action, _ = planner.manoeuvre
+        number, manual = 0 if action is None else action.value, self.manual
+        record.orders[()] = number, planner.manoeuvre_end, self.cruise * KMH, planner.held, manual is not None
+        if manual is not None:
+            record.pedals[()] = manual.throttle, manual.steer, manual.brake
+
+    def debrief(self, record: CarRecord) -> None:
+        """Takes over where the car is, after the world was stepped; see `brief`."""
+        self.planner.note(*record.place.item())
+
+    def speed_at(self, s: float) -> float:
+        """Speed that curves, limits and the end of the path allow at a distance along the path [m/s].
+
+        It is that of the path as the world was last stepped.
+        """
+        path = self._told
+        return float(np.interp(s, path.s, self._speeds)) if path is not None else self.cruise * KMH
+
+    def _tell(self, arrays: Any, *, anew: bool) -> None:
+        """Writes the stretch of path around the car; all else that follows from the path if that was laid anew."""
+        path, s, car = self.planner.path, self.planner.s, plain(arrays.car)[0]
+        if anew:
+            stop_at = path.length - self._length / 2 - END_GAP if self.planner.waits_at_end else None
+            self._speeds = speed_profile(path, stop_at)
+            goals = self._goals_on(path)[: car["goal"].shape[0]]
+            car["goals"], car["goal"][: len(goals)] = len(goals), goals
+            car["stop_at"] = math.inf if stop_at is None else stop_at
+            self._told = path
+        car["offset"] = self.planner.offset
+        self._told_until = write_path(arrays, path, s, self._speeds)
+
+    def _goals_on(self, path: Path) -> list[float]:
+        """Places of the goals along a path [m], those of the lanes beside it among them."""
+        found: list[float] = []
+        for goal in self.goals:
+            for lane, station in self.planner.beside(goal.lane, goal.station):
+                on = np.flatnonzero((path.lanes == lane) & ~path.manoeuvre)
+                if len(on) and path.stations[on[0]] - 1.0 <= station <= path.stations[on[-1]] + 1.0:
+                    found.append(float(np.interp(station, path.stations[on], path.s[on])))
+        return sorted(place for place in found if place >= self.planner.s - 1.0)

@@ -1,0 +1,331 @@
+"""What the session's car has to brake for: bodies on its path, people on crosswalks, junctions, traffic."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.sim.ego.obstacles import (
+    BRAKING,
+    FROM_PROP,
+    HEIGHT_MARGIN,
+    ROADBLOCK_GAP,
+    STANDSTILL_GAP,
+    bodies_ahead,
+    offer,
+)
+from dorothie_gym.sim.ego.path import U_TURN_REACH
+from dorothie_gym.sim.ego.path_tracking import point_at
+from dorothie_gym.sim.ego.planner import BEGUN
+from dorothie_gym.sim.network.lane_lookup import project, value_near
+from dorothie_gym.sim.state.records import (
+    PEDESTRIAN_CLASS,
+    STATIC,
+    U_TURN,
+    VEHICLES,
+    Control,
+    Records,
+    Wait,
+    Walk,
+)
+from dorothie_gym.sim.traffic.idm_traffic import STEP_AHEAD, STEP_PAST
+from dorothie_gym.sim.traffic.junctions import announce, close, request
+from dorothie_gym.sim.traffic.parameters import CRITICAL_GAP, HARDEST_BRAKING
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.world_arrays import WorldArrays
+
+TURN_ROUND_SPEED = 4.0
+"""Whoever comes towards a car that turns round is taken to be at least this fast soon [m/s]."""
+
+ASKING = 11.5
+"""The car asks for a junction this far before it would have to brake for it [m]."""
+
+UPSTREAM = 50.0
+"""How far before a lane's start vehicles that come towards it are looked for [m]."""
+
+STANDING = 0.1
+"""Slower than this the car stands [m/s]."""
+
+BEFORE_MANOEUVRE = 15.0
+"""How far before it would have to brake for a lane switch or U-turn it looks whether others are in its way [m]."""
+
+REACHED = 0.2
+"""A car that switches lanes is in the way on the new one when it reaches into that so far [m]."""
+
+BESIDE = 7.0
+"""Who is no farther before or behind the car than this is beside it [m], and who comes from behind in a second."""
+
+BEFORE_IT = 0.5
+"""The car waits this far before the place where the manoeuvre begins [m]."""
+
+SLOWEST = 1.0
+"""Speed at which a car comes to a place at least [m/s]."""
+
+IN_LINE, FACING = 2.0, 0.5
+"""Who is no farther beside a lane than this [m], and heads along it by this cosine, comes along it."""
+
+TRAFFIC_LIGHT, TRAFFIC_SIGN = int(ObjectClass.TRAFFIC_LIGHT.value), int(ObjectClass.TRAFFIC_SIGN.value)
+
+
+@inlined
+def look(town: TownArrays, world: WorldArrays, seen: int) -> None:
+    """Finds what limits the car's speed most, and asks junctions for it; notes it in the record `car`.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world.
+        seen: how many bodies are perceived.
+    """
+    car = world.car[0]
+    car.kind = 0
+    best = bodies_ahead(world, seen)
+    way, other, kind = _gap_to_others(town, world, seen, best <= 0.0)
+    safe, best = best, _crosswalk(town, world, best)
+    if best > 0.0 or safe <= 0.0:
+        best = _junction(town, world, best)
+    if way < math.inf:
+        margin = ROADBLOCK_GAP if kind == STATIC else STANDSTILL_GAP
+        offer(car, best, kind, way + (margin - BEFORE_IT), 0.0, other, False, False)
+
+
+# --- crosswalks and junctions -----------------------------------------------------------------------------------------
+
+
+@compiled
+def _crosswalk(town: TownArrays, world: WorldArrays, best: float) -> float:
+    """Offers the next crosswalk on the path with people on it, whom the car sees and for whom it can still stop."""
+    car, vehicle, path = world.car[0], world.vehicles[0], world.path
+    braking = vehicle.speed * vehicle.speed
+    reach = braking / (2.0 * BRAKING) + ASKING + 0.5 * vehicle.length
+    last = point_at(world, car.s + reach)
+    for r in range(car.run, car.runs):
+        k = max(int(car.run_first[r]), int(car.at))
+        if k > last:
+            break
+        lane = town.lanes[car.run_lane[r]]
+        if path[k].manoeuvre or lane.passages == 0:
+            continue
+        for p in range(lane.passage, lane.passage + lane.passages):
+            passage = town.passages[p]
+            if world.busy[passage.crossing] == 0:
+                continue
+            gap = path[k].s + passage.start - path[k].station - car.s - 0.5 * vehicle.length
+            if gap < 0.0 or gap > reach or braking > 2.0 * HARDEST_BRAKING * max(gap, 0.1):
+                continue
+            walker = _walker_on(world, passage)
+            if walker >= 0:
+                return offer(car, best, PEDESTRIAN_CLASS, gap, 0.0, walker, False, True)
+    return best
+
+
+@compiled
+def _walker_on(world: WorldArrays, passage: Records) -> int:
+    """Key of somebody in sight on a crosswalk who is about to pass a lane, or has only just passed it; or -1."""
+    vehicle, sight = world.vehicles[0], world.eye[0].sight
+    for p in range(len(world.pedestrians)):
+        walker = world.pedestrians[p]
+        if walker.state == Walk.CROSSING and walker.crossing == passage.crossing:
+            left = (passage.across - walker.station) * walker.direction
+            dx, dy = walker.x - vehicle.x, walker.y - vehicle.y
+            if -STEP_PAST < left < STEP_AHEAD and dx * dx + dy * dy < sight * sight:
+                return int(walker.key)
+    return -1
+
+
+@compiled
+def _junction(town: TownArrays, world: WorldArrays, best: float) -> float:
+    """Offers the line before a junction that the car may not enter yet."""
+    car, vehicle, path = world.car[0], world.vehicles[0], world.path
+    if car.held and vehicle.speed < STANDING:
+        return best  # asks for nothing that it does not use
+    asking = vehicle.speed * vehicle.speed / (2.0 * BRAKING) + ASKING
+    half = 0.5 * vehicle.length
+    last = point_at(world, car.s + max(asking, CRITICAL_GAP * vehicle.speed) + half)
+    for r in range(car.run + 1, car.runs):
+        k = int(car.run_first[r])
+        if k > last:
+            break
+        connector, lane = int(car.run_lane[r]), int(car.run_lane[r - 1])
+        if town.lanes[connector].junction < 0:
+            continue
+        line = path[k].s - path[k].station - car.s - half
+        if line < -half:
+            break  # over the line already
+        announce(vehicle, lane, connector, line, world.clock[0].time)
+        if line > asking:
+            break
+        wait = request(town, world, 0, r - int(car.run))
+        if wait == Wait.NOT:
+            break
+        return offer(car, best, _holder(town, wait, lane), line, 0.0, -2, False, True)
+    return best
+
+
+@compiled
+def _holder(town: TownArrays, wait: int, lane: int) -> int:
+    """What holds the car before a junction, as a driver would say: an `ObjectClass`."""
+    if wait == Wait.LIGHT:
+        return TRAFFIC_LIGHT
+    control = town.lanes[lane].control
+    if (control == Control.STOP or control == Control.YIELD) and wait != Wait.NO_ROOM and wait != Wait.CLOSED:
+        return TRAFFIC_SIGN
+    return VEHICLES
+
+
+# --- manoeuvres -------------------------------------------------------------------------------------------------------
+
+
+@compiled
+def _gap_to_others(town: TownArrays, world: WorldArrays, seen: int, blocked: bool) -> tuple[float, int, int]:
+    """Before a lane switch or U-turn: way to the place where it begins [m], while somebody or something is in its way.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world.
+        seen: how many bodies are perceived.
+        blocked: whether the car stands behind something: it may be waiting for the junction, which stays open then.
+
+    Returns:
+        The way, infinite if it may begin, the key of who is in the way, and of which class that is.
+    """
+    car, vehicle, path = world.car[0], world.vehicles[0], world.path
+    turning = car.action == U_TURN
+    start = int(car.at)
+    if path[start].manoeuvre and (car.s > BEGUN or vehicle.speed > STANDING):
+        if not turning:
+            way, other = _gap_beside(town, world, seen, int(path[start].lane))
+            return way, other, VEHICLES
+        if not blocked:
+            _close_junctions(town, world, start)
+        return math.inf, 0, VEHICLES
+    reach = BEFORE_MANOEUVRE + vehicle.speed * vehicle.speed / (2.0 * BRAKING)
+    while start < car.points and not path[start].manoeuvre and path[start].s - car.s <= reach:
+        start += 1
+    if start >= car.points or not path[start].manoeuvre or path[start].s - car.s > reach:
+        return math.inf, 0, VEHICLES
+    ahead = path[start].s - car.s
+    target = int(path[start].lane)
+    meeting, _, _ = project(town, target, path[start].x, path[start].y)
+    lanes = _find_upstream(town, world, target)
+    for n in range(seen):
+        body = world.seen[n]
+        if body.kind == STATIC and not turning and _leads_to(town, world, start, meeting, body):
+            return max(ahead, 0.0), int(body.key), STATIC
+        if body.kind != VEHICLES:
+            continue
+        station = _place_towards(town, world, lanes, body)
+        if turning:  # it takes the car's length of time to get round, in which who stands now may have come up
+            behind = 8.0 + 5.0 * max(body.speed, TURN_ROUND_SPEED)
+        else:
+            behind = 8.0 + 3.0 * max(body.speed - vehicle.speed, 0.0)
+            station += body.speed * ahead / max(vehicle.speed, SLOWEST)  # where it is when the car comes there
+        if -behind < station - meeting < 9.0:
+            return max(ahead, 0.0), int(body.key), VEHICLES
+    # asked for last: those who wait before the junction have to go first
+    if turning and not blocked and not _close_junctions(town, world, start):
+        return max(ahead, 0.0), -2, VEHICLES
+    return math.inf, 0, VEHICLES
+
+
+@compiled
+def _leads_to(town: TownArrays, world: WorldArrays, start: int, meeting: float, prop: Records) -> bool:
+    """Whether a lane switch would lead the car too close to a prop on the new lane to get away from it again.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world.
+        start: point of the path at which the switch begins.
+        meeting: where that is along the new lane [m].
+        prop: a `records.SEEN`.
+    """
+    car, vehicle, path = world.car[0], world.vehicles[0], world.path
+    target, end = int(path[start].lane), start
+    while end + 1 < car.points and path[end].manoeuvre:
+        end += 1
+    station, lateral, segment = project(town, target, prop.x, prop.y)
+    until = path[end].s - path[start].s + vehicle.speed * vehicle.speed / (2.0 * BRAKING) + FROM_PROP
+    if abs(lateral) > town.lanes[target].half_width or not -0.5 * vehicle.length < station - meeting < until:
+        return False
+    height = value_near(town.points, town.lanes[target], segment, 4, station)
+    return bool(abs(height - prop.height) <= HEIGHT_MARGIN)
+
+
+@compiled
+def _gap_beside(town: TownArrays, world: WorldArrays, seen: int, target: int) -> tuple[float, int]:
+    """In a lane switch, as long as the car is not yet in the way on its target: whether somebody is beside it there.
+
+    Returns:
+        0 if so, else infinite, and the key of that one.
+    """
+    vehicle, half_width = world.vehicles[0], town.lanes[target].half_width
+    own, lateral, _ = project(town, target, vehicle.x, vehicle.y)
+    if abs(lateral) < half_width + 0.5 * vehicle.width - REACHED:
+        return math.inf, 0
+    for n in range(seen):
+        body = world.seen[n]
+        if body.kind != VEHICLES or body.distance2 > BESIDE * BESIDE * 4.0:
+            continue
+        station, lateral, _ = project(town, target, body.x, body.y)
+        if abs(lateral) < half_width and abs(station - own) < BESIDE + max(body.speed - vehicle.speed, 0.0):
+            return 0.0, int(body.key)
+    return math.inf, 0
+
+
+@compiled
+def _close_junctions(town: TownArrays, world: WorldArrays, start: int) -> bool:
+    """Keeps others out of junctions into which a U-turn reaches that begins at a point; tells if they are empty."""
+    x, y, free = world.path[start].x, world.path[start].y, True
+    for j in range(len(town.junctions)):
+        dx, dy = town.junctions[j, 0] - x, town.junctions[j, 1] - y
+        reach = town.junctions[j, 2] + U_TURN_REACH
+        if dx * dx + dy * dy < reach * reach and not close(town, world, j):
+            free = False
+    return free
+
+
+@compiled
+def _find_upstream(town: TownArrays, world: WorldArrays, target: int) -> int:
+    """Writes a lane, and those that lead to it within sight of a turning car, into the scratch arrays.
+
+    `stack` holds the lanes, `starts` where they begin on the first [m]; returns how many there are.
+    """
+    stack, starts = world.stack, world.starts
+    stack[0], starts[0] = target, 0.0
+    count, k = 1, 0
+    while k < count:
+        lane, offset = town.lanes[stack[k]], starts[k]
+        if offset > -UPSTREAM:
+            for p in range(lane.predecessor, lane.predecessor + lane.predecessors):
+                before = town.neighbours[p]
+                known = False
+                for m in range(count):
+                    known = known or stack[m] == before
+                if not known and count < len(stack):
+                    stack[count], starts[count] = before, offset - town.lanes[before].length
+                    count += 1
+        k += 1
+    return count
+
+
+@compiled
+def _place_towards(town: TownArrays, world: WorldArrays, lanes: int, body: Records) -> float:
+    """Where a body is along the lane that was looked upstream from, negative before it [m]; infinite if it is not."""
+    other = world.vehicles[body.body]
+    for k in range(lanes):
+        number = world.stack[k]
+        lane = town.lanes[number]
+        station, lateral, segment = project(town, number, body.x, body.y)
+        if abs(lateral) > IN_LINE:
+            continue
+        if abs(value_near(town.points, lane, segment, 4, station) - body.height) > HEIGHT_MARGIN:
+            continue
+        heading = value_near(town.points, lane, segment, 3, station)
+        if math.cos(heading - body.heading) < FACING:
+            continue
+        if lane.junction < 0 or other.claim == number or other.inside == number:
+            return float(station + world.starts[k])
+    return math.inf

@@ -1,0 +1,231 @@
+"""From lanes to a path: which lanes a manoeuvre takes, and the pieces of path along them."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from dorothie_gym.maps.model import Exit, LinkType, Town, wrap_degrees
+from dorothie_gym.sim.ego.path import Piece, follow, switch
+
+HORIZON = 120.0
+"""Length of path kept ahead [m]."""
+
+LAID = 180.0
+"""Length of path that is laid ahead: so it has to be laid anew only now and then [m]."""
+
+SWITCH_TIME = 3.0
+"""A lane switch takes about this long [s]."""
+
+MIN_SWITCH = 14.0
+"""Shortest lane switch [m]."""
+
+SWITCH_COST = 20.0
+"""Degrees by which an exit of the own lane may fit worse than that of a lane beside it and still be taken."""
+
+SETTLE = 15.0
+"""A lane that was just entered is followed for this long before it is changed, where there is room [m]."""
+
+EXACT = 5.0
+"""An exit within this many degrees is the one that was meant."""
+
+ANOTHER_WAY = 15.0
+"""Exits whose angles differ by more than this are different turns [degrees]."""
+
+LEAD = 1.0
+"""Room that a manoeuvre leaves to the car before it begins [m]."""
+
+STOPPING = 3.0
+"""Deceleration of a car that finds somebody beside it before a lane switch [m/s^2]."""
+
+WAITING_ROOM = 4.5
+"""A lane switch ends this far before the end of a lane at which the car may have to wait [m]."""
+
+MOST_CHANGES = 3
+"""Lane changes that a turn may take."""
+
+SIDES = (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A lane of a plan, and whether it is entered from the side."""
+
+    lane: int
+    change: bool = False
+
+
+class Lanes:
+    """Questions about the lanes of a town that plans ask."""
+
+    def __init__(self, town: Town) -> None:
+        self._town = town
+        self._choices: dict[int, bool] = {}
+
+    def is_choice(self, lane: int) -> bool:
+        """Whether a turn has to be chosen at the end of a lane."""
+        exits = self._town.exits(lane)
+        return len(exits) > 1 and any(way.junction_id >= 0 for way in exits)
+
+    def offers_turns(self, lane: int) -> bool:
+        """Whether the junction at the end of a lane offers a turn: from this lane or, as beside a turn lane, others."""
+        if lane not in self._choices:
+            ways = [way for beside in self.side_by_side(lane) for way in self._town.exits(beside)]
+            turns = [way.angle for way in ways if way.junction_id >= 0]
+            apart = max((abs(wrap_degrees(turn - turns[0])) for turn in turns), default=0.0)
+            self._choices[lane] = self.is_choice(lane) or (bool(self._town.exits(lane)) and apart > ANOTHER_WAY)
+        return self._choices[lane]
+
+    def side_by_side(self, lane: int) -> list[int]:
+        """A lane and all that one comes to from it by lane changes."""
+        found = [lane]
+        for known in found:
+            for side in SIDES:
+                beside = self._town.neighbour(known, side)
+                if beside is not None and beside not in found:
+                    found.append(beside)
+        return found
+
+    def default_successor(self, lane: int) -> int | None:
+        """The lane that follows without being asked: the only one, or outside junctions the straightest."""
+        exits = self._town.exits(lane)
+        if not exits or self.is_choice(lane):
+            return None
+        return min(exits, key=lambda way: (abs(way.angle), way.connector)).connector
+
+    def through_junction(self, lane: int) -> list[Step]:
+        """The lane, and where it crosses a junction those up to the lane behind it."""
+        steps = [Step(lane)]
+        while self._town.lanes[steps[-1].lane].in_junction:
+            on = self.default_successor(steps[-1].lane)
+            if on is None:
+                break
+            steps.append(Step(on))
+        return steps
+
+    def steps_along(self, lanes: Sequence[int]) -> list[Step]:
+        """The steps that lead along lanes which follow, or lie beside, one another."""
+        steps = [Step(lane) for lane in lanes]
+        for k in range(1, len(steps)):
+            beside = [self._town.neighbour(steps[k - 1].lane, side) for side in SIDES]
+            if steps[k].lane in beside:
+                steps[k] = Step(steps[k].lane, change=True)
+        return steps
+
+    def find_turn(self, first: list[Step], station: float, angle: int) -> tuple[list[Step], Exit] | None:
+        """Steps to the exit that fits an angle best, changing lanes before the junction if that fits much better.
+
+        Args:
+            first: steps that are taken in any case.
+            station: where the car is on the first of them [m].
+            angle: degrees, positive left.
+        """
+        town = self._town
+        own = first[-1].lane
+        if not self.offers_turns(own):
+            # where the lane itself leads on as asked, it is kept to its end: a lane is changed further on, if at all
+            fits = [way for way in town.exits(own) if abs(wrap_degrees(way.angle - angle)) <= EXACT]
+            if fits:
+                first = [*first, Step(fits[0].connector), *self._onward(fits[0])]
+                if fits[0].junction_id >= 0 and abs(fits[0].angle) > ANOTHER_WAY:
+                    return first, fits[0]  # everybody has to turn there: that is the turn which was asked for
+        best: tuple[float, list[Step], Exit] | None = None
+        # lanes that go on are looked at before lanes beside, so that a lane is changed as late as there is room for it
+        queue: deque[tuple[list[Step], int]] = deque([(first, 0)])
+        seen = {first[-1].lane}
+        while queue:
+            steps, changes = queue.popleft()
+            lane = steps[-1].lane
+            if self.offers_turns(lane):
+                for way in town.exits(lane):
+                    misfit = abs(wrap_degrees(way.angle - angle)) + SWITCH_COST * changes
+                    if best is None or misfit < best[0]:
+                        best = (misfit, [*steps, Step(way.connector), *self._onward(way)], way)
+            else:
+                on = self.default_successor(lane)
+                if on is not None and on not in seen:
+                    seen.add(on)
+                    queue.appendleft(([*steps, Step(on)], changes))
+            for side in SIDES:
+                beside = town.neighbour(lane, side)
+                if beside is None or beside in seen or changes == MOST_CHANGES:
+                    continue
+                if self._room_to_switch(steps, station):
+                    seen.add(beside)
+                    queue.append(([*steps, Step(beside, change=True)], changes + 1))
+        return None if best is None else (best[1], best[2])
+
+    def _onward(self, way: Exit) -> list[Step]:
+        """Connectors and lane from the entered one to the exit's lane."""
+        steps, lane = [], way.connector
+        while lane != way.lane:
+            lane = self._town.successors(lane)[0].target
+            steps.append(Step(lane))
+        return steps
+
+    def _room_to_switch(self, steps: list[Step], station: float) -> bool:
+        lane = self._town.lanes[steps[-1].lane]
+        changes = 1
+        for step in reversed(steps):
+            if not step.change:
+                break
+            changes += 1
+        first = len(steps) - changes  # where the lanes that lie beside one another begin
+        start = station if first <= 0 else 0.0
+        return lane.length - start >= changes * (MIN_SWITCH + LEAD) and not lane.in_junction
+
+    # --- pieces of path ---------------------------------------------------------------------------------------------
+
+    def lay(self, steps: list[Step], station: float, speed: float) -> tuple[list[Piece], bool]:
+        """Pieces of path along steps, and on from there while nothing has to be chosen.
+
+        Args:
+            steps: the lanes.
+            station: where the path begins on the first of them [m].
+            speed: of the car [m/s]: lane switches take their time.
+
+        Returns:
+            The pieces (none at the very end of a lane), and whether the path ends where a turn has to be chosen.
+        """
+        steps = list(steps)
+        lengths = [self._town.lanes[step.lane].length for step in steps if not step.change]
+        open_end = self._grow(steps, sum(lengths) - station)
+        pieces: list[Piece] = []
+        at = station
+        for k, step in enumerate(steps):
+            lane = self._town.lanes[step.lane]
+            following = steps[k + 1] if k + 1 < len(steps) else None
+            if following is None or not following.change:
+                if at < lane.length - 1e-3:
+                    pieces.append(follow(lane, at))
+                at = 0.0
+                continue
+            changes = 1
+            while k + 1 + changes < len(steps) and steps[k + 1 + changes].change:
+                changes += 1
+            end = lane.length - WAITING_ROOM * self.is_choice(following.lane)
+            room = max((end - at) / changes - LEAD, 2.0)
+            distance = min(max(MIN_SWITCH, SWITCH_TIME * speed), room)
+            spare = (lane.length - at) - changes * (distance + LEAD)
+            if k == 0:  # announced in time to stop before it, should others be beside the car
+                most = max(end - at - changes * (distance + LEAD), 0.0)
+                lead = LEAD + min(speed**2 / (2 * STOPPING), most)
+            else:
+                lead = min(max(spare, LEAD), SETTLE)
+            begin = min(at + lead, lane.length - distance)
+            if begin > at + 1e-3:
+                pieces.append(follow(lane, at, begin))
+            pieces.append(switch(lane, self._town.lanes[following.lane], max(begin, at), distance))
+            at = float(pieces[-1].stations[-1])
+        return pieces, open_end
+
+    def _grow(self, steps: list[Step], ahead: float) -> bool:
+        """Adds the lanes that follow until there is path enough; tells whether the path has an open end."""
+        while ahead < LAID:
+            on = self.default_successor(steps[-1].lane)
+            if on is None:
+                return True
+            steps.append(Step(on))
+            ahead += self._town.lanes[on].length
+        return False

@@ -1,0 +1,268 @@
+"""What is in the way of the session's car: bodies on its path, and bodies about to be there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.maps.model import Lane
+from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.sim.ego.manoeuvre_lanes import LEAD, MIN_SWITCH, SWITCH_TIME
+from dorothie_gym.sim.ego.path import SPACING, U_TURN_REACH
+from dorothie_gym.sim.ego.path_tracking import WIDEST, point_at
+from dorothie_gym.sim.state.records import STATIC, Records
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.state.world_arrays import WorldArrays
+
+
+LOOKAHEAD = 45.0
+"""How far ahead the path is watched [m]."""
+
+SIDE_MARGIN = 0.35
+"""Room kept beside the car [m]."""
+
+HEIGHT_MARGIN = 2.5
+"""Things further above or below are on another road [m]."""
+
+CROSSING = 0.35
+"""Sine of the angle to the path from which on a moving body counts as crossing it."""
+
+REACTION = 0.4
+"""Time until brakes bite, kept in hand [s]."""
+
+STANDSTILL_GAP = 2.5
+"""Gap that is left to a body that stands [m]."""
+
+ROADBLOCK_GAP = 12.5
+"""Gap that is left to a prop [m]: room for a U-turn (`path.U_TURN_REACH` from the car's middle)."""
+
+LINE_GAP = 1.5
+"""Gap that is left to the line before a junction [m]."""
+
+TIGHT_GAP = 1.0
+"""Gap that is left to what stands, while the car turns or switches lanes [m]."""
+
+HARD_BRAKING = 4.0
+"""Deceleration that the safe speed counts on [m/s^2]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """A thing that can be hit, as perceived.
+
+    Attributes:
+        key: tells it apart from others, the same over time.
+        kind: its object class.
+        x: position of its middle [m]; `y` likewise.
+        heading: [rad].
+        length: [m].
+        width: [m].
+        speed: along its heading [m/s].
+        height: of the road it is on [m].
+    """
+
+    key: int
+    kind: ObjectClass
+    x: float
+    y: float
+    heading: float
+    length: float
+    width: float
+    speed: float
+    height: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hazard:
+    """Something that the car stops for: its class, and the gap from the car's nose to it [m]."""
+
+    kind: ObjectClass
+    gap: float
+
+
+# --- What is in the way of the session's car: bodies on its path, and bodies about to be there -----------------------
+
+INSTANTS, INSTANT = 4, 0.5
+"""Moving bodies are looked for on the path now and at three more times, so far apart [s]."""
+
+MOVING = 0.2
+"""Slower than this a body is where it is [m/s]."""
+
+SLOWLY = 0.5
+"""In a manoeuvre the car goes up closely to what is slower than this [m/s]."""
+
+CLOSEST = 0.05
+"""Least way to a place where to stop that braking counts on [m]."""
+
+
+@inlined
+def room(kind: int, gap: float, speed: float, tight: bool, line: bool) -> float:
+    """Way that is left to the place where the car is to stop for something [m]."""
+    if line:
+        margin = LINE_GAP
+    elif tight and speed < SLOWLY:
+        margin = TIGHT_GAP
+    else:
+        margin = ROADBLOCK_GAP if kind == STATIC else STANDSTILL_GAP
+    return max(gap - margin, 0.0)
+
+
+@inlined
+def safe_speed(speed: float, left: float, friction: float) -> float:
+    """Speed from which one can still stop, see `car.hazards.Hazard.safe_speed`.
+
+    Args:
+        speed: of what is ahead, along the path [m/s].
+        left: room to it [m].
+        friction: share of the dry road's grip.
+    """
+    slack = HARD_BRAKING * friction * REACTION
+    return -slack + math.sqrt(slack * slack + speed * speed + 2.0 * HARD_BRAKING * friction * left)
+
+
+@inlined
+def offer(car: Records, best: float, kind: int, gap: float, speed: float, key: int, tight: bool, line: bool) -> float:
+    """Notes something as what limits the car if it asks for less speed than `best` [m/s]; returns the lesser one."""
+    safe = safe_speed(speed, room(kind, gap, speed, tight, line), 1.0)
+    if safe >= best:
+        return best
+    car.kind, car.gap, car.ahead_speed, car.other, car.tight, car.line = kind, gap, speed, key, tight, line
+    return safe
+
+
+@inlined
+def bodies_ahead(world: WorldArrays, seen: int) -> float:
+    """Finds the body on the path, or soon there, that allows the least speed, and notes how far away a roadblock is.
+
+    Args:
+        world: arrays of the world.
+        seen: how many bodies are perceived.
+
+    Returns:
+        The speed that it allows [m/s], infinite if nothing is there.
+    """
+    car, vehicle = world.car[0], world.vehicles[0]
+    tight = bool(world.path[car.at].manoeuvre)
+    speed = vehicle.speed
+    reach = max(LOOKAHEAD, speed * REACTION + speed * speed / (2.0 * HARD_BRAKING) + ROADBLOCK_GAP)
+    last, near = point_at(world, car.s + reach), point_at(world, car.s + LOOKAHEAD)
+    car.roadblock = math.inf
+    best = math.inf
+    if last - car.at < 1:
+        return best
+    far = world.path[last].s - car.s + vehicle.length
+    for n in range(seen):
+        body = world.seen[n]
+        if math.sqrt(body.distance2) > far + 2.0 * abs(body.speed) + body.length:
+            continue
+        k, gap, along = _meet(world, body, last)
+        if k < 0:
+            continue
+        if body.kind == STATIC and k <= near:
+            car.roadblock = min(car.roadblock, gap + 0.5 * vehicle.length)
+        best = offer(car, best, int(body.kind), gap, along, int(body.key), tight, False)
+    return best
+
+
+@compiled
+def _meet(world: WorldArrays, body: Records, last: int) -> tuple[int, float, float]:
+    """The first place of the path where the car would touch a body, now or where it is heading.
+
+    The path is not longer than its points say: those that are closer together than the body is away are skipped.
+
+    Returns:
+        Number of the point (-1 for none), gap from the car's nose [m], and the body's speed along the path [m/s].
+    """
+    car, vehicle, path = world.car[0], world.vehicles[0], world.path
+    radius = 0.5 * math.sqrt(body.length * body.length + body.width * body.width)
+    side = radius + WIDEST + SIDE_MARGIN
+    reach = math.sqrt(side * side + (radius + SPACING) * (radius + SPACING))
+    for instant in range(INSTANTS if body.speed > MOVING else 1):
+        way = instant * INSTANT * body.speed
+        x, y = body.x + way * body.cos, body.y + way * body.sin
+        k = int(car.at)
+        while k <= last:
+            point = path[k]
+            dx, dy = x - point.x, y - point.y
+            away = math.sqrt(dx * dx + dy * dy) - reach
+            if away > SPACING:
+                k = _skip(world, k, last, away)
+                continue
+            parallel = abs(body.cos * point.cos + body.sin * point.sin)
+            square = abs(body.sin * point.cos - body.cos * point.sin)
+            half_width = 0.5 * (body.width * parallel + body.length * square) + SIDE_MARGIN
+            half_length = 0.5 * (body.length * parallel + body.width * square)
+            along = dx * point.cos + dy * point.sin
+            across = dy * point.cos - dx * point.sin
+            swept = half_width + (point.right if across > 0.0 else point.left)
+            touches = abs(across) <= swept and abs(along) <= half_length + SPACING
+            # who goes along the path is where it is now
+            if touches and abs(point.height - body.height) <= HEIGHT_MARGIN and (instant == 0 or square >= CROSSING):
+                gap = point.s - car.s + along - half_length - 0.5 * vehicle.length
+                forward = body.speed * (body.cos * point.cos + body.sin * point.sin)
+                return k, gap, max(forward, 0.0) if instant == 0 else 0.0
+            k += 1
+    return -1, 0.0, 0.0
+
+
+@inlined
+def _skip(world: WorldArrays, k: int, last: int, away: float) -> int:
+    """The next point of the path that is at least `away` [m] further along it."""
+    path = world.path
+    target = path[k].s + away
+    step = int(away / SPACING)
+    while k + step <= last and step > 1 and path[k + step].s > target:
+        step -= 1
+    return k + max(step, 1)
+
+
+# --- Room before props: whether a manoeuvre would lead the car so close to one that it cannot get away ag ------------
+
+LANDING = 6.0
+"""Oncoming lane left after a U-turn, so that the car stands straight before it waits at the lane's end [m]."""
+
+HALF_LENGTH = 2.5
+"""Of the car [m]."""
+
+FROM_PROP = 16.5
+"""Where a lane switch or a U-turn ends, the car's middle is at least this far before that of a prop, less the way to
+stop [m]: `hazards.ROADBLOCK_GAP`, half the car and half the prop."""
+
+BRAKING = 3.0
+"""Deceleration that plans count on [m/s^2]."""
+
+Props = Iterable[tuple[float, float, float]]
+"""Where the middles of props are: x, y and the height of the road there [m]."""
+
+
+def switch_is_blocked(props: Props, lane: Lane, station: float, speed: float) -> bool:
+    """Whether a prop is too close on the lane to switch to.
+
+    Args:
+        props: that the car sees.
+        lane: the lane to switch to.
+        station: how far along it the car is [m].
+        speed: of the car [m/s].
+    """
+    way = LEAD + max(MIN_SWITCH, SWITCH_TIME * speed) + speed**2 / (2 * BRAKING)
+    return _is_blocked(props, lane, station - HALF_LENGTH, station + way + FROM_PROP)
+
+
+def landing_is_blocked(props: Props, lane: Lane, station: float) -> bool:
+    """Whether a prop is too close on an oncoming lane to turn round onto it at a station [m]."""
+    return _is_blocked(props, lane, station - U_TURN_REACH, station + LANDING + FROM_PROP)
+
+
+def _is_blocked(props: Props, lane: Lane, begin: float, end: float) -> bool:
+    for x, y, height in props:
+        station, lateral = lane.project(np.array((x, y)))
+        level = abs(lane.height_at(station) - height) < HEIGHT_MARGIN
+        if level and abs(lateral) < lane.width_at(station) / 2 and begin < station < end:
+            return True
+    return False

@@ -1,0 +1,249 @@
+"""The line that the car is to drive: lanes joined end to end, with lane switches and U-turns cut in."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dorothie_gym.maps.model import Array, Lane
+
+SPACING = 1.0
+"""Distance between points of a path [m]."""
+
+TURNING_RADIUS = 4.5
+"""Radius of a U-turn [m]: a little over the 3.8 m of highway-env's bicycle at full lock (60 degrees, 5 m long)."""
+
+
+U_TURN_REACH = 14.0
+"""Room ahead of its middle that a car needs for a U-turn [m]: 11 m for its middle where lanes are 3.5 m apart, 1 m for
+its side, and what is kept free beside it."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Piece:
+    """A stretch of path that belongs to one lane.
+
+    Attributes:
+        lane: lane that the car counts as being on.
+        points: centre line (n, 2) [m].
+        heights: (n,) [m].
+        stations: distance along `lane` of each point (n,) [m]; during a U-turn that of its end.
+        limit: speed limit [m/s].
+        manoeuvre: whether the stretch leaves the lane's centre line (lane switch or U-turn).
+    """
+
+    lane: int
+    points: Array
+    heights: Array
+    stations: Array
+    limit: float
+    manoeuvre: bool = False
+
+
+def follow(lane: Lane, start: float = 0.0, end: float | None = None) -> Piece:
+    """Stretch along the centre line of a lane."""
+    end = lane.length if end is None else end
+    count = max(2, math.ceil((end - start) / SPACING) + 1)
+    s = np.linspace(start, end, count)
+    return Piece(lane=lane.id, points=_sample(lane, s), heights=_heights(lane, s), stations=s, limit=lane.speed_limit)
+
+
+def switch(source: Lane, target: Lane, start: float, distance: float) -> Piece:
+    """Stretch from one lane to the one beside it.
+
+    The lateral shift follows 10 t^3 - 15 t^4 + 6 t^5, which has no jump in curvature at either end.
+
+    Args:
+        source: lane the car is on.
+        target: lane beside it, in the same direction.
+        start: distance along `source` at which it begins [m].
+        distance: length of the switch along `source` [m].
+    """
+    t = np.linspace(0.0, 1.0, max(3, math.ceil(distance / SPACING) + 1))
+    begin, _ = target.project(source.position(start))
+    end, _ = target.project(source.position(start + distance))
+    weight = (t**3 * (10 - 15 * t + 6 * t**2))[:, None]
+    stations = begin + t * (end - begin)
+    points = (1 - weight) * _sample(source, start + t * distance) + weight * _sample(target, stations)
+    return Piece(
+        lane=target.id,
+        points=points,
+        heights=_heights(target, stations),
+        stations=stations,
+        limit=min(source.speed_limit, target.speed_limit),
+        manoeuvre=True,
+    )
+
+
+def u_turn(source: Lane, target: Lane, start: float, radius: float = TURNING_RADIUS) -> Piece:
+    """Stretch from a lane to the oncoming one on its left.
+
+    Where the lanes are closer than two radii the car first swings out: arcs right, left by more than a half circle,
+    right again, whose lateral shifts add up to the distance d of the lanes: cos(swing) = (d + 2 r) / (4 r).
+
+    Args:
+        source: lane the car is on.
+        target: oncoming lane.
+        start: distance along `source` at which it begins [m].
+        radius: radius of all arcs [m].
+    """
+    origin, heading = source.position(start), source.heading_at(start)
+    station, lateral = target.project(origin)
+    gap = abs(lateral)
+    if gap < 2 * radius:
+        swing = math.acos((gap + 2 * radius) / (4 * radius))
+        arcs = [(radius, swing), (-radius, math.pi + 2 * swing), (radius, swing)]
+        middle = 0.0
+    else:
+        arcs, middle = [(-radius, math.pi / 2), (-radius, math.pi / 2)], gap - 2 * radius
+    x, y, psi = float(origin[0]), float(origin[1]), heading
+    points = [(x, y)]
+    for k, (r, angle) in enumerate(arcs):
+        if k == 1 and middle > 0:
+            x, y = x + middle * math.cos(psi), y + middle * math.sin(psi)
+            points.append((x, y))
+        steps = max(2, math.ceil(abs(r) * angle / (SPACING / 2)))
+        for _ in range(steps):
+            turn = math.copysign(angle / steps, r)
+            # chord of an arc of `turn` radians; positive radius turns right (headings are clockwise)
+            chord = 2 * abs(r) * math.sin(abs(turn) / 2)
+            x, y = x + chord * math.cos(psi + turn / 2), y + chord * math.sin(psi + turn / 2)
+            psi += turn
+            points.append((x, y))
+    line = np.array(points)
+    return Piece(
+        lane=target.id,
+        points=line,
+        heights=np.full(len(line), target.height_at(station)),
+        stations=np.full(len(line), station),
+        limit=min(source.speed_limit, target.speed_limit),
+        manoeuvre=True,
+    )
+
+
+class Path:
+    """Pieces joined to one line that a car can be steered along.
+
+    Only what is asked for in every decision is kept for each point.
+
+    Attributes:
+        s: distance along the path of each point (n,) [m].
+        points: (n, 2) [m].
+        heading: at the first point [rad].
+        heights: (n,) [m].
+        lanes: lane of each point (n,).
+        stations: distance along that lane (n,) [m].
+        manoeuvre: whether each point is off the lanes' centre lines (n,).
+    """
+
+    def __init__(self, pieces: Sequence[Piece]) -> None:
+        points = np.concatenate([piece.points for piece in pieces])
+        keep = np.concatenate(([True], np.hypot(*np.diff(points, axis=0).T) > 1e-3))
+        piece_of = np.repeat(np.arange(len(pieces), dtype=np.int16), [len(piece.points) for piece in pieces])[keep]
+        self.points = points[keep]
+        self.heights = np.concatenate([piece.heights for piece in pieces])[keep]
+        self.stations = np.concatenate([piece.stations for piece in pieces])[keep]
+        self.lanes = np.array([piece.lane for piece in pieces])[piece_of]
+        self.manoeuvre = np.array([piece.manoeuvre for piece in pieces])[piece_of]
+        self._piece_of, self._limits = piece_of, np.array([piece.limit for piece in pieces])
+        steps = np.diff(self.points, axis=0)
+        self.s = np.concatenate(([0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))))
+        self.heading = float(self.headings[0])
+        self._asked, self._answer = math.nan, 0
+
+    @property
+    def limits(self) -> Array:
+        """Speed limit of each point (n,) [m/s]."""
+        limits: Array = self._limits[self._piece_of]
+        return limits
+
+    @property
+    def headings(self) -> Array:
+        """Of each point (n,) [rad], unwrapped."""
+        steps = np.diff(self.points, axis=0)
+        segment = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+        middle = (self.s[:-1] + self.s[1:]) / 2
+        # from those of the segments at their middles; the ends go on with the curvature
+        headings = np.interp(self.s, middle, segment)
+        if len(segment) > 1:
+            headings[0] = segment[0] - (segment[1] - segment[0]) * (middle[0] - 0.0) / (middle[1] - middle[0])
+            rate = (segment[-1] - segment[-2]) / (middle[-1] - middle[-2])
+            headings[-1] = segment[-1] + rate * (self.s[-1] - middle[-1])
+        return headings
+
+    @property
+    def length(self) -> float:
+        """Length of the path [m]."""
+        return float(self.s[-1])
+
+    @property
+    def curvatures(self) -> Array:
+        """Of each point (n,) [1/m], positive to the right."""
+        bends: Array = np.gradient(self.headings, self.s)
+        return bends
+
+    def index_at(self, s: float) -> int:
+        """Number of the point at or before a distance along the path."""
+        if s != self._asked:  # most ask where the car is, one after the other
+            self._asked, self._answer = s, min(max(bisect_right(self.s, s) - 1, 0), len(self.s) - 1)
+        return self._answer
+
+    def project(self, x: float, y: float, near: float, window: float = 6.0) -> tuple[float, float]:
+        """Closest place of the path to a position, looked for around a known place.
+
+        Args:
+            x: [m].
+            y: [m].
+            near: distance along the path close to the answer [m].
+            window: how far from `near` to look [m].
+
+        Returns:
+            Distance along the path [m], and signed distance from it, positive right [m].
+        """
+        first = self.index_at(near - window)
+        last = min(self.index_at(near + window) + 1, len(self.s) - 1)
+        s, points = self.s[first : last + 1].tolist(), self.points[first : last + 1].tolist()
+        best, answer = math.inf, (near, 0.0)
+        for k in range(last - first):
+            (ax, ay), (bx, by) = points[k], points[k + 1]
+            dx, dy = bx - ax, by - ay
+            t = ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)
+            # before the first and after the last point the path goes on straight
+            if (t < 0.0 and first + k > 0) or (t > 1.0 and first + k < len(self.s) - 2):
+                t = 0.0 if t < 0.0 else 1.0
+            ox, oy = x - ax - t * dx, y - ay - t * dy
+            distance = ox * ox + oy * oy
+            if distance < best:
+                best = distance
+                side = 1.0 if dx * oy - dy * ox >= 0 else -1.0
+                answer = (s[k] + t * (s[k + 1] - s[k]), side * math.sqrt(distance))
+        return answer
+
+    def heading_at(self, s: float) -> float:
+        """Direction of the path [rad]."""
+        return self._interpolate(self.headings, s)
+
+    def position_at(self, s: float) -> tuple[float, float]:
+        """Point of the path [m]."""
+        return self._interpolate(self.points[:, 0], s), self._interpolate(self.points[:, 1], s)
+
+    def _interpolate(self, values: Array, s: float) -> float:
+        k = min(self.index_at(s), len(self.s) - 2)
+        t = (s - self.s[k]) / (self.s[k + 1] - self.s[k])
+        t = min(max(t, 0.0), 1.0)
+        return float(values[k] + t * (values[k + 1] - values[k]))
+
+
+def _sample(lane: Lane, stations: Array) -> Array:
+    """Points on the centre line (n, 2) [m]."""
+    x = np.interp(stations, lane.stations, lane.points[:, 0])
+    y = np.interp(stations, lane.stations, lane.points[:, 1])
+    return np.column_stack((x, y))
+
+
+def _heights(lane: Lane, stations: Array) -> Array:
+    return np.interp(stations, lane.stations, lane.points[:, 2])

@@ -1,0 +1,124 @@
+"""The car that the session is about, as a highway-env vehicle: a view on the arrays of its world."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from highway_env.vehicle.kinematics import Vehicle
+
+from dorothie_gym.maps.model import Array
+from dorothie_gym.sim.ego.limits import Control
+from dorothie_gym.sim.road import TownRoad
+from dorothie_gym.sim.state.records import fields, plain
+from dorothie_gym.sim.state.world_arrays import WorldArrays
+
+
+class Car(Vehicle):
+    """Vehicle number 0 of a world (`kernel.Kind.DRIVEN`), as it was when the world was last stepped.
+
+    Whoever sets its position, heading or speed moves it.
+    """
+
+    MAX_SPEED = 40.0
+
+    def __init__(self, road: TownRoad, holder: Any) -> None:
+        """Shows the first vehicle of `holder.arrays`, which may be replaced by others with more room."""
+        self._holder = holder
+        self._state_of: Any = None
+        self._heading: float
+        self._speed: float
+        self._height: float
+        self.refresh()
+        super().__init__(road, self.position, self.heading, self.speed)
+
+    def refresh(self) -> None:
+        """Looks again where the car is."""
+        x, y, self._heading, self._speed, self._height = self._state.item()
+        self._position = np.array((x, y))
+
+    @property
+    def _state(self) -> Any:
+        """Place, heading, speed and height in the arrays, see `fields`."""
+        arrays: WorldArrays = self._holder.arrays
+        if arrays is not self._state_of:
+            self._state_of, self._own_state = arrays, fields(arrays.vehicles, "x", "y", "heading", "speed", "height")
+        return self._own_state
+
+    @property
+    def _row(self) -> Any:
+        return plain(self._holder.arrays.vehicles)[0]
+
+    @property
+    def position(self) -> Array:
+        """Of its middle (2,) [m]."""
+        return self._position
+
+    @position.setter
+    def position(self, place: Array) -> None:
+        self._row["x"], self._row["y"] = place
+        self.refresh()
+
+    @property
+    def heading(self) -> float:
+        """[rad]."""
+        return self._heading
+
+    @heading.setter
+    def heading(self, heading: float) -> None:
+        row = self._row
+        row["heading"], row["cos"], row["sin"] = heading, math.cos(heading), math.sin(heading)
+        self.refresh()
+
+    @property
+    def speed(self) -> float:
+        """[m/s]."""
+        return self._speed
+
+    @speed.setter
+    def speed(self, speed: float) -> None:
+        self._row["speed"] = speed
+        self.refresh()
+
+    @property
+    def height(self) -> float:
+        """Of the road under it [m]."""
+        return self._height
+
+    @property
+    def control(self) -> Control:
+        """What the actuators were told last."""
+        car = plain(self._holder.arrays.car)[0]
+        return Control(throttle=float(car["throttle"]), steer=float(car["steer"]), brake=float(car["brake"]))
+
+    def on_state_update(self) -> None:
+        """Matches the car to the closest lane of its height."""
+        network = self.road.network
+        self.lane_index = network.get_closest_lane_index(self.position, self.heading, height=self.height)
+        self.lane = network.get_lane(self.lane_index)
+
+
+# --- What drives the session's car, `kernel.records.CAR`, as Python reads and writes it: some fields at a ------------
+
+
+class CarRecord:
+    """Groups of fields: ``.item()`` of one is a tuple of numbers, and ``[()] = numbers`` writes one (`fields`).
+
+    Attributes:
+        orders: action, action_end, cruise, held and manual: what the car is to do.
+        pedals: throttle, steer and brake, where it is driven by hand.
+        place: s, offset and roadblock: where it is on its path, and how far ahead a roadblock is.
+        hazard: hazard and hazard_gap: what it stops for.
+        outcome: events and collisions: how many.
+        air: friction, wind, wind_heading and wind_phase: what the weather does to it.
+    """
+
+    def __init__(self, arrays: WorldArrays) -> None:
+        """Shows the record in the arrays of a world."""
+        self.orders = fields(arrays.car, "action", "action_end", "cruise", "held", "manual")
+        self.pedals = fields(arrays.car, "throttle", "steer", "brake")
+        self.place = fields(arrays.car, "s", "offset", "roadblock")
+        self.hazard = fields(arrays.car, "hazard", "hazard_gap")
+        self.outcome = fields(arrays.car, "events", "collisions")
+        self.air = fields(arrays.car, "friction", "wind", "wind_heading", "wind_phase")

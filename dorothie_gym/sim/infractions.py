@@ -1,0 +1,271 @@
+"""Rules of the road that the car broke: red lights, stop signs, leaving the road, driving against the traffic.
+
+Everything is read off the way that the car took, whoever drove it: nothing here asks what it was told or meant to do.
+Collisions, the fifth kind, are found where bodies move (`boxes`, `world`).
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+import weakref
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from dorothie_gym.maps.model import Array, SignalKind
+from dorothie_gym.maps.polyline import WIDTH
+from dorothie_gym.maps.right_of_way import right_of_way
+from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.sim.config import FRAME_RATE
+from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.state.records import FINDING, LINE, MARK, Records
+from dorothie_gym.sim.state.town_arrays import town_arrays
+from dorothie_gym.sim.traffic_rules import HEIGHT, WIDE, Found, WatchArrays, X, Y, watch
+
+LONG_AGO = -(1 << 40)
+"""A frame before all others."""
+
+
+class Infraction(enum.StrEnum):
+    """A kind of breach of the rules, other than collisions."""
+
+    RED_LIGHT = "red_light"
+    """The front of the car passes the end of its lane while the lane's light is red."""
+    STOP_SIGN = "stop_sign"
+    """It passes the end of a lane with a stop sign and has not stood there with its front within `AT_LINE`."""
+    OFF_ROAD = "off_road"
+    """Its middle is farther than `OFF_ROAD` outside of every lane's area, and it is not turning round."""
+    WRONG_WAY = "wrong_way"
+    """Its middle is on lanes that all run against it, outside junctions, and it is not turning round."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Breach:
+    """That a rule was broken, when, where, and which light or sign tells so.
+
+    Attributes:
+        kind: of infraction.
+        frame: physics frame.
+        lane: lane that was left over its end, that is nearest (off the road), or that is driven against.
+        station: distance along it [m].
+        x: of the car's middle [m]; `y` likewise.
+        key: id of the signal, None where there is none.
+        other: class of the signal, None where there is none.
+    """
+
+    kind: Infraction
+    frame: int
+    lane: int
+    station: float
+    x: float
+    y: float
+    key: int | None = None
+    other: ObjectClass | None = None
+
+
+class InfractionWatch:
+    """Looks at the way of one car, stretch by stretch, and tells each breach of a rule once."""
+
+    def __init__(self, network: TownNetwork, length: float) -> None:
+        """Begins to watch a car of a length [m] that has not been seen before."""
+        self._network, self._town, self._length = network, network.town, length
+        self._lines = _lines(network)
+        town = town_arrays(network)
+        self._wide = bool(network.table.points[:, WIDTH].max() > WIDE)
+        self._arrays = WatchArrays(
+            town.points, town.lanes, town.origin, town.cells, town.entries, self._lines.records,
+            np.zeros(len(self._lines.lanes), dtype=MARK).view(np.recarray), np.full(2, LONG_AGO),
+            np.zeros(0, dtype=FINDING).view(np.recarray),
+        )  # fmt: skip
+
+    def look(self, poses: Array, frame: int) -> list[Breach]:
+        """Breaches on a stretch of way, in the order in which they happened.
+
+        Args:
+            poses: of the car at successive frames (n + 1, 6), C-contiguous, columns as in `kernel.rules`; the first
+                is the last one of the stretch before.
+            frame: of the first pose.
+        """
+        if len(self._arrays.found) < 3 * len(poses):
+            room = np.zeros(3 * len(poses), dtype=FINDING).view(np.recarray)
+            self._arrays = self._arrays._replace(found=room)
+        count = watch(self._arrays, poses, frame, self._length, self._wide)
+        found: list[Breach] = []
+        for station, k, kind, number in self._arrays.found[:count].tolist() if count else ():
+            if kind in (Found.LIGHT, Found.STOP_SIGN):
+                found += self._at_line(number, frame + k, poses[k])
+            else:
+                breach = Infraction.OFF_ROAD if kind == Found.OFF_ROAD else Infraction.WRONG_WAY
+                found.append(self._beside_lanes(breach, number, station, frame + k, poses[k]))
+        return found
+
+    def wait(self, first: int, last: int) -> None:
+        """Lets the car stand between two frames: what it has been doing wrong until then it goes on doing."""
+        for k, frame in enumerate(self._arrays.last.tolist()):
+            if frame == first:
+                self._arrays.last[k] = last
+
+    def _at_line(self, line: int, frame: int, pose: Array) -> list[Breach]:
+        """The breach of passing a line, if it is one: at a stop sign without a stand, or at a red light."""
+        kind, signal = self._lines.signals[line]
+        lane = self._lines.lanes[line]
+        infraction, other = Infraction.STOP_SIGN, ObjectClass.TRAFFIC_SIGN
+        if kind is SignalKind.TRAFFIC_LIGHT:
+            # what it showed when the frame began: so the car was let in
+            if self._town.light(lane, (frame - 1) / FRAME_RATE) is not LightColour.RED:
+                return []
+            infraction, other = Infraction.RED_LIGHT, ObjectClass.TRAFFIC_LIGHT
+        return [
+            Breach(
+                kind=infraction, frame=frame, lane=lane, station=self._town.lanes[lane].length,
+                x=float(pose[X]), y=float(pose[Y]), key=signal, other=other,
+            )
+        ]  # fmt: skip
+
+    def _beside_lanes(self, kind: Infraction, lane: int, station: float, frame: int, pose: Array) -> Breach:
+        """The breach of being off the road or against the traffic, at the nearest lane."""
+        x, y = float(pose[X]), float(pose[Y])
+        if lane < 0:
+            place = np.array([x, y])
+            index = self._network.get_closest_lane_index(place, height=float(pose[HEIGHT]))
+            lane = self._network.lane_id(index)
+            station = float(self._network.get_lane(index).local_coordinates(place)[0])
+        station = min(max(station, 0.0), self._town.lanes[lane].length)
+        return Breach(kind=kind, frame=frame, lane=lane, station=station, x=x, y=y)
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """Ends of lanes with a light or stop sign: `kernel.records.LINE` (m,), lanes, kinds and ids of signals."""
+
+    records: Records
+    lanes: tuple[int, ...]
+    signals: tuple[tuple[SignalKind, int], ...]
+
+
+_found_lines: weakref.WeakKeyDictionary[TownNetwork, _Lines] = weakref.WeakKeyDictionary()
+
+
+def _lines(network: TownNetwork) -> _Lines:
+    """The lines of a town's network, looked for when they are asked for first."""
+    found = _found_lines.get(network)
+    if found is None:
+        found = _found_lines[network] = _look_for_lines(network)
+    return found
+
+
+def _look_for_lines(network: TownNetwork) -> _Lines:
+    town, rules = network.town, right_of_way(network.town)
+    found = {
+        lane: (signal.kind, signal.id)
+        for signal in town.signals
+        if signal.kind in (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP)
+        for lane in signal.lanes
+        if rules.control(lane) is signal.kind
+    }
+    records = np.zeros(len(found), dtype=LINE).view(np.recarray)
+    for record, lane in zip(records, sorted(found), strict=True):
+        end, heading = town.lanes[lane].points[-1], float(town.lanes[lane].headings[-1])
+        record.x, record.y, record.height = end
+        record.cos, record.sin = math.cos(heading), math.sin(heading)
+        record.half_width = float(town.lanes[lane].widths[-1]) / 2
+        record.is_stop = found[lane][0] is SignalKind.STOP
+    return _Lines(records, tuple(sorted(found)), tuple(found[lane] for lane in sorted(found)))
+
+
+# --- What the world reports of the car: hazard stops, and breaches of the rules of the road --------------------------
+
+
+class WorldEventKind(enum.StrEnum):
+    """What the world reports of its own."""
+
+    HAZARD_STOP = "hazard_stop"
+    HAZARD_END = "hazard_end"
+    COLLISION = "collision"
+    RED_LIGHT = "red_light"
+    STOP_SIGN = "stop_sign"
+    OFF_ROAD = "off_road"
+    WRONG_WAY = "wrong_way"
+
+
+INFRACTION_KINDS = (
+    WorldEventKind.COLLISION, WorldEventKind.RED_LIGHT, WorldEventKind.STOP_SIGN, WorldEventKind.OFF_ROAD,
+    WorldEventKind.WRONG_WAY,
+)  # fmt: skip
+"""Reports of a breach of the rules of the road; their data tells place and counterpart (`Reports.infraction`)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorldEvent:
+    """Something that happened to the car, at a frame."""
+
+    frame: int
+    kind: WorldEventKind
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Reports:
+    """Collects what happens to the car.
+
+    Attributes:
+        infractions: how often each rule has been broken, collisions of whosever making among them.
+    """
+
+    def __init__(self, network: TownNetwork, length: float) -> None:
+        """Begins with nothing; `length` is that of the car [m]."""
+        self._watch = InfractionWatch(network, length)
+        self._events: list[WorldEvent] = []
+        self.infractions: Counter[WorldEventKind] = Counter()
+
+    def add(self, kind: WorldEventKind, frame: int, **data: Any) -> None:
+        """Reports something that happened at a frame."""
+        self._events.append(WorldEvent(frame=frame, kind=kind, data=data))
+
+    def infraction(
+        self, kind: WorldEventKind, frame: int, *, lane: int, station: float, x: float, y: float,
+        key: int | None, other: ObjectClass | None, **data: Any,
+    ) -> None:  # fmt: skip
+        """Reports a breach of the rules.
+
+        Args:
+            kind: which rule, one of `INFRACTION_KINDS`.
+            frame: when.
+            lane: where; `station` how far along it [m].
+            station: [m].
+            x: of the car [m]; `y` likewise.
+            y: [m].
+            key: of what was touched, or of the light or sign that was passed.
+            other: its class.
+            data: what else is to be said of it.
+        """
+        self.infractions[kind] += 1
+        place = {
+            "lane": lane, "station": round(float(station), 2), "x": round(float(x), 3), "y": round(float(y), 3),
+        }  # fmt: skip
+        self.add(kind, frame, **place, key=key, other=None if other is None else other.label, **data)
+
+    def close(self, poses: Array, frame: int, *, stood: bool = False) -> list[WorldEvent]:
+        """Looks for breaches on the car's way since the last call, and returns all that has been reported since.
+
+        Args:
+            poses: of the car before the way and after each of its frames (n + 1, 6), columns as in `kernel.rules`.
+            frame: that of the last of them.
+            stood: whether it stood all the time; then they are not looked at.
+        """
+        first = frame - len(poses) + 1
+        if stood:
+            self._watch.wait(first, frame)
+        for breach in () if stood else self._watch.look(poses, first):
+            self.infraction(
+                WorldEventKind(breach.kind.value), breach.frame, lane=breach.lane, station=breach.station,
+                x=breach.x, y=breach.y, key=breach.key, other=breach.other,
+            )  # fmt: skip
+        if not self._events:
+            return []
+        events, self._events = sorted(self._events, key=lambda event: event.frame), []
+        return events

@@ -1,0 +1,149 @@
+"""A lane of a town as a highway-env lane."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from highway_env.road.lane import AbstractLane, LineType
+from highway_env.utils import get_class_path
+from numpy.typing import NDArray
+
+from dorothie_gym.maps import polyline
+from dorothie_gym.maps.model import Array, Lane
+from dorothie_gym.maps.polyline import LaneTable
+
+
+class PolylineLane(AbstractLane):
+    """A lane of a town, as stock highway-env drives on, observes and draws it.
+
+    Stations and lateral distances are metres along and to the right of the centre line; before the start and after the
+    end of the lane they go on straight. A lane never changes after it is built, so copies of it are the lane itself.
+
+    Attributes:
+        town_lane: the town's lane.
+        length: [m].
+        width: width at the start [m].
+        line_types: marks on the left and right side (`highway_env.road.lane.LineType`).
+        forbidden: whether vehicles must not change to this lane.
+        priority: right of way, as highway-env ranks it.
+        speed_limit: [m/s].
+        row: row of the lane in the table that it measures with.
+    """
+
+    def __init__(
+        self,
+        town_lane: Lane | Mapping[str, Any],
+        *,
+        line_types: Sequence[int] | None = None,
+        forbidden: bool = False,
+        priority: int = 0,
+    ) -> None:
+        """Build a lane that measures with a table of its own; `TownNetwork` makes it share the network's.
+
+        Args:
+            town_lane: lane of a town, or the mapping that `to_config` wrote for one.
+            line_types: marks on the left and right; none in junctions and continuous elsewhere by default.
+            forbidden: whether vehicles must not change to this lane.
+            priority: right of way.
+        """
+        lane = town_lane if isinstance(town_lane, Lane) else _lane_from_mapping(town_lane)
+        mark = LineType.NONE if lane.in_junction else LineType.CONTINUOUS
+        self.town_lane = lane
+        self.length = lane.length
+        self.width = float(lane.widths[0])
+        self.line_types = list(line_types) if line_types is not None else [mark, mark]
+        self.forbidden = forbidden
+        self.priority = priority
+        self.speed_limit = lane.speed_limit
+        self.share(LaneTable.of([lane]), 0)
+
+    def share(self, table: LaneTable, row: int) -> None:
+        """Measure with a row of a table that other lanes use, too."""
+        self.row = row
+        self._points, self._offsets, self._ends = table.points, table.offsets, table.ends
+        shape = self._points, self._offsets, self._ends, row
+        # Bound once: stock highway-env calls these for every lane and stripe that it draws.
+        self._local = functools.partial(polyline.local_coordinates, *shape)
+        self._place = functools.partial(polyline.position, *shape)
+        self._value = functools.partial(polyline.value_at, self._points, self._offsets, row)
+        self._distance = functools.partial(polyline.distance, *shape)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> PolylineLane:
+        return self
+
+    def position(self, longitudinal: float, lateral: float = 0.0) -> Array:
+        """World position (2,) [m] at a station and a distance to the right."""
+        return np.array(self._place(float(longitudinal), float(lateral)))
+
+    def heading_at(self, longitudinal: float) -> float:
+        """Direction of the lane [rad]; that of its ends beyond them."""
+        return float(self._value(polyline.HEADING, float(longitudinal)))
+
+    def width_at(self, longitudinal: float) -> float:
+        """Width of the lane [m]."""
+        return float(self._value(polyline.WIDTH, float(longitudinal)))
+
+    def height_at(self, longitudinal: float) -> float:
+        """Height of the lane [m]."""
+        return float(self._value(polyline.HEIGHT, float(longitudinal)))
+
+    def local_coordinates(self, position: Array) -> tuple[float, float]:
+        """Station and signed distance to the right [m] of a world position (2,)."""
+        station, lateral = self._local(float(position[0]), float(position[1]))
+        return station, lateral
+
+    def distance(self, position: Array) -> float:
+        """|lateral| + overshoot [m] of a world position (2,)."""
+        return self.distance_with_heading(position, None)
+
+    def distance_with_heading(self, position: Array, heading: float | None, heading_weight: float = 1.0) -> float:
+        """|lateral| + overshoot [m] + `heading_weight` x difference of heading [rad], as highway-env ranks lanes."""
+        if heading is None:
+            heading, heading_weight = 0.0, 0.0
+        cost, _ = self._distance(float(position[0]), float(position[1]), float(heading), float(heading_weight))
+        return float(cost)
+
+    def positions(self, stations: Array, lateral: float = 0.0) -> Array:
+        """World positions (n, 2) [m] at many stations (n,), exactly as `position` gives them."""
+        wanted = np.ascontiguousarray(stations, dtype=np.float64)
+        return polyline.positions(self._points, self._offsets, self._ends, self.row, wanted, float(lateral))
+
+    def local_coordinates_many(self, points: NDArray[np.float64]) -> Array:
+        """Stations and lateral distances (n, 2) [m] of world positions (n, 2), as `local_coordinates` gives them."""
+        places = np.ascontiguousarray(points, dtype=np.float64)
+        return polyline.local_coordinates_many(self._points, self._offsets, self._ends, self.row, places)
+
+    @classmethod
+    def from_config(cls, config: Mapping[str, Any]) -> PolylineLane:
+        """The lane whose parameters `to_config` wrote under "config"."""
+        return cls(**config)
+
+    def to_config(self) -> dict[str, Any]:
+        """The lane as a dict that JSON can hold and highway-env's `lane_from_config` reads."""
+        lane = self.town_lane
+        return {
+            "class_path": get_class_path(self.__class__),
+            "config": {
+                "town_lane": {
+                    "id": lane.id,
+                    "road_id": lane.road_id,
+                    "lane_id": lane.lane_id,
+                    "junction_id": lane.junction_id,
+                    "points": lane.points.tolist(),
+                    "widths": lane.widths.tolist(),
+                    "speed_limit": lane.speed_limit,
+                    "street": lane.street,
+                },
+                "line_types": list(self.line_types),
+                "forbidden": self.forbidden,
+                "priority": self.priority,
+            },
+        }
+
+
+def _lane_from_mapping(mapping: Mapping[str, Any]) -> Lane:
+    arrays = {name: np.array(mapping[name], dtype=np.float64) for name in ("points", "widths")}
+    return Lane(**{**mapping, **arrays})

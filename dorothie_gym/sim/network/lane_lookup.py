@@ -1,0 +1,339 @@
+"""Where a body is on a lane, and which lane is closest to it: exactly `TownNetwork.get_closest_lane_index`.
+
+The functions give the same bits as those of `network.polyline` and `network.grid`, but look at the few segments that a
+cell lists. A cell that does not settle the question (off the road) is answered by looking at all lanes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.compilation import allocating, compiled, inlined
+from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.polyline import closest_on_segment
+from dorothie_gym.sim.network.grid import SAME_LEVEL
+from dorothie_gym.sim.state.records import ENTRY, NOBODY, Records
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.state.town_arrays import TownArrays
+
+
+CELL = 4.0
+"""Side of a cell [m]: finer than the network's own grid, so that the stretches are short."""
+
+REACH = 6.0
+"""A cell lists the lanes whose centre line comes this close to it [m]."""
+
+SLACK = 1e-6
+"""Safety of the bounds against rounding [m]."""
+
+TURNED = 1.0
+"""A lane that is off a body's heading by more than this [rad] costs more than this [m] in highway-env's ranking."""
+
+
+class Cells(NamedTuple):
+    """The lists of all cells.
+
+    Attributes:
+        origin: (2,) corner of the first cell [m].
+        bounds: (rows, columns, 2) int32: first entry of each cell, and the one after its last.
+        entries: `records.ENTRY`, those of a cell in the order of the lanes' ranks.
+    """
+
+    origin: Array
+    bounds: NDArray[np.int32]
+    entries: Records
+
+
+def build_cells(points: Array, lanes: Records) -> Cells:
+    """Lists the lanes of a town.
+
+    Args:
+        points: (p, 6) as in `polyline.LaneTable`.
+        lanes: `records.LANE`.
+    """
+    order = np.argsort(lanes.rank).astype(np.int64)
+    low = np.array([lanes.left_edge.min(), lanes.low_edge.min()]) - REACH - CELL
+    high = np.array([lanes.right_edge.max(), lanes.high_edge.max()]) + REACH + CELL
+    columns, rows = (int(n) for n in np.ceil((high - low) / CELL))
+    counts = np.zeros((rows, columns), dtype=np.int32)
+    none = np.zeros(0, dtype=ENTRY).view(np.recarray)
+    _list_lanes(points, lanes, order, low, counts, none)
+    stops = np.cumsum(counts.ravel(), dtype=np.int32).reshape(counts.shape)
+    starts = stops - counts
+    entries = np.zeros(int(stops[-1, -1]), dtype=ENTRY).view(np.recarray)
+    _list_lanes(points, lanes, order, low, starts.copy(), entries)
+    return Cells(low, np.ascontiguousarray(np.stack((starts, stops), axis=-1)), entries)
+
+
+@allocating
+def _list_lanes(
+    points: Array,
+    lanes: Records,
+    order: NDArray[np.int64],
+    origin: Array,
+    cursors: NDArray[np.int32],
+    entries: Records,
+) -> None:
+    """Counts the lanes of each cell in `cursors`; if there are `entries`, writes them where the cursors stand."""
+    rows, columns = cursors.shape
+    newest = np.full((rows, columns), -1, dtype=np.int32)
+    for number in order:
+        lane = lanes[number]
+        for k in range(lane.first, lane.last):
+            left, right = min(points[k, 0], points[k + 1, 0]), max(points[k, 0], points[k + 1, 0])
+            low, high = min(points[k, 1], points[k + 1, 1]), max(points[k, 1], points[k + 1, 1])
+            first_row = max(int((low - origin[1] - REACH) / CELL) - 1, 0)
+            last_row = min(int((high - origin[1] + REACH) / CELL) + 1, rows - 1)
+            first_column = max(int((left - origin[0] - REACH) / CELL) - 1, 0)
+            last_column = min(int((right - origin[0] + REACH) / CELL) + 1, columns - 1)
+            for row in range(first_row, last_row + 1):
+                for column in range(first_column, last_column + 1):
+                    if newest[row, column] == number:
+                        continue
+                    newest[row, column] = number
+                    x, y = origin[0] + (column + 0.5) * CELL, origin[1] + (row + 0.5) * CELL
+                    first, last = _stretch(points, lane.first, lane.last, x, y)
+                    if first < 0:
+                        continue
+                    if len(entries) > 0:
+                        _write(entries[cursors[row, column]], points, number, first, last)
+                    cursors[row, column] += 1
+
+
+@allocating
+def _stretch(points: Array, first: int, last: int, x: float, y: float) -> tuple[int, int]:
+    """First and last segment that can be closest from within the cell around a place; -1 where the lane is far away."""
+    radius = CELL * math.sqrt(0.5)
+    nearest = math.inf
+    for k in range(first, last):
+        _, gap = closest_on_segment(points, k, x, y)
+        nearest = min(nearest, gap)
+    nearest = math.sqrt(nearest)
+    if nearest > REACH + radius + SLACK:
+        return -1, -1
+    # the distance changes by no more than `radius` between the middle and anywhere in the cell, for every segment
+    limit = nearest + 2.0 * radius + SLACK
+    low, high = last, first
+    for k in range(first, last):
+        _, gap = closest_on_segment(points, k, x, y)
+        if gap <= limit * limit:
+            low, high = min(low, k), max(high, k)
+    return low, high
+
+
+@allocating
+def _write(entry: Records, points: Array, lane: int, first: int, last: int) -> None:
+    low = high = points[first, 3]
+    for k in range(first, last + 2):
+        low, high = min(low, points[k, 3]), max(high, points[k, 3])
+    middle, spread = 0.5 * (low + high), 0.5 * (high - low)
+    entry.lane, entry.first, entry.last = lane, first, last
+    entry.cos, entry.sin = math.cos(middle), math.sin(middle)
+    entry.limit = math.cos(spread + TURNED) - SLACK if spread + TURNED < math.pi else -2.0
+    entry.along_low = entry.across_low = math.inf
+    entry.along_high = entry.across_high = -math.inf
+    for k in range(first, last + 2):
+        along = points[k, 0] * entry.cos + points[k, 1] * entry.sin
+        across = points[k, 1] * entry.cos - points[k, 0] * entry.sin
+        entry.along_low, entry.along_high = min(entry.along_low, along), max(entry.along_high, along)
+        entry.across_low, entry.across_high = min(entry.across_low, across), max(entry.across_high, across)
+
+
+# --- Where a body is on a lane, and which lane is closest to it: exactly `TownNetwork.get_closest_lane_in ------------
+
+TURN = 2.0 * math.pi
+
+
+@inlined
+def wrapped(angle: float) -> float:
+    """The same angle in [-pi, pi) [rad], as `highway_env.utils.wrap_to_pi` gives it."""
+    turned = angle + math.pi
+    # a remainder takes longer than all the rest, and within two turns a sum is the same to the last bit
+    if turned < 0.0:
+        turned = turned + TURN if turned > -TURN else turned % TURN
+    elif turned >= TURN:
+        turned = turned - TURN if turned < 2.0 * TURN else turned % TURN
+    return turned - math.pi
+
+
+@inlined
+def value_near(points: Array, lane: Records, segment: int, column: int, station: float) -> float:
+    """A column of a lane's points at a station, linear between them: `polyline.value_at`, searched from a segment."""
+    k, last = segment, lane.last
+    if station <= 0.0:
+        return float(points[lane.first, column])
+    if station >= points[last, 2]:
+        return float(points[last, column])
+    k = min(k, last - 1)
+    while points[k + 1, 2] <= station:
+        k += 1
+    while points[k, 2] > station:
+        k -= 1
+    t = (station - points[k, 2]) / (points[k + 1, 2] - points[k, 2])
+    return float(points[k, column] + t * (points[k + 1, column] - points[k, column]))
+
+
+@inlined
+def closest_segment(points: Array, first: int, last: int, x: float, y: float) -> tuple[int, float, float]:
+    """Closest segment of some (the first one of several), its share up to the closest place, and the distance^2 [m]."""
+    best, at, share = math.inf, first, 0.0
+    ax, ay = points[first, 0], points[first, 1]
+    for k in range(first, last + 1):
+        bx, by = points[k + 1, 0], points[k + 1, 1]
+        dx, dy = bx - ax, by - ay
+        t = ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)
+        t = min(max(t, 0.0), 1.0)
+        ex, ey = x - (ax + t * dx), y - (ay + t * dy)
+        gap = ex * ex + ey * ey
+        if gap < best:
+            best, at, share = gap, k, t
+        ax, ay = bx, by
+    return at, share, best
+
+
+@inlined
+def coordinates(
+    points: Array, lane: Records, at: int, share: float, gap: float, x: float, y: float
+) -> tuple[float, float]:
+    """Station and lateral distance [m] by the closest segment: `polyline.local_coordinates`."""
+    if at == lane.first and share == 0.0:
+        rx, ry = x - points[at, 0], y - points[at, 1]
+        along = rx * lane.cos_first + ry * lane.sin_first
+        if along < 0.0:
+            return along, ry * lane.cos_first - rx * lane.sin_first
+    if at == lane.last - 1 and share == 1.0:
+        rx, ry = x - points[at + 1, 0], y - points[at + 1, 1]
+        along = rx * lane.cos_last + ry * lane.sin_last
+        if along > 0.0:
+            return points[at + 1, 2] + along, ry * lane.cos_last - rx * lane.sin_last
+    dx, dy = points[at + 1, 0] - points[at, 0], points[at + 1, 1] - points[at, 1]
+    side = dx * (y - points[at, 1]) - dy * (x - points[at, 0])
+    lateral = math.sqrt(gap)
+    station = points[at, 2] + share * (points[at + 1, 2] - points[at, 2])
+    return station, lateral if side >= 0.0 else -lateral
+
+
+@inlined
+def project(town: TownArrays, number: int, x: float, y: float) -> tuple[float, float, int]:
+    """Station, lateral distance [m] and closest segment of a place on a lane."""
+    lane = town.lanes[number]
+    first, last = lane.first, lane.last - 1
+    if last - first > 3:
+        column, row = (x - town.origin[0]) / CELL, (y - town.origin[1]) / CELL
+        if 0.0 <= column < town.cells.shape[1] and 0.0 <= row < town.cells.shape[0]:
+            i, j = int(row), int(column)
+            for e in range(town.cells[i, j, 0], town.cells[i, j, 1]):
+                entry = town.entries[e]
+                if entry.lane == number:
+                    first, last = entry.first, entry.last
+                    break
+    at, share, gap = closest_segment(town.points, first, last, x, y)
+    station, lateral = coordinates(town.points, lane, at, share, gap, x, y)
+    return station, lateral, at
+
+
+@inlined
+def cost(points: Array, lane: Records, at: int, station: float, lateral: float, heading: float) -> float:
+    """highway-env's distance to a lane with heading: |lateral| + overshoot [m] + difference of heading [rad]."""
+    found = abs(lateral) + max(station - points[lane.last, 2], 0.0) + max(0.0 - station, 0.0)
+    return float(found + abs(wrapped(heading - value_near(points, lane, at, 3, station))))
+
+
+@inlined
+def is_level(town: TownArrays, lane: Records, at: int, station: float, height: float) -> bool:
+    """Whether a lane is at about a height where it is closest."""
+    if town.flat or math.isnan(height):
+        return True
+    return abs(value_near(town.points, lane, at, 4, station) - height) <= SAME_LEVEL
+
+
+@inlined
+def closest_lane(
+    town: TownArrays, x: float, y: float, heading: float, cos: float, sin: float, height: float, previous: int
+) -> tuple[int, float, float, int]:
+    """The closest lane of a place and heading.
+
+    Args:
+        town: arrays of the town.
+        x: position [m].
+        y: position [m].
+        heading: [rad], `cos` and `sin` its cosine and sine.
+        cos: see there.
+        sin: see there.
+        height: [m], NaN for any.
+        previous: lane that was closest before, looked at first; any lane does.
+
+    Returns:
+        The lane, and station [m], lateral distance [m] and closest segment on it.
+    """
+    found, best, rank = NOBODY, math.inf, 0
+    station, lateral, segment = 0.0, 0.0, 0
+    column, row = (x - town.origin[0]) / CELL, (y - town.origin[1]) / CELL
+    if 0.0 <= column < town.cells.shape[1] and 0.0 <= row < town.cells.shape[0]:
+        i, j = int(row), int(column)
+        begin, end = town.cells[i, j, 0], town.cells[i, j, 1]
+        seed = begin
+        for e in range(begin, end):
+            if town.entries[e].lane == previous:
+                seed = e
+                break
+        for turn in range(begin - 1, end if end > begin else begin - 1):
+            e = seed if turn < begin else turn
+            if turn == seed:
+                continue
+            entry = town.entries[e]
+            if _is_out_of_question(entry, x, y, cos, sin, best):
+                continue
+            at, share, gap = closest_segment(town.points, entry.first, entry.last, x, y)
+            if gap > (best + SLACK) * (best + SLACK):
+                continue
+            lane = town.lanes[entry.lane]
+            s, r = coordinates(town.points, lane, at, share, gap, x, y)
+            c = cost(town.points, lane, at, s, r, heading)
+            if (c < best or (c == best and lane.rank < rank)) and is_level(town, lane, at, s, height):
+                found, best, rank, station, lateral, segment = entry.lane, c, lane.rank, s, r, at
+        if best < REACH - SLACK:
+            return found, station, lateral, segment
+    return _closest_of_all(town, x, y, heading, height)
+
+
+@inlined
+def _is_out_of_question(entry: Records, x: float, y: float, cos: float, sin: float, best: float) -> bool:
+    """Whether a lane runs another way than a body, or lies farther away, than the best lane is off."""
+    if best <= TURNED and entry.cos * cos + entry.sin * sin < entry.limit:
+        return True
+    across = y * entry.cos - x * entry.sin
+    if across < entry.across_low - best - SLACK or across > entry.across_high + best + SLACK:
+        return True
+    along = x * entry.cos + y * entry.sin
+    return bool(along < entry.along_low - best - SLACK or along > entry.along_high + best + SLACK)
+
+
+@compiled
+def _closest_of_all(
+    town: TownArrays, x: float, y: float, heading: float, height: float
+) -> tuple[int, float, float, int]:
+    """As `closest_lane`, by looking at every lane whose bounding box is near enough."""
+    found, best, rank = NOBODY, math.inf, 0
+    station, lateral, segment = 0.0, 0.0, 0
+    for number in range(len(town.lanes)):
+        lane = town.lanes[number]
+        dx = max(lane.left_edge - x, x - lane.right_edge, 0.0)
+        dy = max(lane.low_edge - y, y - lane.high_edge, 0.0)
+        if math.sqrt(dx * dx + dy * dy) * (1.0 - 1e-9) - SLACK > best:
+            continue
+        at, share, gap = closest_segment(town.points, lane.first, lane.last - 1, x, y)
+        s, r = coordinates(town.points, lane, at, share, gap, x, y)
+        c = cost(town.points, lane, at, s, r, heading)
+        if (c < best or (c == best and lane.rank < rank)) and is_level(town, lane, at, s, height):
+            found, best, rank, station, lateral, segment = number, c, lane.rank, s, r, at
+    if found == NOBODY:
+        if math.isnan(height):
+            raise ValueError("a body is nowhere: its position or heading is not a number")
+        return _closest_of_all(town, x, y, heading, math.nan)  # no lane at this height in the whole town
+    return found, station, lateral, segment

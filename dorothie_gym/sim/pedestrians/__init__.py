@@ -1,0 +1,1 @@
+"""Pedestrians on pavements, crosswalks and streets without pavements."""

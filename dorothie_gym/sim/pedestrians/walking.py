@@ -1,0 +1,278 @@
+"""People on foot: they walk along footways, round corners, and now and then over a road.
+
+They walk towards a place a little ahead on their way, past one another, and keep their distance from everything.
+Everybody decides anew every `PACE` substeps, in turns, and walks straight on in between.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.sim.pedestrians.footways import ASIDE, enter_next, find_segment, locate, place_beside, side_kept
+from dorothie_gym.sim.pedestrians.jaywalking import steps_out, stray
+from dorothie_gym.sim.pedestrians.pacing import AHEAD, LEVEL, PATIENCE, note_progress, walk_towards
+from dorothie_gym.sim.randomness import draw
+from dorothie_gym.sim.state.records import NOBODY, Colour, Footway, Kind, Records, Walk
+from dorothie_gym.sim.traffic.junctions import light
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.world_arrays import WorldArrays
+
+
+REACTION = 1.0
+"""People count on drivers to brake after this time [s] ..."""
+
+BRAKING = 3.0
+"""... no harder than this [m/s^2] ..."""
+
+ROOM = 4.0
+"""... and to stop this far before the crosswalk's middle line at the latest, measured from the front [m]."""
+
+STANDING = 0.3
+"""Slower than this a vehicle stands [m/s]."""
+
+VEHICLES_SIGHT = 60.0
+"""How far people look for those who drive [m]."""
+
+CROSSING_SHARE = 0.35
+"""How often somebody who passes a crosswalk wants to cross."""
+
+GIVES_UP = 40.0
+"""Who has not been able to cross for this long walks on [s]."""
+
+REST = 5.0
+"""Who leaves a crosswalk wants to cross none for this long [s]."""
+
+PLACES, PLACES_APART = 3, 0.7
+"""People wait beside one another in so many places, this far apart [m] ..."""
+
+FROM_KERB = 0.9
+"""... this far from the kerb [m] ..."""
+
+FROM_PAINT = 2.0
+"""... and no further than this beside the middle of the paint [m]."""
+
+READY = 1.0
+"""Who waits steps onto the crosswalk from this close to its place [m]."""
+
+HALF_DEPTH = 1.5
+"""Half of what a crosswalk measures along the road [m]."""
+
+OVER = 0.1
+"""Who is this close to the end of a crosswalk has crossed [m]."""
+
+
+@inlined
+def comes_to_crosswalk(town: TownArrays, walker: Records, way: Records, time: float) -> bool:
+    """Whether one stops at a crosswalk that is passed within some time [s], to wait there."""
+    step = walker.pace * time
+    for m in range(way.mouth, way.mouth + way.mouths):
+        mouth = town.mouths[m]
+        left = (mouth.station - walker.station) * walker.direction
+        if 0.0 <= left < step and draw(walker) < CROSSING_SHARE:
+            walker.state, walker.crossing, walker.mouth = Walk.WAITING, mouth.crossing, mouth.end
+            walker.direction = 1.0 if mouth.end == 0 else -1.0
+            walker.waited, walker.speed = 0.0, 0.0
+            return True
+    return False
+
+
+@inlined
+def wait(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
+    """Stands at the kerb until one may step onto the crosswalk, or goes on when that takes too long.
+
+    That is where the pavement ends, also beside the paint, if not too far from it: further on cars that turn cut the
+    corner.
+    """
+    walker = world.pedestrians[p]
+    crossing = town.crossings[walker.crossing]
+    walker.waited += time
+    cos, sin = walker.direction * crossing.cos, walker.direction * crossing.sin
+    inward = max(town.walks[walker.walk].half_width - FROM_KERB, 0.0)
+    beside = (p % PLACES - (PLACES - 1) // 2) * PLACES_APART
+    x, y, _, _ = place_beside(town, walker, crossing.station[walker.mouth], 0.0)
+    aside = (y - crossing.y[0]) * crossing.cos - (x - crossing.x[0]) * crossing.sin
+    far = aside - min(max(aside, -FROM_PAINT), FROM_PAINT)
+    x += far * crossing.sin + inward * cos - beside * sin
+    y += -far * crossing.cos + inward * sin + beside * cos
+    walk_towards(world, p, x, y, cos, sin, 0.0, math.inf, time)
+    if abs(walker.x - x) > READY or abs(walker.y - y) > READY:
+        ready = False
+    else:
+        ready = _may_step(town, world, crossing, (FROM_PAINT + crossing.length + AHEAD) / walker.pace)
+    if ready:
+        walker.state, walker.waited, walker.speed = Walk.CROSSING, 0.0, 0.0
+        _advance(crossing, walker)
+    elif walker.waited > GIVES_UP:
+        _leave(town, walker)
+
+
+@inlined
+def cross(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
+    """Walks over a crosswalk; back again if a vehicle does not leave the way."""
+    walker = world.pedestrians[p]
+    crossing = town.crossings[walker.crossing]
+    lateral = _advance(crossing, walker)
+    if crossing.length - walker.station < OVER if walker.direction > 0.0 else walker.station < OVER:
+        walker.mouth = 1 if walker.direction > 0.0 else 0
+        _leave(town, walker)
+        return
+    cos, sin = walker.direction * crossing.cos, walker.direction * crossing.sin
+    ahead = walker.station + walker.direction * AHEAD
+    x = crossing.x[0] + ahead * crossing.cos - ASIDE * sin
+    y = crossing.y[0] + ahead * crossing.sin + ASIDE * cos
+    if walk_towards(world, p, x, y, cos, sin, walker.direction * lateral, HALF_DEPTH, time):
+        walker.waited = 0.0
+        return
+    walker.waited += time
+    if walker.waited > PATIENCE:
+        walker.direction, walker.waited = -walker.direction, 0.0
+
+
+@inlined
+def _advance(crossing: Records, walker: Records) -> float:
+    """Finds out how far along a crosswalk somebody is; returns how far to the right of its line [m]."""
+    dx, dy = walker.x - crossing.x[0], walker.y - crossing.y[0]
+    walker.station = dx * crossing.cos + dy * crossing.sin
+    walker.height = crossing.height
+    return float(dy * crossing.cos - dx * crossing.sin)
+
+
+@inlined
+def _leave(town: TownArrays, walker: Records) -> None:
+    """Walks on along the pavement where one has been waiting, or come to."""
+    crossing = town.crossings[walker.crossing]
+    walker.walk, walker.station = crossing.walk[walker.mouth], crossing.station[walker.mouth]
+    find_segment(town, walker)
+    walker.direction = 1.0 if draw(walker) < 0.5 else -1.0
+    walker.state, walker.crossing, walker.waited, walker.speed = Walk.WALKING, NOBODY, -REST, 0.0
+
+
+@compiled
+def _may_step(town: TownArrays, world: WorldArrays, crossing: Records, time: float) -> bool:
+    """Whether one may step onto a crosswalk that takes some time to cross [s].
+
+    Not while a lane with a light leads onto it whose light is not red, or will not be until one is across; nor while
+    somebody drives towards it who could not stop with ease, or stands on it.
+    """
+    now = world.clock[0].time
+    for k in range(crossing.light, crossing.light + crossing.lights):
+        lane = town.neighbours[k]
+        for share in range(3):
+            if light(town, world, lane, now + 0.5 * share * time) != Colour.RED:
+                return False
+    for i in range(len(world.vehicles)):
+        vehicle = world.vehicles[i]
+        if vehicle.kind != Kind.EMPTY and _is_danger(vehicle, crossing):
+            return False
+    return True
+
+
+@inlined
+def _is_danger(vehicle: Records, crossing: Records) -> bool:
+    """Whether a vehicle is on a crosswalk, or comes towards it too fast to stop with ease."""
+    dx, dy = vehicle.x - crossing.x[0], vehicle.y - crossing.y[0]
+    along = min(max(dx * crossing.cos + dy * crossing.sin, 0.0), crossing.length)
+    dx, dy = crossing.x[0] + along * crossing.cos - vehicle.x, crossing.y[0] + along * crossing.sin - vehicle.y
+    away = dx * dx + dy * dy
+    if away > VEHICLES_SIGHT * VEHICLES_SIGHT or abs(vehicle.height - crossing.height) > LEVEL:
+        return False
+    front = math.sqrt(away) - 0.5 * vehicle.length
+    if front < HALF_DEPTH:
+        return True
+    if vehicle.speed < STANDING or (dx * vehicle.cos + dy * vehicle.sin < 0.0 and front > ROOM):
+        return False  # it stands before it, or has passed
+    return bool(front < ROOM + REACTION * vehicle.speed + vehicle.speed * vehicle.speed / (2.0 * BRAKING))
+
+
+# --- People on foot: they walk along footways, round corners, and now and then over a road ---------------------------
+
+PACE = 5
+"""Substeps between two decisions of a pedestrian."""
+
+BLOCKED = 3.0
+"""Who has been kept from walking on for this long turns round [s]."""
+
+CORNER = 0.5
+"""One turns the corner this far before the end of a footway [m]."""
+
+
+@inlined
+def walk(town: TownArrays, world: WorldArrays, dt: float) -> None:
+    """Moves all pedestrians on by `dt` [s], and counts who is on which crosswalk, and who strays."""
+    clock, busy = world.clock[0], world.busy
+    clock.straying = 0
+    for c in range(len(busy)):
+        busy[c] = 0
+    for p in range(len(world.pedestrians)):
+        walker = world.pedestrians[p]
+        if walker.state == Walk.EMPTY:
+            continue
+        if not walker.crashed:
+            if (clock.frame + p) % PACE == 0:
+                _decide(town, world, p, PACE * dt)
+            if walker.speed > 0.0:
+                step = walker.speed * dt
+                walker.x += walker.cos * step
+                walker.y += walker.sin * step
+                walker.odometer += step
+        if walker.state == Walk.CROSSING:
+            busy[walker.crossing] += 1
+        elif walker.state == Walk.STRAYING:
+            clock.straying += 1
+
+
+@compiled
+def _decide(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
+    """What a pedestrian does for some time [s]."""
+    walker = world.pedestrians[p]
+    note_progress(walker, time)
+    if walker.state == Walk.WALKING:
+        _stroll(town, world, p, time)
+    elif walker.state == Walk.WAITING:
+        wait(town, world, p, time)
+    elif walker.state == Walk.CROSSING:
+        cross(town, world, p, time)
+    else:
+        stray(town, world, p, time)
+
+
+@inlined
+def _stroll(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
+    """Walks along a footway, and onto the next one or back at its end."""
+    walker = world.pedestrians[p]
+    lateral = locate(town, walker)
+    way = town.walks[walker.walk]
+    if walker.station > way.length - CORNER if walker.direction > 0.0 else walker.station < CORNER:
+        enter_next(town, walker)
+        lateral = locate(town, walker)
+        way = town.walks[walker.walk]
+    if way.kind == Footway.STREET:
+        if steps_out(town, world, walker, time):
+            return
+    elif walker.waited >= 0.0 and comes_to_crosswalk(town, walker, way, time):
+        return
+    x, y, cos, sin = place_beside(town, walker, walker.station + walker.direction * AHEAD, side_kept(way))
+    if walk_towards(world, p, x, y, cos, sin, walker.direction * lateral, way.half_width, time):
+        walker.waited = min(walker.waited + time, 0.0)
+        return
+    walker.waited += time
+    if walker.waited > BLOCKED:
+        walker.direction, walker.waited = -walker.direction, 0.0
+
+
+@compiled
+def place_walker(town: TownArrays, walker: Records) -> None:
+    """Puts a pedestrian where its footway and station say, with nothing of its past but its random numbers."""
+    walker.state, walker.crossing, walker.crashed, walker.mouth = Walk.WALKING, NOBODY, False, 0
+    walker.waited, walker.staying, walker.crash_age, walker.far = 0.0, 0.0, 0.0, 0.0
+    way = town.walks[walker.walk]
+    find_segment(town, walker)
+    walker.x, walker.y, walker.cos, walker.sin = place_beside(town, walker, walker.station, side_kept(way))
+    locate(town, walker)
+    walker.heading = math.atan2(walker.sin, walker.cos)
+    walker.left_x, walker.left_y = walker.x, walker.y
+    walker.speed = 0.0

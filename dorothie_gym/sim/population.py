@@ -1,0 +1,326 @@
+"""Bodies that come to a world and leave it, while it goes on."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from dorothie_gym.maps.lane_neighbours import rightmost
+from dorothie_gym.maps.model import Town
+from dorothie_gym.ontology import PropKind
+from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.pedestrians.footways import closest_walk, place_beside
+from dorothie_gym.sim.pedestrians.pacing import KERB, WALKING_SPEED
+from dorothie_gym.sim.pedestrians.walking import place_walker
+from dorothie_gym.sim.state.records import NOBODY, PEDESTRIAN, Footway, Kind, Records, Walk
+from dorothie_gym.sim.state.town_arrays import TownArrays
+from dorothie_gym.sim.state.world_arrays import CAR_KEY, WorldArrays
+from dorothie_gym.sim.traffic.lane_index import rebuild
+from dorothie_gym.sim.traffic.parameters import (
+    CAR_LENGTH,
+    CAR_WIDTH,
+    CLEAR_OF_CAR,
+    CLEAR_OF_WALKER,
+    CYCLIST_LENGTH,
+    CYCLIST_SHARE,
+    CYCLIST_SPEEDS,
+    CYCLIST_WIDTH,
+)
+from dorothie_gym.sim.traffic.respawn import is_clear_of_people, is_free, new_key, put_on_lane
+
+BESIDE = 1.0
+"""A way beside a street is walked on where it is this close [m]."""
+
+PROP_LEVEL = 2.0
+"""A prop is on the lanes of about its own height [m]."""
+
+
+def add_vehicle(
+    town: TownArrays, world: WorldArrays, lane: int, station: float, *, kind: Kind = Kind.CAR, desired: float
+) -> int:
+    """Puts a vehicle on a lane, in the first place that is empty.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world.
+        lane: id of the lane.
+        station: along it [m].
+        kind: what it is.
+        desired: speed that it likes [m/s].
+
+    Returns:
+        Its number.
+
+    Raises:
+        ValueError: the world has no room for another one.
+    """
+    empty = np.flatnonzero(world.vehicles.kind == Kind.EMPTY)
+    if not len(empty):
+        raise ValueError(f"the world has room for {len(world.vehicles)} vehicles, and all are there")
+    number = int(empty[0])
+    vehicle = world.vehicles[number]
+    vehicle.kind, vehicle.key, vehicle.touched, vehicle.odometer = kind, new_key(world), False, 0.0
+    vehicle.random = _random(world, int(vehicle.key))
+    vehicle.length, vehicle.width, vehicle.desired, vehicle.to_right = CAR_LENGTH, CAR_WIDTH, desired, 0.0
+    if kind is Kind.CYCLIST:
+        vehicle.length, vehicle.width = CYCLIST_LENGTH, CYCLIST_WIDTH
+        vehicle.desired = min(max(desired, CYCLIST_SPEEDS[0]), CYCLIST_SPEEDS[1])
+    vehicle.radius = 0.5 * math.hypot(vehicle.length, vehicle.width)
+    put_on_lane(town, vehicle, lane, float(station))
+    rebuild(town, world)
+    return number
+
+
+def add_car(town: TownArrays, world: WorldArrays, lane: int, station: float) -> None:
+    """Puts the session's car on a lane, as vehicle 0 of a world that was made for it (`driven`).
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world, with nobody in it yet.
+        lane: id of the lane.
+        station: along it [m].
+    """
+    add_vehicle(town, world, lane, station, kind=Kind.DRIVEN, desired=0.0)
+    world.vehicles[0].key = CAR_KEY
+
+
+def remove_vehicle(town: TownArrays, world: WorldArrays, number: int) -> None:
+    """Takes a vehicle away; its place is empty, and the others keep theirs."""
+    world.vehicles[number].kind = Kind.EMPTY
+    rebuild(town, world)
+
+
+def add_pedestrian(town: TownArrays, world: WorldArrays, walk: int, station: float, *, pace: float) -> int:
+    """Puts a pedestrian on a footway, in the first place that is empty.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world.
+        walk: number of the footway; a pavement has its id in the town.
+        station: along it [m].
+        pace: speed that it likes [m/s].
+
+    Returns:
+        Its number.
+
+    Raises:
+        ValueError: the world has no room for another one, or there is no such footway.
+    """
+    empty = np.flatnonzero(world.pedestrians.state == Walk.EMPTY)
+    if not len(empty):
+        raise ValueError(f"the world has room for {len(world.pedestrians)} pedestrians, and all are there")
+    if not 0 <= walk < len(town.walks) or town.walks[walk].length <= 0.0:
+        raise ValueError(f"there is no footway {walk} in this town")
+    number = int(empty[0])
+    walker = world.pedestrians[number]
+    walker.key, walker.odometer = new_key(world), 0.0
+    walker.random = _random(world, int(walker.key))
+    walker.walk, walker.station, walker.pace = walk, station, pace
+    walker.direction = 1.0 if walker.random & 2 else -1.0
+    place_walker(town, walker)
+    return number
+
+
+def add_street_walker(
+    network: TownNetwork, town: TownArrays, world: WorldArrays, lane: int, station: float
+) -> int | None:  # fmt: skip
+    """Puts a pedestrian beside a lane, or to the right of those beside it.
+
+    Such pedestrians keep to the street where they are, and cross it anywhere but near junctions.
+
+    Args:
+        network: of the town.
+        town: its arrays.
+        world: arrays of the world.
+        lane: id of the lane.
+        station: along it [m].
+
+    Returns:
+        Its number; None if nobody may walk there, if somebody or the car is there already, or if the world has room
+        for nobody else.
+    """
+    beside = network.town.lanes[rightmost(network.town, lane)]
+    station = min(station, beside.length)
+    x, y = (float(value) for value in beside.position(station, beside.width_at(station) / 2 + KERB))
+    walk, at, _ = closest_walk(town, Footway.STREET, x, y, BESIDE)
+    if walk < 0 or town.walks[walk].lane != beside.id or not is_clear_of_people(world, x, y, NOBODY, CLEAR_OF_WALKER):
+        return None
+    if (world.pedestrians.state != Walk.EMPTY).all():
+        return None
+    return add_pedestrian(town, world, walk, at, pace=WALKING_SPEED)
+
+
+def remove_pedestrian(world: WorldArrays, number: int) -> None:
+    """Takes a pedestrian away; the place is empty, and the others keep theirs."""
+    walker = world.pedestrians[number]
+    walker.state, walker.crashed, walker.crash_age, walker.speed = Walk.EMPTY, False, 0.0, 0.0
+
+
+def add_prop(
+    network: TownNetwork, town: TownArrays, world: WorldArrays, kind: PropKind, lane: int, station: float
+) -> int:
+    """Puts a prop on a lane, where it stands across it.
+
+    Args:
+        network: of the town.
+        town: its arrays.
+        world: arrays of the world.
+        kind: what it is.
+        lane: id of the lane.
+        station: along it [m].
+
+    Returns:
+        Its number.
+
+    Raises:
+        ValueError: the world has no room for another one.
+    """
+    empty = np.flatnonzero(~world.props.present)
+    if not len(empty):
+        raise ValueError(f"the world has room for {len(world.props)} props, and all are there")
+    number = int(empty[0])
+    prop = world.props[number]
+    prop.length, prop.width = kind.length, kind.width
+    prop.radius = 0.5 * math.hypot(kind.length, kind.width)
+    prop.present, prop.key = True, new_key(world)
+    move_prop(network, town, world, number, lane, station)
+    return number
+
+
+def move_prop(
+    network: TownNetwork, town: TownArrays, world: WorldArrays, number: int, lane: int, station: float
+) -> None:  # fmt: skip
+    """Puts a prop on another place, where it stands across a lane; it keeps its key.
+
+    Args:
+        network: of the town.
+        town: its arrays.
+        world: arrays of the world.
+        number: of the prop.
+        lane: id of the lane.
+        station: along it [m].
+    """
+    prop, town_lane = world.props[number], network.town.lanes[lane]
+    prop.x, prop.y = town_lane.position(station)
+    prop.heading, prop.height = town_lane.heading_at(station), town_lane.height_at(station)
+    prop.cos, prop.sin = math.cos(prop.heading), math.sin(prop.heading)
+    prop.lane = NOBODY
+    prop.lane[0], prop.station[0] = lane, station
+    others = [place for place in _reached(network, town, prop) if place[0] != lane]
+    for k, (reached, at) in enumerate(others[: len(prop.lane) - 1], start=1):
+        prop.lane[k], prop.station[k] = reached, at
+    rebuild(town, world)
+
+
+def remove_prop(town: TownArrays, world: WorldArrays, number: int) -> None:
+    """Takes a prop away."""
+    world.props[number].present = False
+    rebuild(town, world)
+
+
+def _reached(network: TownNetwork, town: TownArrays, prop: Records) -> list[tuple[int, float]]:
+    """Lanes on which a vehicle would touch a prop, the closest first, and where [m]."""
+    found = []
+    half = 0.5 * max(prop.width, prop.length) + 0.5 * CAR_WIDTH
+    lanes = town.lanes
+    near = (lanes.left_edge < prop.x + half) & (lanes.right_edge > prop.x - half)
+    near &= (lanes.low_edge < prop.y + half) & (lanes.high_edge > prop.y - half)
+    for number in np.flatnonzero(near):
+        lane = network.town.lanes[number]
+        station, lateral = network.lane_of(lane.id).local_coordinates(np.array([prop.x, prop.y]))
+        level = abs(lane.height_at(station) - prop.height) < PROP_LEVEL
+        if abs(lateral) < half and 0.0 <= station <= lane.length and level:
+            found.append((abs(lateral), lane.id, station))
+    return [(lane, station) for _, lane, station in sorted(found)]
+
+
+def _random(world: WorldArrays, key: int) -> int:
+    """What the random numbers of a body begin with: a matter of the world's seed and the body's key alone."""
+    return int(np.random.SeedSequence((int(world.clock[0].random), key)).generate_state(1)[0]) | 1
+
+
+# --- Where vehicles may appear ---------------------------------------------------------------------------------------
+
+
+def free_places(town: Town, rng: np.random.Generator, count: int) -> list[tuple[int, float]]:
+    """Places on lanes outside junctions, drawn evenly along the road, candidates for spawning."""
+    lanes = [lane for lane in town.lanes if not lane.in_junction and lane.length > 12.0]
+    weights = np.array([lane.length for lane in lanes])
+    chosen = rng.choice(len(lanes), size=count, p=weights / weights.sum())
+    shares = rng.uniform(size=count)
+    return [
+        (lanes[int(i)].id, float(5.0 + share * (lanes[int(i)].length - 10.0)))
+        for i, share in zip(chosen, shares, strict=True)
+    ]
+
+
+# --- Traffic and people for an empty town ----------------------------------------------------------------------------
+
+SPEEDS = 6.5, 10.0
+"""Range of the speeds that drivers like [m/s]."""
+
+PACES = 1.1, 1.6
+"""Range of the speeds that pedestrians like [m/s] (Knoblauch et al. 1996 measured 1.2 to 1.5 at crosswalks)."""
+
+TRIES = 40
+"""Places that are drawn for each vehicle and each pedestrian."""
+
+
+def populate(
+    network: TownNetwork, town: TownArrays, world: WorldArrays, *, seed: int, vehicles: int, pedestrians: int,
+    cyclists: float = CYCLIST_SHARE,
+) -> None:  # fmt: skip
+    """Brings traffic and pedestrians to random places, as many as fit; none of them close to the car.
+
+    Args:
+        network: of the town.
+        town: its arrays.
+        world: arrays of the world; a car, if there is one, is the first of its vehicles.
+        seed: of the places and of what everybody likes.
+        vehicles: how many, cyclists included.
+        pedestrians: how many; on pavements, or in a town without them beside the streets.
+        cyclists: share of the vehicles; they ride to the right on slow roads.
+    """
+    rng = np.random.default_rng(seed)
+    _add_traffic(network, town, world, rng, vehicles, cyclists)
+    _add_people(town, world, rng, pedestrians)
+
+
+def _add_traffic(
+    network: TownNetwork, town: TownArrays, world: WorldArrays, rng: np.random.Generator, vehicles: int, cyclists: float
+) -> None:
+    room = min(vehicles, int((world.vehicles.kind == Kind.EMPTY).sum()))
+    rideable = town.lanes.cycling & (town.lanes.right < 0) & (town.lanes.junction < 0)
+    kinds = np.where(rng.random(room) < cyclists * rideable.any(), Kind.CYCLIST, Kind.CAR)
+    count = 0
+    for lane, station in free_places(network.town, rng, TRIES * vehicles):
+        if count == room:
+            return
+        kind = Kind(kinds[count])
+        if kind is Kind.CYCLIST and not rideable[lane]:
+            continue
+        if is_free(town, world, lane, station, int(NOBODY), CLEAR_OF_CAR):
+            speeds = CYCLIST_SPEEDS if kind is Kind.CYCLIST else SPEEDS
+            add_vehicle(town, world, lane, station, kind=kind, desired=float(rng.uniform(*speeds)))
+            count += 1
+
+
+def _add_people(town: TownArrays, world: WorldArrays, rng: np.random.Generator, pedestrians: int) -> None:
+    lengths = np.where(town.walks.kind == Footway.PAVEMENT, town.walks.length, 0.0)
+    if not lengths.any():
+        lengths = np.where(town.walks.kind == Footway.STREET, town.walks.length, 0.0)
+    room = min(pedestrians, int((world.pedestrians.state == Walk.EMPTY).sum()))
+    if room == 0 or not lengths.any():
+        return
+    count = 0
+    place = np.zeros(1, dtype=PEDESTRIAN).view(np.recarray)[0]
+    place.direction = 1.0
+    for walk in rng.choice(len(lengths), size=TRIES * room, p=lengths / lengths.sum()):
+        if count == room:
+            return
+        place.walk, place.station = walk, rng.uniform(0.0, lengths[walk])
+        x, y, _, _ = place_beside(town, place, float(place.station), 0.0)
+        if is_clear_of_people(world, x, y, int(NOBODY), CLEAR_OF_WALKER):
+            add_pedestrian(town, world, int(walk), float(place.station), pace=float(rng.uniform(*PACES)))
+            count += 1

@@ -1,0 +1,26 @@
+"""Random numbers whose state lives in an array, the same in every process: Marsaglia's xorshift32 (2003)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dorothie_gym.compilation import compiled
+
+MASK = 0xFFFFFFFF
+
+
+@compiled
+def draw(body: Any) -> float:
+    """A number in [0, 1); moves the field `random` of a body on, which is never 0."""
+    state = int(body.random)
+    state ^= (state << 13) & MASK
+    state ^= state >> 17
+    state ^= (state << 5) & MASK
+    body.random = state
+    return state / 4294967296.0
+
+
+@compiled
+def choose(body: Any, count: int) -> int:
+    """A number of 0, 1, ... count - 1."""
+    return int(draw(body) * count)

@@ -1,0 +1,1 @@
+"""Sensing of the ego car: visibility, perception of actors, localization."""

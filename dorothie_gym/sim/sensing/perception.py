@@ -1,0 +1,54 @@
+"""The face of `kernel.seeing` for Python: whose eyes they are, and how well they see."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dorothie_gym.sim.sensing.seeing import detection_chance, errors_of_place
+from dorothie_gym.sim.sensing.visibility import Visibility
+from dorothie_gym.sim.state.records import Records
+
+
+class Perception:
+    """Sees bodies as well as visibility allows."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self._seed = int(rng.integers(1 << 63))
+        self._opened: tuple[Records, Visibility] | None = None
+
+    def open(self, eyes: Records, visibility: Visibility) -> bool:
+        """Lets eyes see as well as visibility allows now, with this one's errors.
+
+        Args:
+            eyes: `records.EYE` (1,), written.
+            visibility: air and light.
+
+        Returns:
+            Whether that was anything new.
+        """
+        if self._opened is not None and self._opened[0] is eyes and self._opened[1] is visibility:
+            return False
+        self._opened = eyes, visibility
+        view = visibility
+        eyes[0] = (
+            self._seed, view.sight, view.fog, view.fog_start, view.rain, view.light, view.lamps, view.clarity,
+            view.is_clear,
+        )  # fmt: skip
+        return True
+
+
+BODY = "key", "kind", "x", "y", "heading", "length", "width", "speed", "height"
+"""Columns of a table of what is seen."""
+
+
+def detection_probability(visibility: Visibility, distance: float) -> float:
+    """Chance that something at a distance [m] is perceived: 1 within sight, then falling with its signal."""
+    if distance <= visibility.sight:
+        return 1.0
+    return float(detection_chance(visibility.signal(distance)))
+
+
+def position_error(visibility: Visibility, distance: float) -> tuple[float, float]:
+    """Standard deviations of the place of something at a distance [m], away from the car and across [m]."""
+    away, aside = errors_of_place(visibility.gain(distance), distance * distance)
+    return float(away), float(aside)

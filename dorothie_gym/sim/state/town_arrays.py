@@ -1,0 +1,267 @@
+"""A town as the compiled loops read it: built once, shared by all worlds, never written to."""
+
+from __future__ import annotations
+
+import math
+import weakref
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.maps.model import Array, Lane, LinkType, SignalKind, Town
+from dorothie_gym.maps.polyline import LaneTable
+from dorothie_gym.maps.right_of_way import RightOfWay, right_of_way
+from dorothie_gym.sim.network.lane_lookup import build_cells
+from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.pedestrians.walkways import build_walkways
+from dorothie_gym.sim.state.records import LANE, NOBODY, PROGRAMME, SIBLING, Colour, Control, Records, Relation
+from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CURVE_ACCELERATION, CYCLIST_ROADS
+
+SIDE_BY_SIDE = 2.5
+"""Two vehicles whose middles are this far apart across their lanes pass one another [m]: they are 2 m wide."""
+
+CAR_REAR = CAR_LENGTH / 2
+"""From the middle of a car to its rear [m]."""
+
+LEVEL_TOWN = 2.0
+"""In a town whose lanes are no further apart in height than this, heights decide nothing [m]."""
+
+_CONTROLS = {
+    None: Control.NONE, SignalKind.TRAFFIC_LIGHT: Control.LIGHT,
+    SignalKind.STOP: Control.STOP, SignalKind.YIELD: Control.YIELD,
+}  # fmt: skip
+
+
+class TownArrays(NamedTuple):
+    """A town in arrays; lanes have the town's own ids.
+
+    Attributes:
+        points: (p, 6) x, y, station, heading, height, width of all points of centre lines, the network's own table.
+        lanes: `records.LANE`.
+        neighbours: int32 lists of lanes that follow and precede others, and of those whose lights one heeds on foot.
+        relations: uint8 rows of `records.Relation` of each connector to those of its junction.
+        siblings: `records.SIBLING`.
+        programmes: `records.PROGRAMME`.
+        phase_ends: ends of the phases within the cycle [s].
+        colours: uint8 `records.Colour` by programme, phase and light.
+        origin: (2,) corner of the cells [m].
+        cells: (rows, columns, 2) int32, see `cells.Cells`.
+        entries: `records.ENTRY`.
+        walk_points: (q, 6) points of the footways, as `points`; of those beside streets the last column tells how far
+            it is to the kerb across, 0 where nobody crosses [m].
+        walks: `records.WALKWAY`: the pavements with the town's own ids, the ways between their ends, the ways beside
+            the rightmost lanes.
+        mouths: `records.MOUTH`, those of a pavement in the order of their stations.
+        crossings: `records.CROSSING`.
+        passages: `records.PASSAGE`, those of a lane in the order of their stations.
+        junctions: (j, 3) middle [m] of each junction's connectors, and the radius in which they lie [m].
+        flat: whether all lanes are so level that heights need not be looked at.
+    """
+
+    points: Array
+    lanes: Records
+    neighbours: NDArray[np.int32]
+    relations: NDArray[np.uint8]
+    siblings: Records
+    programmes: Records
+    phase_ends: Array
+    colours: NDArray[np.uint8]
+    origin: Array
+    cells: NDArray[np.int32]
+    entries: Records
+    walk_points: Array
+    walks: Records
+    mouths: Records
+    crossings: Records
+    passages: Records
+    junctions: Array
+    flat: bool
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of all arrays [bytes]."""
+        return sum(array.nbytes for array in self if isinstance(array, np.ndarray))
+
+
+_built: weakref.WeakKeyDictionary[TownNetwork, TownArrays] = weakref.WeakKeyDictionary()
+
+
+def town_arrays(network: TownNetwork) -> TownArrays:
+    """The arrays of a town's network, built when they are asked for first."""
+    found = _built.get(network)
+    if found is None:
+        found = _built[network] = _build(network)
+    return found
+
+
+def _build(network: TownNetwork) -> TownArrays:
+    town = network.town
+    lanes = np.zeros(len(town.lanes), dtype=LANE).view(np.recarray)
+    for lane in town.lanes:
+        _describe(lanes[lane.id], lane, network.row(network.index_of(lane.id)), network.table)
+    neighbours = _link(town, lanes)
+    _find_cycling(lanes, neighbours)
+    relations = _relate(town, lanes, right_of_way(town))
+    siblings = _siblings(town, lanes)
+    programmes, phase_ends, colours = _lights(town, lanes)
+    cells = build_cells(network.table.points, lanes)
+    walkways = build_walkways(network, lanes)
+    walkways.crossings.light += len(neighbours)
+    neighbours = np.concatenate((neighbours, walkways.heeded))
+    low, high = network.height_range
+    return TownArrays(
+        network.table.points, lanes, neighbours, relations, siblings, programmes, phase_ends, colours,
+        cells.origin, cells.bounds, cells.entries,
+        walkways.points, walkways.walks, walkways.mouths, walkways.crossings, walkways.passages, _mouths(town, lanes),
+        bool(high - low < LEVEL_TOWN),
+    )  # fmt: skip
+
+
+def _describe(record: Records, lane: Lane, row: int, table: LaneTable) -> None:
+    record.length = float(table.points[table.offsets[row + 1] - 1, 2])
+    record.limit = lane.speed_limit
+    record.curve_speed = curve_speed(lane)
+    record.half_width = float(lane.widths.min()) / 2
+    record.cos_first, record.sin_first, record.cos_last, record.sin_last = table.ends[row]
+    record.left_edge, record.low_edge, record.right_edge, record.high_edge = table.boxes[row]
+    record.first, record.last = table.offsets[row], table.offsets[row + 1] - 1
+    record.rank = row
+    for name in ("left", "right", "junction", "exit", "programme", "place"):
+        record[name] = NOBODY
+
+
+def curve_speed(lane: Lane) -> float:
+    """Speed at which the tightest bend of a lane is driven, at most its limit [m/s].
+
+    A bend is taken over three stretches between points: the last one of a lane may be as short as a few centimetres.
+    """
+    turned, lengths = np.abs(np.diff(lane.headings)), np.diff(lane.stations)
+    window = np.ones(min(3, len(lengths)))
+    bends = np.convolve(turned, window, mode="valid") / np.convolve(lengths, window, mode="valid")
+    tightest = float(bends.max())
+    return min(lane.speed_limit, math.sqrt(CURVE_ACCELERATION / max(tightest, 1e-4)))
+
+
+def _link(town: Town, lanes: Records) -> NDArray[np.int32]:
+    pool: list[int] = []
+    for lane in town.lanes:
+        record = lanes[lane.id]
+        after = [link.target for link in town.successors(lane.id)]
+        before = list(town.predecessors(lane.id))
+        record.successor, record.successors = len(pool), len(after)
+        record.predecessor, record.predecessors = len(pool) + len(after), len(before)
+        pool += after + before
+        for name, side in (("left", LinkType.LANE_CHANGE_LEFT), ("right", LinkType.LANE_CHANGE_RIGHT)):
+            beside = town.neighbour(lane.id, side)
+            record[name] = NOBODY if beside is None else beside
+    return np.array(pool, dtype=np.int32)
+
+
+def _find_cycling(lanes: Records, neighbours: NDArray[np.int32]) -> None:
+    """Notes on which lanes cyclists ride: on slow ones, unless all ways on lead to faster ones, as from ramps."""
+    lanes.cycling = lanes.limit <= CYCLIST_ROADS
+    changed = True
+    while changed:
+        changed = False
+        for number in np.flatnonzero(lanes.cycling & (lanes.successors > 0)):
+            lane = lanes[number]
+            after = neighbours[lane.successor : lane.successor + lane.successors]
+            if not lanes.cycling[after].any():
+                lane.cycling, changed = False, True
+
+
+def _relate(town: Town, lanes: Records, rules: RightOfWay) -> NDArray[np.uint8]:
+    """Numbers the junctions and connectors, and says of each pair of one junction what they are to each other."""
+    rows: list[NDArray[np.uint8]] = []
+    begin = 0
+    numbers = {junction.id: k for k, junction in enumerate(town.junctions)}
+    members: dict[int, list[int]] = {}
+    for lane in town.lanes:
+        lanes[lane.id].control = _CONTROLS[rules.control(lane.id)]
+        if lane.in_junction:
+            members.setdefault(numbers.setdefault(lane.junction_id, len(numbers)), []).append(lane.id)
+    for junction, connectors in members.items():
+        place = {connector: k for k, connector in enumerate(connectors)}
+        for connector in connectors:
+            row = np.full(len(connectors), Relation.APART, dtype=np.uint8)
+            row[[place[foe] for foe in rules.foes(connector)]] = Relation.FOE
+            row[[place[foe] for foe in rules.waits_for(connector)]] = Relation.WAITS
+            record = lanes[connector]
+            record.junction, record.place, record.relation = junction, place[connector], begin
+            record.exit = _exit(town, connector)
+            rows.append(row)
+            begin += len(row)
+    return np.concatenate(rows) if rows else np.zeros(1, dtype=np.uint8)
+
+
+def _mouths(town: Town, lanes: Records) -> Array:
+    found = np.zeros((max(int(lanes.junction.max()) + 1, 1), 3))
+    for number in range(len(found)):
+        points = [lane.points[:, :2] for lane in town.lanes if lanes[lane.id].junction == number]
+        if points:
+            every = np.concatenate(points)
+            middle = (every.min(axis=0) + every.max(axis=0)) / 2
+            found[number] = *middle, float(np.sqrt(((every - middle) ** 2).sum(axis=1)).max())
+    return found
+
+
+def _exit(town: Town, connector: int) -> int:
+    seen = {connector}
+    lane = connector
+    while len(after := town.successors(lane)) == 1 and after[0].target not in seen:
+        lane = after[0].target
+        if not town.lanes[lane].in_junction:
+            return lane
+        seen.add(lane)
+    return int(NOBODY)
+
+
+def _siblings(town: Town, lanes: Records) -> Records:
+    """Lanes that begin on one lane: up to where each is in the way on the others."""
+    found: list[tuple[float, int]] = []
+    for lane in town.lanes:
+        beside = sorted(
+            {link.target for before in town.predecessors(lane.id) for link in town.successors(before)} - {lane.id}
+        )
+        lanes[lane.id].sibling, lanes[lane.id].siblings = len(found), len(beside)
+        found += [(_parting(lane, town.lanes[other]), other) for other in beside]
+    return np.array(found or [(0.0, 0)], dtype=SIBLING).view(np.recarray)
+
+
+def _parting(lane: Lane, other: Lane) -> float:
+    """Station on the other lane from which on it is clear of a lane that begins where it does [m]."""
+    for station in np.arange(0.0, other.length, 1.0):
+        if abs(lane.project(other.position(float(station)))[1]) > SIDE_BY_SIDE:
+            return float(station) + CAR_REAR
+    return other.length + CAR_REAR
+
+
+def _lights(town: Town, lanes: Records) -> tuple[Records, Array, NDArray[np.uint8]]:
+    programmes = np.zeros(max(len(town.programmes), 1), dtype=PROGRAMME).view(np.recarray)
+    ends: list[float] = []
+    colours: list[Sequence[int]] = []
+    begin = 0
+    slots: dict[int, tuple[int, int]] = {}
+    for k, programme in enumerate(town.programmes):
+        record = programmes[k]
+        record.offset, record.cycle = programme.offset, programme.cycle
+        record.phase, record.phases = len(ends), len(programme.phases)
+        record.colour, record.slots = begin, len(programme.signals)
+        total = 0.0
+        for phase in programme.phases:
+            total += phase.duration
+            ends.append(total)
+            shown = [
+                Colour.GREEN if signal in phase.green else Colour.YELLOW if signal in phase.yellow else Colour.RED
+                for signal in programme.signals
+            ]
+            colours.append(shown)
+            begin += len(shown)
+        slots.update({signal: (k, slot) for slot, signal in enumerate(programme.signals)})
+    for signal in town.signals:
+        for lane in signal.lanes if signal.id in slots else ():
+            lanes[lane].programme, lanes[lane].slot = slots[signal.id]
+    flat = np.concatenate([np.array(shown, dtype=np.uint8) for shown in colours] or [np.zeros(1, dtype=np.uint8)])
+    return programmes, np.array(ends or [0.0]), flat

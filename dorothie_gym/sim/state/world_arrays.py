@@ -1,0 +1,177 @@
+"""The state of one world as the compiled loops read and write it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.maps.model import Array
+from dorothie_gym.sim.state.records import (
+    CAR,
+    CLOCK,
+    EVENT,
+    EYE,
+    LAMP,
+    NOBODY,
+    NODE,
+    PEDESTRIAN,
+    POINT,
+    POSE,
+    PROP,
+    SEEN,
+    TRACE,
+    VEHICLE,
+    Records,
+)
+from dorothie_gym.sim.state.town_arrays import TownArrays
+from dorothie_gym.sim.traffic.lane_index import rebuild
+from dorothie_gym.sim.traffic.parameters import EVENTS, FRAMES, POINTS
+
+PROPS = 16
+"""Most props in a world."""
+
+CAR_KEY = 0
+"""Key of the session's car."""
+
+STACK = 32
+"""Most lanes that a search along lanes keeps in mind."""
+
+
+class WorldArrays(NamedTuple):
+    """A world in arrays; copying the arrays copies the world.
+
+    Attributes:
+        vehicles: `records.VEHICLE`.
+        pedestrians: `records.PEDESTRIAN`.
+        props: `records.PROP`.
+        nodes: `records.NODE`: two for each vehicle and four for each prop, in the lists of the lanes.
+        heads: int32 first node of each lane, or -1.
+        order: int32 bodies (vehicles, pedestrians, props) as `collisions` sorts them, by `keys` [m].
+        keys: see there.
+        lamps: `records.LAMP`, one for each light programme.
+        busy: int32 how many walk on each crosswalk.
+        stack: int32 scratch of searches along lanes, with `starts` [m].
+        starts: see there.
+        clock: one `records.CLOCK`.
+        car: one `records.CAR`: what drives the session's car, if vehicle 0 is of the kind `Kind.DRIVEN`.
+        path: `records.POINT`: the way that it follows.
+        eye: one `records.EYE`: how well it sees.
+        seen: `records.SEEN`: what it sees, nearest first.
+        trace: (f, 10) its way in the last call of `step`, see `records.TRACE`.
+        poses: (f + 1, 6) its poses before that call and after each of its substeps, see `records.POSE`.
+        events: `records.EVENT`: what happened to it then.
+    """
+
+    vehicles: Records
+    pedestrians: Records
+    props: Records
+    nodes: Records
+    heads: NDArray[np.int32]
+    order: NDArray[np.int32]
+    keys: Array
+    lamps: Records
+    busy: NDArray[np.int32]
+    stack: NDArray[np.int32]
+    starts: Array
+    clock: Records
+    car: Records
+    path: Records
+    eye: Records
+    seen: Records
+    trace: Array
+    poses: Array
+    events: Records
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of all arrays [bytes]."""
+        return sum(array.nbytes for array in self)
+
+    def copy(self) -> WorldArrays:
+        """The same world once more."""
+        return WorldArrays(*(_same(array) for array in self))
+
+    def tobytes(self) -> bytes:
+        """The state byte by byte, to compare worlds."""
+        return b"".join(array.tobytes() for array in self)
+
+
+def _same(array: Any) -> Any:
+    """A copy with all bytes, also those between the fields of records, which NumPy leaves out."""
+    copied = np.frombuffer(bytearray(array.tobytes()), dtype=array.dtype).reshape(array.shape)
+    return copied.view(np.recarray) if isinstance(array, np.recarray) else copied
+
+
+def empty_world(
+    town: TownArrays,
+    *,
+    vehicles: int,
+    pedestrians: int,
+    props: int = PROPS,
+    seed: int | np.random.SeedSequence = 0,
+    driven: bool = False,
+) -> WorldArrays:
+    """A world with room for some bodies and nobody in it.
+
+    Args:
+        town: arrays of the town.
+        vehicles: most vehicles.
+        pedestrians: most pedestrians.
+        props: most props.
+        seed: of all that is drawn at random in it.
+        driven: whether vehicle 0 will be a car that follows a path, `Kind.DRIVEN`.
+    """
+
+    def records(count: int, kind: np.dtype[np.void]) -> Records:
+        return np.zeros(count, dtype=kind).view(np.recarray)
+
+    world = WorldArrays(
+        records(vehicles, VEHICLE), records(pedestrians, PEDESTRIAN), records(props, PROP),
+        records(2 * vehicles + 4 * props, NODE), np.full(len(town.lanes), NOBODY, dtype=np.int32),
+        np.arange(vehicles + pedestrians + props, dtype=np.int32), np.zeros(vehicles + pedestrians + props),
+        records(len(town.programmes), LAMP), np.zeros(len(town.crossings), dtype=np.int32),
+        np.zeros(STACK, dtype=np.int32), np.zeros(STACK), records(1, CLOCK),
+        records(1, CAR), records(POINTS if driven else 1, POINT), records(1, EYE),
+        records(vehicles + pedestrians + props if driven else 1, SEEN),
+        np.zeros((FRAMES if driven else 1, len(TRACE))), np.zeros((1 + FRAMES if driven else 1, len(POSE))),
+        records(EVENTS if driven else 1, EVENT),
+    )  # fmt: skip
+    world.car.closed = NOBODY
+    world.car.closed_at = -math.inf
+    world.car.lateral_last = world.car.stop_at = world.car.roadblock = world.car.action_end = math.inf
+    world.car.hold_speed = -1.0
+    world.nodes.lane = world.nodes.next = world.nodes.before = NOBODY
+    world.lamps.until = -math.inf
+    world.props.lane = NOBODY
+    world.vehicles.lane = world.vehicles.approach = world.vehicles.claim = world.vehicles.inside = NOBODY
+    source = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
+    world.clock.random = int(source.generate_state(1)[0]) | 1
+    return world
+
+
+def grown(town: TownArrays, world: WorldArrays, *, vehicles: int, pedestrians: int, props: int) -> WorldArrays:
+    """The same world with more room: everybody keeps the place in the arrays, and does what they would have done.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world, left as they are.
+        vehicles: most vehicles.
+        pedestrians: most pedestrians.
+        props: most props.
+
+    Raises:
+        ValueError: this would be less room than there is.
+    """
+    room, wanted = (len(world.vehicles), len(world.pedestrians), len(world.props)), (vehicles, pedestrians, props)
+    if any(more < less for more, less in zip(wanted, room, strict=True)):
+        raise ValueError(f"a world with room for {room} vehicles, pedestrians and props does not shrink to {wanted}")
+    driven = len(world.path) > 1
+    bigger = empty_world(town, vehicles=vehicles, pedestrians=pedestrians, props=props, driven=driven)
+    for name, old, new in zip(WorldArrays._fields, world, bigger, strict=True):
+        if name not in ("nodes", "heads", "order", "keys"):  # made anew from the bodies, whose numbers they hold
+            new[: len(old)] = old
+    rebuild(town, bigger)
+    return bigger

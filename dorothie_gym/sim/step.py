@@ -1,0 +1,154 @@
+"""All substeps of a decision in one call."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.maps.model import Array
+from dorothie_gym.sim.collisions import collide
+from dorothie_gym.sim.ego.ego_controller import guide
+from dorothie_gym.sim.network.lane_lookup import closest_lane, value_near
+from dorothie_gym.sim.pedestrians.walking import walk
+from dorothie_gym.sim.state.event_log import note_pose, trace
+from dorothie_gym.sim.state.records import Kind, Records, Wait
+from dorothie_gym.sim.traffic.idm_traffic import drive
+from dorothie_gym.sim.traffic.lane_index import rebuild
+from dorothie_gym.sim.traffic.parameters import STUCK_SPEED
+from dorothie_gym.sim.traffic.respawn import tow
+from dorothie_gym.sim.traffic.route import locate
+from dorothie_gym.sim.traffic.vehicle_models import move, slip_of
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.world_arrays import WorldArrays
+
+
+@compiled
+def step(
+    town: TownArrays, world: WorldArrays, substeps: int, dt: float, acceleration: float = 0.0, steering: float = 0.0
+) -> None:
+    """Lets a world go on.
+
+    As on a highway-env road, everybody decides on what is there at the beginning of a substep, then everybody moves.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world, changed in place.
+        substeps: how many.
+        dt: time of each [s].
+        acceleration: of vehicles of the kind `Kind.EGO` [m/s^2].
+        steering: angle of their front wheels, positive to the right [rad].
+    """
+    vehicles, slip = world.vehicles, slip_of(steering)
+    world.car[0].events = world.car[0].frames = 0
+    if len(vehicles) > 0 and vehicles[0].kind == Kind.DRIVEN:
+        note_pose(world, 0)
+    for _ in range(substeps):
+        for i in range(len(vehicles)):
+            if vehicles[i].kind == Kind.EGO:
+                vehicles[i].acceleration, vehicles[i].slip = acceleration, slip
+        _decide(town, world, dt)
+        _move(town, world, dt, True)
+        _meet(town, world, dt, True)
+        world.clock[0].time = world.clock[0].frame * dt
+        if len(vehicles) > 0 and vehicles[0].kind == Kind.DRIVEN:
+            trace(world)
+
+
+# Each phase is compiled on its own: woven into one function they would take the compiler twice as long.
+
+
+@compiled
+def _decide(town: TownArrays, world: WorldArrays, dt: float) -> None:
+    """Lets everybody decide, and those on foot walk."""
+    for i in range(len(world.vehicles)):
+        kind = world.vehicles[i].kind
+        if kind == Kind.DRIVEN:
+            guide(town, world, dt)
+        elif kind != Kind.EMPTY and kind != Kind.EGO:
+            drive(town, world, i)
+    walk(town, world, dt)
+
+
+@compiled
+def _move(town: TownArrays, world: WorldArrays, dt: float, egos: bool) -> None:
+    """Moves all vehicles; those of the kind `Kind.EGO` only if so wanted."""
+    for i in range(len(world.vehicles)):
+        kind = world.vehicles[i].kind
+        if kind != Kind.EMPTY and (egos or kind != Kind.EGO):
+            _go_on(town, world.vehicles[i], dt)
+
+
+@compiled
+def _meet(town: TownArrays, world: WorldArrays, dt: float, tows: bool) -> None:
+    """Finds out who touches whom, tows away if so wanted, and lists who is where; then the substep is over."""
+    collide(world)
+    if tows:
+        tow(town, world, dt, bool(world.car[0].sweeping))
+    rebuild(town, world)
+    world.clock[0].frame += 1
+
+
+@inlined
+def _go_on(town: TownArrays, vehicle: Records, dt: float) -> None:
+    """Moves a vehicle and finds out where it is."""
+    vehicle.timer += dt
+    if vehicle.speed < STUCK_SPEED:
+        vehicle.standing += dt if vehicle.wait != Wait.LIGHT else 0.0
+    else:
+        vehicle.standing = 0.0
+    if vehicle.speed == 0.0 and vehicle.acceleration <= 0.0:
+        return  # it stands, and stays where it was found
+    move(vehicle, dt)
+    find(town, vehicle)
+
+
+@inlined
+def find(town: TownArrays, vehicle: Records) -> None:
+    """Finds the closest lane of a vehicle, and its place on the lane that it follows."""
+    lane, station, lateral, segment = closest_lane(
+        town, vehicle.x, vehicle.y, vehicle.heading, vehicle.cos, vehicle.sin, vehicle.height, vehicle.lane
+    )
+    vehicle.lane, vehicle.own_station, vehicle.own_lateral = lane, station, lateral
+    if vehicle.kind == Kind.EGO:
+        vehicle.plan[0], vehicle.planned = lane, 1
+        vehicle.inside = lane if town.lanes[lane].junction >= 0 else -1
+    if lane == vehicle.plan[0]:
+        vehicle.station, vehicle.lateral, vehicle.segment = station, lateral, segment
+    else:
+        locate(town, vehicle)
+    if not town.flat and vehicle.kind != Kind.DRIVEN:
+        vehicle.height = value_near(town.points, town.lanes[lane], segment, 4, station)
+
+
+@compiled
+def step_around(town: TownArrays, world: WorldArrays, dt: float, rows: NDArray[np.int64], poses: Array) -> None:
+    """One substep in which vehicles of the kind `Kind.EGO` are moved by somebody else, not by these loops.
+
+    As in `step`, everybody decides on what was there before. Once one of them has crashed nobody is towed away, so that
+    those who were touched are found where it happened.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world, changed in place.
+        dt: time of the substep [s].
+        rows: (n,) rows of those vehicles.
+        poses: (n, 4) where they are at its end: x, y [m], heading [rad], and their speed [m/s].
+    """
+    vehicles = world.vehicles
+    _decide(town, world, dt)
+    _move(town, world, dt, False)
+    intact = True
+    for k in range(len(rows)):
+        vehicle = vehicles[rows[k]]
+        vehicle.x, vehicle.y, vehicle.heading, vehicle.speed = poses[k, 0], poses[k, 1], poses[k, 2], poses[k, 3]
+        vehicle.cos, vehicle.sin = math.cos(vehicle.heading), math.sin(vehicle.heading)
+        find(town, vehicle)
+        intact = intact and not vehicle.crashed
+    _meet(town, world, dt, intact)
+    world.clock[0].time = world.clock[0].frame * dt

@@ -1,0 +1,354 @@
+"""`Town-v0`: a plain highway-env environment in a town, without roles, talk or tasks."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium import spaces
+from highway_env.envs.common.abstract import AbstractEnv
+from highway_env.envs.common.graphics import EnvViewer
+from highway_env.envs.common.observation import KinematicObservation, ObservationType, OccupancyGridObservation
+from highway_env.utils import lmap
+from highway_env.vehicle.controller import ControlledVehicle
+from highway_env.vehicle.objects import Landmark
+from numpy.typing import NDArray
+
+from dorothie_gym.maps import load_town
+from dorothie_gym.maps.model import Array
+from dorothie_gym.sim.network.network import FARTHEST, TownNetwork
+from dorothie_gym.sim.population import free_places, populate
+from dorothie_gym.sim.road import CompiledRoad
+from dorothie_gym.sim.state.records import Kind, Walk
+from dorothie_gym.sim.state.town_arrays import town_arrays
+from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
+from dorothie_gym.sim.traffic.lane_index import rebuild
+
+CLEAR_OF_EGO = 25.0
+"""At the start nobody is closer to the vehicle than this [m]."""
+
+ROUNDS = 8
+"""So many times others are brought to places in lieu of those who were too close."""
+
+SEEDS = 2**31
+"""Seeds of what is drawn in the arrays are less than this."""
+
+
+def populate_around(
+    network: TownNetwork, world: WorldArrays, rng: np.random.Generator, *, vehicles: int, pedestrians: int
+) -> None:
+    """Brings others to random places, as many as fit and none close to the first vehicle of a world.
+
+    Args:
+        network: of the town.
+        world: arrays of the world; its first vehicle is there already.
+        rng: of the places.
+        vehicles: how many others.
+        pedestrians: how many people on foot.
+    """
+    town = town_arrays(network)
+    ego, bodies = world.vehicles[0], (world.vehicles[1:], world.pedestrians)
+    for _ in range(ROUNDS):
+        there = _counts(world)
+        missing = np.array((vehicles + 1, pedestrians)) - there
+        if not missing.any():
+            break
+        seed = int(rng.integers(SEEDS))
+        populate(network, town, world, seed=seed, vehicles=int(missing[0]), pedestrians=int(missing[1]))
+        if (_counts(world) == there).all():
+            break  # the town is full
+        for records, field, nobody in zip(bodies, ("kind", "state"), (Kind.EMPTY, Walk.EMPTY), strict=True):
+            close = np.hypot(records.x - ego.x, records.y - ego.y) < CLEAR_OF_EGO
+            records[field][close] = nobody
+    rebuild(town, world)
+
+
+def _counts(world: WorldArrays) -> NDArray[np.int64]:
+    """How many vehicles and pedestrians there are (2,)."""
+    return np.array(((world.vehicles.kind != Kind.EMPTY).sum(), (world.pedestrians.state != Walk.EMPTY).sum()))
+
+
+# --- highway-env's `Kinematics` and `OccupancyGrid` without what takes most of the time of a step in a co ------------
+
+
+class Kinematics(KinematicObservation):
+    """The same rows to the last bit: the observer, then those close to it, each feature scaled to [-1, 1]."""
+
+    def observe(self) -> NDArray[np.float32]:
+        """Rows (`vehicles_count`, features); zeros where nobody is, NaN for what a foreign object does not tell."""
+        if not self.env.road:
+            return np.zeros((self.vehicles_count, len(self.features)), dtype=np.float32)
+        observer = self.observer_vehicle
+        close = self.env.road.close_objects_to(
+            observer,
+            self.env.PERCEPTION_DISTANCE,
+            count=self.vehicles_count - 1,
+            see_behind=self.see_behind,
+            sort=self.order == "sorted",
+            vehicles_only=not self.include_obstacles,
+        )
+        origin = None if self.absolute else observer
+        told = [observer.to_dict()]
+        for other in close[: self.vehicles_count - 1]:
+            told.append(other.to_dict(origin, observe_intentions=self.observe_intentions))
+        rows = np.zeros((self.vehicles_count, len(self.features)))
+        rows[: len(told)] = [[row.get(feature, math.nan) for feature in self.features] for row in told]
+        if self.normalize:
+            self._scale(rows[: len(told)])
+        if self.order == "shuffled":
+            self.env.np_random.shuffle(rows[1:])
+        return rows.astype(np.float32)
+
+    def _scale(self, rows: Array) -> None:
+        """Maps the features' ranges to [-1, 1] in place; highway-env chooses these at the first observation."""
+        if not self.features_range:
+            self.normalize_obs({})  # a table without columns: it sets the ranges and has nothing to scale
+        for column, feature in enumerate(self.features):
+            if feature in self.features_range:
+                values = rows[:, column]
+                values[:] = lmap(values, self.features_range[feature], [-1, 1])
+                if self.clip:
+                    np.clip(values, -1, 1, out=values)
+
+
+class OccupancyGrid(OccupancyGridObservation):
+    """The same cells; of those without a value images show 0, for which highway-env leaves it to the machine."""
+
+    def observe(self) -> NDArray[Any]:
+        """A grid (features, cells along, cells across) around the observer: float32, or uint8 for images."""
+        if not self.env.road or self.absolute:
+            return np.asarray(super().observe())  # nothing yet, or an error that there is no such grid
+        self.grid.fill(np.nan)
+        rows = [vehicle.to_dict(self.observer_vehicle) for vehicle in self.env.road.vehicles]
+        self.normalize({})  # a table without columns: it sets the ranges and has nothing to scale
+        cells = [self._cell(row) for row in rows]
+        told = {feature for row in rows for feature in row}
+        for layer, feature in enumerate(self.features):
+            if feature in told:
+                self._fill(layer, feature, rows, cells)
+            elif feature == "on_road":
+                self.fill_road_layer_by_lanes(layer)
+        shown = np.clip(self.grid, -1, 1) if self.clip else self.grid
+        grid: Array = np.nan_to_num(shown, nan=-1.0 if self.as_image else 0.0)
+        if self.as_image:
+            return ((np.clip(grid, -1, 1) + 1) / 2 * 255).astype(np.uint8)
+        return grid.astype(np.float32)
+
+    def _cell(self, row: dict[str, float]) -> tuple[int, int] | None:
+        """Where a vehicle is in the grid, or None. highway-env takes it from scaled features and back."""
+        place = [self._there_and_back(row[name], name) for name in ("x", "y")]
+        along, across = self.pos_to_index(place, relative=True)
+        if 0 <= along < self.grid.shape[-2] and 0 <= across < self.grid.shape[-1]:
+            return along, across
+        return None
+
+    def _there_and_back(self, value: float, feature: str) -> float:
+        limits = self.features_range.get(feature)
+        return value if limits is None else float(lmap(lmap(value, limits, [-1, 1]), [-1, 1], limits))
+
+    def _fill(
+        self, layer: int, feature: str, rows: list[dict[str, float]], cells: list[tuple[int, int] | None]
+    ) -> None:
+        limits = self.features_range.get(feature)
+        for row, cell in zip(rows[::-1], cells[::-1], strict=True):
+            if cell is not None:
+                value = row.get(feature, math.nan)
+                self.grid[layer, *cell] = value if limits is None else lmap(value, limits, [-1, 1])
+
+    def fill_road_layer_by_lanes(self, layer_index: int, lane_perception_distance: float = 100) -> None:
+        """Sets the cells that points of lanes fall into to 1; only lanes that reach into the grid are looked at.
+
+        Args:
+            layer_index: of the grid.
+            lane_perception_distance: points are looked at so far along each lane before and behind the observer [m].
+        """
+        spacing, network, place = np.amin(self.grid_step), self.env.road.network, self.observer_vehicle.position
+        reach = float(np.linalg.norm(np.abs(self.grid_size).max(axis=1)))
+        boxes = network.table.boxes  # (n, 4): least x, least y, greatest x, greatest y
+        near = (boxes[:, :2] <= place + reach).all(axis=1) & (boxes[:, 2:] >= place - reach).all(axis=1)
+        lanes = network.lanes_list()
+        for row in np.flatnonzero(near).tolist():
+            lane = lanes[row]
+            start, _ = lane.local_coordinates(place)
+            stations = np.arange(start - lane_perception_distance, start + lane_perception_distance, spacing)
+            points = lane.positions(stations.clip(0, lane.length)) - place  # (m, 2)
+            if self.align_to_vehicle_axes:
+                cos, sin = np.cos(self.observer_vehicle.heading), np.sin(self.observer_vehicle.heading)
+                points = points @ np.array([[cos, -sin], [sin, cos]])
+            cells = np.floor((points - self.grid_size[:, 0]) / self.grid_step).astype(int)
+            inside = ((cells >= 0) & (cells < self.grid.shape[-2:])).all(axis=1)
+            self.grid[layer_index, cells[inside, 0], cells[inside, 1]] = 1
+
+
+def quicken(kind: Any) -> None:
+    """Lets highway-env's observation type, and those that it consists of, observe in the quick ways of this module."""
+    for part in parts_of(kind):
+        quick = _QUICK.get(type(part))
+        if quick is not None:
+            part.__class__ = quick  # they differ in what they do, not in what they keep
+
+
+def parts_of(kind: Any) -> list[Any]:
+    """A type of observation and those that it consists of."""
+    parts = [*getattr(kind, "observation_types", ()), *getattr(kind, "agents_observation_types", ())]
+    return [kind, *(found for part in parts for found in parts_of(part))]
+
+
+_QUICK: dict[type[ObservationType], type[ObservationType]] = {
+    KinematicObservation: Kinematics,
+    OccupancyGridObservation: OccupancyGrid,
+}
+
+
+# --- `Town-v0`: a plain highway-env environment in a town, without roles, talk or tasks ------------------------------
+
+
+class TownEnv(AbstractEnv):
+    """Drives through a town among other vehicles.
+
+    ## Description
+    highway-env's own environment on a town's road network: its observation and action types, its viewer, and its
+    vehicle under the agent's control. Routes are drawn by chance at junctions. Traffic, cyclists among it, and
+    pedestrians live as in `DuoWizardEnv`: with lights, signs, priorities and crosswalks, in compiled loops
+    (`world.kernel`); `env.unwrapped.road.vehicles` and `.objects` show them as highway-env's objects.
+
+    ## Observation Space
+    As `config["observation"]` says (highway-env's `Kinematics` by default), with finite bounds. All types work but
+    `ExitObservation`, which is written for one road of highway-env's. `KinematicsGoal` is given a place in the town as
+    its goal, and `AttributesObservation` may read `ego`.
+
+    ## Action Space
+    As `config["action"]` says (highway-env's `DiscreteMetaAction` by default); any type.
+
+    ## Rewards
+    Progress on the road: speed along the lane as a share of `config["reward_speed"]`, in [0, 1], and 0 off the road,
+    plus `config["collision_reward"]` for a crash. The terms are in `info["rewards"]`.
+
+    ## Episode End
+    Terminates when the vehicle crashes, be it into a vehicle, a pedestrian or a prop; truncates after
+    `config["duration"]` seconds.
+
+    ## Arguments
+    `config`: highway-env's settings, and
+    - `town`: name of a town, or path of an `.xodr` or `.yaml` file;
+    - `vehicles`: how many others, as many as fit, nobody within 25 m of the start;
+    - `pedestrians`: how many people on the pavements; none in a town without them. By default there are none:
+      highway-env's `Kinematics` cannot tell them from vehicles, and those who pass by would fill its rows;
+    - `duration` [s], `reward_speed` [m/s], `collision_reward`: see above.
+
+    ## Version History
+    - v0: first version.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 2}
+
+    # set by highway-env's methods, which carry no types
+    observation_type: Any
+    observation_space: Any
+
+    def __init__(self, config: dict[str, Any] | None = None, render_mode: str | None = None) -> None:
+        self._network: TownNetwork | None = None
+        self._network_of: Any = None
+        super().__init__(config, render_mode)
+
+    @classmethod
+    def default_config(cls) -> dict[str, Any]:
+        """Settings that hold where `config` gives no other."""
+        config: dict[str, Any] = super().default_config()
+        config.update(
+            town="brookside",
+            vehicles=10,
+            pedestrians=0,
+            duration=60.0,
+            reward_speed=9.0,
+            collision_reward=-1.0,
+            action={"type": "DiscreteMetaAction", "target_speeds": [0.0, 4.5, 9.0]},
+            neighbour_vehicles_connected_lanes=True,
+            screen_width=600,
+            screen_height=600,
+            centering_position=[0.5, 0.5],
+        )
+        return config
+
+    @property
+    def ego(self) -> Array:
+        """The vehicle under control: x, y [m], heading [rad], speed [m/s]."""
+        vehicle = self.vehicle
+        return np.array((*vehicle.position, vehicle.heading, vehicle.speed))
+
+    def define_spaces(self) -> None:
+        """Sets the spaces, with finite bounds: nothing in a town is beyond `FARTHEST`."""
+        super().define_spaces()
+        quicken(self.observation_type)
+        self.observation_space = finite(self.observation_space)
+        for kind in parts_of(self.observation_type):
+            viewer = getattr(kind, "viewer", None)
+            if viewer is not None:
+                viewer.enabled = True  # under SDL's dummy video driver it would show black
+
+    def _reset(self) -> None:
+        if self._network is None or self._network_of != self.config["town"]:
+            self._network_of = self.config["town"]
+            self._network = TownNetwork(load_town(self._network_of))
+        network, town = self._network, self._network.town
+        vehicles, pedestrians = int(self.config["vehicles"]), int(self.config["pedestrians"])
+        seed = int(self.np_random.integers(SEEDS))
+        arrays = empty_world(town_arrays(network), vehicles=vehicles + 1, pedestrians=pedestrians, seed=seed)
+        self.road = CompiledRoad(
+            network, arrays, np_random=self.np_random, record_history=self.config["show_trajectories"]
+        )
+        (lane, station), (goal, there) = free_places(town, self.np_random, 2)
+        start = town.lanes[lane]
+        vehicle = self.vehicle = self.action_type.vehicle_class(
+            self.road, start.position(station), heading=start.heading_at(station), speed=0.0
+        )
+        vehicle.height = start.height_at(station)
+        vehicle.lane_index = network.index_of(lane)  # highway-env asks for the closest one, be it under a bridge
+        vehicle.lane = network.get_lane(vehicle.lane_index)
+        if isinstance(vehicle, ControlledVehicle):
+            vehicle.target_lane_index = vehicle.lane_index
+        self.vehicle.goal = Landmark(self.road, town.lanes[goal].position(there), town.lanes[goal].heading_at(there))
+        self.road.vehicles.append(self.vehicle)
+        self.road.show()
+        populate_around(network, arrays, self.np_random, vehicles=vehicles, pedestrians=pedestrians)
+        self.road.show()
+
+    def _reward(self, action: Any) -> float:
+        return float(sum(self._rewards(action).values()))
+
+    def _rewards(self, action: Any) -> dict[str, float]:
+        vehicle = self.vehicle
+        station, _ = vehicle.lane.local_coordinates(vehicle.position)
+        along = vehicle.speed * np.cos(vehicle.lane.heading_at(station) - vehicle.heading)
+        return {
+            "progress": float(vehicle.on_road * np.clip(along / self.config["reward_speed"], 0.0, 1.0)),
+            "collision": float(self.config["collision_reward"] * vehicle.crashed),
+        }
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Draws as highway-env does, also under SDL's dummy video driver, where its viewer would show black."""
+        if self.viewer is None and self.render_mode is not None:
+            viewer = EnvViewer(self)
+            viewer.enabled = True
+            self.viewer: EnvViewer | None = viewer
+        picture: NDArray[np.uint8] | None = super().render()
+        return picture
+
+    def _is_terminated(self) -> bool:
+        return bool(self.vehicle.crashed)
+
+    def _is_truncated(self) -> bool:
+        return bool(self.time >= self.config["duration"])
+
+
+def finite(space: spaces.Space[Any]) -> spaces.Space[Any]:
+    """The same space with finite bounds; images have them."""
+    if isinstance(space, spaces.Dict):
+        return spaces.Dict({name: finite(part) for name, part in space.items()})
+    if isinstance(space, spaces.Tuple):
+        return spaces.Tuple([finite(part) for part in space])
+    if isinstance(space, spaces.Box) and space.dtype != np.uint8:
+        low, high = np.clip(space.low, -FARTHEST, FARTHEST), np.clip(space.high, -FARTHEST, FARTHEST)
+        return spaces.Box(low, high, dtype=space.dtype.type)
+    return space

@@ -1,0 +1,1 @@
+"""Background traffic: IDM car following, MOBIL lane changes, junction rules, respawning."""

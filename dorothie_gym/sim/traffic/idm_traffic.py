@@ -1,0 +1,262 @@
+"""What a vehicle of the traffic does: it looks along the lanes that it plans, and accelerates and steers."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.sim.ego.planner import SWEEP_STEP
+from dorothie_gym.sim.network.ahead import HORIZON, LEVEL
+from dorothie_gym.sim.network.lane_lookup import project
+from dorothie_gym.sim.pedestrians.jaywalking import give_way_to_strayers
+from dorothie_gym.sim.state.records import NOBODY, Kind, Records, Wait, Walk
+from dorothie_gym.sim.traffic.junctions import announce, forget, note, request
+from dorothie_gym.sim.traffic.lane_index import around, next_on_lane
+from dorothie_gym.sim.traffic.parameters import (
+    ACC_MAX,
+    ASKING,
+    CRITICAL_GAP,
+    CROSSING_MARGIN,
+    CROSSING_SIGHT,
+    CURVE_BRAKING,
+    CYCLIST_ACCELERATION,
+    HARDEST_BRAKING,
+    LINE_GAP,
+    STOP_BRAKING,
+)
+from dorothie_gym.sim.traffic.route import extend, follow_road
+from dorothie_gym.sim.traffic.vehicle_models import (
+    brake_to,
+    change_lanes,
+    following_acceleration,
+    free_acceleration,
+    slip_towards_lane,
+)
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.world_arrays import WorldArrays
+
+NO_ROOM_PATIENCE = 5.0
+"""Who has been waiting for room behind a junction for this long goes elsewhere, if the lot falls so [s]."""
+
+SLOWEST = 0.5
+"""Speed that no bend keeps a vehicle from [m/s]."""
+
+CURVES_SIGHT = 40.0
+"""Bends further ahead ask for no braking yet: from 14 m/s to 5 m/s it takes 43 m [m]."""
+
+CROSSWALK_GAP = 1.0
+"""Room that is left before a crosswalk [m]."""
+
+STEP_AHEAD = 5.0
+"""A pedestrian who is to come this close to the middle of a lane keeps vehicles off the crosswalk [m]."""
+
+STEP_PAST = 2.5
+"""And one who has passed it by no more than this [m]."""
+
+
+@inlined
+def drive(town: TownArrays, world: WorldArrays, i: int) -> None:
+    """Sets acceleration and slip angle of a vehicle from what it sees."""
+    vehicle = world.vehicles[i]
+    if vehicle.crashed:
+        return
+    follow_road(town, vehicle)
+    note(town, vehicle, world.clock[0].time)
+    change_lanes(town, world, i)
+    most = CYCLIST_ACCELERATION if vehicle.kind == Kind.CYCLIST else ACC_MAX
+    wanted = _acceleration(town, world, i)
+    if world.clock[0].straying > 0:
+        wanted = min(wanted, give_way_to_strayers(town, world, i))
+    vehicle.acceleration = min(max(wanted, -ACC_MAX), most)
+    vehicle.slip = slip_towards_lane(town.points, town.lanes[vehicle.plan[0]], vehicle)
+
+
+@inlined
+def _acceleration(town: TownArrays, world: WorldArrays, i: int) -> float:
+    """Acceleration by everything that is ahead on the planned lanes [m/s^2], not yet limited."""
+    vehicle = world.vehicles[i]
+    target, stop = vehicle.desired, math.inf
+    front, gap = NOBODY, math.inf
+    begin = -vehicle.station  # of a lane, from the vehicle's middle
+    junction, line = NOBODY, 0.0
+    for k in range(int(vehicle.planned)):
+        if begin > HORIZON or (front >= 0 and junction >= 0 and begin > CURVES_SIGHT):
+            break
+        lane = town.lanes[vehicle.plan[k]]
+        if lane.curve_speed < target:
+            reachable = lane.curve_speed * lane.curve_speed + 2.0 * CURVE_BRAKING * max(begin, 0.0)
+            target = min(target, max(math.sqrt(reachable), SLOWEST))
+        if front < 0:
+            front, place = _first_on(town, world, i, k, lane)
+            gap = begin + place
+            if gap > HORIZON and k > 0:
+                front = NOBODY
+        if junction < 0 and lane.junction >= 0 and (k > 0 or vehicle.inside != vehicle.plan[0]):
+            junction, line = k, begin - 0.5 * vehicle.length
+        if lane.passages > 0:
+            stop = min(stop, _give_way_to_walkers(town, world, vehicle, lane, begin))
+        begin += lane.length
+    found = free_acceleration(vehicle.speed, target, town.lanes[vehicle.lane].limit)
+    free = found
+    vehicle.blocked = False
+    if front >= 0:
+        found -= _held_up(world, vehicle, front, gap)
+        vehicle.blocked = world.nodes[front].body >= len(world.vehicles)
+    if vehicle.lane != vehicle.plan[0]:
+        found = min(found, free - _held_up_beside(town, world, i))
+    if town.lanes[vehicle.plan[vehicle.planned - 1]].successors == 0:
+        left = begin - 0.5 * vehicle.length - LINE_GAP
+        if left < vehicle.speed * vehicle.speed / (2.0 * STOP_BRAKING) + ASKING:
+            stop = min(stop, brake_to(vehicle.speed, left))
+    stop = min(stop, _give_way_to_turning(town, world, vehicle))
+    return min(found, stop, _approach(town, world, i, junction, line, front, gap))
+
+
+@compiled
+def _give_way_to_turning(town: TownArrays, world: WorldArrays, vehicle: Records) -> float:
+    """Acceleration that stops a vehicle before the way of the car that turns round [m/s^2]; inf where it is clear."""
+    car, other = world.car[0], world.vehicles[0]
+    if not car.sweeping:
+        return math.inf
+    dx, dy = other.x - vehicle.x, other.y - vehicle.y
+    if dx * dx + dy * dy > CROSSING_SIGHT * CROSSING_SIGHT or abs(other.height - vehicle.height) > LEVEL:
+        return math.inf
+    gap, start = math.inf, 0.0
+    beside = 0.5 * (vehicle.width + other.width) + CROSSING_MARGIN
+    for k in range(min(int(vehicle.planned), 3)):
+        lane = town.lanes[vehicle.plan[k]]
+        for p in range(car.sweep_first, car.sweep_last + 1, SWEEP_STEP):
+            station, lateral, _ = project(town, vehicle.plan[k], world.path[p].x, world.path[p].y)
+            if abs(lateral) < beside and 0.0 <= station <= lane.length:
+                gap = min(gap, start + station - vehicle.station)
+        start += lane.length
+    gap -= 0.5 * (vehicle.length + other.length)
+    # whoever is in its way already had better go on
+    return brake_to(vehicle.speed, gap) if -1.0 < gap < math.inf else math.inf
+
+
+@inlined
+def _held_up(world: WorldArrays, vehicle: Records, front: int, gap: float) -> float:
+    node = world.nodes[front]
+    along = node.speed * (vehicle.cos * node.cos + vehicle.sin * node.sin)
+    return following_acceleration(vehicle.speed, along, gap, 0.5 * vehicle.length + node.half_length)
+
+
+@compiled
+def _held_up_beside(town: TownArrays, world: WorldArrays, i: int) -> float:
+    """What the next body on the lane that a vehicle is leaving takes off its acceleration [m/s^2]."""
+    vehicle = world.vehicles[i]
+    lane = town.lanes[vehicle.lane]
+    if lane.left != vehicle.plan[0] and lane.right != vehicle.plan[0]:
+        return 0.0
+    front, gap, _, _ = around(town, world, vehicle.lane, vehicle.own_station, i)
+    return _held_up(world, vehicle, front, gap) if front >= 0 else 0.0
+
+
+@inlined
+def _first_on(town: TownArrays, world: WorldArrays, i: int, k: int, lane: Records) -> tuple[int, float]:
+    """The first body ahead on the `k`-th lane of a plan: its node (-1 for nobody), and its station [m].
+
+    Who is still near the start of a lane that begins where this one does is in the way, too.
+    """
+    vehicle, nodes = world.vehicles[i], world.nodes
+    own = vehicle.station if k == 0 else -math.inf
+    if k == 0 and vehicle.lane == vehicle.plan[0]:
+        found = next_on_lane(nodes, nodes[2 * i].next, i)
+    else:
+        found = next_on_lane(nodes, world.heads[vehicle.plan[k]], i)
+        while found >= 0 and nodes[found].station < own:
+            found = next_on_lane(nodes, nodes[found].next, i)
+    place = nodes[found].station if found >= 0 else math.inf
+    for s in range(lane.sibling, lane.sibling + lane.siblings):
+        sibling = town.siblings[s]
+        n = world.heads[sibling.lane]
+        while n >= 0 and (nodes[n].body == i or nodes[n].station <= own):
+            n = nodes[n].next
+        if n >= 0 and nodes[n].station < min(sibling.until, place):
+            found, place = n, nodes[n].station
+    return found, place
+
+
+@inlined
+def _approach(town: TownArrays, world: WorldArrays, i: int, k: int, line: float, front: int, gap: float) -> float:
+    """Acceleration that stops a vehicle before a junction that it may not enter [m/s^2]; inf where it may.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world.
+        i: the vehicle.
+        k: which lane of its plan enters the junction, -1 for none.
+        line: from its front to the start of that lane [m].
+        front: node of the body in front, or -1.
+        gap: to its middle [m].
+    """
+    vehicle = world.vehicles[i]
+    stopping = vehicle.speed * vehicle.speed / (2.0 * STOP_BRAKING) + ASKING
+    if k < 0 or line > max(stopping, CRITICAL_GAP * vehicle.speed):
+        if vehicle.approach >= 0:
+            forget(vehicle)
+        return math.inf
+    # the front may be over the line when the next lane begins to be followed
+    before = vehicle.plan[k - 1] if k > 0 else vehicle.approach_lane
+    announce(vehicle, before, vehicle.plan[k], line, world.clock[0].time)
+    if line > stopping:
+        return math.inf
+    if front >= 0 and gap < line + 0.5 * vehicle.length and not _is_let_in(world, front):
+        return math.inf  # somebody in front waits, too: it is their turn to ask
+    wait = request(town, world, i, k)
+    if wait == Wait.NOT:
+        return math.inf
+    if wait == Wait.NO_ROOM and k > 0:
+        _choose_another_way(town, vehicle, k, world.clock[0].time)
+    return brake_to(vehicle.speed, line - LINE_GAP)
+
+
+@compiled
+def _choose_another_way(town: TownArrays, vehicle: Records, k: int, now: float) -> None:
+    """Draws anew what follows the first `k` planned lanes, when there has long been no room where they lead.
+
+    So no ring of full lanes lasts for ever in which everybody waits for the next one.
+    """
+    if vehicle.standing > NO_ROOM_PATIENCE and now - vehicle.rerouted > NO_ROOM_PATIENCE:
+        vehicle.rerouted, vehicle.planned = now, k
+        extend(town, vehicle)
+
+
+@inlined
+def _is_let_in(world: WorldArrays, front: int) -> bool:
+    body = world.nodes[front].body
+    return bool(body < len(world.vehicles) and world.vehicles[body].claim >= 0)
+
+
+@compiled
+def _give_way_to_walkers(town: TownArrays, world: WorldArrays, vehicle: Records, lane: Records, begin: float) -> float:
+    """Acceleration that stops a vehicle before crosswalks of a lane on which somebody walks in its way [m/s^2]."""
+    found = math.inf
+    for p in range(lane.passage, lane.passage + lane.passages):
+        passage = town.passages[p]
+        if world.busy[passage.crossing] == 0:
+            continue
+        left = begin + passage.start - 0.5 * vehicle.length
+        if left < 0.0 or left > CRITICAL_GAP * vehicle.speed + ASKING:
+            continue
+        if vehicle.speed * vehicle.speed > 2.0 * HARDEST_BRAKING * left:
+            continue  # too late: who steps out makes sure that this does not happen
+        if _is_walked(world, passage):
+            found = min(found, brake_to(vehicle.speed, left - CROSSWALK_GAP))
+    return found
+
+
+@compiled
+def _is_walked(world: WorldArrays, passage: Records) -> bool:
+    """Whether somebody on a crosswalk is about to pass a lane, or has only just passed it."""
+    for p in range(len(world.pedestrians)):
+        walker = world.pedestrians[p]
+        if walker.state == Walk.CROSSING and walker.crossing == passage.crossing:
+            left = (passage.across - walker.station) * walker.direction
+            if -STEP_PAST < left < STEP_AHEAD:
+                return True
+    return False

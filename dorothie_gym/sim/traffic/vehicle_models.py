@@ -1,0 +1,270 @@
+"""Keeping one's distance: highway-env's Intelligent Driver Model (Treiber, Hennecke and Helbing 2000) on numbers."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.maps.model import Array
+from dorothie_gym.sim.network.lane_lookup import project, value_near, wrapped
+from dorothie_gym.sim.state.records import Kind, Records
+from dorothie_gym.sim.traffic.lane_index import around
+from dorothie_gym.sim.traffic.parameters import (
+    ACC_MAX,
+    CAR_LENGTH,
+    CHANGE_TIME,
+    CLOSING,
+    COMFORT,
+    CYCLIST_BEFORE,
+    CYCLIST_BEHIND,
+    KP_HEADING,
+    KP_LATERAL,
+    LANE_CHANGE_BRAKING,
+    LANE_CHANGE_DELAY,
+    LANE_CHANGE_GAIN,
+    LARGEST_HEADING,
+    MAX_SLIP,
+    MAX_SPEED,
+    STANDING_GAP,
+    STOP_BRAKING,
+    STOPPED,
+    TAU_PURSUIT,
+    TIME_WANTED,
+)
+from dorothie_gym.sim.traffic.route import take
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.world_arrays import WorldArrays
+
+
+@inlined
+def not_zero(x: float) -> float:
+    """The number, kept away from 0 as by `highway_env.utils.not_zero`."""
+    if abs(x) > 1e-2:
+        return x
+    return 1e-2 if x >= 0.0 else -1e-2
+
+
+@inlined
+def free_acceleration(speed: float, target: float, limit: float) -> float:
+    """Acceleration towards a target speed on a free road, on a lane with a speed limit [m/s^2]."""
+    share = max(speed, 0.0) / abs(not_zero(min(max(target, 0.0), limit)))
+    square = share * share
+    return COMFORT * (1.0 - square * square)
+
+
+@inlined
+def following_acceleration(speed: float, other: float, gap: float, lengths: float) -> float:
+    """What is taken off the free acceleration behind another vehicle [m/s^2].
+
+    Args:
+        speed: [m/s].
+        other: speed of the one in front along one's own heading [m/s].
+        gap: from middle to middle [m].
+        lengths: half of both lengths together [m].
+    """
+    wanted = STANDING_GAP + lengths + TIME_WANTED * speed + speed * (speed - other) / CLOSING
+    share = wanted / not_zero(gap)
+    return COMFORT * share * share
+
+
+@compiled
+def wanted_gap(speed: float, other: float, lengths: float) -> float:
+    """Distance that is wanted to the one in front, from middle to middle [m]."""
+    return STANDING_GAP + lengths + TIME_WANTED * speed + speed * (speed - other) / CLOSING
+
+
+@inlined
+def brake_to(speed: float, distance: float) -> float:
+    """Acceleration that stops at a place [m/s^2]; inf as long as it is not yet time to brake."""
+    if distance <= 0.3:
+        return -ACC_MAX if speed > 0.0 else 0.0
+    needed = speed * speed / (2.0 * distance)
+    if needed < 0.6 * STOP_BRAKING:
+        return math.inf if speed > 2.0 else 0.5 * min(distance, 1.0)
+    return -needed
+
+
+# --- Lane keeping and motion: highway-env's lateral controller and its bicycle, written with the sine of  ------------
+
+STEEP = math.sin(LARGEST_HEADING)
+
+
+@inlined
+def slip_towards_lane(points: Array, lane: Records, vehicle: Records) -> float:
+    """Sine of the slip angle that keeps a vehicle on the lane that it follows (where `station` and `lateral` are)."""
+    return slip_towards(points, lane, vehicle, vehicle.segment, vehicle.station, vehicle.lateral - vehicle.to_right)
+
+
+@inlined
+def slip_towards(points: Array, lane: Records, vehicle: Records, segment: int, station: float, off: float) -> float:
+    """Sine of the slip angle that brings a vehicle to a lane.
+
+    Args:
+        points: of all lanes.
+        lane: the lane.
+        vehicle: the vehicle.
+        segment: of the lane that is closest to it.
+        station: of the vehicle along the lane [m].
+        off: how far to the right of its place across the lane it is [m].
+    """
+    ahead = value_near(points, lane, segment, 3, station + vehicle.speed * TAU_PURSUIT)
+    speed = not_zero(vehicle.speed)
+    back = -KP_LATERAL * off / speed
+    if back >= STEEP:
+        back = LARGEST_HEADING
+    elif back <= -STEEP:
+        back = -LARGEST_HEADING
+    else:
+        back = math.asin(back)
+    rate = KP_HEADING * wrapped(ahead + back - vehicle.heading)
+    return float(min(max(vehicle.length / 2.0 / speed * rate, -MAX_SLIP), MAX_SLIP))
+
+
+@compiled
+def steering_angle(slip: float) -> float:
+    """Angle of the front wheel [rad] that belongs to the sine of a slip angle."""
+    return math.atan(2.0 * slip / math.sqrt(1.0 - slip * slip))
+
+
+@compiled
+def slip_of(steering: float) -> float:
+    """Sine of the slip angle that belongs to an angle of the front wheel [rad]."""
+    tangent = 0.5 * math.tan(steering)
+    return tangent / math.sqrt(1.0 + tangent * tangent)
+
+
+@inlined
+def move(vehicle: Records, dt: float) -> None:
+    """Moves a vehicle on by `dt` [s] as highway-env's `Vehicle.step`; brakes stop it and do not reverse it."""
+    speed, slip = vehicle.speed, vehicle.slip
+    acceleration = vehicle.acceleration
+    if vehicle.crashed:
+        slip, acceleration = 0.0, -speed
+    if speed > MAX_SPEED:
+        acceleration = min(acceleration, MAX_SPEED - speed)
+    if acceleration < 0.0:
+        acceleration = max(acceleration, -speed / dt) if speed > STOPPED else -speed / dt
+    if speed != 0.0:
+        straight = math.sqrt(1.0 - slip * slip)
+        vehicle.x += speed * (vehicle.cos * straight - vehicle.sin * slip) * dt
+        vehicle.y += speed * (vehicle.sin * straight + vehicle.cos * slip) * dt
+        vehicle.heading += speed * slip / (vehicle.length / 2.0) * dt
+        vehicle.cos, vehicle.sin = math.cos(vehicle.heading), math.sin(vehicle.heading)
+        vehicle.odometer += abs(speed) * dt
+    vehicle.speed = speed + acceleration * dt
+
+
+# --- Changing lanes: highway-env's MOBIL (Kesting, Treiber and Helbing 2007) without politeness, as there ------------
+
+GIVING_UP = 1.0
+"""Who changes lanes and has to stand for this long before it is over there gives it up [s]: by now others may come."""
+
+
+@inlined
+def change_lanes(town: TownArrays, world: WorldArrays, i: int) -> None:
+    """Thinks of changing lanes, once in `LANE_CHANGE_DELAY`, or gives up a change that is under way."""
+    vehicle = world.vehicles[i]
+    if vehicle.lane != vehicle.plan[0]:
+        lane = town.lanes[vehicle.lane]
+        if lane.left == vehicle.plan[0] or lane.right == vehicle.plan[0]:
+            held_up = vehicle.standing > GIVING_UP and lane.successors > 0
+            if held_up or _is_taken(world, i):
+                take(town, vehicle, int(vehicle.lane))
+        return
+    if vehicle.timer <= LANE_CHANGE_DELAY:
+        return
+    vehicle.timer = 0.0
+    lane = town.lanes[vehicle.lane]
+    left = lane.length - vehicle.station
+    if lane.junction >= 0 or vehicle.claim >= 0 or vehicle.inside >= 0 or abs(vehicle.speed) < 1.0:
+        return
+    if lane.successors > 0 and left < CAR_LENGTH + CHANGE_TIME * vehicle.speed:
+        return
+    if vehicle.kind == Kind.CYCLIST and lane.successors > 0:
+        _move_over(town, world, i, lane)
+        return
+    if lane.left >= 0:
+        _consider(town, world, i, lane, int(lane.left))
+    if lane.right >= 0:
+        _consider(town, world, i, lane, int(lane.right))
+
+
+@compiled
+def _consider(town: TownArrays, world: WorldArrays, i: int, lane: Records, side: int) -> None:
+    vehicle = world.vehicles[i]
+    beside = town.lanes[side]
+    if beside.successors == 0 and lane.successors > 0:
+        return
+    station, lateral, _ = project(town, side, vehicle.x, vehicle.y)
+    if abs(lateral) > 4.0 * beside.half_width or station < 0.0 or station >= beside.length + CAR_LENGTH:
+        return
+    if mobil(town, world, i, side, station, lane.successors == 0):
+        take(town, vehicle, side)
+
+
+@compiled
+def _move_over(town: TownArrays, world: WorldArrays, i: int, lane: Records) -> None:
+    """A cyclist changes to the lane to the right, if there is one where it may ride and room on it, and to no other."""
+    vehicle = world.vehicles[i]
+    if lane.right < 0 or not town.lanes[lane.right].cycling or town.lanes[lane.right].successors == 0:
+        return
+    station, _, _ = project(town, lane.right, vehicle.x, vehicle.y)
+    _, ahead, _, behind = around(town, world, lane.right, station, i)
+    if ahead > CYCLIST_BEFORE and behind > CYCLIST_BEHIND:
+        take(town, vehicle, int(lane.right))
+
+
+@compiled
+def mobil(town: TownArrays, world: WorldArrays, i: int, side: int, station: float, must: bool) -> bool:
+    """Whether to change to a lane beside: it brings more acceleration and makes nobody brake hard.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world.
+        i: the vehicle.
+        side: lane beside.
+        station: where the vehicle is along that lane [m].
+        must: whether it has to leave its lane, whatever that brings.
+    """
+    vehicle = world.vehicles[i]
+    front, ahead, rear, behind = around(town, world, side, station, i)
+    if rear >= 0 and world.nodes[rear].body < len(world.vehicles):
+        follower = world.vehicles[world.nodes[rear].body]
+        along = vehicle.speed * (vehicle.cos * follower.cos + vehicle.sin * follower.sin)
+        imposed = free_acceleration(follower.speed, follower.desired, town.lanes[follower.lane].limit)
+        imposed -= following_acceleration(follower.speed, along, behind, 0.5 * (vehicle.length + follower.length))
+        if imposed < -LANE_CHANGE_BRAKING:
+            return False
+    there = -_held_up(world, vehicle, front, ahead)
+    if must:
+        return there > -LANE_CHANGE_BRAKING
+    front, ahead, _, _ = around(town, world, vehicle.lane, vehicle.own_station, i)
+    return there + _held_up(world, vehicle, front, ahead) >= LANE_CHANGE_GAIN
+
+
+@compiled
+def _held_up(world: WorldArrays, vehicle: Records, front: int, gap: float) -> float:
+    """What a body in front takes off the acceleration [m/s^2]."""
+    if front < 0:
+        return 0.0
+    node = world.nodes[front]
+    along = node.speed * (vehicle.cos * node.cos + vehicle.sin * node.sin)
+    return following_acceleration(vehicle.speed, along, gap, 0.5 * vehicle.length + node.half_length)
+
+
+@compiled
+def _is_taken(world: WorldArrays, i: int) -> bool:
+    """Whether somebody close in front changes into the same lane."""
+    vehicle = world.vehicles[i]
+    for j in range(len(world.vehicles)):
+        other = world.vehicles[j]
+        if j == i or other.kind == Kind.EMPTY or other.plan[0] != vehicle.plan[0] or other.lane == other.plan[0]:
+            continue
+        gap = other.station - vehicle.station
+        along = other.speed * (vehicle.cos * other.cos + vehicle.sin * other.sin)
+        if 0.0 < gap < wanted_gap(vehicle.speed, along, 0.5 * (vehicle.length + other.length)):
+            return True
+    return False

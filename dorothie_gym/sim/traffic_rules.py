@@ -1,0 +1,296 @@
+"""Looks along a car's way for lines that it passed, for stretches off the road, and for those against the traffic.
+
+On most stretches there is nothing to find, and that is settled by the lines and lanes near the car: a car whose middle
+is on a lane that runs its way, or in a junction, is neither off the road nor against the traffic, and the lanes that a
+place may be on are listed by its cell. `world.infractions` tells what the rules are.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from typing import Any, NamedTuple
+
+from numpy.typing import NDArray
+
+from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.maps.model import Array
+from dorothie_gym.sim.config import FRAME_RATE
+from dorothie_gym.sim.network.lane_lookup import CELL, REACH, SLACK, closest_segment, coordinates, value_near
+from dorothie_gym.sim.state.records import NOBODY, POSE, Records
+from dorothie_gym.sim.traffic.parameters import AT_LINE, STANDING
+
+OFF_ROAD = 0.5
+"""The car has left the road when its middle is farther than this outside of every lane, connectors included [m]."""
+
+AGAINST = math.cos(math.radians(120.0))
+"""Cosine of the angle to a lane from which on the car drives against it (CARLA's scenario runner, WrongLaneTest)."""
+
+LEVEL = 2.5
+"""Lanes and lines further above or below the car are another road's [m]."""
+
+NEARBY = 10.0
+"""How far around the car lanes are looked for to tell which is nearest [m]: more than half of any lane's width."""
+
+OVER = FRAME_RATE
+"""Off the road, or against the traffic, is over when it has not been so for this long; then it counts anew [frames]."""
+
+FORGET = 12.0
+"""Who has stood at a stop sign and is this far from its line has to stand again [m]."""
+
+WIDE = 2.0 * (REACH - 2.0 * OFF_ROAD - SLACK)
+"""Of lanes wider than this a cell may not list all that a place is within `OFF_ROAD` of [m]."""
+
+X, Y, HEADING, SPEED, HEIGHT, TURNING = range(len(POSE))
+"""Columns of poses."""
+
+
+class Found(enum.IntEnum):
+    """What is found along a way."""
+
+    LIGHT = 0
+    """A line with a light has been passed: whether that was a breach is for the light to tell."""
+    STOP_SIGN = 1
+    OFF_ROAD = 2
+    WRONG_WAY = 3
+
+
+class WatchArrays(NamedTuple):
+    """What watching a car takes.
+
+    Attributes:
+        points: as in `TownArrays`; so `lanes`, `origin`, `cells` and `entries`.
+        lanes: `records.LANE`.
+        origin: (2,).
+        cells: (rows, columns, 2).
+        entries: `records.ENTRY`.
+        lines: `records.LINE` (m,), of the town.
+        marks: `records.MARK` (m,), of the car; written.
+        last: (2,) frames at which it was off the road, and against the traffic, last; written.
+        found: `records.FINDING`, room for three a pose; written.
+    """
+
+    points: Array
+    lanes: Records
+    origin: Array
+    cells: NDArray[Any]
+    entries: Records
+    lines: Records
+    marks: Records
+    last: NDArray[Any]
+    found: Records
+
+
+@compiled
+def watch(arrays: WatchArrays, poses: Array, frame: int, length: float, wide: bool) -> int:
+    """Looks at a stretch of way.
+
+    Args:
+        arrays: of the town and of the car.
+        poses: at successive frames, the first being the last one of the stretch before (n + 1, 6).
+        frame: of the first pose.
+        length: of the car [m].
+        wide: whether some lane of the town is wider than `WIDE`.
+
+    Returns:
+        How many findings there are, in the order in which things happened.
+    """
+    count = 0
+    near = _lines_near(arrays, poses, length)
+    for k in range(1, len(poses)):
+        if near > 0:
+            count = _at_lines(arrays, poses, k, length, near, count)
+        if poses[k, TURNING] == 0.0:
+            count = _beside_lanes(arrays, poses, k, frame + k, wide, count)
+    if near > 0:
+        _forget(arrays, poses, length, near)
+    return count
+
+
+# --- lines ------------------------------------------------------------------------------------------------------------
+
+
+@inlined
+def _lines_near(arrays: WatchArrays, poses: Array, length: float) -> int:
+    """Lists the lines that the way may have passed; forgets stands at all others; returns how many are listed."""
+    lines, marks = arrays.lines, arrays.marks
+    x, y, extent2 = poses[0, X], poses[0, Y], 0.0
+    for k in range(1, len(poses)):
+        dx, dy = poses[k, X] - x, poses[k, Y] - y
+        extent2 = max(extent2, dx * dx + dy * dy)
+    # of a line that is passed the front is no farther beyond than it has gone since the pose before
+    reach = 3.0 * math.sqrt(extent2) + 2.0 * length + FORGET
+    near = 0
+    for j in range(len(lines)):
+        line = lines[j]
+        dx, dy, far = line.x - x, line.y - y, reach + line.half_width
+        if dx * dx + dy * dy <= far * far:
+            marks[near].near = j
+            near += 1
+        else:
+            marks[j].stood = False
+    return near
+
+
+@inlined
+def _at_lines(arrays: WatchArrays, poses: Array, k: int, length: float, near: int, count: int) -> int:
+    """Notes a stand at pose k - 1, and the line that the front has passed since; returns the number of findings."""
+    c, s = math.cos(poses[k - 1, HEADING]), math.sin(poses[k - 1, HEADING])
+    before_x, before_y = poses[k - 1, X] + 0.5 * length * c, poses[k - 1, Y] + 0.5 * length * s
+    cos, sin = math.cos(poses[k, HEADING]), math.sin(poses[k, HEADING])
+    x, y = poses[k, X] + 0.5 * length * cos, poses[k, Y] + 0.5 * length * sin
+    stands, turning = poses[k - 1, SPEED] < STANDING, poses[k, TURNING] != 0.0
+    passed, best = NOBODY, math.inf
+    for n in range(near):
+        j = arrays.marks[n].near
+        line = arrays.lines[j]
+        before = (before_x - line.x) * line.cos + (before_y - line.y) * line.sin
+        if before > 0.0:
+            continue
+        if stands and before >= -AT_LINE:
+            if _is_on(line, before_x, before_y, c, s, poses[k - 1, HEIGHT]):
+                arrays.marks[j].stood = True
+        if turning or (x - line.x) * line.cos + (y - line.y) * line.sin <= 0.0:
+            continue
+        across = abs((y - line.y) * line.cos - (x - line.x) * line.sin)
+        # on the border of two lanes it is on the one whose middle is nearer
+        if across < best and _is_on(line, x, y, cos, sin, poses[k, HEIGHT]):
+            passed, best = j, across
+    if passed == NOBODY:
+        return count
+    mark, is_stop = arrays.marks[passed], arrays.lines[passed].is_stop
+    if not is_stop or not mark.stood:
+        kind = Found.STOP_SIGN if is_stop else Found.LIGHT
+        _note(arrays.found[count], k, kind, passed, 0.0)
+        count += 1
+    mark.stood = False
+    return count
+
+
+@inlined
+def _is_on(line: Records, x: float, y: float, cos: float, sin: float, height: float) -> bool:
+    """Whether a place is on the lane of a line, before or behind it, and heads its way."""
+    across = (y - line.y) * line.cos - (x - line.x) * line.sin
+    facing = cos * line.cos + sin * line.sin
+    return bool(facing > 0.5 and abs(across) <= line.half_width and abs(height - line.height) <= LEVEL)
+
+
+@inlined
+def _forget(arrays: WatchArrays, poses: Array, length: float, near: int) -> None:
+    """Forgets stands at lines that the front is far from."""
+    k = len(poses) - 1
+    x = poses[k, X] + 0.5 * length * math.cos(poses[k, HEADING])
+    y = poses[k, Y] + 0.5 * length * math.sin(poses[k, HEADING])
+    for n in range(near):
+        j = arrays.marks[n].near
+        dx, dy = x - arrays.lines[j].x, y - arrays.lines[j].y
+        if dx * dx + dy * dy >= FORGET * FORGET:
+            arrays.marks[j].stood = False
+
+
+@inlined
+def _note(finding: Records, k: int, kind: int, number: int, station: float) -> None:
+    finding.pose, finding.kind, finding.number, finding.station = k, kind, number, station
+
+
+# --- lanes ------------------------------------------------------------------------------------------------------------
+
+
+@inlined
+def _beside_lanes(arrays: WatchArrays, poses: Array, k: int, frame: int, wide: bool, count: int) -> int:
+    """Finds out whether the car is off the road or against the traffic; returns the number of findings."""
+    off_road, against = _state(arrays, poses, k, wide)
+    if off_road:
+        count = _tell(arrays, poses, k, frame, Found.OFF_ROAD, count)
+    if against:
+        count = _tell(arrays, poses, k, frame, Found.WRONG_WAY, count)
+    return count
+
+
+@compiled
+def _tell(arrays: WatchArrays, poses: Array, k: int, frame: int, kind: int, count: int) -> int:
+    """Notes a breach if it has been over for long enough to count anew."""
+    which = kind - Found.OFF_ROAD
+    last = arrays.last[which]
+    arrays.last[which] = frame
+    if frame - last <= OVER:
+        return count
+    _, _, lane, station = _survey(arrays, poses, k)
+    _note(arrays.found[count], k, kind, lane, station)
+    return count + 1
+
+
+@inlined
+def _state(arrays: WatchArrays, poses: Array, k: int, wide: bool) -> tuple[bool, bool]:
+    """Whether the car is off the road, and whether it is against the traffic.
+
+    A place that is no farther than `OFF_ROAD` outside of a lane is no farther from its middle than half its width and
+    twice `OFF_ROAD`. Cells list all lanes as near as that, save very wide ones.
+    """
+    if wide:
+        outside, against, _, _ = _survey(arrays, poses, k)
+        return outside > OFF_ROAD, against
+    x, y = poses[k, X], poses[k, Y]
+    column, row = (x - arrays.origin[0]) / CELL, (y - arrays.origin[1]) / CELL
+    if not (0.0 <= column < arrays.cells.shape[1] and 0.0 <= row < arrays.cells.shape[0]):
+        return True, False
+    i, j = int(row), int(column)
+    off_road, against = True, False
+    for e in range(arrays.cells[i, j, 0], arrays.cells[i, j, 1]):
+        entry = arrays.entries[e]
+        lane = arrays.lanes[entry.lane]
+        at, share, gap = closest_segment(arrays.points, entry.first, entry.last, x, y)
+        out, station, _ = _outside(arrays.points, lane, at, share, gap, poses, k)
+        off_road = off_road and out > OFF_ROAD
+        if out <= 0.0:
+            if _is_with(arrays.points, lane, at, station, poses[k, HEADING]):
+                return False, False
+            against = True
+    return off_road, against
+
+
+@inlined
+def _outside(
+    points: Array, lane: Records, at: int, share: float, gap: float, poses: Array, k: int
+) -> tuple[float, float, bool]:
+    """How far outside of a lane's area a pose is (negative inside, infinite at another height), and the station [m]."""
+    station, lateral = coordinates(points, lane, at, share, gap, poses[k, X], poses[k, Y])
+    if abs(value_near(points, lane, at, 4, station) - poses[k, HEIGHT]) > LEVEL:
+        return math.inf, station, False
+    side = abs(lateral) - 0.5 * value_near(points, lane, at, 5, station)
+    return max(side, -station, station - points[lane.last, 2]), station, True
+
+
+@inlined
+def _is_with(points: Array, lane: Records, at: int, station: float, heading: float) -> bool:
+    """Whether a heading on a lane is not against it; in junctions none is."""
+    return bool(lane.junction >= 0 or math.cos(heading - value_near(points, lane, at, 3, station)) > AGAINST)
+
+
+@compiled
+def _survey(arrays: WatchArrays, poses: Array, k: int) -> tuple[float, bool, int, float]:
+    """How far outside of all lanes a pose is [m], whether all lanes it is on run against it, and the nearest lane.
+
+    Returns:
+        Distance to the nearest lane's area (negative inside), whether it is on lanes and all of them run the other
+        way, the nearest lane (-1: none nearby), and the station on it [m].
+    """
+    x, y = poses[k, X], poses[k, Y]
+    outside, nearest, rank, station = math.inf, NOBODY, 0, 0.0
+    with_it, against = False, False
+    for number in range(len(arrays.lanes)):
+        lane = arrays.lanes[number]
+        if x < lane.left_edge - NEARBY or x > lane.right_edge + NEARBY:
+            continue
+        if y < lane.low_edge - NEARBY or y > lane.high_edge + NEARBY:
+            continue
+        at, share, gap = closest_segment(arrays.points, lane.first, lane.last - 1, x, y)
+        out, place, is_level = _outside(arrays.points, lane, at, share, gap, poses, k)
+        if is_level and (out < outside or (out == outside and lane.rank < rank)):
+            outside, nearest, rank, station = out, number, lane.rank, place
+        if out <= 0.0:
+            if _is_with(arrays.points, lane, at, place, poses[k, HEADING]):
+                with_it = True
+            else:
+                against = True
+    return outside, against and not with_it, nearest, station

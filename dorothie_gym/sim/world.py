@@ -1,0 +1,266 @@
+"""The world of a session: a town, the car, what drives, walks and stands there, weather and faults."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dorothie_gym.maps.model import Array, Town
+from dorothie_gym.ontology import ObjectClass, Sensor, WeatherParameter
+from dorothie_gym.sim.actors import Actors
+from dorothie_gym.sim.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
+from dorothie_gym.sim.ego.driver import Driver
+from dorothie_gym.sim.ego.obstacles import Body, Hazard
+from dorothie_gym.sim.ego.planner import LocalPlanner
+from dorothie_gym.sim.ego.vehicle import Car, CarRecord
+from dorothie_gym.sim.infractions import Reports, WorldEvent, WorldEventKind
+from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.population import add_car
+from dorothie_gym.sim.road import TownRoad
+from dorothie_gym.sim.sensing.localizer import Localizer
+from dorothie_gym.sim.sensing.perception import BODY, Perception
+from dorothie_gym.sim.sensing.seeing import look_around
+from dorothie_gym.sim.sensing.visibility import Visibility
+from dorothie_gym.sim.state.records import EventCode, Records, plain
+from dorothie_gym.sim.state.town_arrays import town_arrays
+from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
+from dorothie_gym.sim.step import step
+from dorothie_gym.sim.traffic.parameters import FRAMES
+from dorothie_gym.sim.traffic_rules import HEIGHT
+from dorothie_gym.sim.weather import Weather, Wind
+
+FAULT_SECONDS = 30.0
+"""A sensor fault ends by itself after this long [s] (design)."""
+
+CLARITY = {Sensor.BLUR: 0.25, Sensor.VIEW: 0.0}
+"""Share of the signal that a fault of the view leaves: blur halves the sight."""
+
+
+class Senses(NamedTuple):
+    """Arrays of a world that `kernel.seeing.see` takes, see `kernel.WorldArrays`."""
+
+    vehicles: Records
+    pedestrians: Records
+    props: Records
+    seen: Records
+    eye: Records
+
+
+class World:
+    """A town in which a car drives among others.
+
+    All that moves is stepped by the compiled loops of `kernel`; this class lays the car's wishes before them, and
+    takes out what came of it.
+
+    Attributes:
+        town: the map.
+        network: its lanes as highway-env's graph.
+        road: highway-env's road, with the car and all others on it.
+        car: the car.
+        planner: its local planner.
+        driver: what drives it.
+        actors: traffic, pedestrians and props.
+        weather: weather and light.
+        wind: where the wind blows, and its gusts.
+        lights: whether the car's head lights are on.
+        faults: sensors that are faulty, and the frame at which each works again.
+        hazard: what the car is braking or standing for, or None.
+        frame: physics frames since the start.
+        frames: trajectory of the last call of `step` (n, 9), see `FRAME_COLUMNS`.
+        offsets: how far the car was to the right of its path at each of these frames (n,) [m].
+        reports: what has happened to the car, and how often it broke which rule.
+    """
+
+    def __init__(
+        self, town: Town, config: WorldConfig, *, seed: np.random.SeedSequence, departure: tuple[int, float],
+        network: TownNetwork | None = None,
+    ) -> None:  # fmt: skip
+        """Builds the world.
+
+        Args:
+            town: the map.
+            config: settings.
+            seed: source of the generators of traffic, pedestrians, localisation, perception and wind, one each.
+            departure: lane and distance along it [m] where the car stands.
+            network: the town's network, if there is one already: it is never changed.
+        """
+        chance_seed, crowd_seed, locate_seed, perceive_seed, wind_seed = seed.spawn(5)
+        self.town, self.config = town, config
+        self.network = network or TownNetwork(town)
+        self._arrays = town_arrays(self.network)
+        lane, station = departure
+        state = empty_world(
+            self._arrays, vehicles=1 + config.vehicles, pedestrians=config.pedestrians, props=0, seed=chance_seed,
+            driven=True,
+        )  # fmt: skip
+        add_car(self._arrays, state, lane, station)
+        state.car.collision_stop = round(config.collisions_stop * FRAME_RATE)
+        self.road = TownRoad(self.network, np_random=np.random.default_rng(crowd_seed))
+        self.actors = Actors(self.road, self._arrays, state, seed=crowd_seed)
+        self.car = Car(self.road, self.actors)
+        self.road.vehicles.append(self.car)
+        self.planner = LocalPlanner(town, lane, station)
+        self.driver = Driver(self.planner, length=self.car.LENGTH, cruise=config.cruise_speed)
+        self.weather = Weather()
+        self.wind = Wind(np.random.default_rng(wind_seed))
+        self._perception = Perception(np.random.default_rng(perceive_seed))
+        self.actors.populate(vehicles=config.vehicles, pedestrians=config.pedestrians)
+        self.localizer = Localizer(
+            float(self.car.position[0]), float(self.car.position[1]), float(self.car.heading),
+            np.random.default_rng(locate_seed),
+        )  # fmt: skip
+        self._record_of: WorldArrays | None = None
+        self.lights = False
+        self.faults: dict[Sensor, int] = {}
+        self.frame = 0
+        self.frames: Array = np.zeros((0, len(FRAME_COLUMNS)))
+        self.offsets: Array = np.zeros(0)
+        self.reports = Reports(self.network, self.car.LENGTH)
+
+    # --- time -------------------------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Simulated seconds since the start."""
+        return self.frame / FRAME_RATE
+
+    def step(self, frames: int) -> list[WorldEvent]:
+        """Lets the world run for a number of physics frames; returns what happened to the car."""
+        if frames <= FRAMES:
+            trace, poses = self._run(frames)
+        else:
+            parts = [self._run(min(FRAMES, frames - first)) for first in range(0, frames, FRAMES)]
+            trace = np.concatenate([part for part, _ in parts])
+            poses = np.concatenate([parts[0][1][:1], *(part[1:] for _, part in parts)])
+        self.frames, self.offsets = trace[:, : len(FRAME_COLUMNS)], trace[:, -1]
+        self.localizer.localize(poses, self.frame - frames, gps_from=self.faults.get(Sensor.GPS, 0))
+        if self.faults:
+            self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
+        self.planner.props = self._props_seen()
+        stood = self.car.speed == 0.0 and poses[0, :HEIGHT].tolist() == poses[-1, :HEIGHT].tolist()
+        return self.reports.close(poses, self.frame, stood=stood)
+
+    def _run(self, frames: int) -> tuple[Array, Array]:
+        """Steps all bodies by no more than `FRAMES` substeps; returns the car's way and poses, see `WorldArrays`."""
+        arrays, record = self.actors.arrays, self._record
+        self.planner.extend(self.car.speed)
+        self.driver.brief(arrays, record)
+        self._tell_weather(arrays)
+        step(self._arrays, arrays, frames, 1.0 / FRAME_RATE)
+        self.driver.debrief(record)
+        self.car.refresh()
+        self.frame += frames
+        events, _ = record.outcome.item()
+        if events:
+            self._report(arrays.events[:events])
+        return arrays.trace[:frames].copy(), arrays.poses[: frames + 1].copy()
+
+    @property
+    def _record(self) -> CarRecord:
+        """What drives the car."""
+        if self._record_of is not self.actors.arrays:
+            self._record_of, self._own_record = self.actors.arrays, CarRecord(self.actors.arrays)
+        return self._own_record
+
+    def _tell_weather(self, arrays: WorldArrays) -> None:
+        """Writes what the weather does to grip, sight and course into the world's arrays, where it has changed."""
+        visibility = self.visibility  # another one after any change of the weather
+        if self._perception.open(arrays.eye, visibility):
+            wind = self.weather.above_clear(WeatherParameter.WIND_INTENSITY)
+            self._record.air[()] = self.weather.friction, wind, self.wind.heading, tuple(self.wind.phases)
+
+    def _report(self, events: Records) -> None:
+        """Takes over what happened to the car, `kernel.records.EVENT`."""
+        for event in events:
+            frame, kind = int(event.frame), ObjectClass(int(event.kind))
+            if event.code == EventCode.HAZARD_STOP:
+                distance = round(float(event.value), 2)
+                self.reports.add(WorldEventKind.HAZARD_STOP, frame, reason=kind.label, distance=distance)
+            elif event.code == EventCode.HAZARD_END:
+                seconds = round(float(event.value) / FRAME_RATE, 2)
+                self.reports.add(WorldEventKind.HAZARD_END, frame, reason=kind.label, seconds=seconds)
+            else:
+                self.reports.infraction(
+                    WorldEventKind.COLLISION, frame, lane=int(event.lane), station=float(event.station),
+                    x=float(event.x), y=float(event.y), key=int(event.key), other=kind,
+                    own_fault=bool(event.own), speed=round(float(event.value), 2),
+                )  # fmt: skip
+
+    @property
+    def hazard(self) -> Hazard | None:
+        """What the car is braking or standing for, or None."""
+        kind, gap = self._record.hazard.item()
+        return Hazard(kind=ObjectClass(kind), gap=gap) if kind else None
+
+    @property
+    def collisions(self) -> int:
+        """Collisions of the car's own making."""
+        _, collisions = self._record.outcome.item()
+        return int(collisions)
+
+    def find_path(self) -> None:
+        """Lays the path anew from the lane that the car is on, where somebody else has driven it off its path."""
+        vehicle = plain(self.actors.arrays.vehicles)[0]
+        lane, station, offset = (vehicle[name].item() for name in ("lane", "own_station", "own_lateral"))
+        self.planner.restart(lane, min(max(station, 0.0), self.town.lanes[lane].length), offset)
+
+    # --- perception -------------------------------------------------------------------------------------------------
+
+    @property
+    def visibility(self) -> Visibility:
+        """How well the car sees now, by weather, light and faults of the view."""
+        clarity = 1.0
+        if self.faults:
+            clarity = min((CLARITY[sensor] for sensor in CLARITY if self._is_faulty(sensor, self.frame)), default=1.0)
+        return self.weather.visibility(lights=self.lights, clarity=clarity)
+
+    @property
+    def sight(self) -> float:
+        """How far the car perceives all bodies now [m]."""
+        return self.visibility.sight
+
+    def perceived(self) -> list[Body]:
+        """Bodies that the car perceives, where it takes them to be, nearest first."""
+        return [
+            Body(
+                key=int(key), kind=ObjectClass(int(kind)), x=x, y=y, heading=heading, length=length, width=width,
+                speed=speed, height=height,
+            )
+            for key, kind, x, y, heading, length, width, speed, height in self.seen().tolist()
+        ]  # fmt: skip
+
+    @property
+    def senses(self) -> Senses:
+        """What the car sees with now, and what there is to be seen."""
+        arrays = self.actors.arrays
+        self._tell_weather(arrays)
+        return Senses(arrays.vehicles, arrays.pedestrians, arrays.props, arrays.seen, arrays.eye)
+
+    def seen(self) -> Array:
+        """What `perceived` tells in numbers (n, 9), columns `perception.BODY` [m, rad, m/s]."""
+        arrays = self.actors.arrays
+        self._tell_weather(arrays)
+        table = np.empty((len(arrays.seen), len(BODY)))
+        return table[: look_around(arrays, self.frame, table)]
+
+    def _props_seen(self) -> tuple[tuple[float, float, float], ...]:
+        """Where the props are that the car perceives: x, y and height [m]."""
+        if not self.actors.has_props:
+            return ()
+        return tuple((body.x, body.y, body.height) for body in self.perceived() if body.kind is ObjectClass.STATIC)
+
+    # --- faults -----------------------------------------------------------------------------------------------------
+
+    def _is_faulty(self, sensor: Sensor, frame: int) -> bool:
+        return self.faults.get(sensor, frame) > frame
+
+    def set_fault(self, sensor: Sensor, on: bool) -> str | None:
+        """Switches a sensor fault on or off; returns the reason if nothing changes."""
+        if on == (sensor in self.faults):
+            return f"the fault of {sensor} is {'on' if on else 'off'} already"
+        if on:
+            self.faults[sensor] = self.frame + round(FAULT_SECONDS * FRAME_RATE)
+        else:
+            del self.faults[sensor]
+        return None

@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from dorothie_gym.analysis import inconsistencies
+from dorothie_gym.ontology import ActionValue, LandmarkName
+from dorothie_gym.recording import Event, EventType, Session
+from tests.analysis.builders import M, car, drive, human
+
+
+def annotated(numbers: Iterable[int | None], *events: list[Event], **changes: object) -> Session:
+    """A drive whose acts are stored in exchanges of the given numbers, all in one transaction."""
+    flat = [event for part in events for event in part]
+    stored = [
+        replace(event, data={**event.data, "exchange": number, "transaction": 0})
+        for event, number in zip(flat, numbers, strict=True)
+    ]
+    return replace(drive(stored), **changes)  # type: ignore[arg-type]
+
+
+TALK = (
+    human(1.0, "KFC please", M.INSTRUCT, LandmarkName.KFC),
+    car(4.0, "okay", M.ACKNOWLEDGE),
+    car(8.0, "which way", M.QUERY_W, ActionValue.QUERIED),
+    human(11.0, "left", M.REPLY_W, ActionValue.J_TURN),
+)
+
+
+def test_what_the_rules_say_is_consistent() -> None:
+    assert inconsistencies(annotated((0, 0, 1, 1), *TALK)) == ()
+
+
+def test_a_response_without_an_exchange_is_told() -> None:
+    faults = inconsistencies(annotated((0, None, 1, 1), *TALK))
+    assert "events[1] (utterance 40, Acknowledge): responds in no exchange" in faults
+
+
+def test_an_exchange_that_starts_with_a_response_is_told() -> None:
+    faults = inconsistencies(annotated((0, 1, 2, 2), *TALK))
+    assert faults[0] == "events[1] (utterance 40, Acknowledge): begins exchange 1, which is not for a Acknowledge"
+    assert "exchanges: 3 are stored, 2 are found anew" in faults
+
+
+def test_exchanges_that_were_cut_otherwise_are_told_even_if_their_number_is_right() -> None:
+    faults = inconsistencies(annotated((0, 0, 1, 0), *TALK))
+    assert faults == ("events[3] (utterance 110, ReplyW): is stored in exchange 0, found anew in 1",)
+
+
+def test_missing_transactions_are_told() -> None:
+    session = annotated((0, 0, 1, 1), *TALK)
+    bare = [
+        replace(event, data={k: v for k, v in event.data.items() if k != "transaction"})
+        if event.type is EventType.DIALOGUE_MOVE
+        else event
+        for event in session.events
+    ]
+    assert inconsistencies(replace(session, events=tuple(bare))) == ("transactions: 0 are stored, 1 are found anew",)
+
+
+def test_an_outcome_that_counts_otherwise_is_told() -> None:
+    session = annotated((0, 0, 1, 1), *TALK, summary={"exchanges": 5, "utterances": 4})
+    assert inconsistencies(session) == ("outcome: field 'exchanges' is 5, and 2 are found anew",)
+
+
+def test_people_who_annotate_are_asked_for_starts_and_responses_only() -> None:
+    session = annotated((7, 7, 7, 7), *TALK)
+    people = replace(session, header=replace(session.header, source="sdn-release"))
+    assert inconsistencies(people) == ()
+    assert inconsistencies(session) != ()

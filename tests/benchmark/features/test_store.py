@@ -1,0 +1,126 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dorothie_gym.benchmark.features import build, building
+from dorothie_gym.benchmark.features.store import INDEX_FILE, StoreError, features_folder, keep, read_columns
+from dorothie_gym.recording import SessionError
+from tests.benchmark.features.test_layouts import assert_same
+from tests.recording.builders import write
+from tests.recording.dialogues import talk
+
+
+@pytest.fixture
+def corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("DOROTHIE_GYM_CACHE", str(tmp_path / "cache"))
+    write(tmp_path / "corpus" / "train" / "a", talk())
+    return tmp_path / "corpus"
+
+
+def entry() -> Path:
+    folder = features_folder()
+    assert folder is not None
+    (found,) = folder.iterdir()
+    return found
+
+
+def forbid_extraction(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(building, "extract", lambda *_: pytest.fail("built anew"))
+
+
+def test_columns_are_built_once_and_mapped_then(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = build(corpus)
+    forbid_extraction(monkeypatch)
+    again = build(corpus)
+    assert_same(first, again)
+    assert again.sessions.names == ("a",) and again.key == first.key
+    assert isinstance(again.frames.pose.base, np.memmap)
+    assert not again.frames.pose.flags.writeable
+
+
+def test_without_a_cache_nothing_is_kept(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    build(corpus, cache=False)
+    folder = features_folder()
+    assert folder is not None and not folder.exists()
+    monkeypatch.setenv("DOROTHIE_GYM_CACHE", "")
+    assert features_folder() is None
+    assert len(build(corpus).moves.move) == 7
+
+
+def test_what_changes_in_a_session_or_its_place_is_built_anew(corpus: Path) -> None:
+    keys = {build(corpus).key}
+    events = corpus / "train" / "a" / "events.jsonl"
+    events.write_text(events.read_text().replace("turning left.", "turning right."))
+    keys.add(build(corpus).key)
+    (corpus / "train" / "a").rename(corpus / "train" / "b")
+    keys.add(build(corpus).key)
+    (corpus / "train").rename(corpus / "test")
+    keys.add(build(corpus).key)
+    assert len(keys) == 4
+
+
+def test_a_corpus_is_known_by_what_it_holds_whatever_its_sessions_are_called(corpus: Path) -> None:
+    first = build(corpus).content
+    (corpus / "train" / "a").rename(corpus / "train" / "b")
+    assert build(corpus).content == build(corpus, cache=False).content == first
+    events = corpus / "train" / "b" / "events.jsonl"
+    events.write_text(events.read_text().replace("turning left.", "turning right."))
+    assert build(corpus).content != first
+
+
+@pytest.mark.parametrize("name", ["moves.slots.npy", "frames.pose.npy", INDEX_FILE])
+@pytest.mark.parametrize("damage", ["torn", "changed", "gone"])
+def test_damaged_files_are_built_anew(corpus: Path, name: str, damage: str) -> None:
+    first = build(corpus)
+    path = entry() / name
+    data = bytearray(path.read_bytes())
+    if damage == "gone":
+        path.unlink()
+    else:
+        data[-3] ^= 1
+        path.write_bytes(bytes(data) if damage == "changed" else bytes(data[:-9]))
+        with pytest.raises(StoreError, match=path.name.split(".npy")[0]):
+            read_columns(entry())
+    assert_same(first, build(corpus))
+    assert_same(first, read_columns(entry()))
+
+
+def test_the_faster_of_two_processes_wins(corpus: Path) -> None:
+    first = build(corpus)
+    before = (entry() / INDEX_FILE).stat().st_ino
+    keep(build(corpus, cache=False))
+    assert (entry() / INDEX_FILE).stat().st_ino == before
+    assert_same(first, build(corpus))
+
+
+def test_nothing_in_the_cache_can_run_code(corpus: Path) -> None:
+    build(corpus)
+    assert {path.suffix for path in entry().iterdir()} == {".npy", ".json"}
+    for path in entry().glob("*.npy"):
+        assert np.load(path, allow_pickle=False).dtype.kind in "biuf"
+
+
+def test_sessions_that_cannot_be_read_are_listed(corpus: Path) -> None:
+    broken = write(corpus / "train" / "broken", talk())
+    (broken / "session.json").write_text("{")
+    columns = build(corpus)
+    assert columns.sessions.names == ("a",)
+    ((name, reason),) = columns.unreadable
+    assert name == "broken" and "session.json" in reason
+    assert build(corpus).unreadable == columns.unreadable
+
+
+def test_a_corpus_of_which_nothing_can_be_read_is_one_clear_error(tmp_path: Path) -> None:
+    broken = write(tmp_path / "corpus" / "broken", talk())
+    (broken / "session.json").write_text("{")
+    with pytest.raises(SessionError, match=r"no session can be read: .*session\.json"):
+        build(tmp_path / "corpus")
+
+
+def test_progress_is_told(corpus: Path) -> None:
+    told: list[int] = []
+    build(corpus, cache=False, told=lambda: told.append(1))
+    assert told == [1]

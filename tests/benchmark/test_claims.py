@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+import pytest
+
+from dorothie_gym.benchmark import COLUMNS, Estimate, Verdict, above, findings, paper_figures
+from dorothie_gym.benchmark.claims import FULL, NO_HISTORY, NO_MAP, OTHER_ABLATIONS, TUNED
+
+NOISE = (-0.01, 0.0, 0.01)
+
+
+class Table:
+    """Figures of models: 0.6 with a little noise over three seeds, but for what is said otherwise."""
+
+    def __init__(self, means: dict[tuple[str, str], float], seeds: int = 3) -> None:
+        self.means = means
+        self.seeds = seeds
+
+    def __call__(self, model: str, part: str, metric: str) -> Estimate:
+        mean = self.means.get((model, metric), self.means.get((model, ""), 0.6))
+        # Noise of another order in each model: differences of equals are not zero everywhere.
+        turn = len(model) % 3
+        return Estimate.of({k: mean + NOISE[(k + turn) % 3] / 4 for k in range(self.seeds)})
+
+
+def verdicts(table: Table) -> list[Verdict]:
+    return [finding.verdict for finding in findings(table, "seen")]
+
+
+def test_findings_that_appear_hold() -> None:
+    table = Table(
+        {
+            (NO_HISTORY, ""): 0.3,
+            (TUNED, ""): 0.8,
+            (TUNED, "nfd_joint_accuracy"): 0.2,
+            ("TOTO (- Current Speech)", "ufn_move_accuracy"): 0.5,
+        }
+    )
+    assert verdicts(table) == [Verdict.HOLDS] * 4
+
+
+def test_differences_the_other_way_do_not_hold() -> None:
+    table = Table({(NO_HISTORY, ""): 0.9, (TUNED, ""): 0.3, (NO_MAP, ""): 0.2, (OTHER_ABLATIONS[3], ""): 0.9})
+    assert verdicts(table) == [Verdict.FAILS] * 4
+
+
+def test_without_a_difference_it_is_undecided_but_for_what_should_not_help() -> None:
+    assert verdicts(Table({})) == [Verdict.UNDECIDED, Verdict.UNDECIDED, Verdict.UNDECIDED, Verdict.HOLDS]
+
+
+def test_one_seed_decides_nothing() -> None:
+    assert verdicts(Table({(NO_HISTORY, ""): 0.1}, seeds=1)) == [Verdict.UNDECIDED] * 4
+
+
+def test_without_the_models_nothing_is_tested() -> None:
+    found = findings(lambda model, part, metric: Estimate.of({}), "seen")
+    assert [finding.verdict for finding in found] == [Verdict.UNTESTED] * 4
+
+
+def test_history_is_compared_with_whatever_else_costs_most() -> None:
+    rival = "TOTO (- GT Transcript)"
+    (history, *_) = findings(Table({(NO_HISTORY, ""): 0.3, (rival, ""): 0.2}), "seen")
+    assert history.verdict is Verdict.FAILS
+    claim = history.claims[1]
+    assert (claim.higher, claim.lower, claim.verdict) == (rival, NO_HISTORY, Verdict.FAILS)
+
+
+def test_claims_name_models_of_the_paper_and_columns_of_its_table() -> None:
+    names = paper_figures()
+    for finding in findings(Table({}), "seen"):
+        for claim in finding.claims:
+            assert claim.higher in names and claim.lower in names and claim.metric in COLUMNS
+
+
+def test_the_papers_figures_are_shares() -> None:
+    toto = paper_figures()[FULL]["unseen"]
+    assert toto["nfd_joint_accuracy"].mean == pytest.approx(0.411)
+    assert len(paper_figures()) == 16
+
+
+def test_a_model_is_above_another_if_it_is_in_every_figure() -> None:
+    table = Table({("mine", ""): 0.8, ("other", ""): 0.8, ("other", "rfn_slot_f1"): 0.6})
+    assert above(table, "seen", "mine", FULL).verdict is Verdict.HOLDS
+    assert above(table, "seen", "other", FULL).verdict is Verdict.UNDECIDED
+    assert above(table, "seen", "other", FULL, ("ufn_move_accuracy",)).verdict is Verdict.HOLDS
+    assert above(table, "seen", FULL, "mine").verdict is Verdict.FAILS

@@ -1,0 +1,209 @@
+"""Guesses of hidden places, from what is marked on the map and what is said."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dorothie_gym.engine.beliefs import Beliefs
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.engine.scenario import Scenario, draw_scenario
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.maps import load_town
+from dorothie_gym.ontology import (
+    ActionValue,
+    DialogueAct,
+    DialogueMove,
+    LandmarkName,
+    MentalAction,
+    Role,
+    SlotValue,
+    StreetName,
+)
+from dorothie_gym.sim.config import WorldConfig
+from dorothie_gym.spaces import (
+    CoWizardAction,
+    GuessColumn,
+    LanePosition,
+    Mental,
+    ParticipantAction,
+    Speech,
+    noop,
+)
+from dorothie_gym.tasks import Landmark
+
+TOWN = load_town("brookside")
+FAR = np.array([1e4, 1e4, 0.0])
+SURE = 0.01 * np.eye(3)
+
+
+def scenario_with_neighbours() -> tuple[Scenario, Landmark, Landmark]:
+    """One in which a hidden landmark on a street and a known one stand close together, the only ones of their names."""
+    for seed in range(500):
+        scenario = draw_scenario(TOWN, None, seed)
+        landmarks = scenario.storyboard.landmarks
+        names = [mark.name for mark in landmarks]
+        alone = [mark for mark in landmarks if names.count(mark.name) == 1]
+        for one in alone:
+            for other in alone:
+                if (
+                    one.hidden
+                    and one.street >= 0
+                    and not other.hidden
+                    and math.dist(one.position, other.position) < 60.0
+                ):
+                    return scenario, one, other
+    raise AssertionError("no scenario hides a landmark beside a known one")
+
+
+SCENARIO, HIDDEN, KNOWN = scenario_with_neighbours()
+LANDMARKS = SCENARIO.storyboard.landmarks
+STREET = SCENARIO.street_names[HIDDEN.street]
+
+
+def beliefs() -> Beliefs:
+    return Beliefs(TOWN, SCENARIO)
+
+
+def told(held: Beliefs, move: DialogueMove, *values: SlotValue, by: Role = Role.PARTICIPANT) -> None:
+    held.hear(by, [DialogueAct.of(move, *values)])
+
+
+def mark(held: Beliefs, lane: int, station: float, pose: np.ndarray = FAR, sight: float = 80.0) -> None:
+    held.guess(HIDDEN.name, lane, station, pose=pose, covariance=SURE, sight=sight)
+
+
+def spread(held: Beliefs) -> float:
+    return float(np.trace(np.array(held.places[HIDDEN.name].covariance)))
+
+
+def test_a_street_that_is_named_tells_where_the_place_is() -> None:
+    held = beliefs()
+    told(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET)
+    place = held.places[HIDDEN.name]
+    assert place.distance(*HIDDEN.position) < 9.0
+    assert not held.guesses
+
+
+def test_an_answer_without_a_name_is_about_what_was_last_spoken_of() -> None:
+    held = beliefs()
+    told(held, DialogueMove.QUERY_W, HIDDEN.name, by=Role.CO_WIZARD)
+    told(held, DialogueMove.REPLY_W, STREET)
+    named = beliefs()
+    told(named, DialogueMove.REPLY_W, HIDDEN.name, STREET)
+    assert held.places == named.places
+
+
+def test_a_landmark_beside_it_tells_more() -> None:
+    held = beliefs()
+    told(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET)
+    before = spread(held)
+    told(held, DialogueMove.REPLY_W, HIDDEN.name, KNOWN.name)
+    assert spread(held) < before
+
+
+def test_the_same_said_again_tells_nothing_new() -> None:
+    held = beliefs()
+    told(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET)
+    told(held, DialogueMove.EXPLAIN, HIDDEN.name, KNOWN.name)
+    before = dict(held.places)
+    told(held, DialogueMove.CLARIFY, HIDDEN.name, STREET)
+    assert held.places == before
+
+
+@pytest.mark.parametrize(
+    ("move", "values", "speaker"),
+    [
+        (DialogueMove.INSTRUCT, (ActionValue.J_TURN, STREET), Role.PARTICIPANT),  # a turn, not a place
+        (DialogueMove.QUERY_YN, (HIDDEN.name, STREET), Role.PARTICIPANT),
+        (DialogueMove.REPLY_N, (HIDDEN.name, STREET), Role.PARTICIPANT),
+        (DialogueMove.EXPLAIN, (HIDDEN.name, STREET), Role.CO_WIZARD),  # it does not learn from itself
+        (DialogueMove.EXPLAIN, (HIDDEN.name, StreetName.UNKNOWN), Role.PARTICIPANT),
+        (DialogueMove.EXPLAIN, (KNOWN.name, STREET), Role.PARTICIPANT),
+    ],
+)
+def test_what_says_nothing_of_a_hidden_place_is_left_alone(
+    move: DialogueMove, values: tuple[SlotValue, ...], speaker: Role
+) -> None:
+    held = beliefs()
+    told(held, move, *values, by=speaker)
+    assert not held.places
+
+
+def test_a_new_task_with_a_known_place_changes_the_subject() -> None:
+    held = beliefs()
+    told(held, DialogueMove.QUERY_W, HIDDEN.name, by=Role.CO_WIZARD)
+    told(held, DialogueMove.INSTRUCT, KNOWN.name)
+    told(held, DialogueMove.REPLY_W, STREET)
+    assert HIDDEN.name not in held.places
+
+
+def test_a_mark_of_what_is_in_sight_is_surer_than_one_from_afar() -> None:
+    x, y = TOWN.lanes[HIDDEN.lane].position(HIDDEN.station)
+    afar, near = beliefs(), beliefs()
+    mark(afar, HIDDEN.lane, HIDDEN.station)
+    mark(near, HIDDEN.lane, HIDDEN.station, pose=np.array([x + 15.0, y, 0.0]))
+    fog = beliefs()
+    mark(fog, HIDDEN.lane, HIDDEN.station, pose=np.array([x + 25.0, y, 0.0]), sight=20.0)
+    assert spread(near) < spread(fog) == spread(afar)
+
+
+def test_marks_and_words_add_up() -> None:
+    held = beliefs()
+    mark(held, HIDDEN.lane, HIDDEN.station)
+    alone = spread(held)
+    told(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET)
+    assert spread(held) < alone
+    again = dict(held.places)
+    mark(held, HIDDEN.lane, HIDDEN.station)  # the same mark
+    assert held.places == again
+
+
+def test_hidden_places_do_not_show_in_what_is_believed() -> None:
+    moved = tuple(replace(m, position=(m.position[0] + 50.0, m.position[1])) if m.hidden else m for m in LANDMARKS)
+    other = replace(SCENARIO, storyboard=replace(SCENARIO.storyboard, landmarks=moved))
+    found = []
+    for scenario in (SCENARIO, other):
+        held = Beliefs(TOWN, scenario)
+        told(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET, KNOWN.name)
+        found.append(held.places)
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("observe_acts", [True, False])
+def test_the_co_wizard_observes_mean_and_covariance(observe_acts: bool) -> None:
+    env = DuoWizardEnv(
+        "brookside", config=EnvConfig(observe_acts=observe_acts, world=WorldConfig(vehicles=0, pedestrians=0))
+    )
+    env.reset(seed=SCENARIO.seed)
+    words = f"the {HIDDEN.name.label} is on {STREET.label}"
+    act = DialogueAct.of(DialogueMove.EXPLAIN, HIDDEN.name, STREET)
+    said = ParticipantAction(speech=Speech(act=act, text=words))
+    place = LanePosition(lane=HIDDEN.lane, metres=round(HIDDEN.station))
+    actions = {agent: noop(Role(agent), env.limits) for agent in env.agents}
+    row = None
+    for k in range(12):
+        now = dict(actions)
+        if k == 0:
+            now["participant"] = said.encode(env.limits)
+        if k == 10:
+            marked = Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=HIDDEN.name, place=place)
+            now["co_wizard"] = CoWizardAction(mental=marked).encode(env.limits)
+        observations, *_ = env.step(now)
+        if k == 9:
+            row = observations["co_wizard"]["guesses"][HIDDEN.name.value].copy()
+    last = observations["co_wizard"]["guesses"][HIDDEN.name.value]
+    assert row is not None
+    for told_row in (row, last):
+        c = GuessColumn
+        assert told_row[c.PRESENT] == 1.0
+        covariance = np.array(
+            [[told_row[c.VARIANCE_X], told_row[c.COVARIANCE_XY]], [told_row[c.COVARIANCE_XY], told_row[c.VARIANCE_Y]]]
+        )
+        assert np.linalg.eigvalsh(covariance)[0] > 0.0
+    assert last[GuessColumn.VARIANCE_X] + last[GuessColumn.VARIANCE_Y] < row[3] + row[4]
+    names = {LandmarkName(k) for k, guess in enumerate(observations["co_wizard"]["guesses"]) if guess[0]}
+    assert names == {HIDDEN.name}

@@ -1,0 +1,142 @@
+"""Sessions in which the participant and the Co-Wizard hear each other through a recogniser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dorothie_gym.dialogue import word_error_rate
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.ontology import AGENT_ROLES, DialogueAct, DialogueMove, LandmarkName, Role, encode_slots
+from dorothie_gym.policies import make_policy
+from dorothie_gym.recording import Session
+from dorothie_gym.rollout import play_session
+from dorothie_gym.sim.config import WorldConfig
+from dorothie_gym.spaces import NO_MOVE, ParticipantAction, Speech, noop
+from tests.envs.sessions_played import play_by_script
+
+ALONE = WorldConfig(vehicles=0, pedestrians=0)
+
+
+def noisy(rate: float, **settings: Any) -> DuoWizardEnv:
+    return DuoWizardEnv(config=EnvConfig(world=ALONE, word_error_rate=rate, **settings))
+
+
+def talk(env: DuoWizardEnv, seed: int, decisions: int = 160) -> list[tuple[Any, list[dict[str, Any]]]]:
+    """Observations of each decision with the acts that ended in it."""
+    found = []
+    for observations, _, _ in play_by_script(env, seed=seed, decisions=decisions):
+        spoken = [{**event.data, "by": event.source} for event in env.last_events if event.type == "DialogueMove"]
+        found.append((observations, spoken))
+    return found
+
+
+@pytest.fixture(scope="module")
+def heard() -> list[tuple[Any, list[dict[str, Any]]]]:
+    return talk(noisy(0.2), seed=3, decisions=300)
+
+
+def test_listeners_observe_the_transcript_and_the_ad_wizard_what_was_said(heard: Any) -> None:
+    other = {Role.PARTICIPANT: "co_wizard", Role.CO_WIZARD: "participant"}
+    misheard = 0
+    for observations, spoken in heard:
+        for act in spoken:
+            field = f"{act['by']}_text"
+            assert observations[other[act["by"]]][field] == act["recognised"]
+            assert observations["ad_wizard"][field] == act["text"]
+            misheard += act["recognised"] != act["text"]
+    assert misheard > 5
+
+
+def test_acts_that_were_meant_do_not_come_with_words_that_were_misheard(heard: Any) -> None:
+    other = {Role.PARTICIPANT: "co_wizard", Role.CO_WIZARD: "participant"}
+    differing = 0
+    for observations, spoken in heard:
+        for by in other:
+            acts = [act for act in spoken if act["by"] is by]
+            observed = observations[other[by]][f"{by}_moves"]
+            meant = observations["ad_wizard"][f"{by}_moves"]
+            assert (observed == NO_MOVE).tolist() == (meant == NO_MOVE).tolist() and len(acts) == (meant < 15).sum()
+            if acts and acts[0]["recognised"] == acts[0]["text"]:
+                assert observed.tolist() == meant.tolist()
+            differing += observed.tolist() != meant.tolist()
+    assert differing
+
+
+def test_an_act_says_nothing_that_was_not_heard() -> None:
+    """An Instruct to go to the KFC by words that name no place arrives as these words alone would."""
+    env = noisy(0.9)
+    to_kfc = DialogueAct.of(DialogueMove.INSTRUCT, LandmarkName.KFC)
+    observations, _ = env.reset(seed=5)
+    actions = {agent: noop(Role(agent), env.limits) for agent in env.agents}
+    speech = Speech(act=to_kfc, text="we will do as I told you before")
+    actions["participant"] = ParticipantAction(speech=speech).encode(env.limits)
+    for _ in range(12):
+        observations, *_ = env.step(actions)
+        actions["participant"] = noop(Role.PARTICIPANT, env.limits)
+        if observations["co_wizard"]["participant_text"]:
+            break
+    assert observations["co_wizard"]["participant_text"] != speech.text
+    kfc = encode_slots(to_kfc.slots).index(1)
+    assert observations["ad_wizard"]["participant_slots"][0][kfc]
+    assert not observations["co_wizard"]["participant_slots"][0][kfc]
+    assert observations["ad_wizard"]["participant_moves"][0] == DialogueMove.INSTRUCT
+
+
+def test_without_word_errors_sessions_have_no_transcripts_and_hear_everything() -> None:
+    for observations, spoken in talk(noisy(0.0), seed=3):
+        for act in spoken:
+            assert "recognised" not in act
+            listener = "co_wizard" if act["by"] is Role.PARTICIPANT else "participant"
+            assert observations[listener][f"{act['by']}_text"] == act["text"]
+
+
+def test_word_errors_are_drawn_apart_from_everything_else() -> None:
+    """Actions given, only what is heard differs: the words found for acts and the traffic are the same."""
+    clear, unclear = (DuoWizardEnv(config=EnvConfig(word_error_rate=rate)) for rate in (0.0, 0.5))
+    for env in (clear, unclear):
+        env.reset(seed=8)
+    for k in range(40):
+        actions = {agent: noop(Role(agent), clear.limits) for agent in clear.agents}
+        if k % 5 == 0:
+            speech = Speech(act=DialogueAct(DialogueMove.EXPLAIN), text="")
+            actions["participant"] = ParticipantAction(speech=speech).encode(clear.limits)
+        (seen, *_), (others, *_) = (env.step(actions) for env in (clear, unclear))
+        assert seen["ad_wizard"]["participant_text"] == others["ad_wizard"]["participant_text"]
+        assert (clear.last_frames == unclear.last_frames).all()
+        assert (seen["participant"]["objects"] == others["participant"]["objects"]).all()
+
+
+def played(env: DuoWizardEnv, seed: int, folder: Path) -> Session:
+    policies = {role: make_policy("scripted", role, env.limits) for role in AGENT_ROLES}
+    play_session(env, policies, seed=seed, folder=folder)
+    return Session.load(folder)
+
+
+def measured_rate(sessions: list[Session]) -> float:
+    utterances = [utterance for session in sessions for utterance in session.utterances()]
+    return word_error_rate(
+        [utterance.text for utterance in utterances], [str(utterance.moves[0].recognised) for utterance in utterances]
+    )
+
+
+def test_a_session_has_about_the_word_errors_that_were_asked_for(tmp_path: Path) -> None:
+    assert measured_rate([played(noisy(0.3, max_seconds=200.0), 2, tmp_path / "one")]) == pytest.approx(0.3, abs=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rate", [0.05, 0.15, 0.3])
+def test_a_corpus_has_the_word_errors_that_were_asked_for(tmp_path: Path, rate: float) -> None:
+    env = noisy(rate)
+    assert measured_rate([played(env, seed, tmp_path / str(seed)) for seed in range(16)]) == pytest.approx(
+        rate, rel=0.1
+    )
+
+
+@pytest.mark.parametrize("rate", [-0.1, 1.0, float("nan")])
+def test_rates_out_of_range_are_named(rate: float) -> None:
+    with pytest.raises(ValueError, match=r"EnvConfig.word_error_rate is .*; it must be at least 0 and below 1"):
+        EnvConfig(word_error_rate=rate)

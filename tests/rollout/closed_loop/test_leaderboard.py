@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from dorothie_gym.cli.app import app
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.maps import SEEN_TOWNS
+from dorothie_gym.ontology import Role
+from dorothie_gym.policies import ALL_SCRIPTED, Player
+from dorothie_gym.rollout.closed_loop import RolloutError, RolloutResult, RolloutSettings, Row
+from dorothie_gym.rollout.closed_loop.leaderboard import leaderboard_page, read_entries
+from tests.rollout.closed_loop.drives import record
+
+
+def write(folder: Path, name: str, successes: int, **settings: Any) -> Path:
+    """The result of four sessions of a Co-Wizard."""
+    player = Player(name=name, training={"steps": 50_000, "seconds": 1200.0} if name == "ppo" else {})
+    made = RolloutSettings(cast={**ALL_SCRIPTED, Role.CO_WIZARD: player}, sessions=4, **settings)
+    rows = tuple(Row(number=k, town="brookside", seed=k, record=record(success=k < successes)) for k in range(4))
+    folder.mkdir(parents=True)
+    result = RolloutResult(settings=made.to_json(), rows=rows)
+    (folder / "rollout.json").write_text(json.dumps(result.to_json()))
+    return folder
+
+
+def test_policies_are_ranked_within_each_fold_of_towns(tmp_path: Path) -> None:
+    for name, successes in (("random", 0), ("ppo", 3), ("scripted", 4)):
+        write(tmp_path / name, name, successes)
+    write(tmp_path / "seen", "random", 1, towns=SEEN_TOWNS)
+    ranked = [(entry.part, entry.policy) for entry in read_entries([tmp_path])]
+    assert ranked == [("seen", "random"), ("unseen", "scripted"), ("unseen", "ppo"), ("unseen", "random")]
+
+
+def test_page_has_figures_cost_and_the_command_of_each_row(tmp_path: Path) -> None:
+    folder = write(tmp_path / "one", "ppo", 3)
+    (folder / "cost.json").write_text('{"wall_seconds": 100.0, "cpu_seconds": 180.0, "workers": 2}')
+    page = leaderboard_page(read_entries([folder]), "board.png")
+    assert "![Success and driving score of each policy, with intervals](board.png)" in page
+    assert "| ppo | 4 | 0 | 75.0 [25.0, 100.0] % |" in page
+    assert "| ppo | unseen | 50,000 | 20 min | 800 | 100 s by 2 | 180 s |" in page
+    assert "dorothie-gym rollout --co-wizard ppo --participant scripted" in page
+
+
+def test_who_hears_badly_has_a_row_of_its_own(tmp_path: Path) -> None:
+    write(tmp_path / "clear", "scripted", 4)
+    write(tmp_path / "noisy", "scripted", 2, config=EnvConfig(word_error_rate=0.2))
+    assert [entry.policy for entry in read_entries([tmp_path])] == ["scripted", "scripted (word errors 20 %)"]
+
+
+def test_two_results_of_one_row_and_none_at_all_are_told(tmp_path: Path) -> None:
+    write(tmp_path / "a", "scripted", 4)
+    write(tmp_path / "b", "scripted", 3)
+    with pytest.raises(RolloutError, match=r"b: scripted in unseen towns is in .*a, too"):
+        read_entries([tmp_path])
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(RolloutError, match=r"empty: holds no rollout.json"):
+        read_entries([tmp_path / "empty"])
+
+
+def test_command_writes_page_and_picture(tmp_path: Path) -> None:
+    write(tmp_path / "runs" / "a", "scripted", 4)
+    page = tmp_path / "leaderboard.md"
+    done = CliRunner().invoke(app, ["leaderboard", str(tmp_path / "runs"), "--out", str(page)])
+    assert done.exit_code == 0, done.output
+    assert page.read_text().startswith("# Leaderboard")
+    assert (tmp_path / "leaderboard.png").read_bytes().startswith(b"\x89PNG")
+    done = CliRunner().invoke(app, ["leaderboard", str(tmp_path), "--out", str(page)])
+    assert done.exit_code == 2 and "holds no rollout.json" in done.stderr

@@ -1,0 +1,96 @@
+"""Perfect instructions: whoever gives them knows the map, the route and where the car is."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from dorothie_gym.maps import Site, Town
+from dorothie_gym.maps.routing import Entry, Leg, router
+from dorothie_gym.ontology import ARRIVAL_DISTANCE, PhysicalAction
+from dorothie_gym.sim.config import FRAME_RATE
+from dorothie_gym.sim.ego.driver import GoalAhead
+from dorothie_gym.sim.ego.manoeuvre_lanes import LEAD, Lanes
+from dorothie_gym.sim.ego.obstacles import BRAKING
+from dorothie_gym.sim.ego.planner import U_TURN_SPEED, LocalPlanner
+from dorothie_gym.sim.network.network import TownNetwork
+from tests.sim.driving import Trip, on_lane
+
+Instruction = tuple[PhysicalAction, int]
+
+FRAMES = 15
+
+DECISION = FRAMES / FRAME_RATE
+"""An instruction is given at most this often [s]."""
+
+STRAIGHT = {Entry.CHANGE_LEFT: 90, Entry.CHANGE_RIGHT: -90}
+
+
+def guided_trip(roads: TownNetwork, start: Site, goal: Site, *, most: float = 1200.0) -> Trip:
+    """Drives from one site to another without anybody else; it has arrived when the car stands beside the goal.
+
+    Args:
+        roads: the town.
+        start: where the car stands.
+        goal: where it is to go.
+        most: seconds after which it is given up.
+    """
+    town = roads.town
+    world = on_lane(roads, start.lane, start.station)
+    car, driver, planner = world.car, world.driver, world.planner
+    driver.cruise = 60.0
+    driver.set_goals([GoalAhead(lane=goal.lane, station=goal.station)])
+    worst = 0.0
+    for _ in range(round(most / DECISION)):
+        speed = float(car.speed)
+        planner.extend(speed)
+        if planner.held and speed < 0.1:
+            if math.dist(car.position, goal.waypoint) <= ARRIVAL_DISTANCE:
+                return Trip(world, worst, True)
+            planner.command(PhysicalAction.START, 0, speed)
+        instruction = _next(town, planner, goal, speed)
+        if instruction is not None:
+            planner.command(*instruction, speed)
+        world.step(FRAMES)
+        worst = max(worst, float(np.abs(world.offsets).max()))
+    return Trip(world, worst, False)
+
+
+def _next(town: Town, planner: LocalPlanner, goal: Site, speed: float) -> Instruction | None:
+    """What a guide says now, if anything."""
+    if planner.held or town.lanes[planner.lane].in_junction:
+        return None
+    left = goal.station - planner.station
+    turning_round = planner.in_manoeuvre and planner.manoeuvre[0] is PhysicalAction.U_TURN
+    if planner.lane == goal.lane and not turning_round and -1.0 < left <= 0.56 * speed + speed**2 / 6.0 + 0.3:
+        return PhysicalAction.STOP, 0
+    route = router(town).route((planner.lane, planner.station), (goal.lane, goal.station))
+    assert route is not None, (planner.lane, planner.station, goal)
+    for before, leg in zip(route.legs, route.legs[1:], strict=False):
+        if leg.entry is not Entry.FOLLOW:
+            return _aside(planner, before, leg, speed)
+        if town.lanes[leg.lane].in_junction and Lanes(town).offers_turns(before.lane):
+            (angle,) = (way.angle for way in town.exits(before.lane) if way.connector == leg.lane)
+            return None if planner.turn_ahead == angle else (PhysicalAction.J_TURN, angle)
+    return None
+
+
+def _aside(planner: LocalPlanner, before: Leg, leg: Leg, speed: float) -> Instruction | None:
+    """A lane switch or U-turn, when the car is where it is to begin."""
+    busy = planner.in_manoeuvre or planner.manoeuvre[0] not in (None, PhysicalAction.J_TURN)
+    if busy or before.lane != planner.lane:
+        return None
+    left = before.end - planner.station
+    if leg.entry is Entry.U_TURN:
+        braking = LEAD + max(speed**2 - U_TURN_SPEED**2, 0.0) / (2.0 * BRAKING)
+        return (PhysicalAction.U_TURN, 0) if left <= max(3.0, braking + DECISION * speed) else None
+    if left > max(3.0, 0.8 * speed):
+        return None
+    return PhysicalAction.LANE_SWITCH, STRAIGHT[leg.entry]
+
+
+def random_pair(town: Town, seed: int) -> tuple[Site, Site]:
+    """Two different sites."""
+    one, other = np.random.default_rng(seed).choice(len(town.sites), size=2, replace=False)
+    return town.sites[int(one)], town.sites[int(other)]

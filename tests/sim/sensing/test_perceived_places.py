@@ -1,0 +1,45 @@
+"""What the car senses is the same, byte by byte, compiled and in plain Python."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+SENSES = """
+import hashlib
+import numpy as np
+from dorothie_gym.sim.infractions import InfractionWatch
+from dorothie_gym.sim.sensing.localizer import Localizer
+from dorothie_gym.sim.sensing.visibility import Visibility
+from tests.sim.driving import network
+from tests.sim.state.plain_rules import lawless_way
+from tests.sim.sensing.test_seeing import Street
+digest = hashlib.sha256()
+for seed in range(4):
+    view = Visibility(fog=0.02, rain=0.002, light=3.0, lamps=20200.0 * (seed % 2))
+    digest.update(Street(seed).seen(view, 100 * seed, seed).tobytes())
+roads = network("brookside")
+way = lawless_way(roads, np.random.default_rng(2), 450)
+watch, localizer = InfractionWatch(roads, 5.0), Localizer(*way[0, :3], np.random.default_rng(7))
+for k in range(0, 450, 15):
+    localizer.localize(way[k : k + 16], k, gps_from=200)
+    digest.update(localizer.pose.tobytes() + localizer.covariance.tobytes())
+    digest.update(repr(watch.look(way[k : k + 16], k)).encode())
+print(digest.hexdigest())
+"""
+
+
+def run(disabled: str) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled}
+    root = Path(__file__).resolve().parents[3]
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-c", SENSES], env=environment, capture_output=True, text=True, cwd=root
+    )
+
+
+def test_senses_are_the_same_bytes_compiled_and_in_plain_python() -> None:
+    compiled, plain = run("0"), run("1")
+    assert compiled.returncode == plain.returncode == 0, compiled.stderr + plain.stderr
+    assert compiled.stdout == plain.stdout

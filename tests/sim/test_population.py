@@ -1,0 +1,97 @@
+"""Worlds that are changed while they go on."""
+
+import numpy as np
+import pytest
+
+from dorothie_gym.ontology import PropKind
+from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.population import (
+    add_pedestrian,
+    add_prop,
+    add_vehicle,
+    move_prop,
+    populate,
+    remove_pedestrian,
+    remove_vehicle,
+)
+from dorothie_gym.sim.state.records import Kind, Walk
+from dorothie_gym.sim.state.town_arrays import town_arrays
+from dorothie_gym.sim.state.world_arrays import empty_world, grown
+from dorothie_gym.sim.step import step
+from tests.sim.network.towns import find_town, straight_town
+from tests.sim.state.states import DT, Pose, kernel_world
+
+
+def crowd(network, *, vehicles, pedestrians, props):
+    arrays = town_arrays(network)
+    world = empty_world(arrays, vehicles=vehicles, pedestrians=pedestrians, props=props, seed=9)
+    populate(network, arrays, world, seed=9, vehicles=20, pedestrians=15)
+    add_prop(network, arrays, world, PropKind.TRAFFIC_CONE, 3, 20.0)
+    return arrays, world
+
+
+def test_world_that_has_grown_goes_on_as_one_that_had_the_room_from_the_start():
+    network = TownNetwork(find_town("brookside"))
+    arrays, small = crowd(network, vehicles=20, pedestrians=15, props=1)
+    _, large = crowd(network, vehicles=27, pedestrians=22, props=4)
+    step(arrays, small, 100, DT)
+    step(arrays, large, 100, DT)
+    small = grown(arrays, small, vehicles=27, pedestrians=22, props=4)
+    for world in (small, large):
+        add_pedestrian(arrays, world, 2, 10.0, pace=1.2)
+        add_vehicle(arrays, world, 5, 20.0, desired=7.0)
+        step(arrays, world, 300, DT)
+    for name in ("vehicles", "pedestrians", "props", "clock", "lamps", "busy", "heads"):
+        assert getattr(small, name).tobytes() == getattr(large, name).tobytes(), name
+
+
+def test_world_does_not_shrink():
+    arrays, world = kernel_world(TownNetwork(straight_town()), [Pose(0, 50.0), Pose(0, 80.0)])
+    with pytest.raises(ValueError, match="does not shrink"):
+        grown(arrays, world, vehicles=1, pedestrians=0, props=16)
+
+
+def test_vehicle_that_is_taken_away_leaves_the_road_to_others():
+    arrays, world = kernel_world(TownNetwork(straight_town(lanes=1)), [Pose(0, 20.0), Pose(0, 45.0, desired=0.01)])
+    step(arrays, world, 300, DT)
+    assert world.vehicles[0].x < 45.0
+    remove_vehicle(arrays, world, 1)
+    step(arrays, world, 300, DT)
+    assert world.vehicles[0].x > 60.0 and world.vehicles[1].kind == Kind.EMPTY
+    key = int(world.vehicles[1].key)
+    assert add_vehicle(arrays, world, 0, 10.0, desired=5.0) == 1
+    assert world.vehicles[1].key > key
+
+
+def test_pedestrian_that_is_taken_away_is_gone():
+    network = TownNetwork(find_town("brookside"))
+    arrays = town_arrays(network)
+    world = empty_world(arrays, vehicles=0, pedestrians=2)
+    for station in (10.0, 30.0):
+        add_pedestrian(arrays, world, 0, station, pace=1.2)
+    world.pedestrians[0].crashed = True
+    remove_pedestrian(world, 0)
+    step(arrays, world, 300, DT)
+    assert world.pedestrians.state.tolist() == [Walk.EMPTY, Walk.WALKING]
+    assert add_pedestrian(arrays, world, 0, 10.0, pace=1.2) == 0
+
+
+def test_prop_that_is_moved_keeps_its_key_and_is_in_the_way_elsewhere():
+    network = TownNetwork(straight_town(lanes=2))
+    arrays, world = kernel_world(network, [Pose(0, 20.0)])
+    number = add_prop(network, arrays, world, PropKind.STREET_BARRIER, 2, 20.0)
+    key = int(world.props[number].key)
+    move_prop(network, arrays, world, number, 3, 60.0)
+    prop = world.props[number]
+    assert prop.key == key and prop.x == pytest.approx(160.0) and prop.y == pytest.approx(4.0)
+    assert 3 in prop.lane and np.flatnonzero(world.heads >= 0).tolist() == [0, *sorted(k for k in prop.lane if k >= 0)]
+
+
+def test_what_a_body_draws_is_a_matter_of_its_key_not_of_the_room():
+    arrays = town_arrays(TownNetwork(straight_town()))
+    numbers = []
+    for room in (1, 5):
+        world = empty_world(arrays, vehicles=room, pedestrians=room, seed=3)
+        add_vehicle(arrays, world, 0, 20.0, desired=8.0)
+        numbers.append(int(world.vehicles[0].random))
+    assert numbers[0] == numbers[1] > 0

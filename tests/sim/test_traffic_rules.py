@@ -1,0 +1,84 @@
+"""The compiled watch finds what loops over all lanes and lines in plain Python find."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.model import Array, SignalKind
+from dorothie_gym.sim.infractions import Infraction, InfractionWatch
+from dorothie_gym.sim.network.network import TownNetwork
+from tests.sim.crossings import crossing, way_in
+from tests.sim.driving import network
+from tests.sim.state.plain_rules import LENGTH, PlainWatch, lawless_way
+
+
+def compare(roads: TownNetwork, poses: Array, decision: int, frame: int = 0) -> Counter[Infraction]:
+    """Breaches of a way that both watches agree on, cut into decisions."""
+    compiled, plain = InfractionWatch(roads, LENGTH), PlainWatch(roads)
+    count: Counter[Infraction] = Counter()
+    for k in range(0, len(poses) - 1, decision):
+        stretch = poses[k : k + decision + 1]
+        found, expected = compiled.look(stretch, frame + k), plain.look(stretch, frame + k)
+        assert [replace(b, station=0.0) for b in found] == [replace(b, station=0.0) for b in expected]
+        assert [b.station for b in found] == pytest.approx([b.station for b in expected], abs=1e-9)
+        count.update(breach.kind for breach in found)
+    return count
+
+
+@pytest.mark.parametrize("name", ["brookside", "northgate", "Town02", "Town05"])
+def test_breaches_are_those_of_loops_over_everything(name: str) -> None:
+    roads, count = network(name), Counter[Infraction]()
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        count += compare(roads, lawless_way(roads, rng, 450), int(rng.integers(1, 40)), int(rng.integers(3000)))
+    assert count[Infraction.OFF_ROAD] > 0
+    assert count[Infraction.WRONG_WAY] > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["brookside", "midtown", "northgate", "Town02", "Town05"])
+def test_breaches_are_those_of_loops_over_everything_on_many_drives(name: str) -> None:
+    roads, count = network(name), Counter[Infraction]()
+    for seed in range(100, 160):
+        rng = np.random.default_rng(seed)
+        count += compare(roads, lawless_way(roads, rng, 450), int(rng.integers(1, 40)), int(rng.integers(3000)))
+    lines = {signal.kind for signal in PlainWatch(roads).signals.values()}
+    assert count[Infraction.OFF_ROAD] > 10
+    assert count[Infraction.WRONG_WAY] > 10
+    assert count[Infraction.RED_LIGHT] > 0 or SignalKind.TRAFFIC_LIGHT not in lines
+
+
+def passages(rng: np.random.Generator, count: int) -> Array:
+    """Ways north over the line of the crossing at 12 m; on each the car stands once, somewhere before it or beside."""
+    ways = []
+    for _ in range(count):
+        stands, beside = 12.0 + LENGTH / 2 + float(rng.uniform(-1.0, 5.0)), float(rng.normal(0.0, 1.2))
+        y = np.concatenate((np.arange(30.0, stands, -0.3), np.full(5, stands), np.arange(stands, 4.0, -0.3)))
+        poses = np.zeros((len(y), 6))
+        poses[:, 0], poses[:, 1], poses[:, 2] = 2.0 + beside, y, -np.pi / 2
+        poses[:, 3] = np.where(y == stands, 0.0, 9.0)
+        ways.append(poses)
+    return np.concatenate(ways)
+
+
+def test_stands_at_stop_signs_count_as_in_loops_over_everything() -> None:
+    roads, count = TownNetwork(crossing({"s": SignalKind.STOP})), Counter[Infraction]()
+    for seed in range(8):
+        count += compare(roads, passages(np.random.default_rng(seed), 10), 1 + 3 * seed)
+    assert 20 < count[Infraction.STOP_SIGN] < 60
+
+
+def test_lanes_too_wide_for_the_cells_are_looked_at_one_by_one() -> None:
+    town = crossing()
+    wide = replace(town.lanes[way_in("s")], widths=np.full_like(town.lanes[way_in("s")].widths, 15.0))
+    lanes = [wide if lane.id == wide.id else lane for lane in town.lanes]
+    roads = TownNetwork(Town(name="wide", lanes=lanes, links=town.links, junctions=town.junctions))
+    poses = np.zeros((20, 6))
+    poses[:, 0], poses[:, 1], poses[:, 2] = 2.0 + np.linspace(6.5, 8.3, 20), 60.0, -np.pi / 2
+    assert compare(roads, poses, 5) == {Infraction.OFF_ROAD: 1}
+    assert compare(roads, poses[:10], 5) == {}
