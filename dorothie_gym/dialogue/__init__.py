@@ -1,4 +1,4 @@
-"""Talk: utterances and their timing, exchanges, wording of acts and understanding of words."""
+"""Dialogue: utterances and timing, exchange units, language generation (NLG) and understanding (NLU)."""
 
 from dorothie_gym.dialogue.asr_channel import AsrChannel, Recogniser, word_error_rate
 from dorothie_gym.dialogue.conversation import (

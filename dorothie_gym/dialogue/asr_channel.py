@@ -1,4 +1,4 @@
-"""Speech recognition channel: transcripts with word errors, and the acts that listeners infer from them."""
+"""Simulated speech recognition (ASR): transcripts with word errors, and the acts that follow from them."""
 
 from __future__ import annotations
 
@@ -24,19 +24,22 @@ from dorothie_gym.ontology import DialogueMove, Role, Slot
 
 _WORD = re.compile(r"[A-Za-z][A-Za-z']*")
 _CANDIDATES = 6
-"""Words among which a misheard one is chosen."""
+"""Number of candidate words for a substitution."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class AsrChannel:
-    """How badly a recogniser hears.
+    """Error model of a speech recogniser.
 
     Attributes:
-        rate: word error rate, within [0, 1): substitutions, deletions and insertions per word that was said.
-        substitutions: their share of the errors.
-        deletions: their share of the errors; the rest are insertions. The shares are those of large-vocabulary
-            recognisers in conversation (Goldwater, Jurafsky and Manning, Speech Communication 52(3), 2010: about
+        rate: word error rate in [0, 1): substitutions, deletions and insertions per spoken word.
+        substitutions: share of substitutions among the errors.
+        deletions: share of deletions among the errors; the rest are insertions. The defaults follow large-vocabulary
+            recognition of conversations (Goldwater, Jurafsky and Manning, Speech Communication 52(3), 2010: about
             three fifths substitutions, a quarter deletions).
+
+    Raises:
+        ValueError: if `rate` or the shares are out of range.
     """
 
     rate: float = 0.12
@@ -53,14 +56,14 @@ class AsrChannel:
             )
 
     def transcribe(self, text: str, rng: np.random.Generator) -> str:
-        """Returns what is heard of a text: lower case but for names, without punctuation but for "?" and ",".
+        """Returns a transcript of a text with random word errors.
 
         Args:
-            text: what was said.
-            rng: source of chance.
+            text: spoken text.
+            rng: source of randomness.
 
         Returns:
-            The transcript; at least one word of a text that has one, so that something is heard.
+            The transcript, with at least one word unless the text is empty.
         """
         draw: Callable[[], float] = rng.random
         words = text.split()
@@ -72,7 +75,7 @@ class AsrChannel:
             drawn = draw()
             last_hope = place == len(words) - 1 and not heard
             if drawn < deletions and not last_hope:
-                # What parts sentences is no sound of the word: it stays with the word before.
+                # Punctuation is not part of the deleted word: it moves to the previous word.
                 if heard and word[-1] in "?.," and heard[-1][-1] not in "?.,":
                     heard[-1] += word[-1]
             elif drawn < deletions + substitutions:
@@ -85,17 +88,20 @@ class AsrChannel:
 
 
 def word_error_rate(said: Sequence[str], heard: Sequence[str]) -> float:
-    """Returns the word error rate of transcripts: word edits over words said, case and punctuation aside.
+    """Returns the word error rate of transcripts: word edits per spoken word, ignoring case and punctuation.
 
     Args:
-        said: texts.
-        heard: their transcripts, in the same order.
+        said: spoken texts.
+        heard: transcripts, in the same order.
+
+    Returns:
+        The word error rate; NaN without words.
 
     Raises:
-        ValueError: if there are not as many transcripts as texts.
+        ValueError: if the numbers of texts and transcripts differ.
     """
     if len(said) != len(heard):
-        raise ValueError(f"{len(said)} texts and {len(heard)} transcripts: give one transcript for each text")
+        raise ValueError(f"{len(said)} texts and {len(heard)} transcripts: pass one transcript per text")
     edits = words = 0
     for text, transcript in zip(said, heard, strict=True):
         reference = _bare(text)
@@ -105,16 +111,16 @@ def word_error_rate(said: Sequence[str], heard: Sequence[str]) -> float:
 
 
 def same_words(said: str, heard: str) -> bool:
-    """Returns whether two texts have the same words, case and punctuation aside."""
+    """Returns whether two texts have the same words, ignoring case and punctuation."""
     return _bare(said) == _bare(heard)
 
 
 def misheard(word: str, draw: Callable[[], float]) -> str:
-    """Returns a word that may be heard for another: one that sounds much like it, more probably the more alike.
+    """Returns a random phonetic confusion of a word; similar words are more probable.
 
     Args:
-        word: as written, perhaps with punctuation, which is kept.
-        draw: draws from [0, 1).
+        word: word, possibly with punctuation, which is kept.
+        draw: function that draws from [0, 1).
     """
     found = _WORD.search(word)
     if found is None:
@@ -131,26 +137,26 @@ def misheard(word: str, draw: Callable[[], float]) -> str:
 
 @functools.lru_cache(maxsize=8192)
 def _confusions(word: str) -> tuple[tuple[str, ...], tuple[float, ...]]:
-    """Returns what a word is misheard for, with cumulative weights."""
+    """Returns the possible confusions of a word with their cumulative weights."""
     sounds = _vocabulary_by_sound()
     own = sound_of(word)
     near = process.extract(own, list(sounds), scorer=Levenshtein.normalized_similarity, limit=3 * _CANDIDATES)
     options = [
-        (other, likeness * likeness)
-        for sound, likeness, _ in near
+        (other, similarity * similarity)
+        for sound, similarity, _ in near
         for other in sounds[sound]
-        if other != word and likeness > 0
+        if other != word and similarity > 0
     ][:_CANDIDATES]
     if word in _proper_words():
-        # A rare name is heard as a common word, or as another name, or nearly right.
-        options += [(_worn(word), 0.6)]
+        # A rare name is confused with a common word or another name, or slightly distorted.
+        options += [(_distorted(word), 0.6)]
     if not options:
-        options = [(_worn(word), 1.0)]
+        options = [(_distorted(word), 1.0)]
     return tuple(other for other, _ in options), tuple(itertools.accumulate(weight for _, weight in options))
 
 
-def _worn(word: str) -> str:
-    """Returns a word without its first inner consonant, as a mumbled name is written down."""
+def _distorted(word: str) -> str:
+    """Returns a word without its first inner consonant, as a transcript of a mumbled name."""
     for place in range(1, len(word) - 1):
         if word[place] not in "aeiouy'":
             return word[:place] + word[place + 1 :]
@@ -173,7 +179,7 @@ def _insertions() -> tuple[str, ...]:
 
 @functools.cache
 def _proper_words() -> Mapping[str, str]:
-    """Words of names, in lower case, with their spelling."""
+    """Returns the words of proper names: lower case -> spelling."""
     return {
         word.lower(): word
         for value, forms in load_lexicon().phrases.items()
@@ -186,7 +192,7 @@ def _proper_words() -> Mapping[str, str]:
 
 @functools.cache
 def _vocabulary_by_sound() -> Mapping[str, tuple[str, ...]]:
-    """The words that a recogniser knows: all that speakers say, and ordinary words that sound like names."""
+    """Returns the vocabulary of the recogniser by phonetic key: all generated words and common words like names."""
     spoken = " ".join(read_talk_files().values()).lower()
     known = split_words(" ".join(strings("cues.yaml: known", read_data("cues.yaml").get("known"))))
     words = {word for word in re.findall(r"\b[a-z][a-z']+\b", spoken)} | set(known) | set(_proper_words())
@@ -198,27 +204,27 @@ def _vocabulary_by_sound() -> Mapping[str, tuple[str, ...]]:
 
 
 class Recogniser:
-    """Hears the utterances of a session, one after the other, through a `AsrChannel`.
+    """Recogniser of the utterances of a session, with the errors of an `AsrChannel`.
 
-    Words that are heard right keep the act that was meant. Of a span that is misheard only the heard words count: its
-    act is what rules read from them, so that an act that comes along with the words never tells what they were.
+    Correctly recognised spans keep their act. The act of a misrecognised span is classified from the transcript, so
+    that the act does not reveal the spoken words.
     """
 
     def __init__(self, channel: AsrChannel, rng: np.random.Generator) -> None:
-        """Begins a session.
+        """Starts a session.
 
         Args:
-            channel: how badly it hears.
-            rng: source of chance; nothing is drawn where the channel's rate is 0.
+            channel: error model.
+            rng: source of randomness; unused if the error rate is 0.
         """
         self._channel, self._rng = channel, rng
         self._open: dict[Role, tuple[DialogueMove, float]] = {}
 
     def hear(self, utterance: Utterance) -> Utterance:
-        """Returns the utterance as it is heard: the same spans with heard words, and with acts that fit them.
+        """Returns the recognised utterance: the same spans with transcripts and matching acts.
 
         Args:
-            utterance: what was said; utterances have to come in the order in which they end.
+            utterance: spoken utterance; calls follow the order of utterance ends.
         """
         if self._channel.rate == 0:
             return utterance
@@ -232,7 +238,7 @@ class Recogniser:
         return replace(utterance, spans=tuple(spans))
 
     def _answered_by(self, utterance: Utterance) -> DialogueMove | None:
-        """The last move of somebody else that still waits for an answer; an utterance answers it for good."""
+        """Returns the last unanswered move of another speaker, and marks it as answered."""
         waiting = [(end, move) for role, (move, end) in self._open.items() if role is not utterance.speaker]
         self._open = {role: opened for role, opened in self._open.items() if role is utterance.speaker}
         end, move = max(waiting, default=(-np.inf, None))

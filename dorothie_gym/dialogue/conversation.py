@@ -1,4 +1,4 @@
-"""Utterances, and their timing between the first word and delivery to the listeners."""
+"""Utterances and their timing: spoken while they are in the air, delivered when the last word is over."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from dataclasses import dataclass, replace
 from dorothie_gym.ontology import DialogueAct, Role
 
 WORDS_PER_SECOND = 2.7
-"""Speaking rate [words/s]: ordinary talk runs at 2 to 3 words a second (design, Time)."""
+"""Speaking rate [words/s]; ordinary speech has 2 to 3 words per second (design, Time)."""
 
 SHORTEST_SPAN = 0.6
-"""Least time a span takes [s]: longer than a decision period (0.5 s), so that a speaker can always go on."""
+"""Shortest duration of a span [s]; longer than a decision period (0.5 s), so that a speaker can continue."""
 
 
 def speech_seconds(text: str, words_per_second: float = WORDS_PER_SECOND) -> float:
-    """Returns how long `text` takes to say [s].
+    """Returns the duration of a spoken text [s].
 
     Args:
-        text: what is said.
+        text: spoken words.
         words_per_second: speaking rate [words/s], positive.
 
     Raises:
@@ -30,10 +30,10 @@ def speech_seconds(text: str, words_per_second: float = WORDS_PER_SECOND) -> flo
 
 @dataclass(frozen=True)
 class Span:
-    """A stretch of words with the one act it performs.
+    """Segment of an utterance with one dialogue act.
 
     Attributes:
-        text: the words; never blank.
+        text: words of the span; never blank.
         act: the dialogue act (move and slot values).
     """
 
@@ -42,19 +42,19 @@ class Span:
 
     def __post_init__(self) -> None:
         if not self.text.strip():
-            raise ValueError("Span.text is blank: give the words, or let word_act find some")
+            raise ValueError("Span.text is blank: pass the words, or generate them with word_act")
 
 
 @dataclass(frozen=True)
 class Utterance:
-    """What one speaker says in one breath.
+    """Utterance of one speaker.
 
     Attributes:
-        speaker: who speaks.
-        spans: the acts in order, at least one.
-        start: when the first word begins [s of the session].
-        end: when the last word is over [s of the session].
-        exchange: id of the exchange that each span belongs to; empty until an `ExchangeTracker` has seen it.
+        speaker: role of the speaker.
+        spans: spans in order, at least one.
+        start: start of the first word [s of the session].
+        end: end of the last word [s of the session].
+        exchange: exchange id of each span; empty until an `ExchangeTracker` has processed the utterance.
     """
 
     speaker: Role
@@ -73,33 +73,33 @@ class Utterance:
 
     @property
     def text(self) -> str:
-        """All the words, in order."""
+        """Text of all spans, joined by spaces."""
         return " ".join(span.text for span in self.spans)
 
     @property
     def acts(self) -> tuple[DialogueAct, ...]:
-        """The act of each span, in order."""
+        """Dialogue act of each span, in order."""
         return tuple(span.act for span in self.spans)
 
 
 _TICK = 1e-9
-"""Slack for sums of decision periods [s]."""
+"""Tolerance for the rounding of summed decision periods [s]."""
 
 _ORDER = {role: place for place, role in enumerate((Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD, Role.AGENT))}
 
 
 class Conversation:
-    """Utterances that have begun and are not yet heard to their end.
+    """Buffer of utterances that have started and are not yet over.
 
-    A speaker has at most one utterance in the air; what it says meanwhile is appended to it. Speakers may overlap.
+    A speaker has at most one utterance in progress; further spans are appended to it. Speakers may overlap.
     """
 
     def __init__(self, words_per_second: float = WORDS_PER_SECOND, max_spans: int = 4) -> None:
-        """Starts in silence.
+        """Creates an empty buffer.
 
         Args:
             words_per_second: speaking rate [words/s], positive.
-            max_spans: most acts in one utterance, at least 1.
+            max_spans: largest number of spans in one utterance, at least 1.
 
         Raises:
             ValueError: if an argument is out of its range.
@@ -113,15 +113,15 @@ class Conversation:
         self._air: dict[Role, Utterance] = {}
 
     def say(self, speaker: Role, span: Span, now: float) -> str | None:
-        """Begins an utterance, or goes on with the one that the speaker has in the air.
+        """Starts an utterance, or appends a span to the current one of the speaker.
 
         Args:
-            speaker: who speaks.
-            span: the words and their act.
+            speaker: role of the speaker.
+            span: words and dialogue act.
             now: time of the decision [s].
 
         Returns:
-            None if it was said, else the reason why not.
+            None on success, otherwise the reason for the refusal.
         """
         seconds = speech_seconds(span.text, self.words_per_second)
         current = self._air.get(speaker)
@@ -135,13 +135,13 @@ class Conversation:
         return None
 
     def deliver(self, now: float) -> list[Utterance]:
-        """Takes the utterances whose words are over at `now` out of the air.
+        """Removes and returns the utterances that are over at `now`.
 
         Args:
             now: time [s].
 
         Returns:
-            The utterances by their start; the participant first where two begin together.
+            Utterances sorted by start; the participant comes first among equal starts.
         """
         heard = [utterance for utterance in self._air.values() if utterance.end <= now + _TICK]
         for utterance in heard:
@@ -149,10 +149,10 @@ class Conversation:
         return sorted(heard, key=lambda utterance: (utterance.start, _ORDER[utterance.speaker]))
 
     def speaking(self, speaker: Role, now: float) -> float:
-        """Returns the seconds that `speaker` has still to speak at `now`; 0 if silent."""
+        """Returns the remaining speaking time of `speaker` at `now` [s]; 0 when silent."""
         utterance = self._air.get(speaker)
         return max(0.0, utterance.end - now) if utterance is not None else 0.0
 
     def in_air(self, speaker: Role) -> Utterance | None:
-        """Returns what `speaker` is saying, or None."""
+        """Returns the current utterance of `speaker`, or None."""
         return self._air.get(speaker)

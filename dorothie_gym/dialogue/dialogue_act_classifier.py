@@ -1,4 +1,4 @@
-"""The act behind words that come without one: a rule-based guess for partners who only talk."""
+"""Rule-based dialogue act classifier for text without annotated acts."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _DOMAIN_RULE = "%domain"
 _WORD_LISTS = ("domain", "small_talk", "reports")
 
 _HEADS = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.EXPLAIN})
-"""Moves behind which a command stands on its own: "no, stop"; "I can hardly see, slow down"."""
+"""Moves after which a command is a separate act: "no, stop"; "I can hardly see, slow down"."""
 
 _QUESTIONS = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W})
 _BEFORE_QUESTIONS = frozenset(
@@ -46,16 +46,16 @@ _BEFORE_REASONS = frozenset(
     }
 )
 _MOST_CLAUSES = 6
-"""Commas that are looked at for another act."""
+"""Number of clauses of a sentence up to which commas are tested as act boundaries."""
 
 _BARE_NAME = re.compile(r"(and |but |or )?(the )?#\w+( on #street)?(later|#status)?$|#status$")
 _GOING_ON = re.compile(r"(and |after that|afterwards|next|then)", re.IGNORECASE)
-_ASKS_ANEW = re.compile(r"(so|but|and|now|okay|should|shall|do|does|can|is|are|what|which|where|how|why|when)\b")
+_STARTS_QUESTION = re.compile(r"(so|but|and|now|okay|should|shall|do|does|can|is|are|what|which|where|how|why|when)\b")
 _STATEMENT = re.compile(
     r"(well|actually|because|also|but|so|now i see it)\b(?! (am|do|is|are|can)\b)"
     r"|(there's|there is|there are|i can't|i cannot|i have to|we can't|we have to|the (road|way)|my (gps|map))\b"
 )
-"""The beginning of a statement of its own; others behind "okay," or "yes," only say what is okay."""
+"""Start of a separate statement; other clauses after "okay," or "yes," elaborate on it."""
 
 _CLAUSE = re.compile(
     r"(so |and |but |also |now |then |, )*(also )?"
@@ -63,10 +63,10 @@ _CLAUSE = re.compile(
     r"(?! (one|place|stop|street|road|way|side|#\w+))('s|'m|'re|'ve|'ll|'d| )"
     r"|(the |my |our |your )?(#landmark|#street|#object|road|way|map|gps|car) (is|has|was|comes|can|will|#status)\b)"
 )
-"""The beginning of a clause that has a subject of its own."""
+"""Start of a clause with its own subject."""
 
 _JOINTS = re.compile(r"(?<=\w) (?=(also |but |and )?(we|i|you|they|it|there)('ll| will| still| also| should)\b)", re.I)
-"""Behind a name, "we passed" tells which one is meant; "we still" begins anew."""
+"""Boundaries before a new clause; after a name, "we passed" modifies the name and "we still" starts a clause."""
 
 _ALSO = re.compile(r"(?<=\w) (?=also (we|i|you|they|it|there|that)\b)", re.I)
 _OF_OTHERS = re.compile(r"(so |and |but |also |now |, )*(we|you|it|this|that|they|he|she|these|those|the \w+)\b( |'\w)")
@@ -74,32 +74,34 @@ _VERB = re.compile(
     r"\b(is|are|was|were|am|be|been|has|have|had|do|does|did|can|could|will|would|should|must|may|might|\w{3,}(ing|ed)|"
     r"\w+'(s|m|re|ve|ll|d)|\w+n't|\w+ (it|him|her|them|us|me)|went|got|took|saw|made|told|said)\b|#act|#status"
 )
-"""What a sentence with a verb of its own has."""
+"""Finite verbs and actions in masked words."""
 
 _SUBORDINATE = re.compile(
     r"(and |so |then |, )*(when|if|once|after|before|because|as|while|since|until|till|unless|where)\b"
 )
 _SO = re.compile(r"(so|now|and now|so now)\b,? ?(?!that\b|far\b|much\b)", re.IGNORECASE)
-_TOLD = frozenset({DialogueMove.EXPLAIN, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.IRRELEVANT})
+_STATEMENT_MOVES = frozenset(
+    {DialogueMove.EXPLAIN, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.IRRELEVANT}
+)
 _ANSWERED = frozenset({DialogueMove.CONFIRM, DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_W})
 _AIMED = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W})
 
 _ASKED_FOR = (ActionValue.QUERIED, ObjectClass.QUERIED)
 
 _MOVING = frozenset({ActionValue.STOP, ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_SWITCH})
-"""Actions whose denial is a command to drive on: "don't stop here"."""
+"""Actions whose negation is a command to continue: "don't stop here"."""
 
 
 @dataclass(frozen=True)
 class MoveRule:
-    """Expressions that betray a move.
+    """Rule with the cues of one move.
 
     Attributes:
         move: the move.
-        masked: found in masked words.
-        acted: found in words with actions masked, too.
-        domain: whether any word of rides betrays it.
-        words: words of which one must be there for the rest to be tried; empty for no such condition.
+        masked: pattern over masked words.
+        acted: pattern over words with actions masked as well.
+        domain: whether any driving-domain word is a cue.
+        words: words of which one must occur before the patterns are tried; empty for no condition.
     """
 
     move: DialogueMove
@@ -111,14 +113,14 @@ class MoveRule:
 
 @dataclass(frozen=True)
 class MoveCues:
-    """What betrays moves.
+    """Cues of all moves.
 
     Attributes:
-        rules: in order; the first that is found decides.
-        answers: for the move before, what the guess becomes in its light.
-        domain: words of rides.
-        small_talk: words of other things.
-        reports: words by which somebody's wish is told, which is no small talk.
+        rules: rules in order; the first match decides.
+        answers: for each preceding move, replacements of the classified move.
+        domain: words of the driving domain.
+        small_talk: words of small talk.
+        reports: words that report a wish, which exclude small talk.
     """
 
     rules: tuple[MoveRule, ...]
@@ -130,41 +132,41 @@ class MoveCues:
 
 @functools.lru_cache(maxsize=4096)
 def guess_act(text: str, after: DialogueMove | None = None) -> DialogueAct:
-    """Guesses move and slots from words.
+    """Classifies move and slots of a text.
 
     Args:
         text: free English, see `understand`.
-        after: the other speaker's last move, if it still stands open: "left" after a QueryW is a ReplyW.
+        after: last move of the other speaker if it awaits an answer: "left" after a QueryW is a ReplyW.
 
     Returns:
-        The act; Irrelevant without slots if nothing is recognised.
+        The dialogue act; Irrelevant without slots if nothing is recognised.
     """
     return act_of(understand(text), after)
 
 
-def act_of(heard: ParsedText, after: DialogueMove | None = None) -> DialogueAct:
-    """Returns the act that fits what was heard; see `guess_act`."""
-    move = _move_of(heard)
-    if move is DialogueMove.INSTRUCT and GoalStatus.COMPLETE in heard.statuses and heard.masked.startswith("#status"):
-        move = DialogueMove.EXPLAIN  # "skip the Ikea" is a command, "made it to the Ikea" is none
-    elif move is DialogueMove.EXPLAIN and _is_bare_place(heard):
+def act_of(parsed: ParsedText, after: DialogueMove | None = None) -> DialogueAct:
+    """Returns the dialogue act of a parsed text; see `guess_act`."""
+    move = _move_of(parsed)
+    if move is DialogueMove.INSTRUCT and GoalStatus.COMPLETE in parsed.statuses and parsed.masked.startswith("#status"):
+        move = DialogueMove.EXPLAIN  # "skip the Ikea" is a command, "made it to the Ikea" a statement
+    elif move is DialogueMove.EXPLAIN and _is_bare_place(parsed):
         move = DialogueMove.INSTRUCT  # "first things first, the Ikea"
     if after is not None:
         changes = _cues().answers.get(after)
-        # Small talk stays small talk, unless it is a bare answer: "the blue one".
-        if changes is not None and (move is not DialogueMove.IRRELEVANT or not _is_small_talk(heard)):
+        # Small talk remains irrelevant, unless it is a bare answer: "the blue one".
+        if changes is not None and (move is not DialogueMove.IRRELEVANT or not _is_small_talk(parsed)):
             move = changes.get(move, move)
-    return DialogueAct(move, _slots(heard, move))
+    return DialogueAct(move, _slots(parsed, move))
 
 
-def _is_bare_place(heard: ParsedText) -> bool:
-    """Returns whether words only name a place to go to: there is no verb, and nothing else is named."""
-    return bool(heard.landmarks) and not heard.objects and not heard.question and not _VERB.search(heard.acted)
+def _is_bare_place(parsed: ParsedText) -> bool:
+    """Returns whether the text only names a destination: no verb, no object, no question."""
+    return bool(parsed.landmarks) and not parsed.objects and not parsed.question and not _VERB.search(parsed.acted)
 
 
-def _move_of(heard: ParsedText) -> DialogueMove:
-    sentence, acted = heard.masked.strip(" ,"), heard.acted.strip(" ,")
-    if _is_small_talk(heard):
+def _move_of(parsed: ParsedText) -> DialogueMove:
+    sentence, acted = parsed.masked.strip(" ,"), parsed.acted.strip(" ,")
+    if _is_small_talk(parsed):
         return DialogueMove.IRRELEVANT
     words = set(sentence.split())
     for rule in _cues().rules:
@@ -176,123 +178,125 @@ def _move_of(heard: ParsedText) -> DialogueMove:
             return rule.move
         if rule.domain and not words.isdisjoint(_cues().domain):
             return rule.move
-    return _by_form(heard, sentence)
+    return _by_form(parsed, sentence)
 
 
-def _by_form(heard: ParsedText, sentence: str) -> DialogueMove:
-    """Returns the move of words without any cue, by their form alone."""
-    if heard.actions:
+def _by_form(parsed: ParsedText, sentence: str) -> DialogueMove:
+    """Returns the move of a text without any cue, by form alone."""
+    if parsed.actions:
         return DialogueMove.INSTRUCT  # a bare command: "lights on"
     if _OF_OTHERS.match(sentence):
-        return DialogueMove.EXPLAIN  # a statement that is not about the speaker
+        return DialogueMove.EXPLAIN  # a statement with a subject other than the speaker
     return DialogueMove.ACKNOWLEDGE if sentence.isalpha() else DialogueMove.IRRELEVANT
 
 
-def _is_small_talk(heard: ParsedText) -> bool:
-    """Returns whether there is a word of small talk, and nothing that has to do with the ride or somebody's wishes."""
-    if heard.actions or heard.streets or heard.objects or heard.landmarks:
+def _is_small_talk(parsed: ParsedText) -> bool:
+    """Returns whether the text contains small talk, but neither driving-domain words nor a reported wish."""
+    if parsed.actions or parsed.streets or parsed.objects or parsed.landmarks:
         return False
-    if any(status is not GoalStatus.PENDING for status in heard.statuses):  # "later" is said of anything
+    if any(status is not GoalStatus.PENDING for status in parsed.statuses):  # "later" is unspecific
         return False
-    words = set(heard.masked.split())
+    words = set(parsed.masked.split())
     return not words.isdisjoint(_cues().small_talk) and words.isdisjoint(_cues().reports)
 
 
-def _slots(heard: ParsedText, move: DialogueMove) -> frozenset[SlotValue]:
+def _slots(parsed: ParsedText, move: DialogueMove) -> frozenset[SlotValue]:
     if move is DialogueMove.IRRELEVANT:
         return frozenset()
-    values = set(heard.values)
+    values = set(parsed.values)
     if move is DialogueMove.CONFUSE:
-        values -= set(_ASKED_FOR)  # "what was that?" asks for words, not for what there is
-    if heard.denied and move is DialogueMove.INSTRUCT:
-        values -= set(heard.denied)
-        if not any(isinstance(value, ActionValue) for value in values) and not _MOVING.isdisjoint(heard.denied):
+        values -= set(_ASKED_FOR)  # "what was that?" asks for a repetition, not for an object
+    if parsed.denied and move is DialogueMove.INSTRUCT:
+        values -= set(parsed.denied)
+        if not any(isinstance(value, ActionValue) for value in values) and not _MOVING.isdisjoint(parsed.denied):
             values.add(ActionValue.LANE_FOLLOW)
-    # Something is given up for something else.
-    if GoalStatus.ABANDONED in values and len(heard.landmarks) > 1:
+    # One goal is abandoned in favour of another.
+    if GoalStatus.ABANDONED in values and len(parsed.landmarks) > 1:
         values.add(GoalStatus.ONGOING)
     return frozenset(values)
 
 
 def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...]:
-    """Parts free English into acts: at the ends of sentences, and where another act begins behind a comma.
+    """Segments free English into spans with one act each, at sentence ends and at commas before a new act.
 
     Args:
         text: free English; blank text gives no span.
         after: as in `guess_act`, for the first span.
 
     Returns:
-        Spans whose texts joined by spaces are the text (but for runs of spaces).
+        Spans whose texts, joined by spaces, equal the text except for repeated spaces.
     """
-    pieces = [piece for sentence in _SENTENCE_END.split(text.strip()) for piece in _pieces(sentence)]
+    segments = [segment for sentence in _SENTENCE_END.split(text.strip()) for segment in _segments(sentence)]
     return tuple(
-        Span(piece, guess_act(piece, after if place == 0 else None)) for place, piece in enumerate(pieces) if piece
+        Span(segment, guess_act(segment, after if place == 0 else None))
+        for place, segment in enumerate(segments)
+        if segment
     )
 
 
-def _pieces(sentence: str) -> list[str]:
-    """Returns a sentence parted at the first comma behind which another act begins, and so on with the rest."""
+def _segments(sentence: str) -> list[str]:
+    """Returns the segments of a sentence, split recursively at the first comma before a new act."""
     clauses = sentence.strip().split(",")
     for number in range(1, min(len(clauses), _MOST_CLAUSES)):
         head, rest = ",".join(clauses[:number]).strip(), ",".join(clauses[number:]).strip()
-        if head and rest and _parts(head, rest):
-            return [f"{head},", *_pieces(rest)]
-    return _run_on(sentence.strip())
+        if head and rest and _is_boundary(head, rest):
+            return [f"{head},", *_segments(rest)]
+    return _split_run_on(sentence.strip())
 
 
-def _run_on(sentence: str) -> list[str]:
-    """Returns a sentence parted where a clause begins without a comma, as in what a recogniser writes.
+def _split_run_on(sentence: str) -> list[str]:
+    """Returns the segments of a sentence, split at clauses without a comma, as in speech recognition output.
 
-    "to the Ikea we still have the KFC for later" names two places in two clauses; "also we ..." goes on from anything.
+    "to the Ikea we still have the KFC for later" names two places in two clauses; "also we ..." always starts a clause.
     """
     joints = _JOINTS.finditer(sentence) if len(understand(sentence).landmarks) > 1 else _ALSO.finditer(sentence)
     for joint in joints:
         head, rest = sentence[: joint.start()], sentence[joint.end() :]
         about, other = understand(head).landmarks, understand(rest).landmarks
         if joint.re is _ALSO or (about and other and not set(about) & set(other)):
-            return [head, *_run_on(rest)]
+            return [head, *_split_run_on(rest)]
     return [sentence]
 
 
-def _parts(head: str, rest: str) -> bool:
-    """Returns whether what stands before and behind a comma are two acts."""
+def _is_boundary(head: str, rest: str) -> bool:
+    """Returns whether the texts before and after a comma are separate acts."""
     if rest.lower().strip(" .?!,") in word_lists().vocatives:
         return False
     first, second = guess_act(head), guess_act(rest)
     if second.move is DialogueMove.ALIGN:
-        # "turn left, did you get that?"; but "hello, can you hear me?" asks one thing.
+        # "turn left, did you get that?" has two acts, "hello, can you hear me?" has one.
         return bool(first.slots) and first.move not in _QUESTIONS
     if second.move is DialogueMove.INSTRUCT:
-        return _commands_anew(head, rest, first)
+        return _starts_command(head, rest, first)
     if second.move in _QUESTIONS:
-        return first.move in _BEFORE_QUESTIONS and _ASKS_ANEW.match(rest.lower()) is not None
+        return first.move in _BEFORE_QUESTIONS and _STARTS_QUESTION.match(rest.lower()) is not None
     if second.move is DialogueMove.EXPLAIN:
-        return _tells_anew(head, rest, first, second)
+        return _starts_statement(head, rest, first, second)
     return False
 
 
-def _commands_anew(head: str, rest: str, first: DialogueAct) -> bool:
-    """Returns whether what follows the comma is a command of its own."""
-    if _is_clause(head) and first.move in _TOLD and _SO.match(rest):
+def _starts_command(head: str, rest: str, first: DialogueAct) -> bool:
+    """Returns whether the text after a comma is a separate command."""
+    if _is_clause(head) and first.move in _STATEMENT_MOVES and _SO.match(rest):
         return True  # "we are done here, so the Ikea next"
-    heard = understand(rest)
-    if _BARE_NAME.match(heard.masked):
+    parsed = understand(rest)
+    if _BARE_NAME.match(parsed.masked):
         return False
     if first.move is DialogueMove.INSTRUCT:
-        # "turn left, then right"; but "stop here, at the light" is one command.
+        # "turn left, then right" has two commands, "stop here, at the light" has one.
         return _GOING_ON.match(rest) is not None
-    return first.move in _HEADS and heard.affirms is not False
+    return first.move in _HEADS and parsed.affirms is not False
 
 
-def _tells_anew(head: str, rest: str, first: DialogueAct, second: DialogueAct) -> bool:
-    """Returns whether what follows the comma is a statement of its own."""
+def _starts_statement(head: str, rest: str, first: DialogueAct, second: DialogueAct) -> bool:
+    """Returns whether the text after a comma is a separate statement."""
     if first.move in _BEFORE_REASONS and not first.slots and _STATEMENT.match(rest.lower()) is not None:
         return True
     if not _is_clause(rest) or _SUBORDINATE.match(understand(head).masked):
         return False
     if first.move in _AIMED or first.move in _ANSWERED:
         return True
-    # Two statements are told apart by what they are about.
+    # Two statements are separate if they name different landmarks.
     about, other = first.values(Slot.LANDMARK), second.values(Slot.LANDMARK)
     return bool(about) and bool(other) and not set(about) & set(other)
 
@@ -333,5 +337,5 @@ def _rule(where: str, rule: Mapping[str, Any], terms: Mapping[str, str]) -> Move
 
 def _either(patterns: list[str]) -> re.Pattern[str] | None:
     for pattern in patterns:
-        re.compile(pattern)  # on its own, so that a faulty one is found by its own message
+        re.compile(pattern)  # compiled separately, so that the error message shows the faulty pattern
     return re.compile("|".join(f"(?:{pattern})" for pattern in patterns)) if patterns else None

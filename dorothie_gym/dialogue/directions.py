@@ -1,4 +1,4 @@
-"""Which way words point: left and right that are directions, turns of a route, ordinals."""
+"""Parser of route directions: turns with their ordinals; separates "right" and "left" from other senses."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _BACK = re.compile(
 )
 _AFTER_NEXT = re.compile(r"\b(the one after|one after the next|after next)\b")
 _RIGHT_OPENS = frozenset({"you", "so", "well", "ho", "i"})
-"""Behind these a "right" that opens a sentence is no direction: "right you are"."""
+"""Words after which an initial "right" is no direction: "right you are"."""
 
 _DOUBT = frozenset({"sure", "know", "certain", "idea", "clue", "wonder"})
 _CLAUSE_ENDS = frozenset({",", "?", "then", "and"})
@@ -26,11 +26,11 @@ _TURNING_WORDS = frozenset({"left", "right", "straight", "turn", "turning", "bac
 
 @dataclass(frozen=True, kw_only=True)
 class RouteTurn:
-    """One turn of a route told in words.
+    """One turn of a route description.
 
     Attributes:
-        direction: which way.
-        ordinal: at which opportunity (1 is the next), None if not said.
+        direction: direction of the turn.
+        ordinal: number of the opportunity (1 is the next), None if not given.
     """
 
     direction: Direction
@@ -39,7 +39,7 @@ class RouteTurn:
 
 @dataclass(frozen=True)
 class WordLists:
-    """Word lists of data/cues.yaml, where each is explained."""
+    """Word lists of data/cues.yaml; that file explains each list."""
 
     turning: frozenset[str]
     right_not_before: frozenset[str]
@@ -55,7 +55,7 @@ class WordLists:
 
 @functools.cache
 def word_lists() -> WordLists:
-    """Returns the word lists, read once; raises LexiconError if they are not as they must be."""
+    """Returns the cached word lists; raises LexiconError if a list is missing or malformed."""
     data = read_data("cues.yaml")
     lists = {
         **data.get("directions", {}),
@@ -69,7 +69,7 @@ def word_lists() -> WordLists:
 
 
 def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:
-    """Returns the words with each "left" or "right" that is no direction replaced by "#left", "#ok" or "#tag"."""
+    """Returns the words with each non-directional "left" or "right" replaced by "#left", "#ok" or "#tag"."""
     masked = list(words)
     for place, word in enumerate(words):
         before = words[place - 1] if place else ","
@@ -96,11 +96,11 @@ def _right(before: str, after: str, following: str, place: int, lists: WordLists
 
 
 def find_turns(words: Sequence[str], lists: WordLists) -> tuple[RouteTurn, ...]:
-    """Returns the turns that words (see `mask_directions`) tell, in order, each with the ordinal of its clause."""
+    """Returns the turns in masked words (see `mask_directions`), in order, each with the ordinal of its clause."""
     if _TURNING_WORDS.isdisjoint(words):
         return ()
     turns: list[RouteTurn] = []
-    waiting: int | None = None  # an ordinal said before its direction: "the second one, on the left"
+    waiting: int | None = None  # an ordinal before its direction: "the second one, on the left"
     for clause in _clauses(words):
         ordinal = find_ordinal(clause, lists)
         directions = _directions(clause, lists)
@@ -125,7 +125,7 @@ def _directions(clause: Sequence[str], lists: WordLists) -> list[Direction]:
 
 
 def _is_denied(before: Sequence[str], lists: WordLists) -> bool:
-    """Returns whether the words before a direction deny it: "not right", "don't take a right"; doubt is no denial."""
+    """Returns whether the preceding words negate a direction ("not right"); doubt is no negation."""
     return _DOUBT.isdisjoint(before) and not lists.denying.isdisjoint(before)
 
 
@@ -140,7 +140,7 @@ def _clauses(words: Sequence[str]) -> list[list[str]]:
 
 
 def find_ordinal(words: Sequence[str], lists: WordLists) -> int | None:
-    """Returns which opportunity words mean ("the second light"), 1 for the next one, or None."""
+    """Returns the ordinal in the words ("the second light"), 1 for the next opportunity, or None."""
     if _AFTER_NEXT.search(" ".join(words)):
         return 2
     for word, noun in zip(words, words[1:], strict=False):

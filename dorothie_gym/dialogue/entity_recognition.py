@@ -1,4 +1,4 @@
-"""Finding names in words: as the lexicon has them, misspelt, or misheard."""
+"""Entity recognition: names of places, streets, objects and statuses in words, exact, misspelt or misheard."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ from dorothie_gym.ontology import Slot, SlotValue
 
 _STREET_KINDS = frozenset({"street", "st", "road", "rd", "avenue", "ave", "drive", "dr", "boulevard", "blvd", "lane"})
 _SHORTEST = 4
-"""Names of fewer letters are understood only as they are."""
+"""Shortest word that is matched approximately [letters]."""
 
 _VERB_ENDINGS = ("'ll", "'re", "'ve", "'d", "n't")
-"""No name ends so, whatever it sounds like: "she'll"."""
+"""Endings that exclude an approximate match: "she'll"."""
 
-_ALIKE = 84.0
-"""Least likeness of a misspelt name, in percent of letters that need no change (rapidfuzz's ratio)."""
+_SIMILAR = 84.0
+"""Lowest similarity of a misspelt name (ratio of rapidfuzz) [percent]."""
 
-_SOUNDING_ALIKE = 60.0
-"""Least likeness of letters where a name sounds the same."""
+_SIMILAR_SOUND = 60.0
+"""Lowest similarity of a name with the same consonants (ratio of rapidfuzz) [percent]."""
 
 _PROPER = frozenset({Slot.LANDMARK, Slot.STREET})
 
 
 @dataclass(frozen=True)
 class Mention:
-    """A name found in a row of words.
+    """Mention of a slot value in a sequence of words.
 
     Attributes:
-        value: what is named.
-        start: index of the token that stands for it in the masked words.
-        guessed: whether the word is only like the name.
+        value: the slot value.
+        start: index of its token in the masked words.
+        guessed: whether the match is approximate.
     """
 
     value: SlotValue
@@ -47,14 +47,14 @@ class Mention:
 
 
 def find_names(words: Sequence[str]) -> tuple[list[Mention], list[str]]:
-    """Finds names, the longest first at each place.
+    """Finds the names in a sequence of words, preferring the longest match at each position.
 
     Args:
         words: lower-case words, see `lexicon.split_words`.
 
     Returns:
         The mentions in order, and the words with each mention replaced by "#landmark", "#street", "#object" or
-        "#status"; by "#what" if it is what somebody asks for.
+        "#status", or by "#what" for a queried value.
     """
     index, known = _index(), _known_words()
     words = tuple(words)
@@ -95,24 +95,24 @@ def _at(words: tuple[str, ...], place: int) -> tuple[SlotValue | None, int]:
 
 @functools.lru_cache(maxsize=4096)
 def nearest_name(word: str) -> SlotValue | None:
-    """Returns the place or street that a misspelt or misheard word is meant for, or None.
+    """Returns the landmark or street that best matches a misspelt or misheard word, or None.
 
     Args:
-        word: one lower-case word that is no ordinary English word.
+        word: lower-case word that is no ordinary English word.
     """
     names = _proper_names()
-    found = process.extractOne(word, list(names), scorer=fuzz.ratio, score_cutoff=_SOUNDING_ALIKE)
+    found = process.extractOne(word, list(names), scorer=fuzz.ratio, score_cutoff=_SIMILAR_SOUND)
     if found is None:
         return None
-    name, likeness, _ = found
-    if likeness >= _ALIKE or skeleton_of(name) == skeleton_of(word):
+    name, similarity, _ = found
+    if similarity >= _SIMILAR or skeleton_of(name) == skeleton_of(word):
         return names[name]
     return None
 
 
 @functools.cache
 def _index() -> Mapping[str, tuple[tuple[tuple[str, ...], SlotValue | None], ...]]:
-    """Names by their first word, the longest first; None stands for what only sounds like one."""
+    """Returns the names by their first word, the longest first; the value None marks phrases to ignore."""
     found: dict[str, list[tuple[tuple[str, ...], SlotValue | None]]] = defaultdict(list)
     for name in load_lexicon().ignored:
         found[name[0]].append((name, None))
@@ -130,13 +130,13 @@ def _proper_names() -> Mapping[str, SlotValue]:
 
 
 def _proper_words(value: SlotValue, forms: Mapping[str, tuple[str, ...]]) -> list[str]:
-    """Returns the names of one word that are written with a capital: only they are ever unknown to a listener."""
+    """Returns the capitalized one-word names; only these are matched approximately."""
     return [phrase for phrase in forms["say"] if value.slot in _PROPER and phrase[0].isupper() and " " not in phrase]
 
 
 @functools.cache
 def _known_words() -> frozenset[str]:
-    """Words that are never taken for a misheard name."""
+    """Returns the words that are never matched approximately."""
     spoken = " ".join(read_talk_files().values()).lower()
     listed = strings("cues.yaml: known", read_data("cues.yaml").get("known"))
     other = {word for name in load_lexicon().names for word in name if len(name) > 1}

@@ -1,4 +1,4 @@
-"""Exchange units: from an initiating act to the fulfilment or abandonment of what it expects (paper, section 4)."""
+"""Exchange units: an initiating act up to the fulfilment or abandonment of its expectation (paper, section 4)."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, SlotValue
 
 PATIENCE = 10.0
-"""An exchange that nobody answers for this long is abandoned [s] (spec of the dialogue, phenomenon 21)."""
+"""Time without an answer after which an exchange is abandoned [s] (dialogue spec, phenomenon 21)."""
 
 RECENT = 50
-"""Exchanges that began after another one until nothing belongs to that any more: far more than patience allows."""
+"""Number of latest exchanges that are searched for a match; far more than can start within `PATIENCE`."""
 
 EXPECTATIONS: Mapping[DialogueMove, frozenset[DialogueMove]] = MappingProxyType(
     {
@@ -46,7 +46,7 @@ EXPECTATIONS: Mapping[DialogueMove, frozenset[DialogueMove]] = MappingProxyType(
         DialogueMove.QUERY_W: frozenset({DialogueMove.REPLY_W, DialogueMove.REPLY_U}),
     }
 )
-"""For each initiating move, the responses that fulfil it. Confuse answers any of them and fulfils none."""
+"""Responses that fulfil each initiating move. Confuse is a response to all of them and fulfils none."""
 
 _ASKING = frozenset({DialogueMove.CHECK, DialogueMove.QUERY_YN, DialogueMove.QUERY_W})
 
@@ -56,24 +56,24 @@ _INSERTED: Mapping[DialogueMove, frozenset[DialogueMove]] = MappingProxyType(
         **{move: frozenset({DialogueMove.INSTRUCT, DialogueMove.EXPLAIN}) for move in _ASKING},
     }
 )
-"""For an open move, the initiating moves by which the other side goes on with it instead of beginning something new:
-it checks or objects to what it is told to do, or answers a question by telling what to do or how things are."""
+"""Initiating moves by which the other side continues an open exchange instead of starting a new one: a check of or an
+objection to a command, and a command or statement as the answer to a question."""
 
 _GROUNDING = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
-"""Who takes something up by naming it again speaks of what named it."""
+"""Moves that refer to the exchange in which their slot values were named."""
 
 _UNKNOWN = ActionValue.UNKNOWN.label
-"""In every slot the label of what a speaker does not know."""
+"""Label of the unknown value in every slot."""
 
 _OPEN_LABELS = frozenset({_UNKNOWN, ActionValue.QUERIED.label})
-"""Values that name nothing."""
+"""Labels of values that name nothing."""
 
 _REPAIRS = frozenset({DialogueMove.CLARIFY, DialogueMove.CONFIRM, DialogueMove.REPLY_W})
-"""What the initiator says after a Confuse to get the exchange going again."""
+"""Moves with which the initiator repairs an exchange after a Confuse."""
 
 
 class ExchangeState(enum.StrEnum):
-    """Where an exchange stands."""
+    """State of an exchange."""
 
     OPEN = "open"
     FULFILLED = "fulfilled"
@@ -82,22 +82,22 @@ class ExchangeState(enum.StrEnum):
 
 @dataclass
 class Exchange:
-    """One exchange unit.
+    """Exchange unit.
 
     Attributes:
-        id: counts from 0 in order of beginning.
-        initiator: who opened it.
-        move: the latest initiating move; of an unprompted exchange, the response it consists of.
-        start: start of its first utterance [s].
-        end: end of its last utterance [s].
+        id: index in order of start, from 0.
+        initiator: role that opened the exchange.
+        move: latest initiating move; for an unprompted exchange, its only response.
+        start: start of the first utterance [s].
+        end: end of the last utterance [s].
         state: open, fulfilled or abandoned.
-        unprompted: whether it began with a response that nothing had asked for, the first words of all.
-        acts: number of acts in it.
-        confused: whether the other side has not understood and the initiator has to repair.
-        asked_back: whether the other side has checked, or objected to, what it was told: the initiator has to answer.
-        act: the latest initiating act, of which `move` is the move.
-        taken_up: whether the other side has said something in it.
-        named: what was named in it, and by whom.
+        unprompted: whether the exchange consists of a response without any preceding initiative.
+        acts: number of acts in the exchange.
+        confused: whether the other side signalled non-understanding and a repair by the initiator is due.
+        asked_back: whether the other side checked or objected to a command and an answer by the initiator is due.
+        act: latest initiating act, with the move `move`.
+        taken_up: whether the other side has contributed to the exchange.
+        named: slot values named in the exchange, each with its speaker.
     """
 
     id: int
@@ -115,7 +115,7 @@ class Exchange:
     named: set[tuple[Role, SlotValue]] = field(default_factory=set)
 
     def accepts(self, speaker: Role, move: DialogueMove) -> bool:
-        """Returns whether `move` by `speaker` answers, or goes on with, this exchange."""
+        """Returns whether `move` by `speaker` answers or continues this exchange."""
         if self.unprompted:
             return False
         if speaker is self.initiator:
@@ -123,29 +123,31 @@ class Exchange:
             return answers or (self.confused and move in _REPAIRS)
         return move is DialogueMove.CONFUSE or move in EXPECTATIONS[self.move]
 
-    def is_told(self, move: DialogueMove) -> bool:
-        """Returns whether `move` by the other side tells what the initiator says is not known."""
+    def is_informed_by(self, move: DialogueMove) -> bool:
+        """Returns whether `move` by the other side supplies a value that the initiator declared unknown."""
         puzzles = self.act is not None and any(value.label == _UNKNOWN for value in self.act.slots)
         return puzzles and self.move is DialogueMove.EXPLAIN and move is DialogueMove.EXPLAIN
 
     def names(self, speaker: Role, values: Iterable[SlotValue]) -> bool:
-        """Returns whether `speaker` has named one of the values in it."""
+        """Returns whether `speaker` has named one of the values in this exchange."""
         return any((speaker, value) in self.named for value in values)
 
 
 class ExchangeTracker:
-    """Assigns each act to an exchange, as utterances are delivered.
+    """Assigns the acts of delivered utterances to exchanges.
 
-    Initiating acts of one utterance share an exchange (a reason and the command it leads to are one initiative), and an
-    Explain behind a response in the same breath elaborates on that response. Who is told to do something and asks back,
-    or who is asked, or told that something is not known, and answers by a command or an explanation, goes on with the
-    exchange that is open; so does who then explains or names the same once more, and who says the same again before
-    there is an answer. Who acknowledges or confirms something by its name speaks of the latest exchange in which the
-    other side has named it. Overlapping exchanges are allowed: what begins while the other still speaks is a new one.
+    Rules:
+        - Initiating acts of one utterance share an exchange: a reason and the command that follows are one initiative.
+        - An Explain after a response in the same utterance elaborates on that response.
+        - These acts continue the open exchange: a question about a command; a command or an explanation as the answer
+          to a question or to a statement of missing knowledge; a further explanation or repetition of the same names by
+          the initiator; and an initiating act repeated before any answer.
+        - Acknowledge and Confirm with slot values refer to the latest exchange in which the other side named a value.
+        - Exchanges may overlap: an initiative during speech of the other side opens a new exchange.
     """
 
     def __init__(self, patience: float = PATIENCE) -> None:
-        """Starts without exchanges.
+        """Creates a tracker without exchanges.
 
         Args:
             patience: time without an answer after which an exchange is abandoned [s], positive.
@@ -157,16 +159,16 @@ class ExchangeTracker:
             raise ValueError(f"patience must be positive, not {patience}")
         self.patience = patience
         self.exchanges: list[Exchange] = []
-        self._waiting: dict[int, Exchange] = {}  # those that are open, by their ids
+        self._waiting: dict[int, Exchange] = {}  # open exchanges by id
 
     def update(self, utterance: Utterance) -> tuple[int | None, ...]:
-        """Places every act of a delivered utterance.
+        """Assigns every act of a delivered utterance to an exchange.
 
         Args:
-            utterance: heard to its end; utterances come in the order of delivery.
+            utterance: delivered utterance; calls follow the order of delivery.
 
         Returns:
-            The id of an exchange for each act, in order; None for irrelevant talk outside of any.
+            Exchange id of each act, in order; None for irrelevant talk outside all exchanges.
         """
         opened: Exchange | None = None
         answered: Exchange | None = None
@@ -191,24 +193,24 @@ class ExchangeTracker:
         return tuple(ids)
 
     def tick(self, now: float) -> None:
-        """Abandons the exchanges that have waited too long at `now` [s]; an Explain owed no answer and is fulfilled."""
+        """Closes exchanges without a timely answer at `now` [s]: abandoned, or fulfilled for an Explain."""
         for exchange in list(self._waiting.values()):
             if now - exchange.end > self.patience:
                 optional = exchange.move is DialogueMove.EXPLAIN and not exchange.confused
                 self._close(exchange, ExchangeState.FULFILLED if optional else ExchangeState.ABANDONED)
 
     def open(self) -> list[Exchange]:
-        """Returns the exchanges that still wait for an answer, oldest first."""
+        """Returns the exchanges without an answer, oldest first."""
         return sorted(self._waiting.values(), key=lambda exchange: exchange.id)
 
     def _recent(self) -> Iterator[Exchange]:
-        """Yields the exchanges that something may still belong to, latest first."""
+        """Yields the exchanges that are candidates for new acts, latest first."""
         return itertools.islice(reversed(self.exchanges), RECENT)
 
     def _initiate(self, utterance: Utterance, act: DialogueAct, opened: Exchange | None) -> Exchange:
         move = act.move
         if opened is not None:
-            # An Explain behind a question does not replace what the question expects.
+            # An Explain after a question does not replace the expectation of the question.
             if move is not DialogueMove.EXPLAIN:
                 opened.move, opened.act = move, act
             return opened
@@ -219,7 +221,7 @@ class ExchangeTracker:
         return found
 
     def _say_again(self, utterance: Utterance, act: DialogueAct) -> Exchange | None:
-        """Returns the open exchange whose initiating act, which nobody has answered, an act says again."""
+        """Returns the open, unanswered exchange whose initiating act equals `act`."""
         last = self.exchanges[-1] if self.exchanges else None
         if last is None or last.state is not ExchangeState.OPEN or last.taken_up:
             return None
@@ -227,7 +229,7 @@ class ExchangeTracker:
         return last if same and utterance.start - last.end <= self.patience else None
 
     def _insert(self, utterance: Utterance, act: DialogueAct) -> Exchange | None:
-        """Returns the open exchange that an initiating move goes on with, if there is one."""
+        """Returns the open exchange that an initiating act continues, or None."""
         for exchange in self._recent():
             waited = utterance.start - exchange.end
             if exchange.state is not ExchangeState.OPEN or exchange.unprompted or not 0.0 <= waited <= self.patience:
@@ -237,7 +239,7 @@ class ExchangeTracker:
                 if act.move is DialogueMove.EXPLAIN or exchange.names(utterance.speaker, _names(act)):
                     exchange.asked_back = exchange.confused = False
                     return exchange
-            elif not own and (act.move in _INSERTED.get(exchange.move, ()) or exchange.is_told(act.move)):
+            elif not own and (act.move in _INSERTED.get(exchange.move, ()) or exchange.is_informed_by(act.move)):
                 if exchange.move is not DialogueMove.INSTRUCT:
                     self._close(exchange, ExchangeState.FULFILLED)
                 else:
@@ -255,7 +257,7 @@ class ExchangeTracker:
         recent = last is not None and utterance.start - last.end <= self.patience
         if move is DialogueMove.IRRELEVANT:
             return last if recent else None
-        if last is not None:  # late, but there is nothing else that it could be about
+        if last is not None:  # late, but no other exchange exists
             return last
         exchange = self._begin(utterance, move)
         exchange.unprompted = True
@@ -263,7 +265,7 @@ class ExchangeTracker:
         return exchange
 
     def _named(self, utterance: Utterance, act: DialogueAct) -> Exchange | None:
-        """Returns the latest exchange, answered or not, whose initiator named what an act takes up by its name."""
+        """Returns the latest exchange, open or closed, whose initiator named a value of `act`."""
         values = _names(act) if act.move in _GROUNDING else frozenset()
         for exchange in self._recent() if values else ():
             in_time = utterance.start - exchange.end <= self.patience
@@ -272,9 +274,9 @@ class ExchangeTracker:
         return None
 
     def _awaiting(self, utterance: Utterance, move: DialogueMove) -> Exchange | None:
-        """Returns the latest exchange that `move` fits and that was still alive when the utterance began."""
+        """Returns the latest exchange that accepts `move` and had not timed out at the start of the utterance."""
         for exchange in self._recent():
-            # `tick` may have given an exchange up while its answer was already in the air: the start decides.
+            # `tick` may have abandoned the exchange while the answer was being spoken: the start time decides.
             in_time = utterance.start - exchange.end <= self.patience
             if exchange.state is not ExchangeState.FULFILLED and in_time and exchange.accepts(utterance.speaker, move):
                 return exchange
@@ -304,5 +306,5 @@ class ExchangeTracker:
 
 
 def _names(act: DialogueAct) -> frozenset[SlotValue]:
-    """What an act names."""
+    """Returns the slot values that name something."""
     return frozenset(value for value in act.slots if value.label not in _OPEN_LABELS)

@@ -1,4 +1,4 @@
-"""The grammar behind the words: templates, spoken actions, afterthoughts and manners, from the files of data/talk."""
+"""Generation grammar: templates, action phrases, afterthoughts and discourse markers from the files in data/talk."""
 
 from __future__ import annotations
 
@@ -44,35 +44,35 @@ SLOT_FIELDS: Mapping[str, Slot] = {
     "order": Slot.STATUS,
     "tail": Slot.STATUS,
 }
-"""Gaps that the act's values fill, with their slot."""
+"""Gaps that are filled by slot values, with their slot."""
 
 CONTEXT_FIELDS = frozenset({"side", "nth", "speed", "distance", "past", "dropped"})
-"""Gaps that the wording fills; `side` is a direction that is left or right."""
+"""Gaps that are filled by the wording; `side` is a direction, left or right."""
 
 SPOKEN_SLOTS = (Slot.ACTION, Slot.LANDMARK, Slot.STREET, Slot.OBJECT, Slot.STATUS)
-"""The slots that have words, in the order of afterthoughts."""
+"""Slots with spoken values, in the order of afterthoughts."""
 
 VOICES = (Role.PARTICIPANT, Role.CO_WIZARD)
-"""The roles with words of their own."""
+"""Roles with their own templates."""
 
 _NAMELESS = frozenset({"Unknown", "Unlabeled", "Queried"})
 _ACTIONS = {value.label: value for value in ActionValue}
 MARKER_KINDS = ("opener", "closer", "alarm")
-"""Kinds of words around a sentence: in front, behind, and in front where something unexpected has happened."""
+"""Kinds of discourse markers: before a sentence, after it, and before it during an exception."""
 
 
 @dataclass(frozen=True)
 class Template:
-    """A sentence with gaps.
+    """Sentence template with gaps.
 
     Attributes:
-        body: the words, as an alternative among others.
-        close: words behind the place for afterthoughts, for instance "?".
-        speaker: whose words they are; None for anybody's.
-        when: for each slot, the labels its values must be among; the template then stands for the slot.
-        topic: the topic it belongs to, or None.
-        covers: the slots that it says.
-        needs: the particulars (fields of the wording) that it says.
+        body: text, as one of several alternatives.
+        close: text after the afterthoughts, e.g. "?".
+        speaker: role that uses the template; None for all roles.
+        when: permitted labels of slot values, by slot; the template then covers the slot.
+        topic: topic of the template, or None.
+        covers: slots that the template expresses.
+        needs: details (fields of the wording) that the template expresses.
     """
 
     body: Alternative
@@ -86,11 +86,11 @@ class Template:
 
 @dataclass(frozen=True)
 class DiscourseMarker:
-    """Words around sentences.
+    """Words before or after a sentence, such as "okay" or "please".
 
     Attributes:
         phrase: the words.
-        rate: how often they are said by somebody of chattiness 1.
+        rate: probability of the marker for a speaker of chattiness 1.
     """
 
     phrase: Phrase
@@ -99,37 +99,37 @@ class DiscourseMarker:
 
 @dataclass(frozen=True)
 class Grammar:
-    """Templates and what goes with them.
+    """Complete generation grammar.
 
     Attributes:
-        templates: for each move.
-        actions: for each action, by (form, manner): form is "do", "doing" or, for some, "cmd".
-        tails: for each slot, afterthoughts by move; under None those of the other moves.
-        manners: openers, closers and alarms by (kind, speaker, move).
-        joints: what links an act to the one before it in the same breath, by (move before, move).
-        fillers: what is said while one looks for words.
+        templates: templates of each move.
+        actions: phrases of each action by (form, key); the form is "do", "doing" or, for some actions, "cmd".
+        tails: afterthoughts of each slot by move; the key None holds the default.
+        markers: openers, closers and alarms by (kind, speaker, move).
+        joints: links between two acts of one utterance, by (previous move, move).
+        fillers: filled pauses.
     """
 
     templates: Mapping[DialogueMove, tuple[Template, ...]]
     actions: Mapping[ActionValue, Mapping[tuple[str, str], Phrase]]
     tails: Mapping[Slot, Mapping[DialogueMove | None, Phrase]]
-    manners: Mapping[tuple[str, Role, DialogueMove], DiscourseMarker]
+    markers: Mapping[tuple[str, Role, DialogueMove], DiscourseMarker]
     joints: Mapping[tuple[DialogueMove, DialogueMove], Phrase]
     fillers: Phrase
 
 
 @functools.cache
 def load_grammar() -> Grammar:
-    """Returns the package's grammar, read once.
+    """Returns the cached grammar of the package.
 
     Raises:
-        LexiconError: if it names what does not exist, or leaves a move of a speaker or an action without words.
+        LexiconError: if the files refer to undefined names, or if a move of a speaker or an action has no words.
     """
     return parse_grammar(read_talk_files())
 
 
 def parse_grammar(texts: dict[str, str]) -> Grammar:
-    """Returns the grammar in the texts of talk files, by name.
+    """Builds the grammar from the texts of talk files, by file name.
 
     Raises:
         LexiconError: as `load_grammar`.
@@ -140,14 +140,14 @@ def parse_grammar(texts: dict[str, str]) -> Grammar:
 
 @dataclass
 class _Builder:
-    """Sorts sections by their heads."""
+    """Builder that dispatches the sections of talk files by their heads."""
 
     texts: dict[str, str]
     phrases: dict[str, Phrase] = field(default_factory=dict)
     templates: dict[DialogueMove, list[Template]] = field(default_factory=lambda: defaultdict(list))
     actions: dict[ActionValue, dict[tuple[str, str], Phrase]] = field(default_factory=lambda: defaultdict(dict))
     tails: dict[Slot, dict[DialogueMove | None, Phrase]] = field(default_factory=lambda: defaultdict(dict))
-    manners: dict[tuple[str, Role, DialogueMove], DiscourseMarker] = field(default_factory=dict)
+    markers: dict[tuple[str, Role, DialogueMove], DiscourseMarker] = field(default_factory=dict)
     joints: dict[tuple[DialogueMove, DialogueMove], Phrase] = field(default_factory=dict)
     fillers: Phrase = Phrase("uh", frozenset(), frozenset())
 
@@ -161,7 +161,7 @@ class _Builder:
                 raise error if isinstance(error, LexiconError) else LexiconError(f"{section.where}: {error}") from error
         self._check()
         templates = {move: tuple(self.templates[move]) for move in DialogueMove}
-        return Grammar(templates, dict(self.actions), dict(self.tails), self.manners, self.joints, self.fillers)
+        return Grammar(templates, dict(self.actions), dict(self.tails), self.markers, self.joints, self.fillers)
 
     def _take(self, section: TalkSection) -> None:
         kind, *words = section.words
@@ -175,9 +175,9 @@ class _Builder:
             slot, move = parse_slot(words[0]), parse_move(words[1]) if len(words) > 1 else None
             self.tails[slot][move] = self._phrase(section)
         elif kind in MARKER_KINDS:
-            manner = DiscourseMarker(self._phrase(section), float(section.keys.get("rate", 1)))
+            marker = DiscourseMarker(self._phrase(section), float(section.keys.get("rate", 1)))
             for word in words[1:] or [move.label for move in DialogueMove]:
-                self.manners[kind, parse_role(words[0]), parse_move(word)] = manner
+                self.markers[kind, parse_role(words[0]), parse_move(word)] = marker
         elif kind == "filler":
             self.fillers = self._phrase(section)
         elif kind == "join":
@@ -197,16 +197,16 @@ class _Builder:
         when = {parse_slot(name): _labels(section.where, parse_slot(name), listed) for name, listed in keys.items()}
         for line in section.lines:
             for text in split_alternatives(line.text):
-                body, close = _parted(text)
+                body, close = _split_close(text)
                 ending = parse_phrase(line.where, close, self.phrases)
-                (said,) = parse_alternatives(line.where, body, self.phrases)
-                covers, needs = _fields(line.where, said.phrase)
-                self.templates[move].append(Template(said, ending, speaker, when, topic, covers | when.keys(), needs))
+                (parsed,) = parse_alternatives(line.where, body, self.phrases)
+                covers, needs = _fields(line.where, parsed.phrase)
+                self.templates[move].append(Template(parsed, ending, speaker, when, topic, covers | when.keys(), needs))
 
     def _check(self) -> None:
         for move in DialogueMove:
             for voice in VOICES:
-                # The template of last resort: no slot, no topic, no particulars. With it every act has words.
+                # Fallback template without slots, topic and details; it guarantees words for every act.
                 if not any(_is_plain(item) and item.speaker in (None, voice) for item in self.templates[move]):
                     raise LexiconError(f"data/talk: {move.label} has no template without slots for {voice.value}")
         for action in ActionValue:
@@ -218,8 +218,8 @@ class _Builder:
                 raise LexiconError(f"data/talk: there is no section `== tail {slot.label}`")
 
 
-def _parted(text: str) -> tuple[str, str]:
-    """Returns a template's words before and behind the place for afterthoughts; the weight goes with the former."""
+def _split_close(text: str) -> tuple[str, str]:
+    """Splits a template into the text before (with the weight) and after the place for afterthoughts."""
     weight = WEIGHT.search(text)
     words = text[: weight.start()] if weight else text.rstrip()
     body, slash, close = words.partition("/")

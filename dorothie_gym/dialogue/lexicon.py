@@ -1,4 +1,4 @@
-"""Spoken forms of the ontology's values: how they are said and by what they are recognised."""
+"""Lexicon: spoken forms of the slot values for generation, and cues for their recognition."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ _ARTICLES = frozenset({"a", "an", "the", "some"})
 
 
 class LexiconError(ValueError):
-    """A data file of the dialogue package is not as it must be."""
+    """Malformed data file of the dialogue package."""
 
 
 @dataclass(frozen=True)
 class ActionCues:
-    """By what an action is recognised.
+    """Cues for the recognition of an action.
 
     Attributes:
-        stems: the first four letters of words of which one is needed.
-        pattern: an expression over masked words (see `names.find_names`) that betrays the action.
+        stems: first four letters of words of which one must occur.
+        pattern: pattern over masked words (see `entity_recognition.find_names`).
     """
 
     stems: frozenset[str]
@@ -37,15 +37,15 @@ class ActionCues:
 
 @dataclass(frozen=True)
 class Lexicon:
-    """All spoken forms.
+    """Spoken forms of all slot values.
 
     Attributes:
-        phrases: forms of each value except actions: "say", "also", "again", "here", "the", "order", "tail" -> phrases.
-        actions: cues of actions, in the order in which they are to be recognised.
-        names: what is understood: the words of a phrase, without article -> value.
-        deixis: words that point at what is in view.
-        repairs: words that put right the name before them.
-        ignored: phrases that sound like names and are none.
+        phrases: phrases of each value except actions, by form: "say", "also", "again", "here", "the", "order", "tail".
+        actions: cues of actions, in order of recognition.
+        names: recognised names: words of a phrase without article -> value.
+        deixis: deictic expressions for landmarks in view.
+        repairs: words that correct the preceding name.
+        ignored: phrases that resemble names but are none.
     """
 
     phrases: Mapping[SlotValue, Mapping[str, tuple[str, ...]]]
@@ -56,7 +56,7 @@ class Lexicon:
     ignored: tuple[tuple[str, ...], ...] = ()
 
     def forms(self, value: SlotValue, form: str) -> tuple[str, ...]:
-        """Returns the phrases for `value` in `form` ("say", "the", "order", ...); those of "say" if it has none."""
+        """Returns the phrases for `value` in `form` ("say", "the", "order", ...); falls back to "say"."""
         phrases = self.phrases[value]
         return phrases.get(form) or phrases["say"]
 
@@ -67,13 +67,13 @@ _CONTRACTED = {
     "'em": ("them",), "cuz": ("because",), "'cause": ("because",), "imma": ("i'll",), "dont": ("don't",),
     "cant": ("can't",), "thats": ("that's",), "wont": ("won't",), "didnt": ("didn't",), "im": ("i'm",),
 }  # fmt: skip
-"""Words run together, or written without their apostrophe, as people type and recognisers write them."""
+"""Contractions and words without apostrophe, as typed by people and emitted by speech recognisers."""
 _STOP = re.compile(r"[.;:!\u2014\u2026]+(?=\s|$)")
 _WORD = re.compile(r"[a-z0-9']+|\?|,")
 
 
 def split_words(text: str) -> list[str]:
-    """Returns lower-case words; "?" and "," stand alone, other stops become ",", hyphens part words, "lemme" is two."""
+    """Returns lower-case tokens: "?" and "," are tokens, other stops become ",", hyphens and contractions are split."""
     words = _WORD.findall(_STOP.sub(" , ", text.lower().translate(_TYPOGRAPHY)))
     if _CONTRACTED.keys().isdisjoint(words):
         return words
@@ -81,10 +81,10 @@ def split_words(text: str) -> list[str]:
 
 
 def read_data(name: str) -> dict[str, Any]:
-    """Returns the mapping in a data file of this package.
+    """Returns the mapping of a data file of this package.
 
     Raises:
-        LexiconError: if the file is no YAML mapping.
+        LexiconError: if the file is not a YAML mapping.
     """
     text = resources.files(__package__).joinpath("data", name).read_text(encoding="utf-8")
     try:
@@ -100,7 +100,7 @@ def strings(where: str, value: object) -> tuple[str, ...]:
     """Returns a list of strings as a tuple.
 
     Raises:
-        LexiconError: naming `where`, if it is anything else (an unquoted `yes` or `on` is a boolean in YAML).
+        LexiconError: if `value` is no list of strings (an unquoted `yes` or `on` is a boolean in YAML); names `where`.
     """
     if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
         raise LexiconError(f"{where}: expected a list of strings, got {value!r}; quote words such as 'yes' and 'on'")
@@ -109,16 +109,16 @@ def strings(where: str, value: object) -> tuple[str, ...]:
 
 @functools.cache
 def load_lexicon() -> Lexicon:
-    """Returns the package's lexicon, read once.
+    """Returns the cached lexicon of the package.
 
     Raises:
-        LexiconError: if a value of the ontology is missing or a phrase stands for two values.
+        LexiconError: if a value of the ontology is missing, or if a phrase stands for two values.
     """
     return parse_lexicon(read_data("lexicon.yaml"))
 
 
 def parse_lexicon(data: Mapping[str, Any]) -> Lexicon:
-    """Returns the lexicon in the data of a lexicon file.
+    """Builds the lexicon from the data of a lexicon file.
 
     Raises:
         LexiconError: as `load_lexicon`.
@@ -146,7 +146,7 @@ def parse_lexicon(data: Mapping[str, Any]) -> Lexicon:
 
 
 def bare_name(words: Sequence[str]) -> tuple[str, ...]:
-    """Returns the words of a name without its article."""
+    """Returns the words of a name without the article."""
     return tuple(words[1:] if len(words) > 1 and words[0] in _ARTICLES else words)
 
 

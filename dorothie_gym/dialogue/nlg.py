@@ -1,7 +1,7 @@
-"""Surface text: acts, their speaker and what else is known become a short spoken English utterance.
+"""Natural language generation (NLG): short spoken English utterances from dialogue acts, speaker and context.
 
-The template of the grammar that says most of what is known is used, several equally good ones by chance and by the
-speaker's style; what it leaves out is appended as an afterthought.
+The template that covers most of the given information is used; ties are broken by chance and by the style of the
+speaker. Slots without coverage are appended as afterthoughts.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ _PLAIN_WORDING = Wording()
 _NO_CONTEXT = WordingContext()
 
 _TRIES = 8
-"""Bare sentences of which the shortest is taken where there is hardly room."""
+"""Number of bare sentences generated under a tight length limit; the shortest is used."""
 
-# Enum members are looked up once: each look-up through the class costs as much as a drawn number.
+# Enum members are bound once: each look-up through the class costs as much as a random draw.
 _HUMAN, _CAR = Role.PARTICIPANT, Role.CO_WIZARD
 _HUMANS = (Role.PARTICIPANT, Role.AD_WIZARD)
 _IRRELEVANT = DialogueMove.IRRELEVANT
@@ -49,21 +49,22 @@ def word_act(
     style: SpeakerStyle | None = None,
     scene: WordingContext | None = None,
 ) -> str:
-    """Words one act.
+    """Generates the text of one act.
 
-    Every act gets a text. One that carries more than can be said in a breath is said in part: at most three names of a
-    kind, and afterthoughts only as far as `MAX_CHARACTERS` allows.
+    Every act gets a text. Acts with many slot values are realized in part: at most three names per slot, and
+    afterthoughts up to `MAX_CHARACTERS`.
 
     Args:
         act: move and slot values.
-        speaker: who speaks; the Ad-Wizard speaks as the participant does, the car itself as the Co-Wizard.
-        rng: chooses among equally good wordings.
-        context: particulars that the slots do not carry.
-        style: how the speaker talks; without it, as the middle of all does.
-        scene: what has been said and what is in view.
+        speaker: role of the speaker; the Ad-Wizard shares the templates of the participant, the car those of the
+            Co-Wizard.
+        rng: source of randomness for the choice among equivalent templates.
+        context: details that the slots do not represent.
+        style: style of the speaker; the average style if None.
+        scene: dialogue history and objects in view.
 
     Returns:
-        A text of 1 to `MAX_CHARACTERS` characters.
+        Text of 1 to `MAX_CHARACTERS` characters.
     """
     return _word(act, speaker, rng, context, style, scene, MAX_CHARACTERS)
 
@@ -77,30 +78,30 @@ def word_acts(
     style: SpeakerStyle | None = None,
     scene: WordingContext | None = None,
 ) -> tuple[Span, ...]:
-    """Words the acts of one utterance, each joined to the one before it ("Yes, and then left at the light").
+    """Generates the spans of one utterance, each linked to the previous one ("Yes, and then left at the light").
 
     Args:
-        acts: in order.
-        speaker: as for `word_act`.
-        rng: as for `word_act`.
-        contexts: particulars of each act, as many as there are acts.
-        style: as for `word_act`.
-        scene: as for `word_act`, for the first act; what an act mentions is known to the next.
+        acts: acts in order.
+        speaker: as in `word_act`.
+        rng: as in `word_act`.
+        contexts: details of each act, one entry per act.
+        style: as in `word_act`.
+        scene: as in `word_act`, for the first act.
 
     Returns:
-        A span for each act; their texts joined by spaces have at most `MAX_CHARACTERS` characters.
+        One span per act; the texts joined by spaces have at most `MAX_CHARACTERS` characters.
 
     Raises:
-        ValueError: if there are not as many contexts as acts.
+        ValueError: if the numbers of contexts and acts differ.
     """
     wordings = list(contexts) if contexts is not None else [None] * len(acts)
     if len(wordings) != len(acts):
-        raise ValueError(f"contexts: {len(wordings)} for {len(acts)} acts; give one for each, None for no particulars")
+        raise ValueError(f"contexts: {len(wordings)} for {len(acts)} acts; pass one per act, None for no details")
     scene = _NO_CONTEXT if scene is None else scene
     texts: list[str] = []
     room = MAX_CHARACTERS
     for number, (act, wording) in enumerate(zip(acts, wordings, strict=True)):
-        # Each of the acts to come is left its share of the room.
+        # Each remaining act gets an equal share of the remaining characters.
         limit = room // (len(acts) - number) - 1
         text = _word(act, speaker, rng, wording, style, scene, limit)
         if texts:
@@ -112,7 +113,7 @@ def word_acts(
 
 
 def _linked(before: str, text: str) -> str:
-    """Returns an act's words with the comma that leads over to the next act's, if it ends without a stop."""
+    """Returns the text of an act with the comma before the next act, unless it ends with punctuation."""
     goes_on = text[0].islower() and before[-1] == "."
     stem = before[:-1] if goes_on else before
     return stem if stem[-1] in "?.," else f"{stem},"
@@ -137,7 +138,7 @@ def _word(
         if len(text) <= limit:
             return text
         own = replace(own, chattiness=0.0, disfluency=0.0, repairs=0.0, addressing=0.0)
-    # Not even the bare template fits: what a speaker says who has no time for particulars.
+    # The template does not fit: a bare sentence without details.
     bare = DialogueAct(act.move)
     own = replace(own, register=Register.BLUNT, indirectness=0.0, habit=0.0)
     tries = (_Sentence(bare, voice, draw, _PLAIN_WORDING, own, scene, 1, limit).text() for _ in range(_TRIES))
@@ -146,7 +147,7 @@ def _word(
 
 
 class _Sentence:
-    """Writes one sentence."""
+    """Sentence of one act, under generation."""
 
     def __init__(
         self,
@@ -165,18 +166,18 @@ class _Sentence:
         self._style = style
         self._scene = scene
         self._limit = limit
-        self._teller = SlotRealizer(act, draw, wording, style, scene, names)
+        self._realizer = SlotRealizer(act, draw, wording, style, scene, names)
 
     def text(self) -> str:
-        teller, act = self._teller, self._act
+        realizer, act = self._realizer, self._act
         particulars = self._wording.known
         options = fitting_templates(act.move, act.slots, self._voice, self._wording.topic, particulars)
-        template = teller.pick(options[teller.manner])
-        teller.settle("dropped" in template.needs)
-        body = template.body.phrase.say(teller)
-        body = self._mannered(body, template)
-        close = template.close.say(teller)
-        missing = teller.values.keys() - template.covers if act.move is not _IRRELEVANT else ()
+        template = realizer.pick(options[realizer.manner])
+        realizer.exclude_dropped("dropped" in template.needs)
+        body = template.body.phrase.say(realizer)
+        body = self._decorated(body, template)
+        close = template.close.say(realizer)
+        missing = realizer.values.keys() - template.covers if act.move is not _IRRELEVANT else ()
         for slot in SPOKEN_SLOTS if missing else ():
             if slot in missing:
                 tail = self._tail(slot)
@@ -186,31 +187,31 @@ class _Sentence:
 
     def _tail(self, slot: Slot) -> str:
         tails = load_grammar().tails[slot]
-        return (tails.get(self._act.move) or tails[None]).say(self._teller)
+        return (tails.get(self._act.move) or tails[None]).say(self._realizer)
 
-    def _mannered(self, body: str, template: Template) -> str:
-        """Returns the body with words around it and with slips."""
-        teller, style, scene = self._teller, self._style, self._scene
-        manners, move = load_grammar().manners, self._act.move
-        if style.disfluency and teller.random() < style.disfluency:
-            body = _hesitating(body, teller)
+    def _decorated(self, body: str, template: Template) -> str:
+        """Returns the body with discourse markers, hesitations and an address."""
+        realizer, style, scene = self._realizer, self._style, self._scene
+        markers, move = load_grammar().markers, self._act.move
+        if style.disfluency and realizer.random() < style.disfluency:
+            body = _hesitating(body, realizer)
         front = None
         if scene.joined is not None:
             joint = load_grammar().joints.get((scene.joined, move))
-            front = joint.say(teller) if joint is not None else None
+            front = joint.say(realizer) if joint is not None else None
         else:
             kind = "alarm" if scene.exception else "opener"
-            manner = manners.get((kind, self._voice, move)) or manners.get(("opener", self._voice, move))
-            if manner is not None and teller.random() < manner.rate * style.chattiness:
-                front = manner.phrase.say(teller)
-        teller.fronted = bool(front)
+            marker = markers.get((kind, self._voice, move)) or markers.get(("opener", self._voice, move))
+            if marker is not None and realizer.random() < marker.rate * style.chattiness:
+                front = marker.phrase.say(realizer)
+        realizer.fronted = bool(front)
         if front:
             body = f"{front} {body}"
-        closer = manners.get(("closer", self._voice, move))
-        # A set phrase stands as it is; what asks or has content may be rounded off.
-        if closer is not None and template.covers and teller.random() < closer.rate * style.chattiness:
-            body = f"{body} {closer.phrase.say(teller)}"
-        if style.address and teller.random() < style.addressing:
+        closer = markers.get(("closer", self._voice, move))
+        # Fixed phrases get no closing marker; questions and sentences with content may.
+        if closer is not None and template.covers and realizer.random() < closer.rate * style.chattiness:
+            body = f"{body} {closer.phrase.say(realizer)}"
+        if style.address and realizer.random() < style.addressing:
             body = f"{body}, {style.address}"
         return body
 
@@ -223,19 +224,19 @@ class _Sentence:
             text = _AN.sub("an", text)
         if not self._style.proper:
             return text
-        joined_on = self._scene.joined is not None and text[0].islower() and self._teller.fronted
+        joined_on = self._scene.joined is not None and text[0].islower() and self._realizer.fronted
         start = text if joined_on else text[0].upper() + text[1:]
         return start if text[-1] in "?." else start + "."
 
 
-def _hesitating(body: str, teller: SlotRealizer) -> str:
-    """Returns the sentence with a filled pause, or begun twice."""
+def _hesitating(body: str, realizer: SlotRealizer) -> str:
+    """Returns the sentence with a filled pause or a restart."""
     words = body.split()
-    filler = load_grammar().fillers.say(teller)
+    filler = load_grammar().fillers.say(realizer)
     if len(words) < 3:
         return f"{filler}, {body}"
-    place = 1 + int(teller.random() * (len(words) - 2))
-    if place <= 2 and teller.random() < 0.5:
+    place = 1 + int(realizer.random() * (len(words) - 2))
+    if place <= 2 and realizer.random() < 0.5:
         return " ".join([*words[:place], filler + ",", *words])
     return " ".join([*words[:place], filler + ",", *words[place:]])
 
@@ -244,14 +245,14 @@ def _hesitating(body: str, teller: SlotRealizer) -> str:
 def fitting_templates(
     move: DialogueMove, slots: frozenset[SlotValue], voice: Role, topic: str | None, particulars: frozenset[str]
 ) -> _ByManner:
-    """Returns the templates that say most of an act, for each manner (see `phrases.manner_of`), by weight.
+    """Returns the templates with the best coverage of an act, per manner (see `phrases.manner_of`), by weight.
 
     Args:
-        move: of the act.
-        slots: of the act.
-        voice: the participant or the Co-Wizard.
-        topic: of the wording.
-        particulars: names of what the wording knows.
+        move: move of the act.
+        slots: slot values of the act.
+        voice: participant or Co-Wizard.
+        topic: topic of the wording.
+        particulars: names of the details that the wording provides.
     """
     labels: dict[Slot, set[str]] = {}
     for value in slots:

@@ -1,4 +1,4 @@
-"""What a listener takes from words alone: directions, ordinals, speeds, names, as far as rules can tell."""
+"""Rule-based natural language understanding (NLU): directions, ordinals, speeds, names and more from text."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from dorothie_gym.ontology import (
 _Value = TypeVar("_Value")
 
 _LEAST_NUMBER = 5
-"""Smaller numbers are rarely speeds or distances: "the next one"."""
+"""Smallest number that is read as a speed without a unit; smaller ones are rarely quantities."""
 
 _UP = re.compile(
     r"\b(speed(ing)? (it )?up|fast(er|ly)?|hurry|step on (it|the gas)|floor it|accelerat\w+|quick(er|ly)?|up to #number"
@@ -45,7 +45,7 @@ _FURTHER = re.compile(
     r"|(inch|edge|creep|crawl|nudge|scoot) (it )?(up|forward|ahead|along|closer)"
     r"|(further|farther)(?! (straight|down|along|than|up|away|from)))\b"
 )
-# The first four letters of words without which the expressions above need not be tried.
+# First four letters of the words of the patterns above; other texts skip the patterns.
 _SPEED_STEMS = frozenset(
     "spee fast hurr step floo acce quic up pick hit give move slow brak dece easi ease down drop easy redu lowe".split()
 )
@@ -60,7 +60,7 @@ _DENIAL = re.compile(
     r"(don't|do not|dont|never|not|instead of|rather than|without)"
     r"( even| yet| be| try to| go| take| make| a| the| to| that)* $"
 )
-# "the KFC, I mean the Ikea": the first name is taken back.
+# "the KFC, I mean the Ikea": the first name is retracted.
 _REPAIR = re.compile(
     r"#(landmark|street) (?:, )?(?:uh |um |er )?"
     r"(?:no wait|no no|no|i mean|i meant|wait no|sorry|sorry i meant|or rather)"
@@ -70,33 +70,32 @@ _REPAIR = re.compile(
 
 @dataclass(frozen=True, kw_only=True)
 class ParsedText:
-    """What was heard; whatever was not said is None, False or empty. Names are in the order in which they were said.
+    """Result of the NLU of one text; absent information is None, False or empty. Names follow the order of the text.
 
     Attributes:
-        text: the words themselves.
-        masked: the words in lower case with names masked (see data/cues.yaml).
-        acted: the same, with actions masked as "#action", those in the -ing form as "#acting".
+        text: the text.
+        masked: words in lower case with names masked (see data/cues.yaml).
+        acted: `masked` with actions masked as "#action", those in the -ing form as "#acting".
         turns: directions in order; a route may have several.
-        direction: the first of them.
-        ordinal: which opportunity, 1 is the next.
+        ordinal: number of the opportunity, 1 is the next.
         actions: actions named, in the order of the lexicon.
-        denied: actions named only to be denied: "don't turn".
+        denied: actions named only in negated form: "don't turn".
         landmarks: landmarks named.
         streets: streets named.
         objects: objects named.
         statuses: goal statuses expressed.
-        guessed: landmarks and streets that words are only like.
-        past: landmarks behind which something is said to be or to happen.
-        dropped: landmarks that are given up or denied.
-        order: "before" or "after" where the text says one.
+        guessed: landmarks and streets matched only approximately.
+        past: landmarks named as reference points to drive past.
+        dropped: landmarks that are abandoned or negated.
+        order: "before" or "after" if the text contains one.
         faster: True to speed up, False to slow down.
         lights: True for on, False for off.
         speed: a speed [km/h].
         distance: a distance [m].
-        here: whether it is to be on the spot.
-        further: whether the car is to go on, but only a bit.
-        affirms: True for a yes, False for a no at the beginning.
-        question: whether it is put as a question with a question mark.
+        here: whether the text refers to the current position ("here").
+        further: whether the car is to continue for a short distance.
+        affirms: True for an initial yes, False for an initial no.
+        question: whether the text contains a question mark.
     """
 
     text: str
@@ -125,36 +124,36 @@ class ParsedText:
 
     @property
     def direction(self) -> Direction | None:
-        """The first direction said."""
+        """First direction in the text, or None."""
         return self.turns[0].direction if self.turns else None
 
     @property
     def values(self) -> frozenset[SlotValue]:
-        """All slot values heard."""
+        """All slot values in the text."""
         return frozenset((*self.actions, *self.landmarks, *self.streets, *self.objects, *self.statuses))
 
 
 @functools.lru_cache(maxsize=2048)
 def understand(text: str) -> ParsedText:
-    """Reads a text in free English, of any case and with typographic or plain apostrophes.
+    """Parses free English text, in any case and with typographic or plain apostrophes.
 
     Args:
-        text: what was said; may be empty.
+        text: the text; may be empty.
 
     Returns:
-        What rules can take from it. Nothing is ever refused.
+        The parsed text. Every text is accepted.
     """
     lists = word_lists()
-    mentions, words = find_names(_addressed(split_words(text), lists))
+    mentions, words = find_names(_without_vocative(split_words(text), lists))
     words = mask_directions(words, lists)
     joined = " ".join(words)
     numbered = not NUMBER_WORDS.isdisjoint(words) or any(word[0].isdigit() for word in words)
     speed, distance = _quantities(words) if numbered else (None, None)
     masked = _mask_numbers(words) if numbered else joined
-    mentions = _repaired(mentions, words, joined)
+    mentions = _unretracted(mentions, words, joined)
     stems = {word[:4] for word in words}
     acted, actions, denied = _actions(masked, stems)
-    named = _each_once([*(mention.value for mention in mentions), *_asked(masked, words)])
+    named = _distinct([*(mention.value for mention in mentions), *_queried_values(masked, words)])
     landmarks = [mention for mention in mentions if isinstance(mention.value, LandmarkName)]
     turns = find_turns(words, lists)
     return ParsedText(
@@ -170,8 +169,8 @@ def understand(text: str) -> ParsedText:
         objects=tuple(value for value in named if isinstance(value, ObjectClass)),
         statuses=tuple(value for value in named if isinstance(value, GoalStatus)),
         guessed=tuple(mention.value for mention in mentions if mention.guessed),
-        past=_behind(landmarks, words, _PAST) if landmarks else (),
-        dropped=_behind(landmarks, words, lists.dropping) if landmarks else (),
+        past=_following(landmarks, words, _PAST) if landmarks else (),
+        dropped=_following(landmarks, words, lists.dropping) if landmarks else (),
         order=order[1] if not _ORDER_WORDS.isdisjoint(words) and (order := _ORDER.search(joined)) else None,
         faster=None if stems.isdisjoint(_SPEED_STEMS) else _faster(masked),
         lights=None if stems.isdisjoint(_LIGHT_STEMS) else _lights(words, joined),
@@ -184,8 +183,8 @@ def understand(text: str) -> ParsedText:
     )
 
 
-def _addressed(words: list[str], lists: WordLists) -> list[str]:
-    """Returns the words without an address at the end ("stop here, man") or at the beginning."""
+def _without_vocative(words: list[str], lists: WordLists) -> list[str]:
+    """Returns the words without a vocative at the end ("stop here, man") or at the beginning."""
     while words and words[-1] == ",":
         words.pop()
     marked = words[-1:] == ["?"]
@@ -202,8 +201,8 @@ def _addressed(words: list[str], lists: WordLists) -> list[str]:
     return words
 
 
-def _repaired(mentions: list[Mention], words: Sequence[str], joined: str) -> list[Mention]:
-    """Returns the mentions without those that the speaker takes back."""
+def _unretracted(mentions: list[Mention], words: Sequence[str], joined: str) -> list[Mention]:
+    """Returns the mentions that the speaker does not retract."""
     found = _REPAIR.search(joined) if len(mentions) > 1 else None
     if found is None:
         return mentions
@@ -223,7 +222,7 @@ def _mask_numbers(words: Sequence[str]) -> str:
 
 
 def _quantities(words: Sequence[str]) -> tuple[int | None, int | None]:
-    """Returns a speed [km/h] and a distance [m], each None if not said."""
+    """Returns a speed [km/h] and a distance [m], each None if absent."""
     speed = distance = None
     for place in range(len(words)):
         run = _number_run(words, place)
@@ -239,7 +238,7 @@ def _quantities(words: Sequence[str]) -> tuple[int | None, int | None]:
 
 
 def _number_run(words: Sequence[str], place: int) -> list[str]:
-    """Returns the words of the one number that begins at `place`; none within a number that began before."""
+    """Returns the words of the number that starts at `place`; empty inside a number that started earlier."""
     if not read_cardinals([words[place]]) or (place and _number_run(words[place - 1 : place + 1], 0)[1:]):
         return []
     length = 1
@@ -251,7 +250,7 @@ def _number_run(words: Sequence[str], place: int) -> list[str]:
 
 
 def _actions(masked: str, stems: set[str]) -> tuple[str, tuple[ActionValue, ...], tuple[ActionValue, ...]]:
-    """Returns the words with actions masked, the actions, and those that are denied only."""
+    """Returns the words with actions masked, all actions, and the actions that occur only in negated form."""
     if "#number" in masked:
         stems = stems | {"#num"}
     found: list[ActionValue] = []
@@ -274,31 +273,31 @@ def _actions(masked: str, stems: set[str]) -> tuple[str, tuple[ActionValue, ...]
 
 
 @functools.cache
-def _askings() -> tuple[tuple[SlotValue, re.Pattern[str]], ...]:
-    """Expressions by which the value of a slot is asked for."""
+def _question_patterns() -> tuple[tuple[SlotValue, re.Pattern[str]], ...]:
+    """Returns the patterns of questions for the value of a slot."""
     data: Mapping[str, object] = read_data("cues.yaml").get("asked", {})
-    askings = []
+    patterns = []
     for name, listed in data.items():
         queried = next(value for value in SLOT_VALUES[parse_slot(name)] if value.label == "Queried")
         pattern = "|".join(strings(f"cues.yaml: asked.{name}", listed))
         try:
-            askings.append((queried, re.compile(pattern)))
+            patterns.append((queried, re.compile(pattern)))
         except re.error as error:
             raise LexiconError(f"cues.yaml: asked.{name}: {error}") from error
-    return tuple(askings)
+    return tuple(patterns)
 
 
-_ASKING_WORDS = frozenset({"what", "which", "where", "what's", "where's", "how", "wheres", "whats", "where'd"})
+_QUESTION_WORDS = frozenset({"what", "which", "where", "what's", "where's", "how", "wheres", "whats", "where'd"})
 
 
-def _asked(masked: str, words: Sequence[str]) -> list[SlotValue]:
-    if _ASKING_WORDS.isdisjoint(words):
+def _queried_values(masked: str, words: Sequence[str]) -> list[SlotValue]:
+    if _QUESTION_WORDS.isdisjoint(words):
         return []
-    return [value for value, pattern in _askings() if pattern.search(masked)]
+    return [value for value, pattern in _question_patterns() if pattern.search(masked)]
 
 
-def _behind(landmarks: Sequence[Mention], words: Sequence[str], heads: frozenset[str]) -> tuple[LandmarkName, ...]:
-    """Returns the landmarks that follow one of the words `heads`, articles aside."""
+def _following(landmarks: Sequence[Mention], words: Sequence[str], heads: frozenset[str]) -> tuple[LandmarkName, ...]:
+    """Returns the landmarks that follow one of the words `heads`, ignoring articles."""
     found = []
     for mention in landmarks:
         place = mention.start - 1
@@ -333,8 +332,8 @@ def _affirms(words: Sequence[str], lists: WordLists) -> bool | None:
     return True if first in lists.affirming or (words and words[0] in ("okay", "ok")) else None
 
 
-def _each_once(values: Sequence[SlotValue]) -> list[SlotValue]:
-    """Returns the values, each once, in the order in which they were said."""
+def _distinct(values: Sequence[SlotValue]) -> list[SlotValue]:
+    """Returns the distinct values in the order of the text."""
     return list(dict.fromkeys(values)) if values else []
 
 

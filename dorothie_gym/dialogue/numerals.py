@@ -1,4 +1,4 @@
-"""Numbers as people say them: cardinals below a thousand and the first few ordinals."""
+"""Spoken numbers: cardinals below 1000 and ordinals up to ninth."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _UNITS = {word: number for number, word in enumerate(_ONES)}
 _ROUND = {word: 10 * number for number, word in enumerate(_TENS) if number > 1}
 
 NUMBER_WORDS = frozenset((*_ONES, *_ROUND, "hundred"))
-"""Words that are, or are part of, a cardinal."""
+"""Words that form cardinals."""
 
 
 def cardinal(number: int) -> str:
@@ -38,7 +38,7 @@ def cardinal(number: int) -> str:
 
 
 def ordinal(number: int) -> str:
-    """Returns the word for a place in a row, e.g. 2 -> "second"; 1 to 9.
+    """Returns the ordinal word, e.g. 2 -> "second"; 1 to 9.
 
     Raises:
         ValueError: if `number` is not within 1 to 9.
@@ -49,7 +49,7 @@ def ordinal(number: int) -> str:
 
 
 def read_ordinal(word: str) -> int | None:
-    """Returns the place that a word names ("next", "first", "2nd"), or None."""
+    """Returns the number of an ordinal word ("next", "first", "2nd"), or None."""
     if word == "next":
         return 1
     if word in _DIGIT_ORDINALS:
@@ -58,7 +58,7 @@ def read_ordinal(word: str) -> int | None:
 
 
 def read_cardinals(words: Sequence[str]) -> list[int]:
-    """Returns the numbers spoken in a row of lower-case words, in order ("twenty five" -> 25, "30" -> 30)."""
+    """Returns the numbers in a sequence of lower-case words, in order ("twenty five" -> 25, "30" -> 30)."""
     found: list[int] = []
     current: int | None = None
     for word in (*words, ""):

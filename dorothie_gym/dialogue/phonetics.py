@@ -1,12 +1,12 @@
-"""How words sound, roughly: keys under which words that are easily misheard for one another fall together."""
+"""Phonetic keys: words that are easily confused acoustically share a key."""
 
 from __future__ import annotations
 
 import functools
 import re
 
-# From spelling to sound, in order: letters that are not heard, letter groups with one sound. After the idea of
-# Metaphone (L. Philips, Computer Language 7(12), 1990), far simpler: no more than confusion of English words needs.
+# Spelling to sound, in order: silent letters, letter groups with one sound. A strong simplification of Metaphone
+# (L. Philips, Computer Language 7(12), 1990), sufficient for confusions between English words.
 _RULES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
     (re.compile(pattern), sound)
     for pattern, sound in (
@@ -34,14 +34,14 @@ _RULES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (r"e$", ""),
     )
 )
-# Sounds that differ in voicing or place only are confused most often (Miller and Nicely, JASA 27, 1955).
+# Sounds that differ only in voicing or place are confused most often (Miller and Nicely, JASA 27, 1955).
 _CLASSES = str.maketrans("bdgvjzTCS", "ptkfSsfSS")
 _VOWELS = re.compile(r"[aeiouyw]+")
 
 
 @functools.lru_cache(maxsize=16384)
 def sound_of(word: str) -> str:
-    """Returns the sounds of a lower-case word, vowels kept as "a"."""
+    """Returns the phonetic key of a lower-case word, with all vowels as "a"."""
     for pattern, sound in _RULES:
         word = pattern.sub(sound, word)
     first, rest = word[:1], word[1:]
@@ -49,6 +49,6 @@ def sound_of(word: str) -> str:
 
 
 def skeleton_of(word: str) -> str:
-    """Returns the consonants that a lower-case word sounds with: "bates" and "baits" have the same."""
+    """Returns the consonants of the phonetic key of a lower-case word; equal for "bates" and "baits"."""
     sound = sound_of(word)
     return sound[:1] + sound[1:].replace("a", "")

@@ -1,12 +1,12 @@
-"""A small language for phrases: what a speaker may say, with choices, gaps, options and marks of style.
+"""Phrase language: a small template language with choices, gaps, options and style marks, compiled to closures.
 
-- `(a|b)`: one of several; `b *3` is three times as likely, marks (below) stand in front of an alternative.
-- `[a]`: said or left out, more often said by the chatty; may hold alternatives.
-- `<name>`: a phrase defined elsewhere.
-- `{name}`: a gap that the act or its particulars fill.
+- `(a|b)`: a choice; `b *3` is three times as likely, style marks (below) precede an alternative.
+- `[a]`: an option, with the probability of the chattiness of the speaker; may contain alternatives.
+- `<name>`: a named phrase.
+- `{name}`: a gap, filled from the act or the wording.
 
-Marks: "~" slangy, "^" polite, "!" blunt, "%" indirect. Marked alternatives are for speakers of that kind, who also use
-the unmarked ones; where all are marked, everybody may use them all.
+Marks: "~" slangy, "^" polite, "!" blunt, "%" indirect. Marked alternatives are open to speakers of that style, together
+with unmarked ones; a choice with marked alternatives only is open to all speakers.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from dorothie_gym.dialogue.lexicon import LexiconError
 
 _TOKEN = re.compile(r"[()\[\]|]|<\w+>|{\w+}|[^()\[\]|<>{}]+|[<>{}]")
 WEIGHT = re.compile(r"\s\*(\d+)\s*$")
-"""A weight at the end of an alternative."""
+"""Weight at the end of an alternative."""
 _MARKS = "~^!%"
 _ENDS = ("|", ")", "]")
 _BRACKETS = (*_ENDS, "(", "[")
 _FAVOUR = 3
-"""How much likelier than an unmarked alternative one is that carries a mark of the speaker's style."""
+"""Weight factor of alternatives with a mark of the style of the speaker."""
 
 
 class Register(enum.IntEnum):
-    """How a speaker puts things."""
+    """Register of a speaker."""
 
     PLAIN = 0
     SLANGY = 1
@@ -43,14 +43,14 @@ _REGISTERS = {"~": Register.SLANGY, "^": Register.POLITE, "!": Register.BLUNT}
 
 
 class PhraseSpeaker(Protocol):
-    """What a phrase needs of its speaker to become words.
+    """Interface between a phrase and its speaker.
 
     Attributes:
-        random: draws from [0, 1).
-        manner: which alternatives are open: 2 * register, plus 1 for an indirect speaker.
-        chattiness: share of options that are said.
-        habit: share of choices that fall on the speaker's favourite.
-        idiolect: number that settles the favourites.
+        random: function that draws from [0, 1).
+        manner: key of the open alternatives: 2 * register, plus 1 for an indirect speaker.
+        chattiness: probability of options.
+        habit: probability of the favourite alternative of the speaker.
+        idiolect: number that determines the favourites.
     """
 
     random: Callable[[], float]
@@ -65,37 +65,37 @@ class PhraseSpeaker(Protocol):
 
 
 Words = str | Callable[[PhraseSpeaker], str]
-"""Fixed words, or a function that finds them."""
+"""Fixed words, or a function that generates them for a speaker."""
 
 
 @dataclass(frozen=True)
 class Phrase:
-    """A compiled phrase.
+    """Compiled phrase.
 
     Attributes:
-        words: what is said.
-        gaps: names of the gaps that are always filled.
-        maybe: names of gaps that some of its alternatives fill.
+        words: fixed words or generating function.
+        gaps: names of the gaps in all alternatives.
+        maybe: names of the gaps in any alternative.
     """
 
     words: Words
     gaps: frozenset[str]
     maybe: frozenset[str]
 
-    def say(self, teller: PhraseSpeaker) -> str:
-        """Returns words for it; spaces may be doubled."""
-        return self.words if isinstance(self.words, str) else self.words(teller)
+    def say(self, speaker: PhraseSpeaker) -> str:
+        """Returns the words of the phrase; spaces may be doubled."""
+        return self.words if isinstance(self.words, str) else self.words(speaker)
 
 
 @dataclass(frozen=True)
 class Alternative:
-    """A phrase with what decides how often it is chosen.
+    """Alternative of a choice.
 
     Attributes:
-        phrase: what is said.
-        registers: the registers it is marked for; empty for all.
-        indirect: whether it is for the indirect.
-        weight: how likely it is beside the others.
+        phrase: compiled phrase.
+        registers: marked registers; empty for all.
+        indirect: whether the alternative is marked as indirect.
+        weight: relative probability.
     """
 
     phrase: Phrase
@@ -105,20 +105,20 @@ class Alternative:
 
 
 def manner_of(register: Register, indirect: bool) -> int:
-    """Returns the number by which a teller's open alternatives are found."""
+    """Returns the key of the open alternatives of a speaker."""
     return 2 * register + indirect
 
 
 def parse_phrase(where: str, text: str, phrases: Mapping[str, Phrase]) -> Phrase:
-    """Compiles one alternative (marks and weight in it are refused: see `parse_alternatives`).
+    """Compiles one alternative without marks and weight (see `parse_alternatives`).
 
     Args:
-        where: file and line, for messages.
-        text: in the language of this module, without "|" at the top level.
-        phrases: those that may be named.
+        where: file and line for error messages.
+        text: text in the phrase language, without "|" at the top level.
+        phrases: named phrases that the text may use.
 
     Raises:
-        LexiconError: naming `where`, if the text is not in the language or names an unknown phrase.
+        LexiconError: if the text is malformed or uses an undefined phrase; names `where`.
     """
     reader = _PhraseParser(where, text, phrases)
     phrase = reader.sequence()
@@ -127,7 +127,7 @@ def parse_phrase(where: str, text: str, phrases: Mapping[str, Phrase]) -> Phrase
 
 
 def parse_alternatives(where: str, text: str, phrases: Mapping[str, Phrase]) -> list[Alternative]:
-    """Compiles alternatives parted by "|"; arguments and errors as for `parse_phrase`."""
+    """Compiles alternatives separated by "|"; arguments and errors as in `parse_phrase`."""
     reader = _PhraseParser(where, text, phrases)
     alternatives = reader.alternatives()
     reader.expect_end()
@@ -135,7 +135,7 @@ def parse_alternatives(where: str, text: str, phrases: Mapping[str, Phrase]) -> 
 
 
 def split_alternatives(text: str) -> list[str]:
-    """Returns the alternatives of a line, parted by "|" outside brackets."""
+    """Splits a line into alternatives at "|" outside brackets."""
     found, depth = [""], 0
     for letter in text:
         depth += (letter in "([") - (letter in ")]")
@@ -147,10 +147,10 @@ def split_alternatives(text: str) -> list[str]:
 
 
 def choice(name: str, alternatives: Sequence[Alternative]) -> Phrase:
-    """Returns the phrase that is one of several.
+    """Returns the phrase that chooses among alternatives.
 
     Args:
-        name: settles, with the idiolect, which one is somebody's favourite.
+        name: key that determines, together with the idiolect, the favourite of a speaker.
         alternatives: at least one.
     """
     phrases = [alternative.phrase for alternative in alternatives]
@@ -162,7 +162,7 @@ def choice(name: str, alternatives: Sequence[Alternative]) -> Phrase:
 
 
 def open_to(alternatives: Sequence[Alternative], manner: int) -> tuple[int, ...]:
-    """Returns the places of the alternatives that a manner may choose from, each as often as its weight."""
+    """Returns the indices of the alternatives open to a manner, each repeated according to its weight."""
     register, indirect = Register(manner // 2), bool(manner % 2)
     places: list[int] = []
     for place, item in enumerate(alternatives):
@@ -178,20 +178,20 @@ def _choice_words(name: str, alternatives: Sequence[Alternative]) -> Words:
     options = tuple(tuple(alternatives[place].phrase.words for place in places) for places in manners)
     number = zlib.crc32(name.encode()) | 1
 
-    def say(teller: PhraseSpeaker) -> str:
-        mine = options[teller.manner]
-        drawn, habit = teller.random(), teller.habit
+    def say(speaker: PhraseSpeaker) -> str:
+        mine = options[speaker.manner]
+        drawn, habit = speaker.random(), speaker.habit
         if drawn < habit:
-            words = mine[((teller.idiolect * number) >> 13) % len(mine)]
+            words = mine[((speaker.idiolect * number) >> 13) % len(mine)]
         else:
             words = mine[int((drawn - habit) / (1.0 - habit) * len(mine))]
-        return words if isinstance(words, str) else words(teller)
+        return words if isinstance(words, str) else words(speaker)
 
     return say
 
 
 class _PhraseParser:
-    """Reads one line by recursive descent."""
+    """Recursive descent parser of one line."""
 
     def __init__(self, where: str, text: str, phrases: Mapping[str, Phrase]) -> None:
         self._where = where
@@ -242,7 +242,7 @@ class _PhraseParser:
             if found is not None:
                 weight = int(found[1])
                 self._tokens[place - 1] = self._tokens[place - 1][: found.start()]
-            # Spaces around "|" are for the eye.
+            # Spaces around "|" are insignificant.
             self._tokens[place - 1] = self._tokens[place - 1].rstrip()
         return self.sequence(), weight
 
@@ -283,14 +283,14 @@ class _PhraseParser:
 
 
 def _gap(name: str) -> Phrase:
-    return Phrase(lambda teller: teller.gap(name), frozenset({name}), frozenset({name}))
+    return Phrase(lambda speaker: speaker.gap(name), frozenset({name}), frozenset({name}))
 
 
 def _optional(inner: Words) -> Words:
-    def say(teller: PhraseSpeaker) -> str:
-        if teller.random() >= teller.chattiness:
+    def say(speaker: PhraseSpeaker) -> str:
+        if speaker.random() >= speaker.chattiness:
             return ""
-        return inner if isinstance(inner, str) else inner(teller)
+        return inner if isinstance(inner, str) else inner(speaker)
 
     return say
 
@@ -302,7 +302,7 @@ def _joined(parts: Sequence[Words]) -> Words:
         return parts[0]
     fixed = tuple(parts)
 
-    def say(teller: PhraseSpeaker) -> str:
-        return "".join([part if isinstance(part, str) else part(teller) for part in fixed])
+    def say(speaker: PhraseSpeaker) -> str:
+        return "".join([part if isinstance(part, str) else part(speaker) for part in fixed])
 
     return say

@@ -1,4 +1,4 @@
-"""What a speaker knows beyond the act: particulars that words carry and slots do not, and the talk so far."""
+"""Context of language generation beyond the act: details that slots do not represent, and the dialogue history."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dorothie_gym.ontology import DialogueMove, LandmarkName, SlotValue, StreetN
 
 
 class Direction(enum.StrEnum):
-    """Which way, seen from the driver's seat."""
+    """Direction relative to the heading of the car."""
 
     LEFT = "left"
     RIGHT = "right"
@@ -20,19 +20,22 @@ class Direction(enum.StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Wording:
-    """Particulars for the words of one act; each is optional.
+    """Details of one act for its wording; all fields are optional.
 
     Attributes:
-        direction: of a turn or a lane switch; a plain string such as "left" will do.
-        ordinal: which opportunity, 1 is the next one; 1 to 9.
-        faster: whether a change of speed is upwards.
-        speed: speed aimed at [km/h], not negative.
-        lights: whether the lights go on.
-        distance: how far ahead [m], not negative.
-        here: whether it is to happen on the spot.
-        past: the landmark behind which it is to happen.
-        dropped: the landmark given up in favour of another that the act names.
-        topic: what the talk is about ("fog", "wrong_way", ...); picks the templates marked with it, if there are any.
+        direction: direction of a turn or a lane switch; a plain string such as "left" is accepted.
+        ordinal: number of the opportunity, 1 (the next) to 9.
+        faster: whether a speed change is an increase.
+        speed: target speed [km/h], not negative.
+        lights: whether the lights are switched on.
+        distance: distance ahead [m], not negative.
+        here: whether the action takes place at the current position.
+        past: landmark to drive past before the action.
+        dropped: landmark abandoned in favour of another one in the act.
+        topic: topic of the utterance ("fog", "wrong_way", ...); selects the templates marked with it, if any.
+
+    Raises:
+        ValueError: if a field is out of its range; names the field.
     """
 
     direction: Direction | None = None
@@ -59,7 +62,7 @@ class Wording:
 
     @functools.cached_property
     def known(self) -> frozenset[str]:
-        """Names of the particulars that can be said, as gaps of the grammar, and "here"."""
+        """Names of the given details, as gaps of the grammar, and "here"."""
         sideways = self.direction in (Direction.LEFT, Direction.RIGHT)
         found = {
             "side": sideways,
@@ -75,15 +78,15 @@ class Wording:
 
 @dataclass(frozen=True, kw_only=True)
 class WordingContext:
-    """What has been said and what is in view when an act is worded; each is optional.
+    """Dialogue history and view at the time of generation; all fields are optional.
 
     Attributes:
-        joined: the act said just before in the same breath: "yes, and then left".
-        last: the other speaker's last move.
-        mentioned: values that both have heard lately; they may be referred to by "that one", "the same street".
-        street: the street that the car is on: "this street".
+        joined: move of the previous act in the same utterance: "yes, and then left".
+        last: last move of the other speaker.
+        mentioned: values mentioned recently, which permit references such as "that one" and "the same street".
+        street: street of the car: "this street".
         landmark: a landmark in view: "the KFC over there".
-        exception: whether something unexpected is going on; words come less smoothly then.
+        exception: whether an exception is in progress; selects alarm markers.
     """
 
     joined: DialogueMove | None = None

@@ -1,4 +1,4 @@
-"""What fills the gaps of a sentence: names, actions, numbers and references, as a speaker of some style says them."""
+"""Slot realizer: words for the gaps of a template (names, actions, numbers, references) in the style of a speaker."""
 
 from __future__ import annotations
 
@@ -29,34 +29,34 @@ from dorothie_gym.ontology import (
 _Option = TypeVar("_Option")
 
 Draw = Callable[[], float]
-"""Draws a number from [0, 1)."""
+"""Function that draws a number from [0, 1)."""
 
 _BATCH = 32
-"""Numbers drawn at once: a draw costs numpy as much as a batch does."""
+"""Numbers per draw from numpy; a single number costs as much as a batch."""
 
-# Enum members are looked up once: each look-up through the class costs as much as a drawn number.
+# Enum members are bound once: each look-up through the class costs as much as a random draw.
 _ACTION, _LANDMARK, _STREET = Slot.ACTION, Slot.LANDMARK, Slot.STREET
 _SLANGY = Register.SLANGY
 _OTHERS = ActionValue.UNKNOWN
 
 _COLLOQUIAL = 0.25
-"""Share of names that are paraphrased ("the burger place"); the slangy do it twice as often."""
+"""Share of paraphrased names ("the burger place"); twice as high in the slangy register."""
 
 _DEIXIS = 0.5
-"""Share of names of what is in view that are pointed at."""
+"""Share of names with a deictic expression for landmarks in view, scaled by chattiness."""
 
 
 def draws_of(rng: np.random.Generator) -> Draw:
-    """Returns a function that draws from [0, 1) by batches of `rng`."""
+    """Returns a function that draws from [0, 1), in batches from `rng`."""
     return itertools.chain.from_iterable(iter(lambda: rng.random(_BATCH).tolist(), None)).__next__
 
 
 class SlotRealizer:
-    """Fills gaps for one act; see `phrases.PhraseSpeaker`.
+    """Realizes the gaps of one act; implements `phrases.PhraseSpeaker`.
 
     Attributes:
-        values: the act's values by slot.
-        fronted: whether the sentence goes on from the one before.
+        values: slot values of the act by slot.
+        fronted: whether the sentence continues the previous one.
     """
 
     __slots__ = (
@@ -73,15 +73,15 @@ class SlotRealizer:
         scene: WordingContext,
         names: int,
     ) -> None:
-        """Prepares for an act.
+        """Prepares the realization of an act.
 
         Args:
-            act: what is said.
-            draw: source of chance.
-            wording: particulars.
-            style: of the speaker.
-            scene: what has been said and is in view.
-            names: how many names of a kind are said at most.
+            act: the dialogue act.
+            draw: source of random numbers in [0, 1).
+            wording: details of the act.
+            style: style of the speaker.
+            scene: dialogue history and objects in view.
+            names: largest number of names per slot.
         """
         self.random = draw
         self.values = values_by_slot(act.slots)
@@ -96,22 +96,22 @@ class SlotRealizer:
         self._names = names
         self._without: LandmarkName | None = None
 
-    def settle(self, dropping: bool) -> None:
-        """Tells whether the sentence names the landmark that is given up, which then is not named again."""
+    def exclude_dropped(self, dropping: bool) -> None:
+        """Sets whether the sentence names the abandoned landmark, which is then excluded from the landmark gap."""
         self._without = self._wording.dropped if dropping else None
 
     def pick(self, options: Sequence[_Option]) -> _Option:
-        """Returns one of several by chance."""
+        """Returns a random option."""
         return options[int(self.random() * len(options))]
 
     def gap(self, name: str) -> str:
-        """Returns the words for a gap of a template or of a spoken action."""
+        """Returns the words of a gap in a template or an action phrase."""
         return _GAPS[name](self)
 
     def action(self, form: str) -> str:
-        """Returns what is (being) done."""
+        """Returns the words of the actions in a form: "do", "doing" or "cmd"."""
         manners = _action_keys(self._wording)
-        # Two things to do are as many as one sentence can bear.
+        # A sentence names at most two actions.
         spoken = []
         for value in self.values[_ACTION][: min(2, self._names)]:
             assert isinstance(value, ActionValue)
@@ -122,17 +122,17 @@ class SlotRealizer:
         return _listed(spoken)
 
     def landmark(self) -> str:
-        """Returns the names of the landmarks, or references to them."""
+        """Returns the names of the landmarks, or anaphoric references."""
         values = self.values[_LANDMARK]
         kept = tuple(value for value in values if value is not self._without) if self._without else values
         return self._named(kept or values)
 
     def street(self) -> str:
-        """Returns the names of the streets, or references to them."""
+        """Returns the names of the streets, or anaphoric references."""
         return self._named(self.values[_STREET])
 
     def spoken(self, slot: Slot, form: str) -> str:
-        """Returns the words of a slot's values in a form of the lexicon."""
+        """Returns the words of the values of a slot in a form of the lexicon."""
         lexicon = load_lexicon()
         return _listed([self.pick(lexicon.forms(value, form)) for value in self.values[slot][: self._names]])
 
@@ -141,12 +141,12 @@ class SlotRealizer:
         return "are" if len(self.values.get(_LANDMARK, ())[: self._names]) > 1 else "is"
 
     def nth(self) -> str:
-        """Returns which opportunity."""
+        """Returns the ordinal of the opportunity."""
         number = self._wording.ordinal or 1
         return "next" if number == 1 else ordinal(number)
 
     def speed(self) -> str:
-        """Returns the speed aimed at, in words."""
+        """Returns the target speed in words."""
         return cardinal(round(self._wording.speed or 0))
 
     def distance(self) -> str:
@@ -155,19 +155,19 @@ class SlotRealizer:
         return f"{metres} {'metres' if self.idiolect % 3 == 1 else 'meters'}"
 
     def direction(self) -> str:
-        """Returns which way."""
+        """Returns the direction."""
         return str(self._wording.direction)
 
     def place(self, landmark: LandmarkName | None) -> str:
-        """Returns the name of a landmark that the wording gives."""
+        """Returns the name of a landmark of the wording."""
         return self.pick(load_lexicon().forms(landmark or LandmarkName.UNKNOWN, "say"))
 
     def past(self) -> str:
-        """Returns the landmark behind which it is to happen."""
+        """Returns the name of the landmark to drive past."""
         return self.place(self._wording.past)
 
     def dropped(self) -> str:
-        """Returns the landmark that is given up."""
+        """Returns the name of the abandoned landmark."""
         return self.place(self._wording.dropped)
 
     def _named(self, values: Sequence[SlotValue]) -> str:
@@ -195,16 +195,16 @@ _NAMELESS = frozenset({"Unknown", "Queried"})
 
 _GAPS: Mapping[str, Callable[[SlotRealizer], str]] = MappingProxyType(
     {
-        "do": lambda teller: teller.action("do"),
-        "doing": lambda teller: teller.action("doing"),
-        "cmd": lambda teller: teller.action("cmd"),
+        "do": lambda realizer: realizer.action("do"),
+        "doing": lambda realizer: realizer.action("doing"),
+        "cmd": lambda realizer: realizer.action("cmd"),
         "landmark": SlotRealizer.landmark,
         "street": SlotRealizer.street,
-        "object": lambda teller: teller.spoken(Slot.OBJECT, "say"),
-        "the_object": lambda teller: teller.spoken(Slot.OBJECT, "the"),
-        "state": lambda teller: teller.spoken(Slot.STATUS, "say"),
-        "order": lambda teller: teller.spoken(Slot.STATUS, "order"),
-        "tail": lambda teller: teller.spoken(Slot.STATUS, "tail"),
+        "object": lambda realizer: realizer.spoken(Slot.OBJECT, "say"),
+        "the_object": lambda realizer: realizer.spoken(Slot.OBJECT, "the"),
+        "state": lambda realizer: realizer.spoken(Slot.STATUS, "say"),
+        "order": lambda realizer: realizer.spoken(Slot.STATUS, "order"),
+        "tail": lambda realizer: realizer.spoken(Slot.STATUS, "tail"),
         "is": SlotRealizer.copula,
         "side": SlotRealizer.direction,
         "direction": SlotRealizer.direction,
@@ -219,7 +219,7 @@ _GAPS: Mapping[str, Callable[[SlotRealizer], str]] = MappingProxyType(
 
 @functools.lru_cache(maxsize=8192)
 def values_by_slot(slots: frozenset[SlotValue]) -> Mapping[Slot, tuple[SlotValue, ...]]:
-    """Returns the values of an act by slot, in the order of afterthoughts; slots without values are left out."""
+    """Returns the values of an act by slot, in the order of afterthoughts; slots without values are omitted."""
     ordered = in_label_order(slots)
     found = {slot: tuple(value for value in ordered if value.slot is slot) for slot in SPOKEN_SLOTS}
     return {slot: values for slot, values in found.items() if values}
@@ -227,7 +227,7 @@ def values_by_slot(slots: frozenset[SlotValue]) -> Mapping[Slot, tuple[SlotValue
 
 @functools.lru_cache(maxsize=4096)
 def _action_keys(wording: Wording) -> Mapping[ActionValue, tuple[str, ...]]:
-    """Returns the manners that a wording allows, the most telling first, by action; UNKNOWN stands for the rest."""
+    """Returns the phrase keys that a wording allows, the most specific first, by action; UNKNOWN covers the rest."""
     known = wording.known
     names = (("nth", "nth"), ("past", "past"), ("here", "here"), ("in", "distance"), ("to", "speed"))
     details = [detail for detail, name in names if name in known]

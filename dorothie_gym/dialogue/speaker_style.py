@@ -1,4 +1,4 @@
-"""Styles of speakers: how somebody talks throughout a session, drawn from data/styles.yaml."""
+"""Speaker styles: the manner of speaking of a role during a session, sampled from data/styles.yaml."""
 
 from __future__ import annotations
 
@@ -17,20 +17,23 @@ _SHARES = ("chattiness", "indirectness", "anaphora", "disfluency", "repairs", "h
 
 @dataclass(frozen=True, kw_only=True)
 class SpeakerStyle:
-    """How a speaker talks. Shares are within [0, 1].
+    """Style of a speaker. Shares are in [0, 1].
 
     Attributes:
         register: plain, slangy, polite or blunt.
-        chattiness: share of optional words that are said.
-        indirectness: share of sentences that may be put indirectly: "could you turn left".
-        anaphora: share of names known to both that are replaced by "that one", "the same street".
+        chattiness: share of optional words that are spoken.
+        indirectness: share of sentences open to indirect forms: "could you turn left".
+        anaphora: share of mentioned names that are replaced by "that one", "the same street".
         disfluency: share of sentences with a hesitation or a restart.
-        repairs: share of sentences with a wrong name that is put right at once.
-        habit: share of choices that fall on favourite words; below 1.
-        idiolect: settles which the favourite words are; not negative.
-        address: what the other is called; empty for nothing.
-        addressing: share of sentences with the address.
-        proper: whether sentences are written with a capital and a full stop.
+        repairs: share of names that follow a wrong name as its correction.
+        habit: share of choices that use the favourite alternative; below 1.
+        idiolect: number that determines the favourite alternatives; not negative.
+        address: vocative for the other speaker; empty for none.
+        addressing: share of sentences with the vocative.
+        proper: whether sentences start with a capital letter and end with a full stop.
+
+    Raises:
+        ValueError: if a field is out of its range; names the field.
     """
 
     register: Register = Register.PLAIN
@@ -51,14 +54,14 @@ class SpeakerStyle:
             if not 0 <= value <= 1:
                 raise ValueError(f"SpeakerStyle.{name} must be within 0 to 1, not {value}")
         if self.habit == 1:
-            raise ValueError("SpeakerStyle.habit must be below 1: somebody who always says the same has no choices")
+            raise ValueError("SpeakerStyle.habit must be below 1: a value of 1 leaves no random choices")
         if self.idiolect < 0:
             raise ValueError(f"SpeakerStyle.idiolect must not be negative, but is {self.idiolect}")
 
 
 @dataclass(frozen=True)
 class _StyleSpread:
-    """How styles are spread over the speakers of a role: shares of registers, ranges of the other traits."""
+    """Distribution of the styles of a role: shares of registers, ranges of the other traits."""
 
     registers: Mapping[Register, float]
     ranges: Mapping[str, tuple[float, float]]
@@ -67,11 +70,11 @@ class _StyleSpread:
 
 
 def draw_style(role: Role, rng: np.random.Generator) -> SpeakerStyle:
-    """Draws the style of a speaker for a session.
+    """Samples the style of a speaker for a session.
 
     Args:
-        role: the participant (whose spread the Ad-Wizard shares) or the Co-Wizard (likewise the car itself).
-        rng: source of chance.
+        role: the Ad-Wizard shares the distribution of the participant, the car itself that of the Co-Wizard.
+        rng: source of randomness.
     """
     spread = _spreads()[Role.PARTICIPANT if role in (Role.PARTICIPANT, Role.AD_WIZARD) else Role.CO_WIZARD]
     registers = list(spread.registers)
@@ -96,7 +99,7 @@ def draw_style(role: Role, rng: np.random.Generator) -> SpeakerStyle:
 
 @functools.cache
 def default_style(role: Role) -> SpeakerStyle:
-    """The style of those who have none: the middle of the spread, without favourite words, address and slips."""
+    """Returns the default style of a role: mean traits without favourite words, vocative and disfluencies."""
     spread = _spreads()[role]
     chattiness, indirectness, anaphora = (
         sum(spread.ranges[name]) / 2 for name in ("chattiness", "indirectness", "anaphora")

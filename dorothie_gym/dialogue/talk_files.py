@@ -1,8 +1,8 @@
-"""The files of data/talk: named phrases and sections of lines, in the language of `phrases`.
+"""Reader of the files in data/talk: named phrases and sections of lines in the phrase language (`phrases`).
 
 # a comment
-<name> = one | another          a phrase; lines that begin with "|" go on with it
-== head words key=value         a section; each line behind it is one alternative
+<name> = one | another          a named phrase; lines that start with "|" continue it
+== head words key=value         a section; each following line is one alternative
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ _DEFINITION = re.compile(r"<(\w+)>\s*=\s*(.*)")
 
 @dataclass(frozen=True)
 class TalkLine:
-    """A line of a section.
+    """Line of a section.
 
     Attributes:
-        where: file and line, for messages.
-        text: as written.
+        where: file and line number for error messages.
+        text: text of the line.
     """
 
     where: str
@@ -33,13 +33,13 @@ class TalkLine:
 
 @dataclass(frozen=True)
 class TalkSection:
-    """A section of a talk file.
+    """Section of a talk file.
 
     Attributes:
-        where: file and line of its head, for messages.
-        words: of the head, in order, without "key=value".
-        keys: the "key=value" of the head.
-        lines: its alternatives.
+        where: file and line number of the head for error messages.
+        words: words of the head, in order, without "key=value" pairs.
+        keys: "key=value" pairs of the head.
+        lines: alternatives of the section.
     """
 
     where: str
@@ -50,7 +50,7 @@ class TalkSection:
 
 @dataclass(frozen=True)
 class TalkFiles:
-    """What the files say.
+    """Parsed talk files.
 
     Attributes:
         phrases: named phrases.
@@ -62,17 +62,17 @@ class TalkFiles:
 
 
 def read_talk_files() -> dict[str, str]:
-    """Returns the texts of the package's talk files by name, those whose names sort first in front."""
+    """Returns the texts of the talk files of the package by name, sorted by name."""
     folder = resources.files(__package__).joinpath("data", "talk")
     files = sorted((item for item in folder.iterdir() if item.name.endswith(".talk")), key=lambda item: item.name)
     return {item.name: item.read_text(encoding="utf-8") for item in files}
 
 
 def parse_talk_files(texts: dict[str, str]) -> TalkFiles:
-    """Returns what talk files say; a phrase must be defined before it is named, in this file or an earlier one.
+    """Parses talk files; a phrase must be defined before its first use, in the same file or an earlier one.
 
     Raises:
-        LexiconError: naming file and line.
+        LexiconError: if a line is malformed; names file and line.
     """
     phrases: dict[str, Phrase] = {}
     sections: list[TalkSection] = []
@@ -87,7 +87,7 @@ def parse_talk_files(texts: dict[str, str]) -> TalkFiles:
                 sections += _closed(head, lines)
                 head, lines = _head(line), []
             elif head is None:
-                raise LexiconError(f"{line.where}: {line.text!r} stands before the first section (== ...)")
+                raise LexiconError(f"{line.where}: {line.text!r} precedes the first section (== ...)")
             else:
                 lines.append(line)
         sections += _closed(head, lines)
@@ -95,7 +95,7 @@ def parse_talk_files(texts: dict[str, str]) -> TalkFiles:
 
 
 def alternatives_of(section: TalkSection, phrases: dict[str, Phrase]) -> list[Alternative]:
-    """Compiles the lines of a section; each may hold several alternatives parted by "|"."""
+    """Compiles the lines of a section; a line may contain several alternatives separated by "|"."""
     return [item for line in section.lines for item in parse_alternatives(line.where, line.text, phrases)]
 
 
@@ -107,7 +107,7 @@ def _logical_lines(name: str, text: str) -> Iterator[TalkLine]:
             continue
         if line.startswith("|"):
             if pending is None:
-                raise LexiconError(f"{name}:{number}: there is no line to go on with: {line!r}")
+                raise LexiconError(f"{name}:{number}: there is no line to continue: {line!r}")
             pending = TalkLine(pending.where, f"{pending.text} {line}")
             continue
         if pending is not None:
@@ -126,7 +126,7 @@ def _define(where: str, name: str, text: str, phrases: dict[str, Phrase]) -> Non
 def _head(line: TalkLine) -> TalkSection:
     words = line.text.removeprefix("==").split()
     if not words:
-        raise LexiconError(f"{line.where}: a section needs a head, for instance: == Instruct participant")
+        raise LexiconError(f"{line.where}: a section needs a head, e.g. == Instruct participant")
     keys = dict(word.split("=", 1) for word in words if "=" in word)
     return TalkSection(line.where, tuple(word for word in words if "=" not in word), keys, ())
 

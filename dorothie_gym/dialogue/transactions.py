@@ -1,14 +1,14 @@
-"""Transaction units: everything that is said about one goal (paper, section 4.1 and appendix B.3).
+"""Transaction units: all utterances on one goal (paper, section 4.1 and appendix B.3), and the unit annotator.
 
-The rule, over utterances and arrivals only, so that it can be applied while a session runs and again to its recording:
+The rules use utterances and arrivals only, so that a live session and its recording are annotated alike:
 
-1. An act aims at a landmark if it names one that is a goal, and commands, asks or checks, or speaks of a status. Of
-   several in one utterance, one that is not spoken of as over or as for later counts, the last of those.
-2. Who aims at a landmark continues its transaction, or begins one. Talk of what is to be done later (Pending) or is
-   over (Complete, Abandoned) is of that transaction too, and leaves open the one that is going on.
-3. What aims at nothing belongs where the exchange that it is in belongs, else to what is going on.
-4. A transaction is over when its landmark is reached or given up. A command, or the question where to go, then begins
-   another, which has no landmark until one is named.
+1. An act targets a landmark if the landmark is a goal and the act commands, asks, checks, or mentions a status. Among
+   several targets in one utterance, the last one without a finished or pending status counts.
+2. An act with a target continues the transaction of that landmark, or starts one. This includes pending goals (Pending)
+   and finished goals (Complete, Abandoned), which do not replace the current transaction.
+3. An act without a target belongs to the transaction of its exchange, otherwise to the current transaction.
+4. A transaction ends when its landmark is reached or abandoned. The next command, or question for the next goal, starts
+   another transaction, whose landmark is None until one is named.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ _ASIDE = _OVER | {GoalStatus.PENDING}
 
 @dataclass
 class Transaction:
-    """What is said about one goal.
+    """Transaction unit: the dialogue on one goal.
 
     Attributes:
-        id: counts from 0 in order of beginning.
-        landmark: the goal, None until it is named.
-        over: whether the goal was reached or given up.
+        id: index in order of start, from 0.
+        landmark: the goal, None until named.
+        over: whether the goal was reached or abandoned.
     """
 
     id: int
@@ -44,13 +44,13 @@ class Transaction:
 
 
 class TransactionTracker:
-    """Assigns each utterance to a transaction, as utterances are delivered."""
+    """Assigns delivered utterances to transactions."""
 
     def __init__(self, goals: Iterable[LandmarkName]) -> None:
-        """Starts in silence.
+        """Creates an empty tracker.
 
         Args:
-            goals: landmarks of the subgoals, those that may be added later included.
+            goals: landmarks of the subgoals, including those that may be added later.
         """
         self.transactions: list[Transaction] = []
         self._goals = set(goals) - _NO_GOALS
@@ -58,14 +58,14 @@ class TransactionTracker:
         self._by_exchange: dict[int, Transaction] = {}
 
     def update(self, utterance: Utterance, exchanges: tuple[int | None, ...]) -> int:
-        """Places a delivered utterance.
+        """Assigns a delivered utterance to a transaction.
 
         Args:
-            utterance: heard to its end; utterances come in the order of delivery.
-            exchanges: id of the exchange of each of its acts, None for one that is in none.
+            utterance: delivered utterance; calls follow the order of delivery.
+            exchanges: exchange id of each act, None for acts outside all exchanges.
 
         Returns:
-            The id of its transaction.
+            Id of the transaction.
         """
         aim = self._aim(utterance.acts)
         placed = tuple(exchange for exchange in exchanges if exchange is not None)
@@ -78,7 +78,7 @@ class TransactionTracker:
         return transaction.id
 
     def note(self, landmark: LandmarkName, status: GoalStatus) -> None:
-        """Takes in that a subgoal changed: its landmark is a goal from now on, or is over."""
+        """Processes a change of a subgoal: adds its landmark to the goals, or ends its transaction."""
         if landmark in _NO_GOALS:
             return
         self._goals.add(landmark)
@@ -90,7 +90,7 @@ class TransactionTracker:
             self._current.landmark, self._current.over = landmark, True
 
     def _aim(self, acts: tuple[DialogueAct, ...]) -> tuple[LandmarkName, GoalStatus | None] | None:
-        """The goal that an utterance aims at, and what it says of its status."""
+        """Returns the goal that an utterance targets and the mentioned status; None without a target."""
         found: tuple[LandmarkName, GoalStatus | None] | None = None
         for act in acts:
             named = [value for value in act.values(Slot.LANDMARK) if isinstance(value, LandmarkName)]
@@ -99,7 +99,7 @@ class TransactionTracker:
             if not named or not (statuses or self._may_aim(act.move)):
                 continue
             goals = [name for name in named if name in self._goals]
-            # "Not this one but that one" names two: the one that nothing was said about yet is the new one.
+            # "Not this one but that one" names two goals: the one without a transaction is the new one.
             fresh = [name for name in goals if self._of(name) is None]
             if goals:
                 status = next((status for status in statuses if status not in _ASIDE), None)
@@ -152,45 +152,47 @@ class TransactionTracker:
 
 
 def _begins(act: DialogueAct) -> bool:
-    """Whether an act asks for, or commands, something further."""
+    """Returns whether an act asks for the next goal or gives a command."""
     asks = act.move is DialogueMove.QUERY_W and LandmarkName.QUERIED in act.slots
     return asks or act.move is DialogueMove.INSTRUCT
 
 
 class Annotator:
-    """Numbers the exchange units and transaction units of a conversation (paper, section 4.1).
+    """Annotates a conversation with exchange and transaction units (paper, section 4.1).
+
+    Live sessions and recordings are annotated by the same rules.
 
     Attributes:
-        exchanges: all so far, by number.
-        transactions: all so far, by number.
+        exchanges: exchanges so far, by id.
+        transactions: transactions so far, by id.
     """
 
     def __init__(self, goals: Iterable[LandmarkName]) -> None:
-        """Starts in silence.
+        """Creates an annotator without units.
 
         Args:
-            goals: landmarks of the subgoals, those that may be added later included.
+            goals: landmarks of the subgoals, including those that may be added later.
         """
         self._exchanges, self._transactions = ExchangeTracker(), TransactionTracker(goals)
         self.exchanges: list[Exchange] = self._exchanges.exchanges
         self.transactions: list[Transaction] = self._transactions.transactions
 
     def update(self, utterance: Utterance) -> tuple[tuple[int | None, ...], int]:
-        """Places a delivered utterance.
+        """Annotates a delivered utterance.
 
         Args:
-            utterance: heard to its end; utterances come in the order of delivery.
+            utterance: delivered utterance; calls follow the order of delivery.
 
         Returns:
-            The exchange of each act, None for irrelevant talk outside of any, and the transaction.
+            Exchange id of each act (None for irrelevant talk outside all exchanges), and the transaction id.
         """
         exchanges = self._exchanges.update(utterance)
         return exchanges, self._transactions.update(utterance, exchanges)
 
     def note(self, landmark: LandmarkName, status: GoalStatus) -> None:
-        """Takes in that a subgoal changed, see `TransactionTracker.note`."""
+        """Processes a change of a subgoal, see `TransactionTracker.note`."""
         self._transactions.note(landmark, status)
 
     def tick(self, now: float) -> None:
-        """Abandons the exchanges that have waited too long at `now` [s]."""
+        """Closes exchanges without a timely answer at `now` [s]."""
         self._exchanges.tick(now)

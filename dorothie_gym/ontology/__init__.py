@@ -1,6 +1,6 @@
-"""The closed vocabularies: roles, moves, slots, actions, exceptions, and how files spell them.
+"""Closed vocabularies: roles, dialogue moves, slots, actions, exceptions, and their spellings in files.
 
-Standard library only; everything else in the package builds on this.
+Depends on the standard library only; all other packages depend on this one.
 """
 
 from dorothie_gym.ontology.actions import (

@@ -1,4 +1,4 @@
-"""The physical and mental actions of the Co-Wizard; ids as in SDN."""
+"""Physical and mental actions of the Co-Wizard; ids as in SDN."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ LANE_SWITCH_RIGHT = -90.0
 """Angle argument of a lane switch to the right [degrees, positive left]."""
 
 U_TURN_ANGLE = -180.0
-"""Angle under which a U-turn stands in an action history [degrees]; the action itself takes no argument."""
+"""Angle that action histories record for a U-turn [degrees]; the action itself takes no argument."""
 
 SPEED_STEP = 5.0
-"""Change of cruise speed of one SpeedChange, up or down [km/h]."""
+"""Change of cruise speed by one SpeedChange, up or down [km/h]."""
 
 
 class ActionGroup(StrEnum):
-    """What a physical action serves (paper, appendix A.2)."""
+    """Purpose of a physical action (paper, appendix A.2)."""
 
     NAVIGATION = "navigation"
     ADAPTIVE = "adaptive"
@@ -31,7 +31,7 @@ class ActionGroup(StrEnum):
 
 
 class ArgumentKind(StrEnum):
-    """What a physical action takes as argument."""
+    """Kind of argument of a physical action."""
 
     NONE = "none"
     SIDE = "side"
@@ -41,11 +41,11 @@ class ArgumentKind(StrEnum):
 
     @property
     def domain(self) -> str:
-        """The accepted arguments in words."""
+        """Description of the accepted arguments for error messages."""
         return _DOMAINS[self]
 
     def accepts(self, argument: float | None) -> bool:
-        """Returns whether `argument` is one of this kind; True and False are a switch's On and Off."""
+        """Returns whether `argument` is valid for this kind; a switch takes True (on) and False (off)."""
         if argument is None or self is ArgumentKind.NONE:
             return argument is None and self is ArgumentKind.NONE
         if self is ArgumentKind.ANGLE:
@@ -54,7 +54,7 @@ class ArgumentKind(StrEnum):
 
 
 class PhysicalAction(LabelledInt):
-    """What the Co-Wizard makes the car do."""
+    """Physical action of the car, chosen by the Co-Wizard."""
 
     LANE_FOLLOW = 1, "LaneFollow"
     LANE_SWITCH = 2, "LaneSwitch"
@@ -67,17 +67,17 @@ class PhysicalAction(LabelledInt):
 
     @property
     def group(self) -> ActionGroup:
-        """What the action serves."""
+        """Purpose of the action."""
         return _GROUPS.get(self, ActionGroup.NAVIGATION)
 
     @property
     def argument(self) -> ArgumentKind:
-        """What the action takes as argument."""
+        """Kind of argument that the action takes."""
         return _ARGUMENTS.get(self, ArgumentKind.NONE)
 
     @property
     def slot_value(self) -> ActionValue:
-        """The value of Slot.ACTION that speaks of the action."""
+        """Value of `Slot.ACTION` that names the action."""
         return ActionValue(self.value)
 
     @property
@@ -85,7 +85,7 @@ class PhysicalAction(LabelledInt):
         """Class of the action in the Navigation from Dialogue task, 0 to 5.
 
         Raises:
-            OntologyError: the action is no navigation action.
+            OntologyError: if the action is not a navigation action.
         """
         if self not in NAVIGATION_ACTIONS:
             raise OntologyError(f"physical action: {self.label} is {self.group}, only navigation actions are in NfD")
@@ -96,24 +96,24 @@ class PhysicalAction(LabelledInt):
         """Returns the navigation action of class `index`; the inverse of `nfd_class`.
 
         Raises:
-            OntologyError: `index` is not in 0 to 5.
+            OntologyError: if `index` is not in 0 to 5.
         """
         if not 0 <= index < len(NAVIGATION_ACTIONS):
             raise OntologyError(f"NfD class: {index!r} is out of range, expected 0 to {len(NAVIGATION_ACTIONS) - 1}")
         return NAVIGATION_ACTIONS[index]
 
     def check_argument(self, argument: float | None) -> None:
-        """Does nothing if the action takes `argument`.
+        """Checks the argument of the action.
 
         Raises:
-            OntologyError: it does not; the message says what it takes.
+            OntologyError: if the action does not take `argument`; the message lists the accepted values.
         """
         if not self.argument.accepts(argument):
             raise OntologyError(f"argument of {self.label}: {argument!r} is not {self.argument.domain}")
 
 
 class MentalAction(LabelledInt):
-    """A change of the Co-Wizard's beliefs."""
+    """Update of the Co-Wizard's beliefs."""
 
     PLAN_UPDATE = 1, "PlanUpdate"
     GOAL_UPDATE = 2, "GoalUpdate"
@@ -123,7 +123,7 @@ class MentalAction(LabelledInt):
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """Names of the arguments: ids of junctions, names of landmarks, a status, a guessed place (x, y) [m]."""
+        """Names of the arguments: junction ids, landmark names, a status, or an estimated position (x, y) [m]."""
         return _MENTAL_ARGUMENTS[self]
 
 
@@ -174,14 +174,14 @@ _MENTAL_ARGUMENTS: Mapping[MentalAction, tuple[str, ...]] = MappingProxyType(
 NAVIGATION_ACTIONS: tuple[PhysicalAction, ...] = tuple(
     action for action in PhysicalAction if action.group is ActionGroup.NAVIGATION
 )
-"""Where the car goes: ids 1 to 6, the classes of NfD."""
+"""Actions that choose the path of the car: ids 1 to 6, the classes of NfD."""
 
 ADAPTIVE_ACTIONS: tuple[PhysicalAction, ...] = tuple(
     action for action in PhysicalAction if action.group is ActionGroup.ADAPTIVE
 )
-"""How the car goes."""
+"""Actions that change the speed of the car."""
 
 EPISTEMIC_ACTIONS: tuple[PhysicalAction, ...] = tuple(
     action for action in PhysicalAction if action.group is ActionGroup.EPISTEMIC
 )
-"""What helps the car to see."""
+"""Actions that improve perception (lights)."""

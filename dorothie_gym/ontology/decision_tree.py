@@ -1,8 +1,8 @@
-"""The decision tree that leads an annotator to a dialogue move, as data that a program can walk.
+"""Decision tree for the annotation of dialogue moves, as data that a program can traverse.
 
-The inner nodes below the root are the coarser classes of moves (Initiate, Ask, ...), so membership of a class is read
-off the tree and written nowhere else. The scheme is that of Carletta et al. (1997), adjusted to driving; the wording
-of the questions is ours, and Confirm and ReplyU hang where their names put them (spec: ontology).
+The inner nodes below the root are the coarser classes of moves (Initiate, Ask, ...); membership of a class is derived
+from the tree and not stored anywhere else. The scheme follows Carletta et al. (1997), adapted to driving; the wording
+of the questions is ours, and Confirm and ReplyU are placed according to their names (spec: ontology).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from dorothie_gym.ontology.vocabulary import OntologyError
 
 
 class MoveGroup(StrEnum):
-    """An inner node of the decision tree: a class of moves, for coarser statistics."""
+    """Inner node of the decision tree: a class of moves, used by coarser statistics."""
 
     INITIATE = "Initiate"
     RESPOND = "Respond"
@@ -30,22 +30,22 @@ class MoveGroup(StrEnum):
 
     @property
     def label(self) -> str:
-        """The spelling in tables."""
+        """Spelling in tables."""
         return self.value
 
     @property
     def moves(self) -> tuple[DialogueMove, ...]:
-        """The moves below the node, by id."""
+        """Moves below the node, by id."""
         return MOVE_GROUPS[self]
 
 
 @dataclass(frozen=True)
 class Answer:
-    """One answer to a question and where it leads.
+    """One answer to a question, with the node that follows.
 
     Attributes:
         label: the answer, short enough for a button.
-        next: the question to ask next, or the move that has been found.
+        next: the next question, or the resulting move.
     """
 
     label: str
@@ -54,12 +54,12 @@ class Answer:
 
 @dataclass(frozen=True)
 class Question:
-    """A question about a span of an utterance.
+    """Question about a span of an utterance.
 
     Attributes:
         text: the question.
-        answers: at least two, with different labels.
-        group: the class of moves that all lie below, None at the root.
+        answers: two or more, with distinct labels.
+        group: class of all moves below the question; None at the root.
     """
 
     text: str
@@ -72,10 +72,10 @@ class Question:
             raise OntologyError(f"question {self.text!r}: needs two or more different answers, has {labels}")
 
     def follow(self, label: str) -> Node:
-        """Returns where the answer `label` leads.
+        """Returns the node that follows the answer `label`.
 
         Raises:
-            OntologyError: the question has no such answer.
+            OntologyError: if the question has no such answer.
         """
         for answer in self.answers:
             if answer.label == label:
@@ -173,10 +173,10 @@ DECISION_TREE = Question(
 
 
 def walk(answers: Iterable[str], tree: Question = DECISION_TREE) -> DialogueMove:
-    """Returns the move that the labels of `answers`, given from the root on, lead to.
+    """Returns the move that a sequence of answer labels, starting at the root, leads to.
 
     Raises:
-        OntologyError: an answer is not one of the question's, or there are too few or too many.
+        OntologyError: if an answer does not belong to its question, or if there are too few or too many answers.
     """
     node: Node = tree
     for label in answers:
@@ -189,7 +189,7 @@ def walk(answers: Iterable[str], tree: Question = DECISION_TREE) -> DialogueMove
 
 
 def paths(tree: Question = DECISION_TREE) -> Iterator[tuple[TreePath, DialogueMove]]:
-    """Yields every way through `tree` as (question, answer) pairs and the move at its end, depth first."""
+    """Yields every path through `tree` as (question, answer) pairs with the move at its end, depth first."""
     for answer in tree.answers:
         step = (tree, answer)
         if isinstance(answer.next, Question):
@@ -205,7 +205,7 @@ def path_to(move: DialogueMove) -> TreePath:
 
 
 def groups_of(move: DialogueMove) -> tuple[MoveGroup, ...]:
-    """Returns the classes that `move` belongs to, the widest first; none for Irrelevant."""
+    """Returns the classes that contain `move`, the widest first; empty for Irrelevant."""
     return tuple(question.group for question, _ in path_to(move) if question.group is not None)
 
 
@@ -214,4 +214,4 @@ _PATHS: Mapping[DialogueMove, TreePath] = MappingProxyType({move: path for path,
 MOVE_GROUPS: Mapping[MoveGroup, tuple[DialogueMove, ...]] = MappingProxyType(
     {group: tuple(move for move in DialogueMove if group in groups_of(move)) for group in MoveGroup}
 )
-"""The moves of each class, by id."""
+"""Moves of each class, by id."""

@@ -15,7 +15,7 @@ from dorothie_gym.ontology.vocabulary import LabelledInt, OntologyError
 
 
 class DialogueMove(LabelledInt):
-    """What a span of an utterance does to the talk; ids as in SDN (moves after Carletta et al. 1997)."""
+    """Communicative function of a span of an utterance; ids as in SDN (moves after Carletta et al. 1997)."""
 
     IRRELEVANT = 0, "Irrelevant"
     INSTRUCT = 1, "Instruct"
@@ -35,38 +35,40 @@ class DialogueMove(LabelledInt):
 
 
 VECTOR_SLOTS: tuple[Slot, ...] = (Slot.ACTION, Slot.STREET, Slot.STATUS, Slot.LANDMARK, Slot.OBJECT)
-"""The slots in the order in which the vector holds them."""
+"""Slots in the order of the label vector; SDN puts Status before Landmark despite its larger slot id."""
 
 LABELS: tuple[SlotValue, ...] = tuple(itertools.chain.from_iterable(SLOT_VALUES[slot] for slot in VECTOR_SLOTS))
-"""The value that each of the 69 places of the vector stands for."""
+"""Slot value of each of the 69 entries of the label vector."""
 
 LABEL_INDEX: Mapping[SlotValue, int] = MappingProxyType({value: index for index, value in enumerate(LABELS)})
-"""The place of each value in the vector."""
+"""Index of each value in the label vector."""
 
 SLOT_SPANS: Mapping[Slot, slice] = MappingProxyType(
     {slot: slice(LABEL_INDEX[SLOT_VALUES[slot][0]], LABEL_INDEX[SLOT_VALUES[slot][-1]] + 1) for slot in VECTOR_SLOTS}
 )
-"""The places of each slot's values in the vector; Null has none."""
+"""Slice of the label vector for each slot; Null has none."""
 
 
 def in_label_order(values: Iterable[SlotValue]) -> tuple[SlotValue, ...]:
     """Returns the distinct `values` in the order of the label vector.
 
     Raises:
-        OntologyError: one of them is not a slot value.
+        OntologyError: if one of them is not a slot value.
     """
     given = tuple(values)
     for value in given:
         if not isinstance(value, SlotValue):
-            raise OntologyError(f"slot value: {value!r} is none; give members of the slots' enums, as LandmarkName.KFC")
+            raise OntologyError(
+                f"slot value: {value!r} is not a slot value; pass members of the slot enums, e.g. LandmarkName.KFC"
+            )
     return tuple(sorted(set(given), key=LABEL_INDEX.__getitem__))
 
 
 def encode_slots(values: Iterable[SlotValue]) -> tuple[int, ...]:
-    """Returns the label vector (69,) of 0 and 1 that marks `values`.
+    """Returns the label vector (69,) of `values`, with entries 0 and 1.
 
     Raises:
-        OntologyError: one of the values is not a slot value.
+        OntologyError: if one of the values is not a slot value.
     """
     vector = [0] * len(LABELS)
     for value in in_label_order(values):
@@ -75,10 +77,10 @@ def encode_slots(values: Iterable[SlotValue]) -> tuple[int, ...]:
 
 
 def decode_slots(vector: Iterable[int]) -> frozenset[SlotValue]:
-    """Returns the values that a label vector (69,) of 0 and 1 marks; the inverse of `encode_slots`.
+    """Returns the slot values of a label vector (69,) of 0 and 1; the inverse of `encode_slots`.
 
     Raises:
-        OntologyError: the vector has another length, or an entry is neither 0 nor 1.
+        OntologyError: if the vector has another length, or if an entry is neither 0 nor 1.
     """
     entries = tuple(vector)
     if len(entries) != len(LABELS):
@@ -92,14 +94,14 @@ def decode_slots(vector: Iterable[int]) -> frozenset[SlotValue]:
 
 @dataclass(frozen=True)
 class DialogueAct:
-    """What one span of an utterance does and what it is about.
+    """Dialogue act of one span of an utterance: a move with slot values.
 
     Attributes:
         move: the dialogue move.
-        slots: the values it carries; a slot may have none, one or several.
+        slots: slot values; a slot may have none, one or several.
 
     Raises:
-        OntologyError: `move` is no DialogueMove, or `slots` is no frozenset of slot values.
+        OntologyError: if `move` is not a DialogueMove, or `slots` is not a frozenset of slot values.
     """
 
     move: DialogueMove
@@ -107,24 +109,24 @@ class DialogueAct:
 
     def __post_init__(self) -> None:
         if not isinstance(self.move, DialogueMove):
-            raise OntologyError(f"DialogueAct.move: {self.move!r} is no DialogueMove")
+            raise OntologyError(f"DialogueAct.move: {self.move!r} is not a DialogueMove")
         if not isinstance(self.slots, frozenset):
             raise OntologyError(f"DialogueAct.slots: expected a frozenset, got {self.slots!r}; see DialogueAct.of")
         in_label_order(self.slots)
 
     @classmethod
     def of(cls, move: DialogueMove, *values: SlotValue) -> Self:
-        """Returns the act of `move` that carries `values`."""
+        """Returns the act with `move` and `values`."""
         return cls(move, frozenset(values))
 
     @property
     def ordered(self) -> tuple[SlotValue, ...]:
-        """All values, in the order of the label vector."""
+        """Slot values in the order of the label vector."""
         return in_label_order(self.slots)
 
     @cached_property
     def vector(self) -> tuple[int, ...]:
-        """The label vector (69,) of the values."""
+        """Label vector (69,) of the slot values, entries 0 and 1."""
         return encode_slots(self.slots)
 
     def values(self, slot: Slot) -> tuple[SlotValue, ...]:
@@ -132,7 +134,7 @@ class DialogueAct:
         return tuple(value for value in self.ordered if value.slot is slot)
 
     def slot_labels(self) -> dict[str, list[str]]:
-        """Returns {slot: [values]} in SDN's spelling, slots in vector order; `parse_act` reads it back."""
+        """Returns {slot: [values]} in the spelling of SDN, slots in vector order; `parse_act` is the inverse."""
         labels = {slot.label: [value.label for value in self.values(slot)] for slot in VECTOR_SLOTS}
         return {slot: values for slot, values in labels.items() if values}
 
@@ -142,7 +144,7 @@ class DialogueAct:
 
 
 class UnitEnd(StrEnum):
-    """How a dialogue unit ends."""
+    """Outcome of a dialogue unit."""
 
     COMPLETED = "completed"
     INTERRUPTED = "interrupted"
@@ -151,10 +153,10 @@ class UnitEnd(StrEnum):
 
 
 class DialogueUnit(StrEnum):
-    """A stretch of dialogue.
+    """Unit of dialogue structure.
 
-    A transaction is everything said about one subgoal; an exchange is what follows from one initiating utterance.
-    Exchanges may overlap.
+    A transaction contains all utterances on one subgoal; an exchange contains an initiating utterance and the
+    responses to it. Exchanges may overlap.
     """
 
     TRANSACTION = "transaction"
@@ -162,7 +164,7 @@ class DialogueUnit(StrEnum):
 
     @property
     def ends(self) -> tuple[UnitEnd, ...]:
-        """The ways in which the unit may end."""
+        """Possible outcomes of the unit."""
         return _ENDS[self]
 
 

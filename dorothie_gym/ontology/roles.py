@@ -1,4 +1,4 @@
-"""Who takes part in a session, what each sees and what each may do."""
+"""Roles of a session, with the information each role receives and the actions it may take."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 
 class Role(StrEnum):
-    """A source of events; the first three are agents, the fourth is the car itself."""
+    """Source of events; the first three roles are agents, the fourth is the car itself."""
 
     PARTICIPANT = "participant"
     CO_WIZARD = "co_wizard"
@@ -17,22 +17,22 @@ class Role(StrEnum):
 
     @property
     def sdn_names(self) -> tuple[str, ...]:
-        """What SDN files call the role; the first name is the one to write."""
+        """Names of the role in SDN files; the first one is used for writing."""
         return _SDN_NAMES[self]
 
     @property
     def sees(self) -> frozenset[Sight]:
-        """What the role is shown."""
+        """Parts of the session state that the role observes."""
         return _SEES[self]
 
     @property
     def may(self) -> frozenset[Capability]:
-        """What the role is able to do."""
+        """Kinds of action that the role may take."""
         return _MAY[self]
 
 
 class Sight(StrEnum):
-    """One part of the session's state that a role may or may not be shown."""
+    """Part of the session state that is visible to some roles."""
 
     FIRST_PERSON_VIEW = "first_person_view"
     AERIAL_MAP = "aerial_map"
@@ -46,7 +46,7 @@ class Sight(StrEnum):
 
 
 class Capability(StrEnum):
-    """One kind of thing that a role may be able to do."""
+    """Kind of action that is available to some roles."""
 
     TALK = "talk"
     PHYSICAL_ACTION = "physical_action"
@@ -59,7 +59,7 @@ class Capability(StrEnum):
 
 
 AGENT_ROLES: tuple[Role, ...] = (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD)
-"""The roles that a policy or a person plays."""
+"""Roles that are played by a policy or a person."""
 
 _SDN_NAMES: Mapping[Role, tuple[str, ...]] = MappingProxyType(
     {

@@ -1,4 +1,4 @@
-"""The slots of a dialogue act and the values that each may take; ids as in SDN."""
+"""Slots of a dialogue act and their possible values; ids as in SDN."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import ClassVar, Self, TypeAlias
 from dorothie_gym.ontology.vocabulary import LabelledInt
 
 ARRIVAL_DISTANCE = 2.0
-"""A subgoal is reached when the car stops within this distance of the landmark's waypoint [m]."""
+"""Largest distance between the stopped car and the waypoint of a landmark at which a subgoal is reached [m]."""
 
 
 class Slot(LabelledInt):
-    """A parameter of a dialogue act."""
+    """Parameter of a dialogue act."""
 
     NULL = 0, "Null"
     ACTION = 1, "Action"
@@ -25,36 +25,36 @@ class Slot(LabelledInt):
 
 
 class SlotEnum(Enum):
-    """What the five enums of slot values share. Not an IntEnum: values of different slots are never equal.
+    """Base class of the five slot value enums. Not an IntEnum: values of different slots are never equal.
 
     Attributes:
-        label: the spelling in SDN.
+        label: spelling in SDN.
     """
 
     label: str
     _slot: ClassVar[Slot]
 
-    # The default is never used by a member: it lets type checkers accept the look-up by number, `Enum(3)`.
+    # No member uses the default: it lets type checkers accept the look-up by number, `Enum(3)`.
     def __new__(cls, value: int, label: str = "") -> Self:
-        """Makes a member from its number and its spelling."""
+        """Creates a member from its number and its label."""
         member = object.__new__(cls)
         member._value_ = value
         member.label = label
         return member
 
-    # Enum hashes the member's name, which Python salts anew in each process: sets would print in another order.
+    # Enum hashes the name of a member, and Python salts string hashes per process: the order of sets would differ.
     def __hash__(self) -> int:
-        """Returns a number that is the same in every process."""
+        """Returns a hash that is equal in all processes."""
         return 32 * self.slot.value + int(self.value)
 
     def __init_subclass__(cls, *, slot: Slot) -> None:
-        """Notes the slot that all values of a class fill."""
+        """Stores the slot of the values of a class."""
         super().__init_subclass__()
         cls._slot = slot
 
     @property
     def slot(self) -> Slot:
-        """The slot that the value fills."""
+        """Slot of the value."""
         return self._slot
 
 
@@ -113,7 +113,7 @@ class LandmarkName(SlotEnum, slot=Slot.LANDMARK):
 
 
 class GoalStatus(SlotEnum, slot=Slot.STATUS):
-    """Values of Slot.STATUS, and how far a subgoal has got."""
+    """Values of Slot.STATUS: the state of a subgoal."""
 
     UNKNOWN = 0, "Unknown"
     ONGOING = 1, "Ongoing"
@@ -164,4 +164,4 @@ SLOT_VALUES: Mapping[Slot, tuple[SlotValue, ...]] = MappingProxyType(
         Slot.OBJECT: tuple(ObjectClass),
     }
 )
-"""The values of each slot, by id; Null has none."""
+"""Values of each slot, by id; Null has none."""

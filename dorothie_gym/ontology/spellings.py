@@ -1,6 +1,6 @@
-"""Reading the vocabularies from text, in our spelling and in every spelling that SDN files are known to use.
+"""Parsers of the vocabularies, for our spelling and all spellings known from SDN files.
 
-Case, spaces and punctuation never count, so only words that differ are listed as aliases here.
+Case, spaces and punctuation are ignored; only words that differ otherwise are listed as aliases.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _Member = TypeVar("_Member", bound=_Labelled)
 def _labelled(
     name: str, members: Iterable[_Member], aliases: Mapping[str, _Member] | None = None
 ) -> Vocabulary[_Member]:
-    """Returns the vocabulary of the members' labels and the aliases."""
+    """Returns the vocabulary of the labels of the members and the aliases."""
     return Vocabulary(name, [*((member.label, member) for member in members), *(aliases or {}).items()])
 
 
@@ -51,7 +51,7 @@ _MENTAL_ACTIONS = _labelled("mental action", MentalAction, {"LandmarkUpdate": Me
 _EXCEPTIONS = _labelled(
     "exception",
     ExceptionKind,
-    # The types of rows in SDN's ad_wizardlog.csv.
+    # Row types of ad_wizardlog.csv in SDN.
     {
         "set_weather": ExceptionKind.WEATHER,
         "make_cars": ExceptionKind.SPAWN_VEHICLES,
@@ -66,72 +66,72 @@ _SENSORS = Vocabulary("sensor", [(sensor.value, sensor) for sensor in Sensor])
 
 
 def parse_role(text: str) -> Role:
-    """Returns the role that `text` names; raises OntologyError if none."""
+    """Returns the role that `text` spells; raises OntologyError otherwise."""
     return _ROLES.parse(text)
 
 
 def parse_move(text: str) -> DialogueMove:
-    """Returns the dialogue move that `text` spells; raises OntologyError if none."""
+    """Returns the dialogue move that `text` spells; raises OntologyError otherwise."""
     return _MOVES.parse(text)
 
 
 def parse_slot(text: str) -> Slot:
-    """Returns the slot that `text` spells; raises OntologyError if none."""
+    """Returns the slot that `text` spells; raises OntologyError otherwise."""
     return _SLOTS.parse(text)
 
 
 def parse_action_value(text: str) -> ActionValue:
-    """Returns the value of Slot.ACTION that `text` spells; raises OntologyError if none."""
+    """Returns the value of Slot.ACTION that `text` spells; raises OntologyError otherwise."""
     return _ACTION_VALUES.parse(text)
 
 
 def parse_street(text: str) -> StreetName:
-    """Returns the street that `text` spells; raises OntologyError if none."""
+    """Returns the street that `text` spells; raises OntologyError otherwise."""
     return _STREETS.parse(text)
 
 
 def parse_landmark(text: str) -> LandmarkName:
-    """Returns the landmark that `text` spells; raises OntologyError if none."""
+    """Returns the landmark that `text` spells; raises OntologyError otherwise."""
     return _LANDMARKS.parse(text)
 
 
 def parse_goal_status(text: str) -> GoalStatus:
-    """Returns the goal status that `text` spells; raises OntologyError if none."""
+    """Returns the goal status that `text` spells; raises OntologyError otherwise."""
     return _STATUSES.parse(text)
 
 
 def parse_object_class(text: str) -> ObjectClass:
-    """Returns the class of objects that `text` spells; raises OntologyError if none."""
+    """Returns the object class that `text` spells; raises OntologyError otherwise."""
     return _OBJECTS.parse(text)
 
 
 def parse_physical_action(text: str) -> PhysicalAction:
-    """Returns the physical action that `text` spells; raises OntologyError if none."""
+    """Returns the physical action that `text` spells; raises OntologyError otherwise."""
     return _PHYSICAL_ACTIONS.parse(text)
 
 
 def parse_mental_action(text: str) -> MentalAction:
-    """Returns the mental action that `text` spells; raises OntologyError if none."""
+    """Returns the mental action that `text` spells; raises OntologyError otherwise."""
     return _MENTAL_ACTIONS.parse(text)
 
 
 def parse_exception(text: str) -> ExceptionKind:
-    """Returns the kind of exception that `text` spells; raises OntologyError if none."""
+    """Returns the exception kind that `text` spells; raises OntologyError otherwise."""
     return _EXCEPTIONS.parse(text)
 
 
 def parse_sensor(text: str) -> Sensor:
-    """Returns the sensor that `text` spells; raises OntologyError if none."""
+    """Returns the sensor that `text` spells; raises OntologyError otherwise."""
     return _SENSORS.parse(text)
 
 
 def parse_weather_parameter(text: str) -> WeatherParameter:
-    """Returns the weather parameter that `text` spells; raises OntologyError if none."""
+    """Returns the weather parameter that `text` spells; raises OntologyError otherwise."""
     return _WEATHER.parse(text)
 
 
 def parse_prop(text: str) -> PropKind:
-    """Returns the kind of prop that `text` spells, as a name or as CARLA's blueprint; raises OntologyError if none."""
+    """Returns the prop kind that `text` spells, as a name or as a CARLA blueprint; raises OntologyError otherwise."""
     return _PROPS.parse(text)
 
 
@@ -150,7 +150,7 @@ def parse_slot_value(slot: Slot, text: str) -> SlotValue:
     """Returns the value of `slot` that `text` spells.
 
     Raises:
-        OntologyError: `text` spells none, or `slot` is Null, which has no values.
+        OntologyError: if `text` is unknown, or `slot` is Null, which has no values.
     """
     if slot not in _VALUES:
         raise OntologyError(f"value of slot {slot.label}: {text!r} is unknown; the slot has no values")
@@ -158,14 +158,14 @@ def parse_slot_value(slot: Slot, text: str) -> SlotValue:
 
 
 def parse_act(move: str, slots: Mapping[str, Iterable[str] | str | None] | None = None) -> DialogueAct:
-    """Returns the act of a move and its slots, both in SDN's spelling.
+    """Returns the act for a move and slots in the spelling of SDN.
 
     Args:
         move: spelling of the move.
-        slots: the values of each slot: several, one as a plain text, or none. Null and empty texts count as no value.
+        slots: values of each slot: an iterable, a single text, or None. Null and empty texts count as no value.
 
     Raises:
-        OntologyError: a move, slot or value is unknown.
+        OntologyError: if the move, a slot or a value is unknown.
     """
     values: list[SlotValue] = []
     for slot_text, given in (slots or {}).items():
@@ -176,5 +176,5 @@ def parse_act(move: str, slots: Mapping[str, Iterable[str] | str | None] | None 
 
 
 def _is_blank(text: object) -> bool:
-    """Whether a file means "no value" by `text`."""
+    """Returns whether `text` stands for "no value" in a file."""
     return text is None or (isinstance(text, str) and normalise(text) in ("", "null"))

@@ -1,4 +1,4 @@
-"""Closed vocabularies: labelled enums, look-up of spellings, and the error for unknown ones."""
+"""Labelled enums, look-up of spellings in closed vocabularies, and the error for unknown spellings."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from types import MappingProxyType
 from typing import Generic, Self, TypeVar
 
 LONGEST = 80
-"""So many letters of a text that is unknown are looked at and shown: texts come from files of others."""
+"""Longest prefix of an unknown text that is compared and shown [characters]; files may contain any text."""
 
 
 class OntologyError(ValueError):
-    """A text, number or combination that the closed vocabularies do not contain."""
+    """Text, number or combination that the closed vocabularies do not contain."""
 
     @classmethod
     def unknown(cls, text: object, vocabulary: str, known: Iterable[str]) -> OntologyError:
-        """Returns the error for `text`, naming the vocabulary and the nearest of the `known` spellings."""
+        """Returns the error for `text` with the name of the vocabulary and the nearest `known` spelling."""
         spellings = tuple(known)
         if not isinstance(text, str):
             return cls(f"{vocabulary}: expected a text, got {_shown(repr(text))} of type {type(text).__name__}")
-        # cutoff 0: a far guess still shows the reader what the spellings of this vocabulary look like.
+        # cutoff 0: even a distant spelling shows the format of this vocabulary.
         nearest = _nearest(text[:LONGEST].lower(), spellings)
         hint = f"; the nearest known spelling is {nearest!r}" if nearest is not None else ""
         return cls(f"{vocabulary}: {_shown(repr(text))} is unknown{hint}")
@@ -31,7 +31,7 @@ class OntologyError(ValueError):
 
 @functools.lru_cache(maxsize=1024)
 def _nearest(text: str, spellings: tuple[str, ...]) -> str | None:
-    """Returns the spelling nearest to a text in lower case; kept, since a file has the same mistake many times."""
+    """Returns the spelling nearest to a lower-case text; cached, since files repeat the same mistake."""
     by_lower = {spelling.lower(): spelling for spelling in spellings}
     nearest = difflib.get_close_matches(text, by_lower, n=1, cutoff=0.0)
     return by_lower[nearest[0]] if nearest else None
@@ -42,17 +42,17 @@ def _shown(text: str) -> str:
 
 
 class LabelledInt(IntEnum):
-    """An integer enum whose members are written `NAME = id, "Label"`.
+    """Integer enum with a label; members are written `NAME = id, "Label"`.
 
     Attributes:
-        label: the spelling in files, tables and SDN.
+        label: spelling in files, tables and SDN.
     """
 
     label: str
 
-    # The default is never used by a member: it lets type checkers accept the look-up by number, `Enum(3)`.
+    # No member uses the default: it lets type checkers accept the look-up by number, `Enum(3)`.
     def __new__(cls, value: int, label: str = "") -> Self:
-        """Makes a member from its number and its spelling."""
+        """Creates a member from its number and its label."""
         member = int.__new__(cls, value)
         member._value_ = value
         member.label = label
@@ -63,21 +63,21 @@ Member_co = TypeVar("Member_co", covariant=True)
 
 
 def normalise(text: str) -> str:
-    """Returns what is left of `text` when case, spaces and punctuation do not count."""
+    """Returns `text` in lower case without spaces and punctuation."""
     return "".join(char for char in unicodedata.normalize("NFKC", text).casefold() if char.isalnum())
 
 
 class Vocabulary(Generic[Member_co]):
-    """The spellings of a closed set of members.
+    """Spellings of a closed set of members.
 
-    Case, spaces, underscores and punctuation do not count, so "Seven Eleven" is "SevenEleven" and "Jturn" is "JTurn".
+    Case, spaces, underscores and punctuation are ignored: "Seven Eleven" equals "SevenEleven", "Jturn" equals "JTurn".
 
     Args:
-        name: what the members are, for error messages ("dialogue move").
-        spellings: pairs of a spelling and its member; a member may have several.
+        name: kind of the members in error messages ("dialogue move").
+        spellings: pairs of a spelling and its member; a member may have several spellings.
 
     Raises:
-        OntologyError: one spelling is given to two members, or has no letter and no digit.
+        OntologyError: if two members share a spelling, or if a spelling has neither letters nor digits.
     """
 
     def __init__(self, name: str, spellings: Iterable[tuple[str, Member_co]]) -> None:
@@ -87,7 +87,7 @@ class Vocabulary(Generic[Member_co]):
         for spelling, member in spellings:
             key = normalise(spelling)
             if not key:
-                raise OntologyError(f"{name}: the spelling {spelling!r} has no letter and no digit")
+                raise OntologyError(f"{name}: the spelling {spelling!r} has neither letters nor digits")
             if members.setdefault(key, member) is not member:
                 raise OntologyError(f"{name}: the spelling {spelling!r} belongs to {members[key]!r} and to {member!r}")
             written.setdefault(key, spelling)
@@ -96,14 +96,14 @@ class Vocabulary(Generic[Member_co]):
 
     @property
     def spellings(self) -> Mapping[str, Member_co]:
-        """Every known spelling, as written, and its member."""
+        """Known spellings, as written, with their members."""
         return MappingProxyType({self._written[key]: member for key, member in self._members.items()})
 
     def parse(self, text: str) -> Member_co:
         """Returns the member that `text` spells.
 
         Raises:
-            OntologyError: `text` spells no member; the message names the nearest spelling.
+            OntologyError: if `text` spells no member; the message names the nearest spelling.
         """
         if isinstance(text, str):
             member = self._members.get(normalise(text))

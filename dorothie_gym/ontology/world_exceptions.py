@@ -1,4 +1,4 @@
-"""Exceptions that the Ad-Wizard causes: kinds, sensors, props and weather parameters."""
+"""Exceptions caused by the Ad-Wizard: kinds, sensors, props and weather parameters."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dorothie_gym.ontology.vocabulary import LabelledInt, OntologyError
 
 
 class ExceptionKind(LabelledInt):
-    """A kind of unexpected change. MESSAGE, a text to the participant alone, is neither environmental nor task."""
+    """Kind of unexpected change. MESSAGE, a text to the participant only, is neither environmental nor task."""
 
     NONE = 0, "None"
     WEATHER = 1, "Weather"
@@ -27,22 +27,22 @@ class ExceptionKind(LabelledInt):
 
     @property
     def is_environmental(self) -> bool:
-        """Whether the exception changes the world, or what the car perceives of it."""
+        """Whether the exception changes the world or the perception of the car."""
         return ExceptionKind.WEATHER <= self <= ExceptionKind.SENSOR_FAULT
 
     @property
     def is_plan_level(self) -> bool:
-        """Whether the exception may force another route: a prop put, moved or taken away."""
+        """Whether the exception may force a new route: a prop is placed, moved or removed."""
         return self in (ExceptionKind.PLACE_PROP, ExceptionKind.MOVE_PROP, ExceptionKind.DELETE_PROP)
 
     @property
     def is_task(self) -> bool:
-        """Whether the exception changes the participant's goals."""
+        """Whether the exception changes the goals of the participant."""
         return self in (ExceptionKind.TASK_TRIGGER, ExceptionKind.TASK_DELETE, ExceptionKind.TASK_CHANGE)
 
 
 class Sensor(StrEnum):
-    """What a sensor fault takes away: sharpness of the view, the position, the whole view."""
+    """Sensor that can fail: sharpness of the view, position, or the whole view."""
 
     BLUR = "blur"
     GPS = "gps"
@@ -50,12 +50,12 @@ class Sensor(StrEnum):
 
 
 class PropKind(StrEnum):
-    """A kind of prop, with the size of its bounding box; values are the last part of CARLA's blueprint names.
+    """Kind of prop, with the size of its bounding box; values are the last part of the CARLA blueprint names.
 
     Attributes:
-        length: size along the prop's own heading [m].
-        width: size across its heading [m].
-        height: size upwards [m].
+        length: size along the heading of the prop [m].
+        width: size across the heading [m].
+        height: vertical size [m].
     """
 
     length: float
@@ -68,16 +68,16 @@ class PropKind(StrEnum):
     CONSTRUCTION_CONE = "constructioncone", 0.40, 0.40, 0.91
     # A container of 4 cubic yards: 4.5 x 6 x 4 feet.
     DUMPSTER = "dumpster", 1.37, 1.83, 1.22
-    # A type 3 barricade (MUTCD 2009, 6F.68) of 8 feet. It faces along its heading, so it blocks with its width.
+    # A type 3 barricade (MUTCD 2009, 6F.68) of 8 feet. It faces along its heading: its width blocks the road.
     STREET_BARRIER = "streetbarrier", 0.60, 2.44, 1.52
     # The 28-inch cone of city streets.
     TRAFFIC_CONE = "trafficcone", 0.36, 0.36, 0.71
     # A 30-inch sign whose lower edge is 7 feet above the ground (MUTCD 2009, 2A.18).
     TRAFFIC_SIGN = "trafficsign", 0.10, 0.76, 2.89
 
-    # The defaults are never used by a member: they let type checkers accept the look-up by name, `Enum("tree")`.
+    # No member uses the defaults: they let type checkers accept the look-up by name, `Enum("tree")`.
     def __new__(cls, value: str, length: float = 0.0, width: float = 0.0, height: float = 0.0) -> Self:
-        """Makes a member from its name and its size."""
+        """Creates a member from its name and its size."""
         member = str.__new__(cls, value)
         member._value_ = value
         member.length = length
@@ -87,21 +87,21 @@ class PropKind(StrEnum):
 
     @property
     def blueprint(self) -> str:
-        """The name that CARLA's blueprint library would have for the prop."""
+        """Name of the prop in the style of the CARLA blueprint library."""
         return f"static.prop.{self.value}"
 
 
 class WeatherParameter(StrEnum):
-    """One parameter of the weather.
+    """Weather parameter, with the name and range of CARLA.
 
-    Ranges as in CARLA's documentation of `carla.WeatherParameters`; clear noon is CARLA's preset of that name
-    (LibCarla `rpc/WeatherParameters.cpp`; early 0.9 releases had other numbers).
+    Ranges are those of the documentation of `carla.WeatherParameters`; clear noon is the CARLA preset of that name
+    (LibCarla `rpc/WeatherParameters.cpp`; early 0.9 releases had other values).
 
     Attributes:
         low: smallest value.
         high: largest value.
         clear_noon: value in clear weather at noon.
-        unit: "%" of the strongest, "degrees", "m" or "1".
+        unit: "%" of the maximum, "degrees", "m" or "1".
     """
 
     low: float
@@ -113,19 +113,19 @@ class WeatherParameter(StrEnum):
     PRECIPITATION = "precipitation", 0.0, 100.0, 0.0, "%"
     PRECIPITATION_DEPOSITS = "precipitation_deposits", 0.0, 100.0, 0.0, "%"
     WIND_INTENSITY = "wind_intensity", 0.0, 100.0, 10.0, "%"
-    # CARLA's preset has -1, which leaves the azimuth as it is; 0 is the default of the parameter.
+    # The CARLA preset has -1, which keeps the current azimuth; 0 is the default of the parameter.
     SUN_AZIMUTH_ANGLE = "sun_azimuth_angle", 0.0, 360.0, 0.0, "degrees"
     SUN_ALTITUDE_ANGLE = "sun_altitude_angle", -90.0, 90.0, 45.0, "degrees"
     FOG_DENSITY = "fog_density", 0.0, 100.0, 2.0, "%"
-    # Where the fog starts. CARLA sets no upper end; fog that starts beyond 100 m hides nothing that a town shows.
+    # Distance at which fog starts. CARLA sets no upper limit; fog beyond 100 m hides nothing in a town.
     FOG_DISTANCE = "fog_distance", 0.0, 100.0, 0.75, "m"
-    # CARLA sets no upper end; from 5 on the fog stays too close to the ground to hide anything.
+    # CARLA sets no upper limit; from 5 on the fog is too close to the ground to hide anything.
     FOG_FALLOFF = "fog_falloff", 0.0, 5.0, 0.1, "1"
     WETNESS = "wetness", 0.0, 100.0, 0.0, "%"
 
-    # The defaults are never used by a member: they let type checkers accept the look-up by name, `Enum("wetness")`.
+    # No member uses the defaults: they let type checkers accept the look-up by name, `Enum("wetness")`.
     def __new__(cls, value: str, low: float = 0.0, high: float = 0.0, clear_noon: float = 0.0, unit: str = "") -> Self:
-        """Makes a member from its name and its numbers."""
+        """Creates a member from its name and its numbers."""
         member = str.__new__(cls, value)
         member._value_ = value
         member.low = low
@@ -135,10 +135,10 @@ class WeatherParameter(StrEnum):
         return member
 
     def check(self, value: float) -> None:
-        """Does nothing if `value` lies in [low, high].
+        """Checks that `value` is in [low, high].
 
         Raises:
-            OntologyError: it does not, or it is not a finite number.
+            OntologyError: if it is out of range or not finite.
         """
         if not (math.isfinite(value) and self.low <= value <= self.high):
             raise OntologyError(

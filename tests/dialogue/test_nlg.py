@@ -171,7 +171,7 @@ def test_a_grammar_that_leaves_an_action_without_words_is_refused():
         ("== Explain\ngo ({street}|left)", "lines of their own"),
         ("== Shout\nhey", "Shout"),
         ("== do Fly\nfly", "Fly"),
-        ("hello", "before the first section"),
+        ("hello", "precedes the first section"),
     ],
 )
 def test_a_faulty_line_is_named_with_its_file(line, reason):

@@ -16,7 +16,7 @@ def test_one_spelling_for_two_members_is_refused() -> None:
 
 
 def test_a_spelling_of_punctuation_only_is_refused() -> None:
-    with pytest.raises(OntologyError, match="no letter"):
+    with pytest.raises(OntologyError, match="neither letters"):
         Vocabulary("number", [("--", 1)])
 
 
