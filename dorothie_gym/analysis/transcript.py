@@ -22,7 +22,7 @@ NAMES: Final[Mapping[Role, str]] = {
 
 _HANDLED: Final = {Handled.ENVIRONMENTAL: " (env)", Handled.TASK: " (task)", Handled.NONE: ""}
 _MENTAL: Final = {action.label: action.label for action in MentalAction if action is not MentalAction.PLAN_UPDATE}
-_HEAD: Final = ("time", "who", "words [acts], or what happens", "exchange", "transaction")
+_HEAD: Final = ("time", "speaker", "words [acts] or event", "exchange", "transaction")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +92,7 @@ def _facts(session: Session) -> Iterator[str]:
     talk = Talk(session)
     found = Counter({each.number: sum(1 for _ in each.find(talk)) for each in PHENOMENA if each.has_cause(talk)})
     shown = ", ".join(f"{number} ({count})" for number, count in sorted(found.items()) if count)
-    yield f"- Phenomena (how often): {shown or '-'}."
+    yield f"- Phenomena (count): {shown or '-'}."
 
 
 # --- the lines ------------------------------------------------------------------------------------------------------

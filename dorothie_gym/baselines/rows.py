@@ -35,7 +35,7 @@ SIZES: Final[Mapping[str, Callable[[], TOTOConfig]]] = MappingProxyType(
 )
 """The configurations that a user may choose."""
 
-NO_AUDIO: Final = "no audio: the sessions carry no sound"
+NO_AUDIO: Final = "no audio: the sessions contain no sound"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -138,12 +138,12 @@ def findings(estimate: Estimates, part: str) -> tuple[Finding, ...]:
 
     return (
         Finding(
-            statement="Action history matters most: without it moves and actions fall, and further than without "
-            "anything else",
+            statement="Action history matters most: removing it lowers move and action accuracy more than removing "
+            "any other input",
             part=part,
             claims=tuple(c for metric in (*MOVES, *ACTIONS) for c in most(metric)),
-            note="In the published features the history of a UfN point holds the point's own label, and goes with the "
-            "history; here it never does.",
+            note="In the published features, the history of a UfN point contains the point's own label, which is "
+            "removed together with the history; here it is never included.",
         ),
         Finding(
             statement="The current utterance matters for UfN",

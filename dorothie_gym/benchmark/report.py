@@ -106,9 +106,11 @@ def legend(table: ResultsTable) -> str:
     seeds = sorted({len(table.runs_of(model)) for model in table.models if table.runs_of(model)})
     over = " to ".join(str(count) for count in dict.fromkeys((seeds[0], seeds[-1]))) if seeds else "no"
     some = f"mean and half-width of the 95 % interval over {over} seeds" if seeds and seeds[-1] > 1 else "one seed"
-    paper = " / the paper's figures" if _has_paper(table) else ""
-    protocol = "(paper): computed as the paper's code does, exact match of all slots, angles not wrapped"
-    return f"Per cent: ours ({some}){paper}; {NONE}: none. {protocol}. The best of ours is bold."
+    paper = " / the paper's" if _has_paper(table) else ""
+    protocol = (
+        "Columns marked (paper) use the definitions of the paper's code: exact match of all slots, angles not wrapped"
+    )
+    return f"Values in per cent: ours ({some}){paper}; {NONE}: no value. {protocol}. The best of our values is bold."
 
 
 # --- Markdown -------------------------------------------------------------------------------------------------------
@@ -127,7 +129,8 @@ def markdown(table: ResultsTable) -> str:
             "",
             "## Findings",
             "",
-            "The paper's, and what is above what. Differences are paired over seeds, with 95 % intervals.",
+            "The findings of the paper, and comparisons between models. Differences are paired over seeds, with 95 % "
+            "intervals.",
         ]
         for finding in tested:
             lines += ["", *finding_lines(finding)]
@@ -173,7 +176,7 @@ def claim_line(claim: Claim) -> str:
 
 def points_rows(table: ResultsTable) -> tuple[list[str], list[list[str]]]:
     """Returns headings and rows of the count of points: each fold of the corpus, and their sum."""
-    heads = ["fold", "sessions", "flagged events", *TASK_NAMES.values(), "no point of a task"]
+    heads = ["fold", "sessions", "flagged events", *TASK_NAMES.values(), "other flagged events"]
     rows = []
     for fold, count in sorted(table.labels.counts.items()):
         rows.append([fold or ALL, *(str(value) for value in count.to_json().values())])
@@ -185,7 +188,7 @@ def notes(table: ResultsTable) -> Iterator[str]:
     """Yields what the figures come from, and what was not scored and why, a sentence each."""
     labels = table.labels
     for corpus, encoder in sorted(_origins(table.about)):
-        yield f"Trained on the corpus {corpus}; encoder of texts {encoder}."
+        yield f"Trained on the corpus {corpus}; text encoder {encoder}."
     yield f"Scored: split {labels.split}, {len(labels.part_of)} sessions; divided: {labels.division}."
     for name, reason in labels.unreadable.items():
         yield f"Session {name} cannot be read: {reason}."

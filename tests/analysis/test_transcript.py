@@ -61,7 +61,7 @@ def test_a_page_has_a_head_and_a_table_and_no_stray_markup() -> None:
         drive(human(1.0, "a|b *c* <i>", M.INSTRUCT, LandmarkName.KFC), car(3.0, "fine", M.ACKNOWLEDGE)), "One"
     )
     assert page.startswith("## One\n\n- Town crossing, storyboard errand, seed 7, ")
-    assert "- Errand 1: home (House, hidden from the car)" in page and "- Phenomena (how often): 1 (1)." in page
+    assert "- Errand 1: home (House, hidden from the car)" in page and "- Phenomena (count): 1 (1)." in page
     assert "| 1.0 | Participant | a\\|b \\*c\\* \\<i\\> [Instruct(Landmark=KFC)] | 0 | 0 |" in page
 
 

@@ -57,7 +57,7 @@ def test_markdown_tells_which_corpus_and_encoder_each_training_had(table: Result
         "1": {"corpus": "c0ffee", "encoder": "hashing"},
     }
     page = markdown(replace(table, about={"TOTO": runs}))
-    assert page.count("Trained on the corpus c0ffee; encoder of texts hashing.") == 1
+    assert page.count("Trained on the corpus c0ffee; text encoder hashing.") == 1
     assert "Trained on" not in markdown(replace(table, about={"ours": {"epochs": 3}}))
 
 
