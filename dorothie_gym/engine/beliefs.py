@@ -12,7 +12,7 @@ from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import DialogueAct, DialogueMove, LandmarkName, Role, Slot, StreetName
-from dorothie_gym.sim.ego.driver import GoalAhead
+from dorothie_gym.sim.ego.ego_controller import GoalAhead
 from dorothie_gym.sim.sensing.seeing import RANGE_SCALE
 
 GATE = 13.82

@@ -12,7 +12,7 @@ from dorothie_gym.engine.observation_buffers import Shape, Sheet
 from dorothie_gym.engine.upcoming_junction import Prospect
 from dorothie_gym.maps import LinkType
 from dorothie_gym.ontology import SPEED_STEP, ExceptionKind, PhysicalAction, Role
-from dorothie_gym.sim.ego.driver import MAX_CRUISE, MIN_CRUISE
+from dorothie_gym.sim.ego.ego_controller import MAX_CRUISE, MIN_CRUISE
 from dorothie_gym.sim.ego.manoeuvre_lanes import SIDES
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import SpaceLimits, action_space
@@ -77,7 +77,7 @@ class Masks:
 
     def _note_car(self) -> None:
         """What the car may be told to do, and with which angles, when anything that this depends on has changed."""
-        planner, speed, cruise = self._world.planner, float(self._world.car.speed), self._world.driver.cruise
+        planner, speed, cruise = self._world.planner, float(self._world.car.speed), self._world.ego.cruise
         state = (
             planner.path, planner.s, planner.held, planner.manoeuvre, planner.roadblock, planner.props, speed, cruise
         )  # fmt: skip

@@ -102,7 +102,7 @@ class Views:
             view["time"][0], view["speed"][0] = time, speed
         bearings = Bearings(self._world)
         motion = self._numbers[self.motion()]
-        lights = self._numbers[self._world.lights]
+        lights = self._numbers[self._world.ego.lights]
         self._write_true_place(participant, ad_wizard)
         self._write_believed_place(co_wizard, bearings.pose)
         bearings.write_path(
@@ -209,7 +209,7 @@ class Views:
         world = self._world
         manoeuvre, angle = world.planner.manoeuvre
         hazard = world.hazard
-        view["cruise_speed"][0] = world.driver.cruise
+        view["cruise_speed"][0] = world.ego.cruise
         view["manoeuvre"] = self._numbers[manoeuvre or 0]
         view["manoeuvre_angle"][0] = angle
         view["hazard"] = self._numbers[hazard.kind.value if hazard is not None else 0]

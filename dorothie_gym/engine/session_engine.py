@@ -29,7 +29,7 @@ from dorothie_gym.ontology import (
     Role,
 )
 from dorothie_gym.recording import Event, EventType, SessionHeader
-from dorothie_gym.sim.ego.driver import GoalAhead
+from dorothie_gym.sim.ego.ego_controller import GoalAhead
 from dorothie_gym.sim.infractions import INFRACTION_KINDS, WorldEventKind
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.world import World
@@ -188,24 +188,14 @@ class Stage:
             self._drive(action.physical)
 
     def _drive(self, physical: Physical) -> None:
-        world, action = self.world, physical.action
-        angle: int | None = None
-        up: bool | None = None
-        if action is PhysicalAction.SPEED_CHANGE:
-            up = physical.up
-            reason = world.driver.change_cruise(up)
-        elif action is PhysicalAction.LIGHT_CHANGE:
-            up = physical.up
-            reason = f"the lights are {'on' if up else 'off'} already" if world.lights == up else None
-            world.lights = up
-        else:
-            if action in (PhysicalAction.J_TURN, PhysicalAction.LANE_SWITCH):
-                angle = physical.angle
-            reason = world.planner.command(action, physical.angle, float(world.car.speed))
+        action = physical.action
+        reason = self.world.ego.apply(action, angle=physical.angle, up=physical.up)
         if reason is not None:
             self._refuse(Role.CO_WIZARD, action.label, reason)
             return
         self.counts["physical_actions"] += 1
+        angle = physical.angle if action in (PhysicalAction.J_TURN, PhysicalAction.LANE_SWITCH) else None
+        up = physical.up if action in (PhysicalAction.SPEED_CHANGE, PhysicalAction.LIGHT_CHANGE) else None
         data = {"action": action.label, "angle": angle, "up": up}
         self._log(EventType.PHYSICAL_ACTION, Role.CO_WIZARD, data, flagged=action in NAVIGATION_ACTIONS)
 
@@ -232,7 +222,7 @@ class Stage:
             self.beliefs.guess(mental.landmark, lane, metres, pose=pose, covariance=covariance, sight=self.world.sight)
             x, y = town.lanes[lane].position(metres)
             data.update(landmark=mental.landmark.label, x=round(float(x), 3), y=round(float(y), 3))
-        self.world.driver.set_goals(self.beliefs.goal_places(self._known_places()))
+        self.world.ego.set_goals(self.beliefs.goal_places(self._known_places()))
         self._log(EventType.BELIEF_UPDATE, Role.CO_WIZARD, data)
 
     def _known_places(self) -> dict[LandmarkName, list[GoalAhead]]:

@@ -49,7 +49,7 @@ def scene_of(stage: Stage, caption: str = "") -> Scene:
         town=world.town,
         car=CarView(
             x=float(car.position[0]), y=float(car.position[1]), heading=float(car.heading), speed=float(car.speed),
-            lights=world.lights,
+            lights=world.ego.lights,
         ),
         street_names=[name.label for name in stage.scenario.street_names],
         trail=np.array(stage.trail),

@@ -26,7 +26,7 @@ from dorothie_gym.policies.navigation.junction_exits import JunctionExits
 from dorothie_gym.policies.navigation.observation_vector import HeardInstruction, NavigationEncoder, Vector
 from dorothie_gym.policies.observation_parser import read_landmarks
 from dorothie_gym.policies.policy import policy_seed
-from dorothie_gym.sim.ego.driver import MAX_CRUISE, MIN_CRUISE
+from dorothie_gym.sim.ego.ego_controller import MAX_CRUISE, MIN_CRUISE
 from dorothie_gym.sim.infractions import INFRACTION_KINDS, WorldEventKind
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.world import World
@@ -329,7 +329,7 @@ class NavigationMask:
     def mask(self, seen: Mapping[str, Any]) -> NDArray[np.int8]:
         """Which actions the car follows now (18,): 1 for those; `seen` is what the Co-Wizard observes."""
         world, planner = self._world, self._world.planner
-        speed, cruise = float(world.car.speed), world.driver.cruise
+        speed, cruise = float(world.car.speed), world.ego.cruise
         mask = np.zeros(len(ACTIONS), dtype=np.int8)
         mask[NavigationAction.NOTHING] = mask[NavigationAction.LIGHTS] = 1
         mask[NavigationAction.STOP], mask[NavigationAction.START] = not planner.held, planner.held

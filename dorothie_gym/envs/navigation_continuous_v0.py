@@ -19,7 +19,7 @@ from dorothie_gym.policies.navigation.actions import LEFT, RIGHT
 from dorothie_gym.policies.navigation.instructor import NavigationInstruction
 from dorothie_gym.policies.navigation.junction_exits import SECTORS
 from dorothie_gym.policies.navigation.observation_vector import Vector
-from dorothie_gym.sim.ego.limits import Control
+from dorothie_gym.sim.ego.limits import VehicleControl
 from dorothie_gym.spaces import CoWizardAction, Physical
 from dorothie_gym.tasks import StoryboardTemplate
 
@@ -92,7 +92,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         """Begins a session; see `NavigationEnv.reset`."""
         drive = self.begin(seed, options)
         self._controls = NavigationMask(drive.stage.world, drive.ways)
-        drive.stage.world.driver.manual = Control(throttle=0.0, steer=0.0, brake=0.0)
+        drive.stage.world.ego.manual = VehicleControl(throttle=0.0, steer=0.0, brake=0.0)
         return self._observe(drive), drive.info()
 
     def step(self, action: NDArray[np.float32]) -> tuple[Vector, float, bool, bool, Info]:
@@ -107,7 +107,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
             raise ValueError(f"action is {action}; it must be three numbers: throttle, steer, brake")
         throttle, steer, brake = np.clip(values, (0.0, -1.0, 0.0), 1.0).tolist()
         drive = self.drive
-        drive.stage.world.driver.manual = Control(throttle=throttle, steer=steer, brake=brake)
+        drive.stage.world.ego.manual = VehicleControl(throttle=throttle, steer=steer, brake=brake)
         drive.play(CoWizardAction(physical=self._prepare(drive)))
         self._keep_path(drive)
         if self.render_mode == "human":

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.collisions import collide
-from dorothie_gym.sim.ego.ego_controller import guide
+from dorothie_gym.sim.ego.motion_control import guide
 from dorothie_gym.sim.network.lane_lookup import closest_lane, value_near
 from dorothie_gym.sim.pedestrians.walking import walk
 from dorothie_gym.sim.state.event_log import note_pose, trace

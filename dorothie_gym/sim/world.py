@@ -10,7 +10,7 @@ from dorothie_gym.maps.model import Array, Town
 from dorothie_gym.ontology import ObjectClass, Sensor, WeatherParameter
 from dorothie_gym.sim.actors import Actors
 from dorothie_gym.sim.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
-from dorothie_gym.sim.ego.driver import Driver
+from dorothie_gym.sim.ego.ego_controller import EgoController
 from dorothie_gym.sim.ego.obstacles import Body, Hazard
 from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.ego.vehicle import Car, CarRecord
@@ -59,11 +59,10 @@ class World:
         road: highway-env's road, with the car and all others on it.
         car: the car.
         planner: its local planner.
-        driver: what drives it.
+        ego: its controller, which takes physical actions.
         actors: traffic, pedestrians and props.
         weather: weather and light.
         wind: where the wind blows, and its gusts.
-        lights: whether the car's head lights are on.
         faults: sensors that are faulty, and the frame at which each works again.
         hazard: what the car is braking or standing for, or None.
         frame: physics frames since the start.
@@ -101,7 +100,7 @@ class World:
         self.car = Car(self.road, self.actors)
         self.road.vehicles.append(self.car)
         self.planner = LocalPlanner(town, lane, station)
-        self.driver = Driver(self.planner, length=self.car.LENGTH, cruise=config.cruise_speed)
+        self.ego = EgoController(self.planner, self.car, cruise=config.cruise_speed)
         self.weather = Weather()
         self.wind = Wind(np.random.default_rng(wind_seed))
         self._perception = Perception(np.random.default_rng(perceive_seed))
@@ -111,7 +110,6 @@ class World:
             np.random.default_rng(locate_seed),
         )  # fmt: skip
         self._record_of: WorldArrays | None = None
-        self.lights = False
         self.faults: dict[Sensor, int] = {}
         self.frame = 0
         self.frames: Array = np.zeros((0, len(FRAME_COLUMNS)))
@@ -145,10 +143,10 @@ class World:
         """Steps all bodies by no more than `FRAMES` substeps; returns the car's way and poses, see `WorldArrays`."""
         arrays, record = self.actors.arrays, self._record
         self.planner.extend(self.car.speed)
-        self.driver.brief(arrays, record)
+        self.ego.brief(arrays, record)
         self._tell_weather(arrays)
         step(self._arrays, arrays, frames, 1.0 / FRAME_RATE)
-        self.driver.debrief(record)
+        self.ego.debrief(record)
         self.car.refresh()
         self.frame += frames
         events, _ = record.outcome.item()
@@ -213,7 +211,7 @@ class World:
         clarity = 1.0
         if self.faults:
             clarity = min((CLARITY[sensor] for sensor in CLARITY if self._is_faulty(sensor, self.frame)), default=1.0)
-        return self.weather.visibility(lights=self.lights, clarity=clarity)
+        return self.weather.visibility(lights=self.ego.lights, clarity=clarity)
 
     @property
     def sight(self) -> float:

@@ -10,7 +10,7 @@ from dorothie_gym.maps import Site, Town
 from dorothie_gym.maps.routing import Entry, Leg, router
 from dorothie_gym.ontology import ARRIVAL_DISTANCE, PhysicalAction
 from dorothie_gym.sim.config import FRAME_RATE
-from dorothie_gym.sim.ego.driver import GoalAhead
+from dorothie_gym.sim.ego.ego_controller import GoalAhead
 from dorothie_gym.sim.ego.manoeuvre_lanes import LEAD, Lanes
 from dorothie_gym.sim.ego.obstacles import BRAKING
 from dorothie_gym.sim.ego.planner import U_TURN_SPEED, LocalPlanner
@@ -38,9 +38,9 @@ def guided_trip(roads: TownNetwork, start: Site, goal: Site, *, most: float = 12
     """
     town = roads.town
     world = on_lane(roads, start.lane, start.station)
-    car, driver, planner = world.car, world.driver, world.planner
-    driver.cruise = 60.0
-    driver.set_goals([GoalAhead(lane=goal.lane, station=goal.station)])
+    car, ego, planner = world.car, world.ego, world.planner
+    ego.cruise = 60.0
+    ego.set_goals([GoalAhead(lane=goal.lane, station=goal.station)])
     worst = 0.0
     for _ in range(round(most / DECISION)):
         speed = float(car.speed)

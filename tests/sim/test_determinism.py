@@ -52,7 +52,7 @@ session = World(
 session.weather.set_share(WeatherParameter.PRECIPITATION, 0.6)
 session.weather.set_share(WeatherParameter.WIND_INTENSITY, 0.8)
 session.weather.set(WeatherParameter.SUN_ALTITUDE_ANGLE, -30.0)
-session.lights = True
+session.ego.lights = True
 session.set_fault(Sensor.GPS, True)
 session.actors.add_pedestrian(session.planner.lane, session.planner.station + 15.0)
 session.actors.add_prop(PropKind.STREET_BARRIER, session.planner.lane, session.planner.station + 60.0)

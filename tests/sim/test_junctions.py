@@ -269,7 +269,7 @@ def test_crossing_connectors_are_never_driven_at_the_same_time_with_the_car_amon
     config = WorldConfig(vehicles=30, pedestrians=0)
     world = World(town, config, seed=np.random.SeedSequence(4), departure=(site.lane, site.station))
     foes, rng = right_of_way(town).foes, np.random.default_rng(3)
-    world.driver.cruise = 12.0
+    world.ego.cruise = 12.0
     together, through = 0, 0
     for _ in range(3 * 60 * 10):
         drive_about(world, rng)

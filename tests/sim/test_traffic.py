@@ -65,7 +65,7 @@ def test_car_stays_behind_a_cyclist_where_there_is_one_lane() -> None:
     town = network("brookside").town
     lane = max((lane for lane in town.lanes if not lane.in_junction), key=lambda lane: lane.length)
     world = world_at("brookside", lane.id, 5.0)
-    world.driver.cruise = 12.0
+    world.ego.cruise = 12.0
     for _ in range(100):  # one in eight rides a bicycle
         assert world.actors.add_vehicle(lane.id, 25.0, distance=5.0)
         (cyclist,) = world.actors.vehicles

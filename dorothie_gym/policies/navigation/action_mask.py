@@ -13,7 +13,7 @@ from dorothie_gym.maps.lane_neighbours import oncoming_lanes
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.policies.navigation.actions import ACTIONS, FIRST_TURN, NavigationAction, prepares
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits
-from dorothie_gym.sim.ego.driver import MAX_CRUISE, MIN_CRUISE
+from dorothie_gym.sim.ego.ego_controller import MAX_CRUISE, MIN_CRUISE
 from dorothie_gym.sim.ego.manoeuvre_lanes import LEAD, MIN_SWITCH
 from dorothie_gym.sim.ego.obstacles import BRAKING, HALF_LENGTH
 from dorothie_gym.sim.ego.planner import HARD_STOP, U_TURN_SPEED

@@ -1,225 +1,200 @@
-"""Drives the session's car along its path, no faster than curves, limits, goals and hazards allow."""
+"""Ego controller: applies physical actions, and passes path, cruise speed and goals to the compiled world."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
-from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.sim.ego.ego_hazards import look
-from dorothie_gym.sim.ego.limits import (
-    APPROACH_DISTANCE,
-    APPROACH_SPEED,
-    LATERAL,
-    LONGITUDINAL,
-    MAX_ACCELERATION,
-    MAX_BRAKING,
-    MAX_SLIP,
-    MAX_STEERING,
-    PROFILE_BRAKING,
-    PROP_DEPTH,
-    SURE_BRAKING,
-    WALKING_SPEED,
-)
-from dorothie_gym.sim.ego.obstacles import BRAKING, CLOSEST, room, safe_speed
-from dorothie_gym.sim.ego.path_tracking import advance, heading_at, point_at, take_lanes
-from dorothie_gym.sim.ego.planner import BEGUN
-from dorothie_gym.sim.network.lane_lookup import wrapped
-from dorothie_gym.sim.sensing.seeing import see
-from dorothie_gym.sim.state.event_log import log
-from dorothie_gym.sim.state.records import STATIC, U_TURN, EventCode, Records
-from dorothie_gym.sim.traffic.junctions import note
-from dorothie_gym.sim.traffic.vehicle_models import slip_of
-from dorothie_gym.sim.weather import (
-    AIR_DENSITY,
-    CORNERING_STIFFNESS,
-    FRONTAL_AREA,
-    GALE,
-    GUSTINESS,
-    PERIODS,
-    SIDE_FORCE,
-)
+import numpy as np
 
-if TYPE_CHECKING:
-    from dorothie_gym.sim.state.town_arrays import TownArrays
-    from dorothie_gym.sim.state.world_arrays import WorldArrays
+from dorothie_gym.maps.model import Array
+from dorothie_gym.ontology import SPEED_STEP, PhysicalAction
+from dorothie_gym.sim.ego.limits import KMH, LATERAL_ACCELERATION, PROFILE_BRAKING, VehicleControl
+from dorothie_gym.sim.ego.path import Path
+from dorothie_gym.sim.ego.path_tracking import find_sides
+from dorothie_gym.sim.ego.planner import U_TURN_SPEED, LocalPlanner
+from dorothie_gym.sim.ego.vehicle import Car, CarRecord
+from dorothie_gym.sim.state.records import plain
+from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CAR_WIDTH
+
+END_GAP = 0.8
+"""Room left between the nose of a waiting car and the end of its lane [m]."""
+
+MIN_CRUISE, MAX_CRUISE = 5.0, 90.0
+"""Range of the cruise speed [km/h]."""
 
 
-@inlined
-def drift(car: Records, time: float, heading: float, speed: float) -> float:
-    """Angle by which the car's course lies beside its heading, positive right [rad]: `Wind.drift`."""
-    swing = 0.0
-    for k in range(len(PERIODS)):
-        swing += math.sin(2.0 * math.pi * time / PERIODS[k] + car.wind_phase[k])
-    wind = GALE * car.wind * max(1.0 + GUSTINESS * math.sqrt(2.0 / len(PERIODS)) * swing, 0.0)
-    angle = car.wind_heading - heading
-    across, along = wind * math.sin(angle), wind * math.cos(angle) - speed
-    force = AIR_DENSITY / 2.0 * FRONTAL_AREA * SIDE_FORCE * math.sqrt(across * across + along * along) * across
-    return float(force / CORNERING_STIFFNESS)
+@dataclass(frozen=True, kw_only=True)
+class GoalAhead:
+    """A place where the car is expected to stop: its lane and the distance along it [m]."""
+
+    lane: int
+    station: float
 
 
-# --- Drives the session's car along its path, no faster than curves, limits, goals and hazards allow -----------------
-
-HARD = 3.5
-"""Braking harder than this for something ahead is a hazard stop [m/s^2]."""
-
-SLOWLY = 1.0
-"""So is standing, or going more slowly than this, before what is as slow [m/s]."""
-
-OVER = 15
-"""A hazard stop is over when nothing has been in the way for this long [substeps]."""
-
-LIMITING = 0.5
-"""Something is in the way if it takes this much off the speed [m/s]."""
-
-CREEPING = 0.3
-"""Slower than this the distance from the path is not steered against [m/s]."""
-
-BACK = 1.4
-"""From the answer of the lateral controller to a speed towards the path."""
+BEHIND, AHEAD = 12.0, 150.0
+"""Stretch of path that the compiled world is told at least, behind and ahead of the car [m]."""
 
 
-@compiled
-def guide(town: TownArrays, world: WorldArrays, dt: float) -> None:
-    """Sets acceleration and slip angle of the car for a substep of `dt` [s]."""
-    car, vehicle, clock = world.car[0], world.vehicles[0], world.clock[0]
-    take_lanes(town, world, vehicle)
-    note(town, vehicle, clock.time)
-    seen = see(
-        world.vehicles, world.pedestrians, world.props, world.seen, world.eye[0],
-        vehicle.x, vehicle.y, clock.frame, 0,
-    )  # fmt: skip
-    look(town, world, seen)
-    advance(town, world, vehicle)
-    if car.s >= car.action_end:
-        car.action = 0
-    free = _free_speed(world)
-    target = free
-    limiting = False
-    if car.kind > 0:
-        left = room(int(car.kind), car.gap, car.ahead_speed, bool(car.tight), bool(car.line))
-        safe = safe_speed(car.ahead_speed, left, car.friction)
-        target, limiting = min(free, safe), safe < free - LIMITING
-    if car.held:
-        slow = vehicle.speed if car.hold_speed < 0.0 else min(car.hold_speed, vehicle.speed)
-        car.hold_speed = max(slow - BRAKING * dt, 0.0)
-        target = min(target, car.hold_speed)
-    else:
-        car.hold_speed = -1.0
-    if not car.manual:
-        _control(world, target, dt)
-        _brake_surely(world)
-    if clock.frame < car.stopped_until:
-        car.throttle, car.brake = 0.0, 1.0
-    _note_hazard(world, limiting)
-    _note_sweep(world)
-    vehicle.height = world.path[car.at].height
-    acceleration = car.throttle * MAX_ACCELERATION - car.brake * MAX_BRAKING
-    if acceleration < 0.0:
-        acceleration = max(acceleration, -MAX_BRAKING * car.friction, -vehicle.speed / dt)
-    vehicle.acceleration, vehicle.slip = acceleration, slip_of(car.steer * MAX_STEERING)
-    vehicle.desired, car.before = car.cruise, vehicle.speed
-    if car.wind > 0.0 and vehicle.speed > 0.0:
-        aside = vehicle.speed * dt * math.tan(drift(car, clock.time, vehicle.heading, vehicle.speed))
-        vehicle.x -= aside * vehicle.sin
-        vehicle.y += aside * vehicle.cos
+def speed_profile(path: Path, stop_at: float | None) -> Array:
+    """Speed that curves, limits and the end of a path allow at each of its points (n,) [m/s].
 
-
-@inlined
-def _free_speed(world: WorldArrays) -> float:
-    """Speed that the path, the goals and the sight allow [m/s]."""
-    car, vehicle = world.car[0], world.vehicles[0]
-    s = car.s + 0.1
-    speed = min(car.cruise, world.path[point_at(world, s)].speed)
-    if car.stop_at < math.inf:  # exact near the end, where the points are too coarse
-        left = car.stop_at - s
-        speed = min(speed, math.sqrt(2.0 * PROFILE_BRAKING * left) if left > 0.0 else 0.0)
-    # a roadblock may come in sight at any time
-    left = room(STATIC, world.eye[0].sight - 0.5 * vehicle.length - PROP_DEPTH, 0.0, False, False)
-    speed = min(speed, max(safe_speed(0.0, left, car.friction), WALKING_SPEED))
-    for g in range(car.goals):
-        left = car.goal[g] - car.s
-        if left >= -1.0:
-            beyond = max(left - APPROACH_DISTANCE, 0.0)
-            speed = min(speed, math.sqrt(APPROACH_SPEED * APPROACH_SPEED + 2.0 * PROFILE_BRAKING * beyond))
-    return float(speed)
-
-
-@inlined
-def _control(world: WorldArrays, target: float, dt: float) -> None:
-    """Throttle, brake and steering wheel that keep the car on its path at a speed.
-
-    Lateral: highway-env's bicycle moves along its heading plus the slip angle, and the slip angle follows the wheel at
-    once. So its course can be laid along the path in every substep, also where the path's curvature jumps; a PID on the
-    distance from the path adds the angle to come back at. Longitudinal: a PID on speed.
+    Args:
+        path: the path.
+        stop_at: where the car has to stop [m], or None.
     """
-    car, vehicle = world.car[0], world.vehicles[0]
-    back = 0.0
-    if vehicle.speed > CREEPING:
-        error = -car.offset
-        car.lateral_sum = min(max(car.lateral_sum + error * dt, -LATERAL.integral_limit), LATERAL.integral_limit)
-        slope = (error - car.lateral_last) / dt if car.lateral_last < math.inf else 0.0
-        car.lateral_last = error
-        back = LATERAL.proportional * error + LATERAL.integral * car.lateral_sum + LATERAL.derivative * slope
-    wanted = heading_at(world, car.s + 0.5 * vehicle.speed * dt) + math.atan2(back * BACK, max(vehicle.speed, 1.0))
-    slip = min(max(wrapped(wanted - vehicle.heading), -MAX_SLIP), MAX_SLIP)
-    error = target - vehicle.speed
-    limit = LONGITUDINAL.integral_limit
-    car.speed_sum = min(max(car.speed_sum + error * dt, -limit), limit)
-    pull = LONGITUDINAL.proportional * error + LONGITUDINAL.integral * car.speed_sum
-    if target <= 0.0:
-        car.speed_sum = 0.0
-        pull = min(pull, -1.0) if vehicle.speed > 0.0 else -MAX_BRAKING
-    car.throttle = min(max(pull / MAX_ACCELERATION, 0.0), 1.0)
-    car.brake = min(max(-pull / MAX_BRAKING, 0.0), 1.0)
-    car.steer = min(max(math.atan(2.0 * math.tan(slip)) / MAX_STEERING, -1.0), 1.0)
+    bend = np.convolve(np.pad(np.abs(path.curvatures), 1, mode="edge"), np.full(3, 1 / 3), mode="valid")
+    squared = np.minimum(path.limits**2, LATERAL_ACCELERATION / np.maximum(bend, 1e-4))
+    if path.manoeuvre.any():
+        tight = path.manoeuvre & (bend > 0.1)
+        squared = np.where(tight, np.minimum(squared, U_TURN_SPEED**2), squared)
+    if stop_at is not None:
+        squared = np.where(path.s >= stop_at, 0.0, squared)
+    # v^2 may grow by 2 a ds towards the past: a running minimum from the end
+    slope = 2 * PROFILE_BRAKING * path.s
+    squared = np.minimum.accumulate((squared + slope)[::-1])[::-1] - slope
+    speeds: Array = np.sqrt(np.maximum(squared, 0.0))
+    return speeds
 
 
-@inlined
-def _brake_surely(world: WorldArrays) -> None:
-    """Applies the brake that stops the car before a hazard or line: the speed controller lags behind."""
-    car, speed = world.car[0], world.vehicles[0].speed
-    needed = 0.0
-    if car.stop_at < math.inf:
-        needed = speed * speed / (2.0 * max(car.stop_at - car.s, CLOSEST))
-    if car.kind > 0:
-        left = room(int(car.kind), car.gap, car.ahead_speed, bool(car.tight), bool(car.line))
-        closing = max(speed * speed - car.ahead_speed * car.ahead_speed, 0.0)
-        needed = max(needed, closing / (2.0 * max(left, CLOSEST)))
-    if needed > SURE_BRAKING:
-        car.throttle, car.brake = 0.0, max(car.brake, min(needed / MAX_BRAKING, 1.0))
+def write_path(arrays: Any, path: Path, s: float, speeds: Array) -> float:
+    """Writes the stretch of a path around a place into the arrays of a world.
+
+    Args:
+        arrays: `kernel.WorldArrays` of a world with a driven car.
+        path: the path.
+        s: where the car is on it [m].
+        speeds: allowed at its points (n,) [m/s].
+
+    Returns:
+        Where the stretch ends [m].
+    """
+    car, table = plain(arrays.car)[0], plain(arrays.path)
+    first = path.index_at(s - BEHIND)
+    cut = slice(first, first + len(table))
+    lanes, headings = path.lanes[cut], path.headings[cut]
+    rows = table[: len(lanes)]
+    rows["s"], rows["x"], rows["y"] = path.s[cut], path.points[cut, 0], path.points[cut, 1]
+    rows["heading"], rows["cos"], rows["sin"] = headings, np.cos(headings), np.sin(headings)
+    rows["height"], rows["station"], rows["speed"] = path.heights[cut], path.stations[cut], speeds[cut]
+    rows["lane"], rows["manoeuvre"] = lanes, path.manoeuvre[cut]
+    find_sides(arrays.path, len(lanes), CAR_LENGTH, CAR_WIDTH)
+    starts = np.concatenate(([0], 1 + np.flatnonzero(lanes[1:] != lanes[:-1])))[: len(car["run_lane"])]
+    car["runs"], car["run"] = len(starts), -1
+    car["run_lane"][: len(starts)], car["run_first"][: len(starts)] = lanes[starts], starts
+    car["points"], car["at"], car["s"] = len(lanes), path.index_at(s) - first, s
+    return float(path.s[cut][-1])
 
 
-@inlined
-def _note_sweep(world: WorldArrays) -> None:
-    """Tells others which part of a U-turn is still to come: also while the car waits in it, they give way."""
-    car = world.car[0]
-    at = int(car.at)
-    car.sweeping = bool(car.action == U_TURN and world.path[at].manoeuvre and car.s >= BEGUN)
-    if car.sweeping:
-        car.sweep_first = at
-        while at + 1 < car.points and world.path[at + 1].manoeuvre:
-            at += 1
-        car.sweep_last = at
+class EgoController:
+    """Control of the ego car between the Co-Wizard's physical actions and the compiled world.
 
+    `apply` takes a physical action. `brief` writes path, speed and goals into the arrays of the world before these
+    are stepped (the pedals follow there, in `motion_control`); `debrief` reads the ego's place on the path afterwards.
 
-# --- what is logged ---------------------------------------------------------------------------------------------------
+    Attributes:
+        planner: local planner of the ego.
+        cruise: desired speed [km/h].
+        lights: whether the head lights are on.
+        goals: places where the ego is expected to stop; it approaches them slowly.
+        manual: throttle, brake and steering of an outside driver; None: the ego drives itself.
+    """
 
+    def __init__(self, planner: LocalPlanner, car: Car, *, cruise: float = 40.0) -> None:
+        self.planner = planner
+        self.cruise = cruise
+        self.lights = False
+        self.goals: Sequence[GoalAhead] = ()
+        self.manual: VehicleControl | None = None
+        self._car = car
+        self._told: Path | None = None
+        self._told_until = 0.0
+        self._speeds: Array = np.zeros(0)
 
-@inlined
-def _note_hazard(world: WorldArrays, limiting: bool) -> None:
-    """Logs when the car begins to stop for something, and when it goes on."""
-    car, speed, frame = world.car[0], world.vehicles[0].speed, world.clock[0].frame
-    if car.hazard == 0:
-        stands = speed < SLOWLY and car.ahead_speed < SLOWLY
-        if limiting and not car.held:
-            if stands or car.brake * MAX_BRAKING > HARD:
-                car.hazard, car.hazard_gap, car.hazard_key = car.kind, car.gap, car.other
-                car.hazard_since = car.hazard_seen = frame
-                log(world, EventCode.HAZARD_STOP, int(car.kind), int(car.other), max(car.gap, 0.0))
-        return
-    if limiting:
-        car.hazard, car.hazard_gap, car.hazard_key, car.hazard_seen = car.kind, car.gap, car.other, frame
-    if frame - car.hazard_seen > OVER:
-        log(world, EventCode.HAZARD_END, int(car.hazard), int(car.hazard_key), float(frame - car.hazard_since))
-        car.hazard = 0
+    def apply(self, action: PhysicalAction, *, angle: int = 0, up: bool = True) -> str | None:
+        """Applies a physical action.
+
+        Args:
+            action: the action.
+            angle: degrees, positive left; for JTurn and LaneSwitch.
+            up: direction of SpeedChange, state of LightChange.
+
+        Returns:
+            None, or the reason of the refusal; then nothing has changed.
+        """
+        if action is PhysicalAction.SPEED_CHANGE:
+            return self.change_cruise(up)
+        if action is PhysicalAction.LIGHT_CHANGE:
+            if self.lights == up:
+                return f"the lights are {'on' if up else 'off'} already"
+            self.lights = up
+            return None
+        return self.planner.command(action, angle, float(self._car.speed))
+
+    def change_cruise(self, up: bool) -> str | None:
+        """Changes the cruise speed by one step; returns the reason of a refusal."""
+        wanted = self.cruise + (SPEED_STEP if up else -SPEED_STEP)
+        if not MIN_CRUISE <= wanted <= MAX_CRUISE:
+            return f"the cruise speed stays within {MIN_CRUISE:.0f} and {MAX_CRUISE:.0f} km/h"
+        self.cruise = wanted
+        return None
+
+    def set_goals(self, goals: Sequence[GoalAhead]) -> None:
+        """Sets where the car is expected to stop."""
+        self.goals = tuple(goals)
+        self._told = None
+
+    def brief(self, arrays: Any, record: CarRecord) -> None:
+        """Writes what the car is to do into the arrays of a world, before it is stepped.
+
+        Args:
+            arrays: `kernel.WorldArrays`.
+            record: what drives the car in them.
+        """
+        planner = self.planner
+        if planner.path is not self._told:
+            self._tell(arrays, anew=True)
+        elif self._told_until < min(planner.s + AHEAD, planner.path.length):
+            self._tell(arrays, anew=False)
+        action, _ = planner.manoeuvre
+        number, manual = 0 if action is None else action.value, self.manual
+        record.orders[()] = number, planner.manoeuvre_end, self.cruise * KMH, planner.held, manual is not None
+        if manual is not None:
+            record.pedals[()] = manual.throttle, manual.steer, manual.brake
+
+    def debrief(self, record: CarRecord) -> None:
+        """Takes over where the car is, after the world was stepped; see `brief`."""
+        self.planner.note(*record.place.item())
+
+    def speed_at(self, s: float) -> float:
+        """Speed that curves, limits and the end of the path allow at a distance along the path [m/s].
+
+        It is that of the path as the world was last stepped.
+        """
+        path = self._told
+        return float(np.interp(s, path.s, self._speeds)) if path is not None else self.cruise * KMH
+
+    def _tell(self, arrays: Any, *, anew: bool) -> None:
+        """Writes the stretch of path around the car; all else that follows from the path if that was laid anew."""
+        path, s, car = self.planner.path, self.planner.s, plain(arrays.car)[0]
+        if anew:
+            stop_at = path.length - self._car.LENGTH / 2 - END_GAP if self.planner.waits_at_end else None
+            self._speeds = speed_profile(path, stop_at)
+            goals = self._goals_on(path)[: car["goal"].shape[0]]
+            car["goals"], car["goal"][: len(goals)] = len(goals), goals
+            car["stop_at"] = math.inf if stop_at is None else stop_at
+            self._told = path
+        car["offset"] = self.planner.offset
+        self._told_until = write_path(arrays, path, s, self._speeds)
+
+    def _goals_on(self, path: Path) -> list[float]:
+        """Places of the goals along a path [m], those of the lanes beside it among them."""
+        found: list[float] = []
+        for goal in self.goals:
+            for lane, station in self.planner.beside(goal.lane, goal.station):
+                on = np.flatnonzero((path.lanes == lane) & ~path.manoeuvre)
+                if len(on) and path.stations[on[0]] - 1.0 <= station <= path.stations[on[-1]] + 1.0:
+                    found.append(float(np.interp(station, path.stations[on], path.s[on])))
+        return sorted(place for place in found if place >= self.planner.s - 1.0)

@@ -20,7 +20,7 @@ MAX_BRAKING = 8.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Control:
+class VehicleControl:
     """What the car's actuators are told, normalised (paper, appendix A.2).
 
     Attributes:

@@ -9,7 +9,7 @@ import numpy as np
 from highway_env.vehicle.kinematics import Vehicle
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.sim.ego.limits import Control
+from dorothie_gym.sim.ego.limits import VehicleControl
 from dorothie_gym.sim.road import TownRoad
 from dorothie_gym.sim.state.records import fields, plain
 from dorothie_gym.sim.state.world_arrays import WorldArrays
@@ -87,10 +87,10 @@ class Car(Vehicle):
         return self._height
 
     @property
-    def control(self) -> Control:
+    def control(self) -> VehicleControl:
         """What the actuators were told last."""
         car = plain(self._holder.arrays.car)[0]
-        return Control(throttle=float(car["throttle"]), steer=float(car["steer"]), brake=float(car["brake"]))
+        return VehicleControl(throttle=float(car["throttle"]), steer=float(car["steer"]), brake=float(car["brake"]))
 
     def on_state_update(self) -> None:
         """Matches the car to the closest lane of its height."""

@@ -8,7 +8,7 @@ import pytest
 
 from dorothie_gym.maps import Lane
 from dorothie_gym.ontology import ObjectClass
-from dorothie_gym.sim.ego.driver import write_path
+from dorothie_gym.sim.ego.ego_controller import write_path
 from dorothie_gym.sim.ego.obstacles import bodies_ahead, room, safe_speed
 from dorothie_gym.sim.ego.path import Path, follow
 from dorothie_gym.sim.population import add_car

@@ -25,10 +25,10 @@ def test_jturn_with_the_angle_of_an_exit_ends_in_its_lane(name: str) -> None:
             continue
         for way in town.exits(lane.id):
             world = on_lane(roads, lane.id, max(0.0, lane.length - 45.0))
-            car, driver = world.car, world.driver
-            assert driver.planner.command(PhysicalAction.J_TURN, way.angle, 0.0) is None
+            car, ego = world.car, world.ego
+            assert ego.planner.command(PhysicalAction.J_TURN, way.angle, 0.0) is None
             far = min(12.0, town.lanes[way.lane].length / 2)
-            planner = driver.planner
+            planner = ego.planner
             trip = drive(world, lambda p=planner, w=way, f=far: p.lane == w.lane and p.station > f)
             tried += 1
             worst = max(worst, trip.worst)
@@ -48,12 +48,12 @@ def test_u_turn_where_legal_ends_in_the_oncoming_lane(name: str) -> None:
             continue
         for station in np.linspace(2.0, lane.length - 2.0, 3):
             world = on_lane(roads, lane.id, float(station))
-            car, driver = world.car, world.driver
-            if not driver.planner.may_turn_round(0.0):
-                assert driver.planner.command(PhysicalAction.U_TURN, 0, 0.0) is not None
+            car, ego = world.car, world.ego
+            if not ego.planner.may_turn_round(0.0):
+                assert ego.planner.command(PhysicalAction.U_TURN, 0, 0.0) is not None
                 continue
-            assert driver.planner.command(PhysicalAction.U_TURN, 0, 0.0) is None
-            planner = driver.planner
+            assert ego.planner.command(PhysicalAction.U_TURN, 0, 0.0) is None
+            planner = ego.planner
             trip = drive(world, lambda p=planner: p.manoeuvre[0] is None and not p.in_manoeuvre, 40.0)
             before = lane.heading_at(float(station))
             turned = abs(np.angle(np.exp(1j * (float(car.heading) - before))))
@@ -75,8 +75,8 @@ def test_lane_switch_ends_in_the_lane_beside(step: int) -> None:
     ]
     for lane, side, beside in cases[::step]:
         world = on_lane(roads, lane.id, 0.0)
-        car, driver = world.car, world.driver
-        planner = driver.planner
+        car, ego = world.car, world.ego
+        planner = ego.planner
         accepted = planner.may_switch(side)
         reason = planner.command(PhysicalAction.LANE_SWITCH, 90 if side is LEFT else -90, 0.0)
         assert (reason is None) == accepted
@@ -100,23 +100,23 @@ def test_car_waits_at_the_end_of_its_lane_without_an_instruction_and_turns_with_
     roads = network("brookside")
     lane = roads.town.lanes[choice_lane()]
     world = on_lane(roads, lane.id, lane.length - 50.0)
-    car, driver = world.car, world.driver
+    car, ego = world.car, world.ego
     drive(world, lambda: False, 20.0)
-    nose = driver.planner.station + car.LENGTH / 2
+    nose = ego.planner.station + car.LENGTH / 2
     assert car.speed == 0.0
-    assert driver.planner.waits_at_end
-    assert driver.planner.lane == lane.id
+    assert ego.planner.waits_at_end
+    assert ego.planner.lane == lane.id
     assert 0.0 < lane.length - nose < 2.0
     for way in roads.town.exits(lane.id)[:1]:
-        assert driver.planner.command(PhysicalAction.J_TURN, way.angle, 0.0) is None
-        assert drive(world, lambda w=way: driver.planner.lane == w.lane, 20.0).arrived
+        assert ego.planner.command(PhysicalAction.J_TURN, way.angle, 0.0) is None
+        assert drive(world, lambda w=way: ego.planner.lane == w.lane, 20.0).arrived
 
 
 def test_stop_and_start() -> None:
     roads = network("brookside")
     world = on_lane(roads, long_lane(roads.town), 2.0)
-    car, driver = world.car, world.driver
-    planner = driver.planner
+    car, ego = world.car, world.ego
+    planner = ego.planner
     assert planner.command(PhysicalAction.START, 0, 0.0) == "the car is not stopped"
     drive(world, lambda: car.speed > 8.0)
     before = planner.station
@@ -132,8 +132,8 @@ def test_stop_and_start() -> None:
 
 def test_any_manoeuvre_starts_a_stopped_car_again() -> None:
     roads = network("brookside")
-    driver = on_lane(roads, choice_lane(), 2.0).driver
-    planner = driver.planner
+    ego = on_lane(roads, choice_lane(), 2.0).ego
+    planner = ego.planner
     for action in (PhysicalAction.LANE_FOLLOW, PhysicalAction.J_TURN, PhysicalAction.U_TURN):
         planner.command(PhysicalAction.STOP, 0, 0.0)
         assert planner.command(action, 0, 0.0) is None
@@ -143,8 +143,8 @@ def test_any_manoeuvre_starts_a_stopped_car_again() -> None:
 @pytest.mark.parametrize("action", [PhysicalAction.SPEED_CHANGE, PhysicalAction.LIGHT_CHANGE])
 def test_what_is_no_navigation_is_refused(action: PhysicalAction) -> None:
     roads = network("brookside")
-    driver = on_lane(roads, choice_lane(), 2.0).driver
-    assert driver.planner.command(action, 0, 0.0) == f"{action.label} is no navigation action"
+    ego = on_lane(roads, choice_lane(), 2.0).ego
+    assert ego.planner.command(action, 0, 0.0) == f"{action.label} is no navigation action"
 
 
 def test_plan_is_not_changed_where_the_car_cannot_stop_before_the_junction_any_more() -> None:
@@ -152,8 +152,8 @@ def test_plan_is_not_changed_where_the_car_cannot_stop_before_the_junction_any_m
     town, lane = roads.town, roads.town.lanes[choice_lane()]
     first, second = town.exits(lane.id)[:2]
     for room, late in ((25.0, False), (6.0, True)):
-        driver = on_lane(roads, lane.id, lane.length - room).driver
-        planner = driver.planner
+        ego = on_lane(roads, lane.id, lane.length - room).ego
+        planner = ego.planner
         assert planner.command(PhysicalAction.J_TURN, first.angle, 8.0) is None
         assert planner.is_committed(8.0) == late
         assert (planner.command(PhysicalAction.J_TURN, second.angle, 8.0) is not None) == late
@@ -162,8 +162,8 @@ def test_plan_is_not_changed_where_the_car_cannot_stop_before_the_junction_any_m
 
 def test_u_turn_is_refused_while_the_car_is_too_fast_before_a_roadblock() -> None:
     roads = network("brookside")
-    driver = on_lane(roads, long_lane(roads.town), 30.0).driver
-    planner = driver.planner
+    ego = on_lane(roads, long_lane(roads.town), 30.0).ego
+    planner = ego.planner
     planner.roadblock = 15.0
     assert planner.command(PhysicalAction.U_TURN, 0, 6.0) == "the car is too fast to turn round before the roadblock"
     assert planner.command(PhysicalAction.U_TURN, 0, 0.0) is None
@@ -180,9 +180,9 @@ def test_turn_changes_lanes_before_the_junction_only_where_another_lane_fits_muc
         for way in town.exits(beside):
             if min(abs((way.angle - own.angle + 180) % 360 - 180) for own in exits) < 30 or len(town.exits(beside)) < 2:
                 continue
-            driver = on_lane(roads, lane.id, 2.0).driver
-            assert driver.planner.command(PhysicalAction.J_TURN, way.angle, 0.0) is None
-            assert driver.planner.lanes_ahead[1] == beside
+            ego = on_lane(roads, lane.id, 2.0).ego
+            assert ego.planner.command(PhysicalAction.J_TURN, way.angle, 0.0) is None
+            assert ego.planner.lanes_ahead[1] == beside
             changed += 1
     if not changed:
         pytest.skip("no lane of this map has another one beside it that leads elsewhere")
@@ -221,8 +221,8 @@ def test_a_turn_that_is_asked_for_during_a_u_turn_does_not_disturb_it(name: str,
         if lane.in_junction or lane.length < 60.0 or tried == 12:
             continue
         world = on_lane(roads, lane.id, 30.0)
-        car, driver = world.car, world.driver
-        planner = driver.planner
+        car, ego = world.car, world.ego
+        planner = ego.planner
         if planner.command(PhysicalAction.U_TURN, 0, 0.0) is not None:
             continue
         assert drive(world, lambda p=planner: p.in_manoeuvre and p.s > begun).arrived
@@ -243,8 +243,8 @@ def test_a_turn_that_is_asked_for_during_a_lane_switch_does_not_disturb_it() -> 
         if beside is None or town.predecessors(beside):
             continue  # not beside a turn lane
         world = on_lane(roads, lane.id, 0.0)
-        car, driver = world.car, world.driver
-        planner = driver.planner
+        car, ego = world.car, world.ego
+        planner = ego.planner
         assert planner.command(PhysicalAction.LANE_SWITCH, 90, 10.0) is None
         assert drive(world, lambda p=planner: p.in_manoeuvre and p.s > 8.0).arrived
         planner.command(PhysicalAction.J_TURN, 0, float(car.speed))

@@ -123,9 +123,9 @@ def bad_world(trouble: str, seed: int, *, lights: bool = True) -> World:
     world = world_at("brookside", long_lane(network("brookside").town), 2.0, ALONE, seed)
     for parameter, value in TROUBLES[trouble].items():
         world.weather.set(parameter, value)
-    world.lights = lights
+    world.ego.lights = lights
     for _ in range(8):
-        world.driver.change_cruise(up=True)
+        world.ego.change_cruise(up=True)
     return world
 
 

@@ -5,29 +5,29 @@ import math
 import pytest
 
 from dorothie_gym.ontology import PhysicalAction
-from dorothie_gym.sim.ego.driver import MAX_CRUISE, MIN_CRUISE, GoalAhead
+from dorothie_gym.sim.ego.ego_controller import MAX_CRUISE, MIN_CRUISE, GoalAhead
 from dorothie_gym.sim.ego.limits import KMH
 from tests.sim.driving import drive, long_lane, network, on_lane
 
 
 def test_cruise_speed_goes_by_steps_of_five_within_its_range() -> None:
     roads = network("brookside")
-    driver = on_lane(roads, long_lane(roads.town), 2.0).driver
-    seen = [driver.cruise]
-    while driver.change_cruise(up=True) is None:
-        seen.append(driver.cruise)
+    ego = on_lane(roads, long_lane(roads.town), 2.0).ego
+    seen = [ego.cruise]
+    while ego.change_cruise(up=True) is None:
+        seen.append(ego.cruise)
     assert seen[-1] == MAX_CRUISE
     assert all(b - a == 5.0 for a, b in zip(seen, seen[1:], strict=False))
-    while driver.change_cruise(up=False) is None:
+    while ego.change_cruise(up=False) is None:
         pass
-    assert driver.cruise == MIN_CRUISE
+    assert ego.cruise == MIN_CRUISE
 
 
 def test_car_drives_at_its_cruise_speed() -> None:
     roads = network("brookside")
     world = on_lane(roads, long_lane(roads.town), 2.0)
-    car, driver = world.car, world.driver
-    driver.cruise = 20.0
+    car, ego = world.car, world.ego
+    ego.cruise = 20.0
     drive(world, lambda: False, 8.0)
     assert float(car.speed) == pytest.approx(20.0 * KMH, abs=0.4)
 
@@ -37,27 +37,27 @@ def test_car_comes_slowly_to_a_goal_and_can_be_stopped_within_two_metres(cruise:
     roads = network("brookside")
     lane = long_lane(roads.town)
     world = on_lane(roads, lane, 2.0)
-    car, driver = world.car, world.driver
-    driver.cruise = cruise
-    driver.set_goals([GoalAhead(lane=lane, station=80.0)])
-    drive(world, lambda: driver.planner.station > 80.0 - 15.0)
+    car, ego = world.car, world.ego
+    ego.cruise = cruise
+    ego.set_goals([GoalAhead(lane=lane, station=80.0)])
+    drive(world, lambda: ego.planner.station > 80.0 - 15.0)
     assert car.speed <= 16.0 * KMH
     # twice a second somebody decides whether to stop now
     while True:
         speed = float(car.speed)
-        if 80.0 - driver.planner.station < speed**2 / 6.0 + 0.56 * speed + 0.5 * speed / 2:
-            driver.planner.command(PhysicalAction.STOP, 0, speed)
+        if 80.0 - ego.planner.station < speed**2 / 6.0 + 0.56 * speed + 0.5 * speed / 2:
+            ego.planner.command(PhysicalAction.STOP, 0, speed)
             break
         drive(world, lambda: False, 0.5)
     drive(world, lambda: car.speed == 0.0, 8.0)
-    assert abs(driver.planner.station - 80.0) < 2.0
+    assert abs(ego.planner.station - 80.0) < 2.0
 
 
 def test_controls_are_normalised_and_the_car_never_rolls_back() -> None:
     roads = network("Town02")
     world = on_lane(roads, long_lane(roads.town, 60.0), 2.0)
-    car, driver = world.car, world.driver
-    driver.planner.command(PhysicalAction.J_TURN, 90, 0.0)
+    car, ego = world.car, world.ego
+    ego.planner.command(PhysicalAction.J_TURN, 90, 0.0)
 
     def check() -> bool:
         control = car.control

@@ -1,0 +1,225 @@
+"""Drives the session's car along its path, no faster than curves, limits, goals and hazards allow."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.sim.ego.ego_hazards import look
+from dorothie_gym.sim.ego.limits import (
+    APPROACH_DISTANCE,
+    APPROACH_SPEED,
+    LATERAL,
+    LONGITUDINAL,
+    MAX_ACCELERATION,
+    MAX_BRAKING,
+    MAX_SLIP,
+    MAX_STEERING,
+    PROFILE_BRAKING,
+    PROP_DEPTH,
+    SURE_BRAKING,
+    WALKING_SPEED,
+)
+from dorothie_gym.sim.ego.obstacles import BRAKING, CLOSEST, room, safe_speed
+from dorothie_gym.sim.ego.path_tracking import advance, heading_at, point_at, take_lanes
+from dorothie_gym.sim.ego.planner import BEGUN
+from dorothie_gym.sim.network.lane_lookup import wrapped
+from dorothie_gym.sim.sensing.seeing import see
+from dorothie_gym.sim.state.event_log import log
+from dorothie_gym.sim.state.records import STATIC, U_TURN, EventCode, Records
+from dorothie_gym.sim.traffic.junctions import note
+from dorothie_gym.sim.traffic.vehicle_models import slip_of
+from dorothie_gym.sim.weather import (
+    AIR_DENSITY,
+    CORNERING_STIFFNESS,
+    FRONTAL_AREA,
+    GALE,
+    GUSTINESS,
+    PERIODS,
+    SIDE_FORCE,
+)
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.world_arrays import WorldArrays
+
+
+@inlined
+def drift(car: Records, time: float, heading: float, speed: float) -> float:
+    """Angle by which the car's course lies beside its heading, positive right [rad]: `Wind.drift`."""
+    swing = 0.0
+    for k in range(len(PERIODS)):
+        swing += math.sin(2.0 * math.pi * time / PERIODS[k] + car.wind_phase[k])
+    wind = GALE * car.wind * max(1.0 + GUSTINESS * math.sqrt(2.0 / len(PERIODS)) * swing, 0.0)
+    angle = car.wind_heading - heading
+    across, along = wind * math.sin(angle), wind * math.cos(angle) - speed
+    force = AIR_DENSITY / 2.0 * FRONTAL_AREA * SIDE_FORCE * math.sqrt(across * across + along * along) * across
+    return float(force / CORNERING_STIFFNESS)
+
+
+# --- Drives the session's car along its path, no faster than curves, limits, goals and hazards allow -----------------
+
+HARD = 3.5
+"""Braking harder than this for something ahead is a hazard stop [m/s^2]."""
+
+SLOWLY = 1.0
+"""So is standing, or going more slowly than this, before what is as slow [m/s]."""
+
+OVER = 15
+"""A hazard stop is over when nothing has been in the way for this long [substeps]."""
+
+LIMITING = 0.5
+"""Something is in the way if it takes this much off the speed [m/s]."""
+
+CREEPING = 0.3
+"""Slower than this the distance from the path is not steered against [m/s]."""
+
+BACK = 1.4
+"""From the answer of the lateral controller to a speed towards the path."""
+
+
+@compiled
+def guide(town: TownArrays, world: WorldArrays, dt: float) -> None:
+    """Sets acceleration and slip angle of the car for a substep of `dt` [s]."""
+    car, vehicle, clock = world.car[0], world.vehicles[0], world.clock[0]
+    take_lanes(town, world, vehicle)
+    note(town, vehicle, clock.time)
+    seen = see(
+        world.vehicles, world.pedestrians, world.props, world.seen, world.eye[0],
+        vehicle.x, vehicle.y, clock.frame, 0,
+    )  # fmt: skip
+    look(town, world, seen)
+    advance(town, world, vehicle)
+    if car.s >= car.action_end:
+        car.action = 0
+    free = _free_speed(world)
+    target = free
+    limiting = False
+    if car.kind > 0:
+        left = room(int(car.kind), car.gap, car.ahead_speed, bool(car.tight), bool(car.line))
+        safe = safe_speed(car.ahead_speed, left, car.friction)
+        target, limiting = min(free, safe), safe < free - LIMITING
+    if car.held:
+        slow = vehicle.speed if car.hold_speed < 0.0 else min(car.hold_speed, vehicle.speed)
+        car.hold_speed = max(slow - BRAKING * dt, 0.0)
+        target = min(target, car.hold_speed)
+    else:
+        car.hold_speed = -1.0
+    if not car.manual:
+        _control(world, target, dt)
+        _brake_surely(world)
+    if clock.frame < car.stopped_until:
+        car.throttle, car.brake = 0.0, 1.0
+    _note_hazard(world, limiting)
+    _note_sweep(world)
+    vehicle.height = world.path[car.at].height
+    acceleration = car.throttle * MAX_ACCELERATION - car.brake * MAX_BRAKING
+    if acceleration < 0.0:
+        acceleration = max(acceleration, -MAX_BRAKING * car.friction, -vehicle.speed / dt)
+    vehicle.acceleration, vehicle.slip = acceleration, slip_of(car.steer * MAX_STEERING)
+    vehicle.desired, car.before = car.cruise, vehicle.speed
+    if car.wind > 0.0 and vehicle.speed > 0.0:
+        aside = vehicle.speed * dt * math.tan(drift(car, clock.time, vehicle.heading, vehicle.speed))
+        vehicle.x -= aside * vehicle.sin
+        vehicle.y += aside * vehicle.cos
+
+
+@inlined
+def _free_speed(world: WorldArrays) -> float:
+    """Speed that the path, the goals and the sight allow [m/s]."""
+    car, vehicle = world.car[0], world.vehicles[0]
+    s = car.s + 0.1
+    speed = min(car.cruise, world.path[point_at(world, s)].speed)
+    if car.stop_at < math.inf:  # exact near the end, where the points are too coarse
+        left = car.stop_at - s
+        speed = min(speed, math.sqrt(2.0 * PROFILE_BRAKING * left) if left > 0.0 else 0.0)
+    # a roadblock may come in sight at any time
+    left = room(STATIC, world.eye[0].sight - 0.5 * vehicle.length - PROP_DEPTH, 0.0, False, False)
+    speed = min(speed, max(safe_speed(0.0, left, car.friction), WALKING_SPEED))
+    for g in range(car.goals):
+        left = car.goal[g] - car.s
+        if left >= -1.0:
+            beyond = max(left - APPROACH_DISTANCE, 0.0)
+            speed = min(speed, math.sqrt(APPROACH_SPEED * APPROACH_SPEED + 2.0 * PROFILE_BRAKING * beyond))
+    return float(speed)
+
+
+@inlined
+def _control(world: WorldArrays, target: float, dt: float) -> None:
+    """Throttle, brake and steering wheel that keep the car on its path at a speed.
+
+    Lateral: highway-env's bicycle moves along its heading plus the slip angle, and the slip angle follows the wheel at
+    once. So its course can be laid along the path in every substep, also where the path's curvature jumps; a PID on the
+    distance from the path adds the angle to come back at. Longitudinal: a PID on speed.
+    """
+    car, vehicle = world.car[0], world.vehicles[0]
+    back = 0.0
+    if vehicle.speed > CREEPING:
+        error = -car.offset
+        car.lateral_sum = min(max(car.lateral_sum + error * dt, -LATERAL.integral_limit), LATERAL.integral_limit)
+        slope = (error - car.lateral_last) / dt if car.lateral_last < math.inf else 0.0
+        car.lateral_last = error
+        back = LATERAL.proportional * error + LATERAL.integral * car.lateral_sum + LATERAL.derivative * slope
+    wanted = heading_at(world, car.s + 0.5 * vehicle.speed * dt) + math.atan2(back * BACK, max(vehicle.speed, 1.0))
+    slip = min(max(wrapped(wanted - vehicle.heading), -MAX_SLIP), MAX_SLIP)
+    error = target - vehicle.speed
+    limit = LONGITUDINAL.integral_limit
+    car.speed_sum = min(max(car.speed_sum + error * dt, -limit), limit)
+    pull = LONGITUDINAL.proportional * error + LONGITUDINAL.integral * car.speed_sum
+    if target <= 0.0:
+        car.speed_sum = 0.0
+        pull = min(pull, -1.0) if vehicle.speed > 0.0 else -MAX_BRAKING
+    car.throttle = min(max(pull / MAX_ACCELERATION, 0.0), 1.0)
+    car.brake = min(max(-pull / MAX_BRAKING, 0.0), 1.0)
+    car.steer = min(max(math.atan(2.0 * math.tan(slip)) / MAX_STEERING, -1.0), 1.0)
+
+
+@inlined
+def _brake_surely(world: WorldArrays) -> None:
+    """Applies the brake that stops the car before a hazard or line: the speed controller lags behind."""
+    car, speed = world.car[0], world.vehicles[0].speed
+    needed = 0.0
+    if car.stop_at < math.inf:
+        needed = speed * speed / (2.0 * max(car.stop_at - car.s, CLOSEST))
+    if car.kind > 0:
+        left = room(int(car.kind), car.gap, car.ahead_speed, bool(car.tight), bool(car.line))
+        closing = max(speed * speed - car.ahead_speed * car.ahead_speed, 0.0)
+        needed = max(needed, closing / (2.0 * max(left, CLOSEST)))
+    if needed > SURE_BRAKING:
+        car.throttle, car.brake = 0.0, max(car.brake, min(needed / MAX_BRAKING, 1.0))
+
+
+@inlined
+def _note_sweep(world: WorldArrays) -> None:
+    """Tells others which part of a U-turn is still to come: also while the car waits in it, they give way."""
+    car = world.car[0]
+    at = int(car.at)
+    car.sweeping = bool(car.action == U_TURN and world.path[at].manoeuvre and car.s >= BEGUN)
+    if car.sweeping:
+        car.sweep_first = at
+        while at + 1 < car.points and world.path[at + 1].manoeuvre:
+            at += 1
+        car.sweep_last = at
+
+
+# --- what is logged ---------------------------------------------------------------------------------------------------
+
+
+@inlined
+def _note_hazard(world: WorldArrays, limiting: bool) -> None:
+    """Logs when the car begins to stop for something, and when it goes on."""
+    car, speed, frame = world.car[0], world.vehicles[0].speed, world.clock[0].frame
+    if car.hazard == 0:
+        stands = speed < SLOWLY and car.ahead_speed < SLOWLY
+        if limiting and not car.held:
+            if stands or car.brake * MAX_BRAKING > HARD:
+                car.hazard, car.hazard_gap, car.hazard_key = car.kind, car.gap, car.other
+                car.hazard_since = car.hazard_seen = frame
+                log(world, EventCode.HAZARD_STOP, int(car.kind), int(car.other), max(car.gap, 0.0))
+        return
+    if limiting:
+        car.hazard, car.hazard_gap, car.hazard_key, car.hazard_seen = car.kind, car.gap, car.other, frame
+    if frame - car.hazard_seen > OVER:
+        log(world, EventCode.HAZARD_END, int(car.hazard), int(car.hazard_key), float(frame - car.hazard_since))
+        car.hazard = 0
