@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from dorothie_gym.analysis.diversity import plain, words_of
 from dorothie_gym.analysis.units import Units, is_initiating
+from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Slot
-from dorothie_gym.recording.errors import SessionError
 from dorothie_gym.recording.events import MoveRecord, UtteranceRecord
 from dorothie_gym.recording.header import NATIVE
 from dorothie_gym.recording.session import Session

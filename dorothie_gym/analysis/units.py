@@ -12,7 +12,8 @@ from functools import cached_property
 from dorothie_gym.dialogue.conversation import Span, Utterance
 from dorothie_gym.dialogue.exchanges import EXPECTATIONS, Exchange
 from dorothie_gym.dialogue.transactions import Annotator
-from dorothie_gym.ontology import GoalStatus, LandmarkName, OntologyError, Role, parse_goal_status, parse_landmark
+from dorothie_gym.errors import OntologyError
+from dorothie_gym.ontology import GoalStatus, LandmarkName, Role, parse_goal_status, parse_landmark
 from dorothie_gym.recording.events import Event, EventType, MoveRecord, UtteranceRecord
 from dorothie_gym.recording.header import NATIVE
 from dorothie_gym.recording.session import Session

@@ -20,7 +20,8 @@ from dorothie_gym.baselines.outputs import allowed_angle
 from dorothie_gym.baselines.training import checkpoints
 from dorothie_gym.benchmark import ActionPredictions, ActPredictions, TaskPredictions
 from dorothie_gym.benchmark.teacher_forced import NfDEnv, RfNEnv, TeacherForcedEnv, UfNEnv
-from dorothie_gym.recording import Corpus, SessionError, Task
+from dorothie_gym.errors import SessionError
+from dorothie_gym.recording import Corpus, Task
 from dorothie_gym.wrappers.flatten import FlattenAction, FlattenObservation
 
 ENVS: Final[dict[Task, type[TeacherForcedEnv]]] = {Task.UFN: UfNEnv, Task.RFN: RfNEnv, Task.NFD: NfDEnv}

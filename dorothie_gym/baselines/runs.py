@@ -19,11 +19,12 @@ from dorothie_gym.baselines.material import TEST, TRAIN, VALIDATION, Material
 from dorothie_gym.baselines.outputs import Predicted
 from dorothie_gym.baselines.rows import Row, find_row, make_model, needs_pieces
 from dorothie_gym.baselines.toto import TOTO, FrozenTexts
-from dorothie_gym.baselines.training import BEST_FILE, CheckpointError, Trained, predict, train
+from dorothie_gym.baselines.training import BEST_FILE, Trained, predict, train
 from dorothie_gym.baselines.training.curves import draw_curves
 from dorothie_gym.baselines.training.trainer import OnEpoch
 from dorothie_gym.benchmark import ActionPredictions, ActPredictions, TaskPredictions, write_predictions
 from dorothie_gym.benchmark.features import Columns, PointTable
+from dorothie_gym.errors import CheckpointError
 from dorothie_gym.recording import Task
 from dorothie_gym.recording.json_io import write_atomically
 

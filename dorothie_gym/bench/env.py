@@ -96,7 +96,7 @@ def measure(
 
     Raises:
         TownError: there is no such town, or its file is wrong.
-        WorkerError: a process that measures has ended before its time.
+        BenchmarkProcessError: a process that measures has ended before its time.
     """
     # imported here: a process that only drives needs none of the references
     from dorothie_gym.sim.highway_reference import StockIntersection

@@ -16,11 +16,9 @@ from importlib import import_module
 from types import TracebackType
 from typing import Any, Self
 
+from dorothie_gym.errors import BenchmarkProcessError
+
 _READY = "ready"
-
-
-class WorkerError(RuntimeError):
-    """A process that measures has ended before it had measured."""
 
 
 class Worker:
@@ -55,7 +53,7 @@ class Worker:
         """Waits until it is ready to work.
 
         Raises:
-            WorkerError: it will never be.
+            BenchmarkProcessError: it will never be.
         """
         self._read()
 
@@ -72,7 +70,7 @@ class Worker:
         """Waits until it has worked; returns what that took [s].
 
         Raises:
-            WorkerError: it ended before.
+            BenchmarkProcessError: it ended before.
         """
         return float(self._read())
 
@@ -93,7 +91,7 @@ class Worker:
         self._noise.seek(0)
         said = [line for line in self._noise.read().splitlines() if line.strip()]
         last = said[-1] if said else "it said nothing"
-        raise WorkerError(f"the process that measures {self._job!r} ended with code {code}: {last}")
+        raise BenchmarkProcessError(f"the process that measures {self._job!r} ended with code {code}: {last}")
 
 
 def _work(job: str, settings: str) -> None:

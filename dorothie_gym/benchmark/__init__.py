@@ -23,7 +23,6 @@ from dorothie_gym.benchmark.prediction_reader import read_about, read_prediction
 from dorothie_gym.benchmark.predictions import (
     ActionPredictions,
     ActPredictions,
-    PredictionError,
     TaskPredictions,
     act_labels,
     action_labels,
@@ -40,6 +39,7 @@ from dorothie_gym.benchmark.trivial_baselines import (
     make_floor,
     predict_floor,
 )
+from dorothie_gym.errors import PredictionError
 
 __all__ = [
     "ActPredictions",

@@ -23,12 +23,12 @@ from dorothie_gym.benchmark.predictions import (
     joined_actions,
     joined_acts,
 )
+from dorothie_gym.errors import SessionError
 from dorothie_gym.recording import (
     Corpus,
     CorpusEntry,
     Fold,
     Session,
-    SessionError,
     Task,
     nfd_points,
     rfn_points,

@@ -17,12 +17,12 @@ from dorothie_gym.benchmark.predictions import (
     VERSION,
     ActionPredictions,
     ActPredictions,
-    PredictionError,
     Predictions,
     TaskPredictions,
     joined_actions,
     joined_acts,
 )
+from dorothie_gym.errors import PredictionError
 from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, DialogueMove
 from dorothie_gym.recording import Task
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.errors import PredictionError
 from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, DialogueMove, SlotValue
 from dorothie_gym.recording import DecisionPoint, InferencePoint, Task
 from dorothie_gym.recording.file_names import PART
@@ -131,10 +132,6 @@ VERSION: Final = 1
 
 ABOUT: Final = b"dorothie_gym.about"
 """Key of the file's metadata under which a JSON object may tell how the predictions were made."""
-
-
-class PredictionError(ValueError):
-    """Predictions that cannot be scored; the message names the file, the row or point, and what to do."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

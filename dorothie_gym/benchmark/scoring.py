@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from dorothie_gym.analysis import Handled
 from dorothie_gym.benchmark.labels import ALL, CorpusLabels, TaskLabels, Unscored
 from dorothie_gym.benchmark.metrics import confusion_matrix, metrics_of
-from dorothie_gym.benchmark.predictions import ActPredictions, PredictionError, Predictions, TaskPredictions
+from dorothie_gym.benchmark.predictions import ActPredictions, Predictions, TaskPredictions
+from dorothie_gym.errors import PredictionError
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, DialogueMove
 from dorothie_gym.recording import Task
 

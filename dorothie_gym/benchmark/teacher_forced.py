@@ -18,6 +18,7 @@ from dorothie_gym.benchmark.metrics import (
     SlotScorePaper,
 )
 from dorothie_gym.benchmark.predictions import ActionPredictions, ActPredictions, act_labels, action_labels
+from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import Town
 from dorothie_gym.recording import (
     Corpus,
@@ -27,7 +28,6 @@ from dorothie_gym.recording import (
     InferencePoint,
     Point,
     Session,
-    SessionError,
     Task,
     task_points,
 )

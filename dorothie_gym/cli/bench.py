@@ -140,7 +140,7 @@ def rl(
             from dorothie_gym.baselines.rl.measuring import measure
         except ImportError:
             fail("bench rl needs torch and stable-baselines3; pip install 'dorothie-gym[baselines]' brings them")
-        from dorothie_gym.baselines.rl.settings import SettingsError
+        from dorothie_gym.errors import SettingsError
 
         settings: dict[str, Any] = {"algorithm": algorithm, "environments": environments, "workers": workers}
         try:
@@ -183,7 +183,8 @@ def train(
             from dorothie_gym.baselines.bench import measure
         except ImportError as error:
             fail(f"{error.name} is not installed; run: pip install 'dorothie-gym[baselines]'")
-        from dorothie_gym.rollout import CacheError, default_corpus
+        from dorothie_gym.errors import CacheError
+        from dorothie_gym.rollout import default_corpus
 
         try:
             folder = corpus or default_corpus()

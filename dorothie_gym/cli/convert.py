@@ -105,8 +105,7 @@ def _convert_one(
     is_one: bool,
 ) -> dict[str, Any]:
     """Converts a session; returns what --json writes of it."""
-    from dorothie_gym.maps import TownError
-    from dorothie_gym.recording import SessionError
+    from dorothie_gym.errors import SessionError, TownError
     from dorothie_gym.recording.sdn import write_sdn
 
     path = entry.path.relative_to(corpus.root)

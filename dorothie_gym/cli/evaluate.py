@@ -54,7 +54,8 @@ def evaluate(
             fail("--save writes the predictions of a floor; give --model majority or --model random with it")
         check_file(save)
     with told_plainly():
-        from dorothie_gym.benchmark import PredictionError, evaluate_predictions, labels_of, read_about
+        from dorothie_gym.benchmark import evaluate_predictions, labels_of, read_about
+        from dorothie_gym.errors import PredictionError
         from dorothie_gym.recording import Corpus
 
         chosen, part = _tasks(tasks), _split(split)
@@ -134,7 +135,8 @@ def _check_floor(name: str) -> None:
 
 
 def _default_sessions() -> Path:
-    from dorothie_gym.rollout import CacheError, default_corpus
+    from dorothie_gym.errors import CacheError
+    from dorothie_gym.rollout import default_corpus
 
     try:
         return default_corpus()

@@ -31,7 +31,8 @@ def generate(
     The same bytes come out whatever the number of workers. When it is stopped, the same command goes on.
     """
     with told_plainly():
-        from dorothie_gym.rollout import ProcessError, generate_corpus
+        from dorothie_gym.errors import ProcessError
+        from dorothie_gym.rollout import generate_corpus
 
         config = env_config(max_seconds, word_errors)
         begun = time.perf_counter()

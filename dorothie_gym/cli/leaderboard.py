@@ -24,7 +24,7 @@ def leaderboard(
 ) -> None:
     """Rank policies by the results of their rollouts: a page with intervals, cost and commands, and a picture."""
     with told_plainly():
-        from dorothie_gym.rollout.closed_loop import RolloutError
+        from dorothie_gym.errors import RolloutError
         from dorothie_gym.rollout.closed_loop.leaderboard import draw_leaderboard, leaderboard_page, read_entries
 
         if out.suffix != ".md":

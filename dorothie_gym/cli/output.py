@@ -59,9 +59,7 @@ def print_json(value: Mapping[str, Any] | list[Any]) -> None:
 @contextmanager
 def told_plainly() -> Iterator[None]:
     """Turns the mistakes that a user can make into one message and exit code 2."""
-    from dorothie_gym.maps import TownError
-    from dorothie_gym.recording import SessionError
-    from dorothie_gym.tasks import StoryboardError
+    from dorothie_gym.errors import SessionError, StoryboardError, TownError
 
     try:
         yield

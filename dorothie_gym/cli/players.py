@@ -19,15 +19,16 @@ def find_cast(participant: str, co_wizard: str, ad_wizard: str) -> dict[Role, Pl
         co_wizard: likewise.
         ad_wizard: likewise.
     """
+    from dorothie_gym.errors import PolicyLoadError
     from dorothie_gym.ontology import AGENT_ROLES
-    from dorothie_gym.policies import CastError, find_player, policy_names
+    from dorothie_gym.policies import find_player, policy_names
 
     given = dict(zip(AGENT_ROLES, (participant, co_wizard, ad_wizard), strict=True))
     if any(name not in policy_names(role) for role, name in given.items()):
         import dorothie_gym.baselines  # noqa: F401  # what is learned there makes itself known
     try:
         cast = {role: find_player(name, role) for role, name in given.items()}
-    except CastError as error:
+    except PolicyLoadError as error:
         fail(str(error))
     for role, player in cast.items():
         if player.path is not None:

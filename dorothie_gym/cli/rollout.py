@@ -74,7 +74,7 @@ def rollout(
 
 
 def _play(settings: RolloutSettings, out: Path | None, workers: int, ray: str | None, *, quiet: bool) -> RolloutResult:
-    from dorothie_gym.rollout import ProcessError
+    from dorothie_gym.errors import ProcessError
     from dorothie_gym.rollout.closed_loop import roll_out
 
     folder = Path(tempfile.mkdtemp(prefix="dorothie_gym-rollout-")) if out is None else out

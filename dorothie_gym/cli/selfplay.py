@@ -29,11 +29,9 @@ def train_selfplay(
         ray: address of a cluster that steps the sessions, or None.
         as_json: whether to write one JSON object, and nothing else.
     """
-    from dorothie_gym.baselines.rl import SettingsError, WeightsError
     from dorothie_gym.baselines.selfplay.settings import selfplay_settings
     from dorothie_gym.baselines.selfplay.training import SelfPlay
-    from dorothie_gym.recording import SessionError
-    from dorothie_gym.rollout import ProcessError
+    from dorothie_gym.errors import ModelFileError, ProcessError, SessionError, SettingsError
 
     with told_plainly():
         try:
@@ -42,7 +40,7 @@ def train_selfplay(
                 settings = replace(settings, workers=processes(settings.environments))
             with training_progress(settings.steps, out, _line, quiet=as_json) as (watch, tell):
                 run = SelfPlay(settings, out, watch, ray, tell).go()
-        except (SettingsError, WeightsError, SessionError) as error:
+        except (SettingsError, ModelFileError, SessionError) as error:
             fail(str(error))
         except ProcessError as error:
             fail(str(error), FAILED)

@@ -153,7 +153,8 @@ def _places(corpus: Path | None, out: Path | None) -> tuple[Path, Path]:
     """The corpus, and the folder of its trainings, which is made."""
     folder = corpus
     if folder is None:
-        from dorothie_gym.rollout import CacheError, default_corpus
+        from dorothie_gym.errors import CacheError
+        from dorothie_gym.rollout import default_corpus
 
         try:
             folder = default_corpus()
@@ -178,10 +179,7 @@ def _told_plainly() -> Iterator[None]:
         import torch  # noqa: F401
     except ImportError:
         fail("training needs torch; run: pip install 'dorothie-gym[baselines]'")
-    from dorothie_gym.baselines.encoders import EncoderError
-    from dorothie_gym.baselines.training import CheckpointError
-    from dorothie_gym.benchmark import PredictionError
-    from dorothie_gym.rollout import ProcessError
+    from dorothie_gym.errors import CheckpointError, EncoderError, PredictionError, ProcessError
 
     with told_plainly():
         try:

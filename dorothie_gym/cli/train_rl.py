@@ -68,11 +68,11 @@ def train_rl(
         "warm_start": None if warm_start is None else str(warm_start),
     }  # fmt: skip
     try:
-        from dorothie_gym.baselines.rl import SettingsError, Training, WeightsError, tuned_settings
+        from dorothie_gym.baselines.rl import Training, tuned_settings
+        from dorothie_gym.errors import ModelFileError, SettingsError
     except ImportError:
         fail(NEEDS)
-    from dorothie_gym.recording import SessionError
-    from dorothie_gym.rollout import ProcessError
+    from dorothie_gym.errors import ProcessError, SessionError
 
     if algorithm == "selfplay":
         from dorothie_gym.cli.selfplay import train_selfplay
@@ -88,7 +88,7 @@ def train_rl(
                 settings = replace(settings, workers=processes(settings.environments))
             with training_progress(settings.steps, out, _line, quiet=as_json) as (watch, tell):
                 run = Training(settings, out, watch, ray, tell).go()
-        except (SettingsError, WeightsError, SessionError) as error:
+        except (SettingsError, ModelFileError, SessionError) as error:
             fail(str(error))
         except ProcessError as error:
             fail(str(error), FAILED)

@@ -12,13 +12,14 @@ from dorothie_gym.dialogue.conversation import (
 from dorothie_gym.dialogue.dialogue_act_classifier import act_of, guess_act, guess_spans
 from dorothie_gym.dialogue.directions import RouteTurn
 from dorothie_gym.dialogue.exchanges import EXPECTATIONS, PATIENCE, Exchange, ExchangeState, ExchangeTracker
-from dorothie_gym.dialogue.lexicon import Lexicon, LexiconError, load_lexicon
+from dorothie_gym.dialogue.lexicon import Lexicon, load_lexicon
 from dorothie_gym.dialogue.nlg import MAX_CHARACTERS, word_act, word_acts
 from dorothie_gym.dialogue.nlu import ParsedText, understand
 from dorothie_gym.dialogue.phrases import Register
 from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext
 from dorothie_gym.dialogue.speaker_style import SpeakerStyle, draw_style
 from dorothie_gym.dialogue.transactions import Annotator
+from dorothie_gym.errors import PhraseFileError
 
 __all__ = [
     "EXPECTATIONS",
@@ -35,7 +36,7 @@ __all__ = [
     "ExchangeTracker",
     "ParsedText",
     "Lexicon",
-    "LexiconError",
+    "PhraseFileError",
     "Recogniser",
     "Register",
     "Span",

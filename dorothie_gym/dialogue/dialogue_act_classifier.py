@@ -10,15 +10,15 @@ from typing import Any
 
 from dorothie_gym.dialogue.conversation import Span
 from dorothie_gym.dialogue.directions import word_lists
-from dorothie_gym.dialogue.lexicon import LexiconError, read_data, strings
+from dorothie_gym.dialogue.lexicon import read_data, strings
 from dorothie_gym.dialogue.nlu import ParsedText, understand
+from dorothie_gym.errors import OntologyError, PhraseFileError
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueAct,
     DialogueMove,
     GoalStatus,
     ObjectClass,
-    OntologyError,
     Slot,
     SlotValue,
     parse_move,
@@ -330,7 +330,7 @@ def _rule(where: str, rule: Mapping[str, Any], terms: Mapping[str, str]) -> Move
         acted = _either([text[1:] for text in texts if text.startswith("@")])
         masked = _either([text for text in texts if text[0] not in "@%"])
     except (re.error, OntologyError) as error:
-        raise LexiconError(f"{where}: {error}") from error
+        raise PhraseFileError(f"{where}: {error}") from error
     words = frozenset(strings(f"{where}.words", rule.get("words", [])))
     return MoveRule(move, masked, acted, _DOMAIN_RULE in texts, words)
 

@@ -7,9 +7,10 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dorothie_gym.dialogue.lexicon import LexiconError, read_data, strings
+from dorothie_gym.dialogue.lexicon import read_data, strings
 from dorothie_gym.dialogue.numerals import read_ordinal
 from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.errors import PhraseFileError
 
 _BACK = re.compile(
     r"\bu turn|\b(go|going|head|heading) back\b|\b(turn|turning|come|coming) (back|a?round)\b|\bthe other way\b"
@@ -55,14 +56,14 @@ class WordLists:
 
 @functools.cache
 def word_lists() -> WordLists:
-    """Returns the cached word lists; raises LexiconError if a list is missing or malformed."""
+    """Returns the cached word lists; raises PhraseFileError if a list is missing or malformed."""
     data = read_data("cues.yaml")
     lists = {
         **data.get("directions", {}),
         **{name: data.get(name) for name in ("ordinal_nouns", "dropping", "affirming", "denying", "vocatives")},
     }
     if lists.keys() != WordLists.__dataclass_fields__.keys():
-        raise LexiconError(
+        raise PhraseFileError(
             f"cues.yaml: needs the word lists {sorted(WordLists.__dataclass_fields__)}, has {sorted(lists)}"
         )
     return WordLists(**{name: frozenset(strings(f"cues.yaml: {name}", words)) for name, words in lists.items()})

@@ -7,7 +7,6 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from dorothie_gym.dialogue.lexicon import LexiconError
 from dorothie_gym.dialogue.phrases import (
     WEIGHT,
     Alternative,
@@ -18,11 +17,11 @@ from dorothie_gym.dialogue.phrases import (
     split_alternatives,
 )
 from dorothie_gym.dialogue.talk_files import TalkSection, alternatives_of, parse_talk_files, read_talk_files
+from dorothie_gym.errors import OntologyError, PhraseFileError
 from dorothie_gym.ontology import (
     SLOT_VALUES,
     ActionValue,
     DialogueMove,
-    OntologyError,
     Role,
     Slot,
     SlotValue,
@@ -123,7 +122,7 @@ def load_grammar() -> Grammar:
     """Returns the cached grammar of the package.
 
     Raises:
-        LexiconError: if the files refer to undefined names, or if a move of a speaker or an action has no words.
+        PhraseFileError: if the files refer to undefined names, or if a move of a speaker or an action has no words.
     """
     return parse_grammar(read_talk_files())
 
@@ -132,7 +131,7 @@ def parse_grammar(texts: dict[str, str]) -> Grammar:
     """Builds the grammar from the texts of talk files, by file name.
 
     Raises:
-        LexiconError: as `load_grammar`.
+        PhraseFileError: as `load_grammar`.
     """
     builder = _Builder(texts)
     return builder.build()
@@ -158,7 +157,9 @@ class _Builder:
             try:
                 self._take(section)
             except (OntologyError, ValueError) as error:
-                raise error if isinstance(error, LexiconError) else LexiconError(f"{section.where}: {error}") from error
+                raise (
+                    error if isinstance(error, PhraseFileError) else PhraseFileError(f"{section.where}: {error}")
+                ) from error
         self._check()
         templates = {move: tuple(self.templates[move]) for move in DialogueMove}
         return Grammar(templates, dict(self.actions), dict(self.tails), self.markers, self.joints, self.fillers)
@@ -169,7 +170,7 @@ class _Builder:
             action = _ACTIONS.get(words[0] if words else "")
             if action is None:
                 head = " ".join(section.words)
-                raise LexiconError(f"{section.where}: `{head}` names no action; they are {sorted(_ACTIONS)}")
+                raise PhraseFileError(f"{section.where}: `{head}` names no action; they are {sorted(_ACTIONS)}")
             self.actions[action][kind, words[1] if len(words) > 1 else "plain"] = self._phrase(section)
         elif kind == "tail":
             slot, move = parse_slot(words[0]), parse_move(words[1]) if len(words) > 1 else None
@@ -208,14 +209,14 @@ class _Builder:
             for voice in VOICES:
                 # Fallback template without slots, topic and details; it guarantees words for every act.
                 if not any(_is_plain(item) and item.speaker in (None, voice) for item in self.templates[move]):
-                    raise LexiconError(f"data/talk: {move.label} has no template without slots for {voice.value}")
+                    raise PhraseFileError(f"data/talk: {move.label} has no template without slots for {voice.value}")
         for action in ActionValue:
             for form in ("do", "doing"):
                 if (form, "plain") not in self.actions[action]:
-                    raise LexiconError(f"data/talk: there is no section `== {form} {action.label}`")
+                    raise PhraseFileError(f"data/talk: there is no section `== {form} {action.label}`")
         for slot in SPOKEN_SLOTS:
             if None not in self.tails[slot]:
-                raise LexiconError(f"data/talk: there is no section `== tail {slot.label}`")
+                raise PhraseFileError(f"data/talk: there is no section `== tail {slot.label}`")
 
 
 def _split_close(text: str) -> tuple[str, str]:
@@ -236,10 +237,10 @@ def _fields(where: str, phrase: Phrase) -> tuple[frozenset[Slot], frozenset[str]
     needs = phrase.maybe & CONTEXT_FIELDS
     unknown = phrase.maybe - needs - SLOT_FIELDS.keys()
     if unknown:
-        raise LexiconError(f"{where}: unknown gaps {sorted(unknown)}")
+        raise PhraseFileError(f"{where}: unknown gaps {sorted(unknown)}")
     covers = frozenset(SLOT_FIELDS[name] for name in phrase.gaps - needs)
     if covers != frozenset(SLOT_FIELDS[name] for name in phrase.maybe - needs):
-        raise LexiconError(f"{where}: a slot is filled in some alternatives only; write them as lines of their own")
+        raise PhraseFileError(f"{where}: a slot is filled in some alternatives only; write them as lines of their own")
     return covers, needs
 
 
@@ -248,5 +249,5 @@ def _labels(where: str, slot: Slot, wanted: str) -> frozenset[str]:
     known = {value.label for value in values}
     labels = frozenset(known - _NAMELESS if wanted == "named" else wanted.split(","))
     if not labels <= known:
-        raise LexiconError(f"{where}: {slot.label} has no values {sorted(labels - known)}")
+        raise PhraseFileError(f"{where}: {slot.label} has no values {sorted(labels - known)}")
     return labels

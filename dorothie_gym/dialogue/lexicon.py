@@ -11,15 +11,12 @@ from typing import Any
 
 import yaml
 
+from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology import SLOT_VALUES, ActionValue, Slot, SlotValue
 
 _FORMS = frozenset({"say", "also", "again", "here", "the", "order", "tail", "hear"})
 _HEARD_FORMS = ("say", "also", "the", "tail", "hear")
 _ARTICLES = frozenset({"a", "an", "the", "some"})
-
-
-class LexiconError(ValueError):
-    """Malformed data file of the dialogue package."""
 
 
 @dataclass(frozen=True)
@@ -84,15 +81,15 @@ def read_data(name: str) -> dict[str, Any]:
     """Returns the mapping of a data file of this package.
 
     Raises:
-        LexiconError: if the file is not a YAML mapping.
+        PhraseFileError: if the file is not a YAML mapping.
     """
     text = resources.files(__package__).joinpath("data", name).read_text(encoding="utf-8")
     try:
         data = yaml.safe_load(text)
     except yaml.YAMLError as error:
-        raise LexiconError(f"{name}: not readable as YAML: {error}") from error
+        raise PhraseFileError(f"{name}: not readable as YAML: {error}") from error
     if not isinstance(data, dict):
-        raise LexiconError(f"{name}: the top level must be a mapping")
+        raise PhraseFileError(f"{name}: the top level must be a mapping")
     return data
 
 
@@ -100,10 +97,11 @@ def strings(where: str, value: object) -> tuple[str, ...]:
     """Returns a list of strings as a tuple.
 
     Raises:
-        LexiconError: if `value` is no list of strings (an unquoted `yes` or `on` is a boolean in YAML); names `where`.
+        PhraseFileError: if `value` is no list of strings (an unquoted `yes` or `on` is a boolean in YAML); names
+            `where`.
     """
     if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-        raise LexiconError(f"{where}: expected a list of strings, got {value!r}; quote words such as 'yes' and 'on'")
+        raise PhraseFileError(f"{where}: expected a list of strings, got {value!r}; quote words such as 'yes' and 'on'")
     return tuple(value)
 
 
@@ -112,7 +110,7 @@ def load_lexicon() -> Lexicon:
     """Returns the cached lexicon of the package.
 
     Raises:
-        LexiconError: if a value of the ontology is missing, or if a phrase stands for two values.
+        PhraseFileError: if a value of the ontology is missing, or if a phrase stands for two values.
     """
     return parse_lexicon(read_data("lexicon.yaml"))
 
@@ -121,7 +119,7 @@ def parse_lexicon(data: Mapping[str, Any]) -> Lexicon:
     """Builds the lexicon from the data of a lexicon file.
 
     Raises:
-        LexiconError: as `load_lexicon`.
+        PhraseFileError: as `load_lexicon`.
     """
     phrases: dict[SlotValue, Mapping[str, tuple[str, ...]]] = {}
     for slot in (Slot.LANDMARK, Slot.STREET, Slot.OBJECT, Slot.STATUS):
@@ -153,26 +151,26 @@ def bare_name(words: Sequence[str]) -> tuple[str, ...]:
 def _entry(data: Mapping[str, Any], slot: str, label: str) -> dict[str, Any]:
     entry = data.get(slot, {}).get(label)
     if not isinstance(entry, dict):
-        raise LexiconError(f"lexicon.yaml: {slot}.{label} is missing")
+        raise PhraseFileError(f"lexicon.yaml: {slot}.{label} is missing")
     return entry
 
 
 def _forms(value: SlotValue, entry: Mapping[str, Any]) -> Mapping[str, tuple[str, ...]]:
     where = f"lexicon.yaml: {value.slot.label}.{value.label}"
     if not set(entry) <= _FORMS or not entry.get("say"):
-        raise LexiconError(f"{where}: needs `say` and may have {sorted(_FORMS)}, got {sorted(entry)}")
+        raise PhraseFileError(f"{where}: needs `say` and may have {sorted(_FORMS)}, got {sorted(entry)}")
     return {form: strings(f"{where}.{form}", listed) for form, listed in entry.items()}
 
 
 def _action_cues(label: str, entry: Mapping[str, Any]) -> ActionCues:
     where = f"lexicon.yaml: Action.{label}"
     if set(entry) != {"stems", "hear"}:
-        raise LexiconError(f"{where}: needs `stems` and `hear`, has {sorted(entry)}")
+        raise PhraseFileError(f"{where}: needs `stems` and `hear`, has {sorted(entry)}")
     listed = strings(f"{where}.hear", entry["hear"])
     try:
         pattern = re.compile(rf"(?<!\S)(?:{'|'.join(f'(?:{text})' for text in listed)})(?!\S)")
     except re.error as error:
-        raise LexiconError(f"{where}.hear: {error}") from error
+        raise PhraseFileError(f"{where}.hear: {error}") from error
     return ActionCues(frozenset(stem[:4] for stem in strings(f"{where}.stems", entry["stems"])), pattern)
 
 
@@ -182,5 +180,5 @@ def _names(phrases: Mapping[SlotValue, Mapping[str, tuple[str, ...]]]) -> dict[t
         for phrase in [phrase for form in _HEARD_FORMS for phrase in forms.get(form, ())]:
             name = bare_name(split_words(phrase))
             if names.setdefault(name, value) != value:
-                raise LexiconError(f"lexicon.yaml: {phrase!r} stands for {names[name].label} and for {value.label}")
+                raise PhraseFileError(f"lexicon.yaml: {phrase!r} stands for {names[name].label} and for {value.label}")
     return names

@@ -10,9 +10,10 @@ from typing import TypeVar
 
 from dorothie_gym.dialogue.directions import RouteTurn, WordLists, find_ordinal, find_turns, mask_directions, word_lists
 from dorothie_gym.dialogue.entity_recognition import Mention, find_names
-from dorothie_gym.dialogue.lexicon import LexiconError, load_lexicon, read_data, split_words, strings
+from dorothie_gym.dialogue.lexicon import load_lexicon, read_data, split_words, strings
 from dorothie_gym.dialogue.numerals import NUMBER_WORDS, read_cardinals
 from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology import (
     SLOT_VALUES,
     ActionValue,
@@ -283,7 +284,7 @@ def _question_patterns() -> tuple[tuple[SlotValue, re.Pattern[str]], ...]:
         try:
             patterns.append((queried, re.compile(pattern)))
         except re.error as error:
-            raise LexiconError(f"cues.yaml: asked.{name}: {error}") from error
+            raise PhraseFileError(f"cues.yaml: asked.{name}: {error}") from error
     return tuple(patterns)
 
 

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from dorothie_gym.dialogue.lexicon import LexiconError
+from dorothie_gym.errors import PhraseFileError
 
 _TOKEN = re.compile(r"[()\[\]|]|<\w+>|{\w+}|[^()\[\]|<>{}]+|[<>{}]")
 WEIGHT = re.compile(r"\s\*(\d+)\s*$")
@@ -118,7 +118,7 @@ def parse_phrase(where: str, text: str, phrases: Mapping[str, Phrase]) -> Phrase
         phrases: named phrases that the text may use.
 
     Raises:
-        LexiconError: if the text is malformed or uses an undefined phrase; names `where`.
+        PhraseFileError: if the text is malformed or uses an undefined phrase; names `where`.
     """
     reader = _PhraseParser(where, text, phrases)
     phrase = reader.sequence()
@@ -278,8 +278,8 @@ class _PhraseParser:
     def _peek(self) -> str | None:
         return self._tokens[self._place] if self._place < len(self._tokens) else None
 
-    def _error(self, reason: str) -> LexiconError:
-        return LexiconError(f"{self._where}: {reason} in {self._text!r}")
+    def _error(self, reason: str) -> PhraseFileError:
+        return PhraseFileError(f"{self._where}: {reason} in {self._text!r}")
 
 
 def _gap(name: str) -> Phrase:

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dorothie_gym.dialogue.lexicon import LexiconError, read_data, strings
+from dorothie_gym.dialogue.lexicon import read_data, strings
 from dorothie_gym.dialogue.phrases import Register
+from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology import Role, parse_role
 
 _SHARES = ("chattiness", "indirectness", "anaphora", "disfluency", "repairs", "habit", "addressing")
@@ -117,14 +118,14 @@ def _spreads() -> Mapping[Role, _StyleSpread]:
 def _spread(role: str, entry: Mapping[str, object]) -> _StyleSpread:
     wanted = {"registers", "addresses", "proper", *_SHARES}
     if set(entry) != wanted:
-        raise LexiconError(f"styles.yaml: {role} needs exactly {sorted(wanted)}, has {sorted(entry)}")
+        raise PhraseFileError(f"styles.yaml: {role} needs exactly {sorted(wanted)}, has {sorted(entry)}")
     shares = entry["registers"]
     if not isinstance(shares, dict) or not set(shares) <= {register.name.lower() for register in Register}:
-        raise LexiconError(f"styles.yaml: {role}.registers gives shares of {[r.name.lower() for r in Register]}")
+        raise PhraseFileError(f"styles.yaml: {role}.registers gives shares of {[r.name.lower() for r in Register]}")
     ranges = {name: _range(f"{role}.{name}", entry[name]) for name in _SHARES}
     proper = entry["proper"]
     if not isinstance(proper, int | float):
-        raise LexiconError(f"styles.yaml: {role}.proper is a share, not {proper!r}")
+        raise PhraseFileError(f"styles.yaml: {role}.proper is a share, not {proper!r}")
     return _StyleSpread(
         {Register[name.upper()]: float(share) for name, share in shares.items()},
         ranges,
@@ -138,4 +139,4 @@ def _range(where: str, value: object) -> tuple[float, float]:
         low, high = map(float, value)
         if 0 <= low <= high <= 1:
             return low, high
-    raise LexiconError(f"styles.yaml: {where} is a range [low, high] within 0 to 1, not {value!r}")
+    raise PhraseFileError(f"styles.yaml: {where} is a range [low, high] within 0 to 1, not {value!r}")

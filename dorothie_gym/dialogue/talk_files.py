@@ -12,8 +12,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib import resources
 
-from dorothie_gym.dialogue.lexicon import LexiconError
 from dorothie_gym.dialogue.phrases import Alternative, Phrase, choice, parse_alternatives
+from dorothie_gym.errors import PhraseFileError
 
 _DEFINITION = re.compile(r"<(\w+)>\s*=\s*(.*)")
 
@@ -72,7 +72,7 @@ def parse_talk_files(texts: dict[str, str]) -> TalkFiles:
     """Parses talk files; a phrase must be defined before its first use, in the same file or an earlier one.
 
     Raises:
-        LexiconError: if a line is malformed; names file and line.
+        PhraseFileError: if a line is malformed; names file and line.
     """
     phrases: dict[str, Phrase] = {}
     sections: list[TalkSection] = []
@@ -87,7 +87,7 @@ def parse_talk_files(texts: dict[str, str]) -> TalkFiles:
                 sections += _closed(head, lines)
                 head, lines = _head(line), []
             elif head is None:
-                raise LexiconError(f"{line.where}: {line.text!r} precedes the first section (== ...)")
+                raise PhraseFileError(f"{line.where}: {line.text!r} precedes the first section (== ...)")
             else:
                 lines.append(line)
         sections += _closed(head, lines)
@@ -107,7 +107,7 @@ def _logical_lines(name: str, text: str) -> Iterator[TalkLine]:
             continue
         if line.startswith("|"):
             if pending is None:
-                raise LexiconError(f"{name}:{number}: there is no line to continue: {line!r}")
+                raise PhraseFileError(f"{name}:{number}: there is no line to continue: {line!r}")
             pending = TalkLine(pending.where, f"{pending.text} {line}")
             continue
         if pending is not None:
@@ -119,14 +119,14 @@ def _logical_lines(name: str, text: str) -> Iterator[TalkLine]:
 
 def _define(where: str, name: str, text: str, phrases: dict[str, Phrase]) -> None:
     if name in phrases:
-        raise LexiconError(f"{where}: the phrase <{name}> is defined twice")
+        raise PhraseFileError(f"{where}: the phrase <{name}> is defined twice")
     phrases[name] = choice(name, parse_alternatives(where, text, phrases))
 
 
 def _head(line: TalkLine) -> TalkSection:
     words = line.text.removeprefix("==").split()
     if not words:
-        raise LexiconError(f"{line.where}: a section needs a head, e.g. == Instruct participant")
+        raise PhraseFileError(f"{line.where}: a section needs a head, e.g. == Instruct participant")
     keys = dict(word.split("=", 1) for word in words if "=" in word)
     return TalkSection(line.where, tuple(word for word in words if "=" not in word), keys, ())
 
@@ -135,5 +135,5 @@ def _closed(head: TalkSection | None, lines: Sequence[TalkLine]) -> list[TalkSec
     if head is None:
         return []
     if not lines:
-        raise LexiconError(f"{head.where}: the section has no lines")
+        raise PhraseFileError(f"{head.where}: the section has no lines")
     return [TalkSection(head.where, head.words, head.keys, tuple(lines))]

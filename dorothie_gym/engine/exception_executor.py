@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from dorothie_gym.errors import StoryboardError
 from dorothie_gym.maps.model import Array, LinkType
 from dorothie_gym.ontology import ExceptionKind, GoalStatus, PropKind
 from dorothie_gym.sim.bodies import Prop
@@ -16,7 +17,7 @@ from dorothie_gym.sim.ego.obstacles import BRAKING
 from dorothie_gym.sim.roadblocks import crowds, cuts_off
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import AdWizardAction
-from dorothie_gym.tasks import StoryboardError, TaskState
+from dorothie_gym.tasks import TaskState
 
 FROM_START = 30.0
 """A prop stands at least this far behind the start of its lane [m], so that the car can turn round before it."""

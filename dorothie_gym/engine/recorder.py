@@ -12,9 +12,10 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import LightColour, LightProgramme, Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.recording import ACTOR_DTYPE, ActorKind, Decision, SessionError, SessionWriter
+from dorothie_gym.recording import ACTOR_DTYPE, ActorKind, Decision, SessionWriter
 from dorothie_gym.sim.bodies import Pedestrian
 from dorothie_gym.sim.state.records import Kind, Walk, plain
 from dorothie_gym.sim.world import World

@@ -1,7 +1,7 @@
 """Towns to drive in: the model, towns that are shipped or read from files, and a town in figures."""
 
+from dorothie_gym.errors import TownError
 from dorothie_gym.maps.catalogue import SEEN_TOWNS, UNSEEN_TOWNS, describe, fold_of, load_town, town_names
-from dorothie_gym.maps.errors import TownError
 from dorothie_gym.maps.model import (
     NO_JUNCTION,
     NO_STREET,

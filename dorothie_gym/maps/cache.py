@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from dorothie_gym.errors import TownArchiveError
 from dorothie_gym.maps.model import (
     Array,
     Crosswalk,
@@ -59,10 +60,6 @@ _DIGEST_LENGTH = 64  # hexadecimal digits of SHA-256
 _Column = list[Any] | dict[str, list[list[int]]]
 
 
-class ArchiveError(ValueError):
-    """Bytes are not the archive of a town that was asked for: damaged, of another format, or of another town."""
-
-
 def pack(town: Town, key: str) -> bytes:
     """A town as the bytes of an `.npz` file.
 
@@ -93,19 +90,19 @@ def unpack(data: bytes, key: str) -> Town:
     """The town that `pack` wrote under a key; nothing is parsed before the checksum is found to be right.
 
     Raises:
-        ArchiveError: the bytes are damaged, or another format, or filed under another key.
+        TownArchiveError: the bytes are damaged, or another format, or filed under another key.
     """
     body = memoryview(data)[:-_DIGEST_LENGTH]
     if hashlib.sha256(body).hexdigest().encode() != data[-_DIGEST_LENGTH:]:
-        raise ArchiveError("its checksum is wrong")
+        raise TownArchiveError("its checksum is wrong")
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
             document = json.loads(archive["document"].tobytes())
             floats: Array = archive["floats"]
         if (document["format"], document["key"]) != (FORMAT, key):
-            raise ArchiveError("it is of another format or another town")
+            raise TownArchiveError("it is of another format or another town")
         return _town(document, floats)
-    except ArchiveError:
+    except TownArchiveError:
         raise
     except (
         ValueError,
@@ -117,7 +114,7 @@ def unpack(data: bytes, key: str) -> Town:
         zipfile.BadZipFile,
         zlib.error,
     ) as error:
-        raise ArchiveError(f"it holds no town: {error}") from error
+        raise TownArchiveError(f"it holds no town: {error}") from error
 
 
 def _column(values: list[Any], arrays: list[Array]) -> _Column:
@@ -145,7 +142,7 @@ def _town(document: dict[str, Any], floats: Array) -> Town:
         rows = zip(*columns.values(), strict=True)
         parts[part] = [kind(**dict(zip(columns, row, strict=True))) for row in rows]
     if not numbers.at_end:
-        raise ArchiveError("it holds more numbers than its town has")
+        raise TownArchiveError("it holds more numbers than its town has")
     return Town(name=document["name"], **parts)
 
 
@@ -283,7 +280,7 @@ def _recall(folder: Path, key: str) -> Town | None:
         return unpack(entry.read_bytes(), key)
     except FileNotFoundError:
         return None
-    except (OSError, ArchiveError) as error:
+    except (OSError, TownArchiveError) as error:
         _log.debug("the cached town %s is of no use and is read anew: %s", entry, error)
         return None
 

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from dorothie_gym.errors import TownError
 from dorothie_gym.maps.cache import through_cache
-from dorothie_gym.maps.errors import TownError
 from dorothie_gym.maps.model import LaneLink, SignalKind, Town
 
 SEEN_TOWNS: tuple[str, ...] = ("midtown", "millbrook", "northgate")

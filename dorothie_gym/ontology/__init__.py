@@ -3,6 +3,7 @@
 Depends on the standard library only; all other packages depend on this one.
 """
 
+from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology.actions import (
     ADAPTIVE_ACTIONS,
     EPISTEMIC_ACTIONS,
@@ -76,9 +77,6 @@ from dorothie_gym.ontology.spellings import (
     parse_slot_value,
     parse_street,
     parse_weather_parameter,
-)
-from dorothie_gym.ontology.vocabulary import (
-    OntologyError,
 )
 from dorothie_gym.ontology.world_exceptions import (
     ExceptionKind,

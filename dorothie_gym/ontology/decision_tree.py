@@ -13,8 +13,9 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import TypeAlias
 
+from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
-from dorothie_gym.ontology.vocabulary import OntologyError
+from dorothie_gym.ontology.vocabulary import unknown_spelling
 
 
 class MoveGroup(StrEnum):
@@ -80,7 +81,7 @@ class Question:
         for answer in self.answers:
             if answer.label == label:
                 return answer.next
-        raise OntologyError.unknown(label, f"answer to {self.text!r}", [answer.label for answer in self.answers])
+        raise unknown_spelling(label, f"answer to {self.text!r}", [answer.label for answer in self.answers])
 
 
 Node: TypeAlias = Question | DialogueMove

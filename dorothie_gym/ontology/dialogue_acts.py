@@ -10,8 +10,9 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Self
 
+from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology.slots import SLOT_VALUES, Slot, SlotValue
-from dorothie_gym.ontology.vocabulary import LabelledInt, OntologyError
+from dorothie_gym.ontology.vocabulary import LabelledInt
 
 
 class DialogueMove(LabelledInt):

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Protocol, TypeVar
 
+from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
@@ -21,7 +22,7 @@ from dorothie_gym.ontology.slots import (
     SlotValue,
     StreetName,
 )
-from dorothie_gym.ontology.vocabulary import OntologyError, Vocabulary, normalise
+from dorothie_gym.ontology.vocabulary import Vocabulary, normalise
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
 
 

@@ -10,23 +10,10 @@ from enum import IntEnum
 from types import MappingProxyType
 from typing import Generic, Self, TypeVar
 
+from dorothie_gym.errors import OntologyError
+
 LONGEST = 80
 """Longest prefix of an unknown text that is compared and shown [characters]; files may contain any text."""
-
-
-class OntologyError(ValueError):
-    """Text, number or combination that the closed vocabularies do not contain."""
-
-    @classmethod
-    def unknown(cls, text: object, vocabulary: str, known: Iterable[str]) -> OntologyError:
-        """Returns the error for `text` with the name of the vocabulary and the nearest `known` spelling."""
-        spellings = tuple(known)
-        if not isinstance(text, str):
-            return cls(f"{vocabulary}: expected a text, got {_shown(repr(text))} of type {type(text).__name__}")
-        # cutoff 0: even a distant spelling shows the format of this vocabulary.
-        nearest = _nearest(text[:LONGEST].lower(), spellings)
-        hint = f"; the nearest known spelling is {nearest!r}" if nearest is not None else ""
-        return cls(f"{vocabulary}: {_shown(repr(text))} is unknown{hint}")
 
 
 @functools.lru_cache(maxsize=1024)
@@ -39,6 +26,17 @@ def _nearest(text: str, spellings: tuple[str, ...]) -> str | None:
 
 def _shown(text: str) -> str:
     return text if len(text) <= LONGEST + 2 else f"{text[:LONGEST]}..."
+
+
+def unknown_spelling(text: object, vocabulary: str, known: Iterable[str]) -> OntologyError:
+    """Returns the error for `text`, naming the vocabulary and the nearest of the `known` spellings."""
+    spellings = tuple(known)
+    if not isinstance(text, str):
+        return OntologyError(f"{vocabulary}: expected a text, got {_shown(repr(text))} of type {type(text).__name__}")
+    # cutoff 0: a far guess still shows the reader what the spellings of this vocabulary look like.
+    nearest = _nearest(text[:LONGEST].lower(), spellings)
+    hint = f"; the nearest known spelling is {nearest!r}" if nearest is not None else ""
+    return OntologyError(f"{vocabulary}: {_shown(repr(text))} is unknown{hint}")
 
 
 class LabelledInt(IntEnum):
@@ -109,4 +107,4 @@ class Vocabulary(Generic[Member_co]):
             member = self._members.get(normalise(text))
             if member is not None:
                 return member
-        raise OntologyError.unknown(text, self.name, self._written.values())
+        raise unknown_spelling(text, self.name, self._written.values())

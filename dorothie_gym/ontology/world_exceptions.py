@@ -6,7 +6,8 @@ import math
 from enum import StrEnum
 from typing import Self
 
-from dorothie_gym.ontology.vocabulary import LabelledInt, OntologyError
+from dorothie_gym.errors import OntologyError
+from dorothie_gym.ontology.vocabulary import LabelledInt
 
 
 class ExceptionKind(LabelledInt):

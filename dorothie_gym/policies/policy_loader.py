@@ -10,6 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, TypeAlias
 
+from dorothie_gym.errors import PolicyLoadError
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
 from dorothie_gym.policies.co_wizard import ScriptedCoWizard
@@ -66,10 +67,6 @@ DESCRIPTION: Final = "model.json"
 _COSTS: Final = ("steps", "seconds")
 
 _LOADERS: Final[dict[str, Loader]] = {}
-
-
-class CastError(ValueError):
-    """A player cannot be had; the message tells why and what to give."""
 
 
 def register_loader(kind: str, loader: Loader) -> None:
@@ -135,13 +132,13 @@ def find_player(given: str, role: Role) -> Player:
         role: whom it is to play.
 
     Raises:
-        CastError: there is no such policy for the role, no such file, or none that can be played.
+        PolicyLoadError: there is no such policy for the role, no such file, or none that can be played.
     """
     if given in policy_names(role):
         return Player(name=given)
     path = Path(given)
     if not path.exists():
-        raise CastError(
+        raise PolicyLoadError(
             f"{role}: there is no policy {given!r}, nor a file of that name; "
             f"the policies are {', '.join(policy_names(role))}"
         )
@@ -150,7 +147,9 @@ def find_player(given: str, role: Role) -> Player:
     loader = next((_LOADERS[kind] for kind in kinds if kind in _LOADERS), None)
     if loader is None:
         known = ", ".join(loadable_kinds()) or "none: is dorothie-gym[baselines] installed?"
-        raise CastError(f"{role}: {given} is of the kind {' or '.join(kinds)}, which cannot be played (known: {known})")
+        raise PolicyLoadError(
+            f"{role}: {given} is of the kind {' or '.join(kinds)}, which cannot be played (known: {known})"
+        )
     training = {name: value for name in _COSTS if isinstance(value := description.get(name), int | float)}
     return Player(name=given, path=path, loader=loader, sha256=_sha256(path), training=training)
 
@@ -163,7 +162,7 @@ def _description(path: Path) -> Mapping[str, Any]:
     try:
         page = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise CastError(f"{file}: cannot be read ({error}); give the file of a policy") from None
+        raise PolicyLoadError(f"{file}: cannot be read ({error}); give the file of a policy") from None
     return page if isinstance(page, dict) else {}
 
 

@@ -1,5 +1,6 @@
 """Sessions: what happened, written as it happens, read by everything else."""
 
+from dorothie_gym.errors import SessionError
 from dorothie_gym.recording.action_log import Decision
 from dorothie_gym.recording.comparison import Difference, first_difference
 from dorothie_gym.recording.corpus import (
@@ -11,7 +12,6 @@ from dorothie_gym.recording.corpus import (
     split_by_name,
     write_manifest,
 )
-from dorothie_gym.recording.errors import SessionError
 from dorothie_gym.recording.events import (
     INFRACTIONS,
     ActionRecord,

@@ -9,8 +9,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Final, Self
 
-from dorothie_gym.ontology import ExceptionKind, OntologyError, parse_exception
-from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.errors import OntologyError, SessionError
+from dorothie_gym.ontology import ExceptionKind, parse_exception
 from dorothie_gym.recording.events import Event, EventType, decode_event
 from dorothie_gym.recording.export import export_tables
 from dorothie_gym.recording.file_names import EVENTS_FILE

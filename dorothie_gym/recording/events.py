@@ -7,16 +7,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from dorothie_gym.ontology import (
-    DialogueAct,
-    ObjectClass,
-    OntologyError,
-    PhysicalAction,
-    Role,
-    parse_act,
-    parse_physical_action,
-)
-from dorothie_gym.recording.errors import SessionError, shown
+from dorothie_gym.errors import OntologyError, SessionError
+from dorothie_gym.errors import short_repr as shown
+from dorothie_gym.ontology import DialogueAct, ObjectClass, PhysicalAction, Role, parse_act, parse_physical_action
 from dorothie_gym.recording.file_names import MAX_FRAME
 from dorothie_gym.recording.json_io import Fields, canonical, from_line, to_line
 from dorothie_gym.sim.config import FRAME_RATE

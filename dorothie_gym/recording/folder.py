@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.errors import SessionError
 from dorothie_gym.recording.action_log import Decision, encode_decision, read_decisions
-from dorothie_gym.recording.errors import SessionError
 from dorothie_gym.recording.events import Event, EventType, decode_event, encode_event
 from dorothie_gym.recording.file_names import (
     ACTIONS_FILE,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.errors import SessionError
 from dorothie_gym.recording.file_names import MAX_FRAME, MAX_FRAMES, MAX_FRAMES_FILE, PART
 from dorothie_gym.recording.json_io import read_bytes
 from dorothie_gym.recording.surroundings import (

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any, Final, NotRequired, TypedDict
 
 from dorothie_gym import __version__
-from dorothie_gym.ontology import OntologyError, parse_landmark, parse_street
-from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.errors import OntologyError, SessionError
+from dorothie_gym.ontology import parse_landmark, parse_street
 from dorothie_gym.recording.json_io import Fields, canonical
 from dorothie_gym.recording.trajectory import NO_LANE
 from dorothie_gym.recording.version import FORMAT_VERSION, OLD_VERSION, parse_version

@@ -12,7 +12,8 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from dorothie_gym.recording.errors import SessionError, shown
+from dorothie_gym.errors import SessionError
+from dorothie_gym.errors import short_repr as shown
 from dorothie_gym.recording.file_names import MAX_TEXT_FILE, PART
 
 MAX_DEPTH: Final = 40

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.errors import SessionError
 from dorothie_gym.recording.file_names import HEADER_FILE
 from dorothie_gym.recording.sdn import SignVote, detect_layout, read_sdn, settle_sign
 from dorothie_gym.recording.session import Session

@@ -17,8 +17,9 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.errors import OntologyError
 from dorothie_gym.maps import Town
-from dorothie_gym.ontology import OntologyError, PhysicalAction, WeatherParameter
+from dorothie_gym.ontology import PhysicalAction, WeatherParameter
 from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.surroundings import Scene, SceneTable
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT

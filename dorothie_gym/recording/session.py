@@ -8,9 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import Role
 from dorothie_gym.recording.action_log import Decision
-from dorothie_gym.recording.errors import SessionError
 from dorothie_gym.recording.events import (
     INFRACTIONS,
     ActionRecord,

@@ -6,7 +6,7 @@ import enum
 from pathlib import Path
 from typing import Final
 
-from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.errors import SessionError
 
 
 class Fold(enum.StrEnum):

@@ -11,9 +11,9 @@ from typing import Any, Final, Self, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import LightColour
 from dorothie_gym.ontology import WeatherParameter
-from dorothie_gym.recording.errors import SessionError
 
 Rows: TypeAlias = NDArray[np.void]
 """Structured array."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from dorothie_gym.recording.errors import SessionError, shown
+from dorothie_gym.errors import SessionError
+from dorothie_gym.errors import short_repr as shown
 
 FORMAT_VERSION: Final = "2.0"
 """Version of the layout of a session folder, "major.minor".

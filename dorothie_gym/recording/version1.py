@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.errors import SessionError
 from dorothie_gym.recording.file_names import MAX_FRAMES, SUMMARY_FILE, TRAJECTORY_FILE
 from dorothie_gym.recording.json_io import Fields, from_line, read_lines
 from dorothie_gym.recording.trajectory import TRAJECTORY_COLUMNS, TRAJECTORY_DTYPE, WHOLE_COLUMNS, Trajectory

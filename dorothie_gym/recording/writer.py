@@ -11,10 +11,10 @@ from typing import IO, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import LightColour
 from dorothie_gym.ontology import Role
 from dorothie_gym.recording.action_log import Decision, encode_decision
-from dorothie_gym.recording.errors import SessionError
 from dorothie_gym.recording.events import Event, encode_event
 from dorothie_gym.recording.file_names import (
     ACTIONS_FILE,

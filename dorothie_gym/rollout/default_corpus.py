@@ -18,6 +18,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from dorothie_gym import __version__
 from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.errors import CacheError
 from dorothie_gym.recording import FORMAT_VERSION
 from dorothie_gym.rollout.corpus_generation import generate_corpus
 
@@ -32,10 +33,6 @@ SEED = 0
 CONFIG = EnvConfig()
 
 _LOG = logging.getLogger(__name__)
-
-
-class CacheError(RuntimeError):
-    """The folder in which sessions are kept cannot be written; the message says what to set."""
 
 
 def cache_folder() -> Path:

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from dorothie_gym import __version__
-from dorothie_gym.recording import FORMAT_VERSION, SessionError
+from dorothie_gym.errors import SessionError
+from dorothie_gym.recording import FORMAT_VERSION
 
 if sys.platform != "win32":
     import fcntl

@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
+from dorothie_gym.errors import ProcessError
 from dorothie_gym.recording import SessionState, session_state
 from dorothie_gym.rollout.folder import PARTS
 from dorothie_gym.rollout.play import Planned
-from dorothie_gym.rollout.processes import ProcessError
 
 Plan = TypeVar("Plan", bound=Planned)
 Result = TypeVar("Result")

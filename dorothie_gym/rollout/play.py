@@ -11,10 +11,11 @@ from typing import Any, Protocol
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.recorder import SessionRecorder
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Player, Policy
 from dorothie_gym.policies.policy import policy_seed
-from dorothie_gym.recording import Session, SessionError, SessionState, SessionWriter, session_state
+from dorothie_gym.recording import Session, SessionState, SessionWriter, session_state
 from dorothie_gym.rollout.folder import PARTS
 
 

@@ -12,12 +12,10 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, Generic, TypeVar
 
+from dorothie_gym.errors import ProcessError
+
 Task = TypeVar("Task")
 Result = TypeVar("Result")
-
-
-class ProcessError(RuntimeError):
-    """A task failed in its process, or the process died; the message tells which task and why."""
 
 
 def share_out(

@@ -11,8 +11,9 @@ from dorothie_gym.engine.config import EnvConfig, RewardWeights
 from dorothie_gym.engine.recorder import SessionRecorder, expand, idle_actions
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import Town
-from dorothie_gym.recording import Session, SessionError, SessionHeader, SessionWriter
+from dorothie_gym.recording import Session, SessionHeader, SessionWriter
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.spaces import ActionDict, Observation
 from dorothie_gym.tasks import StoryboardTemplate, load_template, template_names

@@ -1,10 +1,11 @@
 """What the participant has to do: landmarks, storyboard templates, their binding to a town, and the task's state."""
 
+from dorothie_gym.errors import StoryboardError
 from dorothie_gym.tasks.binding import bind
 from dorothie_gym.tasks.catalogue import LandmarkKind, catalogue
 from dorothie_gym.tasks.parsing import load_template, parse_template, template_names
 from dorothie_gym.tasks.state import TaskState
-from dorothie_gym.tasks.storyboard import Landmark, LandmarkSite, Storyboard, StoryboardError, Subgoal
+from dorothie_gym.tasks.storyboard import Landmark, LandmarkSite, Storyboard, Subgoal
 from dorothie_gym.tasks.templates import Dependent, StoryboardTemplate, SubgoalTemplate, Variable
 
 __all__ = [

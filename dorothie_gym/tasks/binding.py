@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from dorothie_gym.errors import StoryboardError
 from dorothie_gym.ontology import LandmarkName
 from dorothie_gym.tasks.catalogue import LandmarkKind, catalogue, categories, find_kind, kinds_in
-from dorothie_gym.tasks.storyboard import Landmark, LandmarkSite, Storyboard, StoryboardError, Subgoal
+from dorothie_gym.tasks.storyboard import Landmark, LandmarkSite, Storyboard, Subgoal
 from dorothie_gym.tasks.templates import StoryboardTemplate, SubgoalTemplate, Variable, fill, variable_of
 
 

@@ -10,8 +10,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, NoReturn
 
+from dorothie_gym.errors import StoryboardError
 from dorothie_gym.tasks.catalogue import find_kind
-from dorothie_gym.tasks.storyboard import StoryboardError
 from dorothie_gym.tasks.templates import Dependent, StoryboardTemplate, SubgoalTemplate, Variable
 from dorothie_gym.tasks.validation import check
 

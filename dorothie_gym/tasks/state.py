@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from dorothie_gym.errors import StoryboardError
 from dorothie_gym.ontology import GoalStatus
-from dorothie_gym.tasks.storyboard import Storyboard, StoryboardError
+from dorothie_gym.tasks.storyboard import Storyboard
 
 
 class TaskState:

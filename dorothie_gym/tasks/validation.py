@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
 
+from dorothie_gym.errors import StoryboardError
 from dorothie_gym.tasks.binding import cast
-from dorothie_gym.tasks.storyboard import StoryboardError
 from dorothie_gym.tasks.templates import StoryboardTemplate, references, variable_of
 
 # Paper, appendix "Task Configuration": two to six landmarks to visit. Those to be triggered come on top.

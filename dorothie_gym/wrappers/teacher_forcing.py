@@ -12,21 +12,12 @@ from numpy.typing import NDArray
 
 from dorothie_gym.engine.recorder import LightStates, actors_around
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
 from dorothie_gym.policies.policy import policy_seed
-from dorothie_gym.recording import (
-    Event,
-    Point,
-    Scene,
-    SceneTable,
-    Session,
-    SessionError,
-    Task,
-    task_points,
-    trajectory_of,
-)
+from dorothie_gym.recording import Event, Point, Scene, SceneTable, Session, Task, task_points, trajectory_of
 from dorothie_gym.recording.surroundings import Rows, light_rows, weather_rows
 from dorothie_gym.spaces import SpaceLimits
 from dorothie_gym.wrappers.point_env import PointEnv

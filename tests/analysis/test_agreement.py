@@ -5,8 +5,9 @@ import pytest
 from sklearn.metrics import cohen_kappa_score
 
 from dorothie_gym.analysis import agreement
+from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import ActionValue, DialogueAct, LandmarkName
-from dorothie_gym.recording import Event, Session, SessionError
+from dorothie_gym.recording import Event, Session
 from tests.analysis.builders import HUMAN, M, act, drive, said
 
 

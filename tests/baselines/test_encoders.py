@@ -6,7 +6,6 @@ import pytest
 from dorothie_gym.baselines.encoders import (
     BertEncoder,
     BytePairs,
-    EncoderError,
     HashingEncoder,
     HubertEncoder,
     MiniLMEncoder,
@@ -17,6 +16,7 @@ from dorothie_gym.baselines.encoders import (
     text_table,
 )
 from dorothie_gym.baselines.encoders.encoder import Vectors
+from dorothie_gym.errors import EncoderError
 
 SENTENCES = ("turn left at the market", "turn right at the market", "where is my house", "")
 

@@ -7,9 +7,10 @@ import torch
 
 from dorothie_gym.baselines.inputs import Examples
 from dorothie_gym.baselines.toto import TOTOConfig
-from dorothie_gym.baselines.training import BEST_FILE, LAST_FILE, CheckpointError, batches, predict, train
+from dorothie_gym.baselines.training import BEST_FILE, LAST_FILE, batches, predict, train
 from dorothie_gym.baselines.training.checkpoints import about, restore, save
 from dorothie_gym.baselines.training.curves import draw_curves
+from dorothie_gym.errors import CheckpointError
 from tests.baselines import samples
 from tests.baselines.test_toto import TINY, make
 

@@ -8,8 +8,9 @@ import pytest
 from dorothie_gym.benchmark import ActPredictions, labels_of, score_task
 from dorothie_gym.benchmark.features import build, points
 from dorothie_gym.benchmark.features.extraction import HANDLINGS
+from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import PhysicalAction, Role
-from dorothie_gym.recording import Event, EventType, SessionError, Task, read_session
+from dorothie_gym.recording import Event, EventType, Task, read_session
 from dorothie_gym.recording.sdn import write_sdn
 from tests.benchmark.corpora import FOLDS, corpus
 from tests.recording.builders import physical, write

@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 from dorothie_gym.benchmark import (
     ActionPredictions,
     ActPredictions,
-    PredictionError,
     TaskPredictions,
     labels_of,
     read_about,
     read_predictions,
     write_predictions,
 )
+from dorothie_gym.errors import PredictionError
 from dorothie_gym.ontology import LABEL_INDEX, LABELS, ActionValue, DialogueMove, LandmarkName, PhysicalAction
 from dorothie_gym.recording import Task
 from tests.benchmark.corpora import corpus, no_actions, no_acts, oracle

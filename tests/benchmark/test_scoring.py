@@ -6,14 +6,8 @@ import numpy as np
 import pytest
 
 from dorothie_gym.analysis import Handled
-from dorothie_gym.benchmark import (
-    ActionPredictions,
-    CorpusLabels,
-    PredictionError,
-    TaskPredictions,
-    labels_of,
-    score_runs,
-)
+from dorothie_gym.benchmark import ActionPredictions, CorpusLabels, TaskPredictions, labels_of, score_runs
+from dorothie_gym.errors import PredictionError
 from dorothie_gym.recording import Task
 from tests.benchmark.corpora import corpus, oracle
 

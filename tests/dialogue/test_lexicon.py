@@ -2,9 +2,10 @@ import copy
 
 import pytest
 
-from dorothie_gym.dialogue import LexiconError, load_lexicon
+from dorothie_gym.dialogue import load_lexicon
 from dorothie_gym.dialogue.entity_recognition import find_names, nearest_name
 from dorothie_gym.dialogue.lexicon import parse_lexicon, read_data, split_words
+from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology import LABELS, ActionValue, LandmarkName, StreetName
 
 
@@ -42,21 +43,21 @@ def test_spellings_and_slips_are_understood(text, value):
 def test_a_missing_value_is_named():
     data = copy.deepcopy(read_data("lexicon.yaml"))
     del data["Street"]["Baits"]
-    with pytest.raises(LexiconError, match=r"Street\.Baits"):
+    with pytest.raises(PhraseFileError, match=r"Street\.Baits"):
         parse_lexicon(data)
 
 
 def test_an_ambiguous_phrase_is_named():
     data = copy.deepcopy(read_data("lexicon.yaml"))
     data["Street"]["Baits"]["hear"] = ["Beal"]
-    with pytest.raises(LexiconError, match="Beal"):
+    with pytest.raises(PhraseFileError, match="Beal"):
         parse_lexicon(data)
 
 
 def test_an_unquoted_boolean_is_named():
     data = copy.deepcopy(read_data("lexicon.yaml"))
     data["Object"]["Pole"]["hear"] = [True]
-    with pytest.raises(LexiconError, match=r"Object\.Pole\.hear"):
+    with pytest.raises(PhraseFileError, match=r"Object\.Pole\.hear"):
         parse_lexicon(data)
 
 
@@ -72,5 +73,5 @@ def test_a_word_unlike_every_name_is_none():
 def test_cues_that_are_no_expression_are_named():
     data = copy.deepcopy(read_data("lexicon.yaml"))
     data["Action"]["Stop"]["hear"] = ["stop("]
-    with pytest.raises(LexiconError, match=r"Action\.Stop\.hear"):
+    with pytest.raises(PhraseFileError, match=r"Action\.Stop\.hear"):
         parse_lexicon(data)

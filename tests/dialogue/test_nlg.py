@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from dorothie_gym.dialogue import (
     MAX_CHARACTERS,
     Direction,
-    LexiconError,
     SpeakerStyle,
     Wording,
     WordingContext,
@@ -20,6 +19,7 @@ from dorothie_gym.dialogue import (
 )
 from dorothie_gym.dialogue.grammar import parse_grammar
 from dorothie_gym.dialogue.talk_files import read_talk_files
+from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology import (
     LABELS,
     ActionValue,
@@ -152,12 +152,12 @@ def without_section(name: str, head: str) -> dict[str, str]:
 
 def test_a_grammar_that_leaves_a_speaker_without_words_is_refused():
     texts = without_section("20_initiating.talk", "== Align co_wizard")
-    with pytest.raises(LexiconError, match="Align has no template without slots for co_wizard"):
+    with pytest.raises(PhraseFileError, match="Align has no template without slots for co_wizard"):
         parse_grammar(texts)
 
 
 def test_a_grammar_that_leaves_an_action_without_words_is_refused():
-    with pytest.raises(LexiconError, match="doing UTurn"):
+    with pytest.raises(PhraseFileError, match="doing UTurn"):
         parse_grammar(without_section("00_actions.talk", "== doing UTurn"))
 
 
@@ -175,7 +175,7 @@ def test_a_grammar_that_leaves_an_action_without_words_is_refused():
     ],
 )
 def test_a_faulty_line_is_named_with_its_file(line, reason):
-    with pytest.raises(LexiconError, match=rf"new\.talk.*{reason}"):
+    with pytest.raises(PhraseFileError, match=rf"new\.talk.*{reason}"):
         parse_grammar({**read_talk_files(), "new.talk": line})
 
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from dorothie_gym.dialogue import LexiconError
 from dorothie_gym.dialogue.phrases import Register, choice, manner_of, parse_alternatives
+from dorothie_gym.errors import PhraseFileError
 
 
 @dataclass
@@ -63,5 +63,5 @@ def test_habits_favour_one_alternative_of_a_speaker():
 
 @pytest.mark.parametrize("text", ["(left", "left)", "[now", "<unknown>", "<", "go }"])
 def test_faulty_phrases_name_their_line(text):
-    with pytest.raises(LexiconError, match="here:1"):
+    with pytest.raises(PhraseFileError, match="here:1"):
         parse_alternatives("here:1", text, {})

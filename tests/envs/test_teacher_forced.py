@@ -14,8 +14,9 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 from dorothie_gym.benchmark import NfDEnv, RfNEnv, TeacherForcedEnv, UfNEnv
+from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import DialogueMove, PhysicalAction, Role
-from dorothie_gym.recording import Corpus, SessionError
+from dorothie_gym.recording import Corpus
 from dorothie_gym.spaces import NO_MOVE, LandmarkColumn, SpaceLimits
 from tests.recording.builders import physical, session, utterance, write
 from tests.recording.dialogues import DONE, OKAY, STREET, TO_KFC, talk

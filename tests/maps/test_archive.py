@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dorothie_gym.errors import TownArchiveError
 from dorothie_gym.maps import Town, load_town, town_names
 from dorothie_gym.maps import cache as archive_module
-from dorothie_gym.maps.cache import PARTS, ArchiveError, pack, unpack
+from dorothie_gym.maps.cache import PARTS, pack, unpack
 
 from .opendrive_text import shared_map
 from .same_town import town_bits, town_with_everything
@@ -74,38 +75,38 @@ def test_an_archive_is_an_npz_file_without_pickles() -> None:
 
 def test_any_changed_byte_is_noticed() -> None:
     for at in range(len(PACKED)):
-        with pytest.raises(ArchiveError, match="checksum"):
+        with pytest.raises(TownArchiveError, match="checksum"):
             unpack(PACKED[:at] + bytes([PACKED[at] ^ 0x10]) + PACKED[at + 1 :], "key")
 
 
 def test_any_missing_or_added_end_is_noticed() -> None:
     for length in range(0, len(PACKED), 7):
-        with pytest.raises(ArchiveError):
+        with pytest.raises(TownArchiveError):
             unpack(PACKED[:length], "key")
-    with pytest.raises(ArchiveError):
+    with pytest.raises(TownArchiveError):
         unpack(PACKED + b"\0", "key")
 
 
 @given(st.binary(max_size=300))
 def test_no_bytes_do_worse_than_an_archive_error(noise: bytes) -> None:
     for data in (noise, _sealed(noise)):
-        with pytest.raises(ArchiveError):
+        with pytest.raises(TownArchiveError):
             unpack(data, "key")
 
 
 def test_the_archive_of_another_town_is_refused() -> None:
-    with pytest.raises(ArchiveError, match="another"):
+    with pytest.raises(TownArchiveError, match="another"):
         unpack(PACKED, "another key")
 
 
 def test_another_format_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(archive_module, "FORMAT", archive_module.FORMAT + 1)
-    with pytest.raises(ArchiveError, match="another format"):
+    with pytest.raises(TownArchiveError, match="another format"):
         unpack(PACKED, "key")
 
 
 def test_objects_that_would_have_to_be_unpickled_are_refused() -> None:
-    with pytest.raises(ArchiveError, match="allow_pickle"):
+    with pytest.raises(TownArchiveError, match="allow_pickle"):
         unpack(_npz(document=np.array([{"format": 1}], dtype=object), floats=np.empty(0)), "key")
 
 
@@ -125,7 +126,7 @@ def test_objects_that_would_have_to_be_unpickled_are_refused() -> None:
     ],
 )
 def test_what_holds_no_town_is_refused_even_with_a_right_checksum(data: bytes) -> None:
-    with pytest.raises(ArchiveError):
+    with pytest.raises(TownArchiveError):
         unpack(data, "key")
 
 

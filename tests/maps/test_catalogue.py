@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
+from dorothie_gym.errors import TownError
 from dorothie_gym.maps.catalogue import load_town, town_names
-from dorothie_gym.maps.errors import TownError
 
 LOOP = """\
 junctions: {a: [0, 0], b: [100, 0]}

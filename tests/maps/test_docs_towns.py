@@ -10,7 +10,7 @@ import networkx as nx
 import pytest
 import yaml
 
-from dorothie_gym.maps.errors import TownError
+from dorothie_gym.errors import TownError
 from dorothie_gym.maps.model import SignalKind, Town
 from dorothie_gym.maps.yaml import arms as ramps
 from dorothie_gym.maps.yaml import clearance, layout, read_yaml_town, schema, streets

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.maps.errors import TownError
+from dorothie_gym.errors import TownError
 from dorothie_gym.maps.opendrive import read_opendrive
 
 from .opendrive_text import geometry, lane, opendrive, road, section, shared_map

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dorothie_gym.maps import TownError, load_town
+from dorothie_gym.errors import TownError
+from dorothie_gym.maps import load_town
 from dorothie_gym.maps.lane_graph import EdgeType, JunctionGraph, LaneGraph, Repair, lane_graph
 from dorothie_gym.maps.sdn_graph import parse_sdn_graph, read_sdn_graph
 from tests.maps.opendrive_text import shared_map

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.maps import Town, TownError, load_town
+from dorothie_gym.errors import TownError
+from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps import cache as store_module
 from dorothie_gym.maps.cache import CACHE_VARIABLE, cache_folder, compiler_digest, through_cache
 from dorothie_gym.maps.yaml import read_yaml_town

@@ -6,7 +6,7 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from dorothie_gym.maps.errors import TownError
+from dorothie_gym.errors import TownError
 from dorothie_gym.maps.lint import check_town
 from dorothie_gym.maps.model import LinkType, SignalKind, Town, wrap_degrees
 from dorothie_gym.maps.traffic_lights import LightColour

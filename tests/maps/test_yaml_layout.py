@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dorothie_gym.maps.errors import TownError
+from dorothie_gym.errors import TownError
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.yaml.arms import POCKET
 from dorothie_gym.maps.yaml.courses import SMALLEST_RADIUS

@@ -10,7 +10,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dorothie_gym.maps.errors import TownError
+from dorothie_gym.errors import TownError
 from dorothie_gym.maps.yaml import read_yaml_town
 from dorothie_gym.maps.yaml.schema import read_plan
 from tests.maps.yaml_misplaced import MISPLACED

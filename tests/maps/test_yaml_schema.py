@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.maps.errors import TownError
+from dorothie_gym.errors import TownError
 from dorothie_gym.maps.yaml import nodes as source
 from dorothie_gym.maps.yaml.plan import Bend, GreenPlan, StreetPlan, TownPlan
 from dorothie_gym.maps.yaml.schema import read_plan

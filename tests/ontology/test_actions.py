@@ -4,14 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dorothie_gym.ontology import (
-    ADAPTIVE_ACTIONS,
-    EPISTEMIC_ACTIONS,
-    NAVIGATION_ACTIONS,
-    MentalAction,
-    OntologyError,
-    PhysicalAction,
-)
+from dorothie_gym.errors import OntologyError
+from dorothie_gym.ontology import ADAPTIVE_ACTIONS, EPISTEMIC_ACTIONS, NAVIGATION_ACTIONS, MentalAction, PhysicalAction
 
 
 def test_ids_and_labels_are_those_of_sdn() -> None:

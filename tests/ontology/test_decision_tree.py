@@ -2,12 +2,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology import (
     DECISION_TREE,
     Answer,
     DialogueMove,
     MoveGroup,
-    OntologyError,
     Question,
     groups_of,
     path_to,

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology import (
     LABELS,
     ActionValue,
@@ -14,7 +15,6 @@ from dorothie_gym.ontology import (
     LandmarkName,
     MentalAction,
     ObjectClass,
-    OntologyError,
     PhysicalAction,
     PropKind,
     Role,

@@ -2,8 +2,8 @@ import pickle
 
 import pytest
 
-from dorothie_gym.ontology import OntologyError
-from dorothie_gym.ontology.vocabulary import Vocabulary, normalise
+from dorothie_gym.errors import OntologyError
+from dorothie_gym.ontology.vocabulary import Vocabulary, normalise, unknown_spelling
 
 
 def test_case_space_and_punctuation_do_not_count() -> None:
@@ -25,16 +25,16 @@ def test_spellings_are_shown_as_written() -> None:
 
 
 def test_error_names_text_vocabulary_and_nearest_spelling() -> None:
-    message = str(OntologyError.unknown("instrukt", "dialogue move", ["Explain", "Instruct"]))
+    message = str(unknown_spelling("instrukt", "dialogue move", ["Explain", "Instruct"]))
     assert "'instrukt'" in message and "dialogue move" in message and "'Instruct'" in message
 
 
 def test_error_shows_a_spelling_even_when_none_is_near() -> None:
-    assert "'Explain'" in str(OntologyError.unknown("%%%", "dialogue move", ["Explain"]))
+    assert "'Explain'" in str(unknown_spelling("%%%", "dialogue move", ["Explain"]))
 
 
 def test_error_for_what_is_no_text_names_its_type() -> None:
-    assert "int" in str(OntologyError.unknown(3, "dialogue move", ["Explain"]))
+    assert "int" in str(unknown_spelling(3, "dialogue move", ["Explain"]))
 
 
 def test_error_is_a_value_error_and_survives_pickling() -> None:
@@ -44,4 +44,4 @@ def test_error_is_a_value_error_and_survives_pickling() -> None:
 
 def test_a_huge_text_is_neither_compared_nor_shown_as_a_whole() -> None:
     for text in ("a" * 100_000, ["a"] * 100_000):
-        assert len(str(OntologyError.unknown(text, "slots", ["Action", "Street"]))) < 250
+        assert len(str(unknown_spelling(text, "slots", ["Action", "Street"]))) < 250

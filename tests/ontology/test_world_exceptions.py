@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dorothie_gym.ontology import ExceptionKind, OntologyError, PropKind, Sensor, WeatherParameter
+from dorothie_gym.errors import OntologyError
+from dorothie_gym.ontology import ExceptionKind, PropKind, Sensor, WeatherParameter
 
 
 def test_ids_are_those_of_the_contract() -> None:

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
+from dorothie_gym.errors import PolicyLoadError
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import (
-    CastError,
     LaneFollowPolicy,
     Policy,
     SilentPolicy,
@@ -36,7 +36,9 @@ def test_player_by_name_makes_its_policy() -> None:
 
 
 def test_name_of_another_role_is_told_with_those_there_are() -> None:
-    with pytest.raises(CastError, match="participant: there is no policy 'lane-follow'.*scripted, silent, random$"):
+    with pytest.raises(
+        PolicyLoadError, match="participant: there is no policy 'lane-follow'.*scripted, silent, random$"
+    ):
         find_player("lane-follow", Role.PARTICIPANT)
 
 
@@ -59,18 +61,18 @@ def test_file_without_a_kind_goes_by_its_ending(tmp_path: Path) -> None:
 
 def test_kind_that_nobody_reads_is_told(tmp_path: Path) -> None:
     (tmp_path / "model.json").write_text(json.dumps({"kind": "quiet"}))
-    with pytest.raises(CastError, match=r"of the kind quiet or .json, which cannot be played \(known: none"):
+    with pytest.raises(PolicyLoadError, match=r"of the kind quiet or .json, which cannot be played \(known: none"):
         find_player(str(tmp_path / "model.json"), Role.CO_WIZARD)
     register_loader(".weights", load_silent)
-    with pytest.raises(CastError, match=r"known: .weights"):
+    with pytest.raises(PolicyLoadError, match=r"known: .weights"):
         find_player(str(tmp_path), Role.CO_WIZARD)
 
 
 def test_folder_without_a_description_and_torn_json_are_told(tmp_path: Path) -> None:
-    with pytest.raises(CastError, match="folder without model.json"):
+    with pytest.raises(PolicyLoadError, match="folder without model.json"):
         find_player(str(tmp_path), Role.CO_WIZARD)
     (tmp_path / "model.json").write_text('{"kind": ')
-    with pytest.raises(CastError, match="model.json: cannot be read"):
+    with pytest.raises(PolicyLoadError, match="model.json: cannot be read"):
         find_player(str(tmp_path), Role.CO_WIZARD)
 
 

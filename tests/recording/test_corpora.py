@@ -8,8 +8,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import ExceptionKind, Role
-from dorothie_gym.recording import Corpus, Event, EventType, Fold, Session, SessionError, nfd_points
+from dorothie_gym.recording import Corpus, Event, EventType, Fold, Session, nfd_points
 from tests.recording.builders import write
 from tests.recording.dialogues import talk
 from tests.recording.sdn.builders import release

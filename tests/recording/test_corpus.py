@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.recording import SessionError, load_readable, load_sessions, session_folders, split_by_name
+from dorothie_gym.errors import SessionError
+from dorothie_gym.recording import load_readable, load_sessions, session_folders, split_by_name
 from tests.recording.builders import session, write
 
 

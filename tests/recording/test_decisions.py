@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import Role
-from dorothie_gym.recording import Decision, Session, SessionError, SessionWriter
+from dorothie_gym.recording import Decision, Session, SessionWriter
 from tests.recording.builders import header, rows, session
 
 SAID = {Role.PARTICIPANT: {"move": 1, "slots": [3, 40], "utterance": "Left, please: çà et là."}}

@@ -13,8 +13,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import Role
-from dorothie_gym.recording import Event, EventType, Session, SessionError, SessionWriter
+from dorothie_gym.recording import Event, EventType, Session, SessionWriter
 from dorothie_gym.recording.file_names import MAX_EVENTS, safe_name
 from tests.recording.builders import header, physical, rows, session, utterance, write
 from tests.recording.dialogues import OKAY, talk

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dorothie_gym.recording import SessionError, SessionHeader
+from dorothie_gym.errors import SessionError
+from dorothie_gym.recording import SessionHeader
 from tests.recording.builders import header
 
 

@@ -5,8 +5,9 @@ from typing import Any
 
 import pytest
 
+from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import ObjectClass, Role
-from dorothie_gym.recording import INFRACTIONS, Event, EventType, Session, SessionError
+from dorothie_gym.recording import INFRACTIONS, Event, EventType, Session
 from tests.recording.builders import write
 
 PLACE = {"lane": 3, "station": 12.5, "x": 1.0, "y": -2.0}

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dorothie_gym.recording import LIGHT_STATES, ActorKind, Session, SessionError, SessionWriter
+from dorothie_gym.errors import SessionError
+from dorothie_gym.recording import LIGHT_STATES, ActorKind, Session, SessionWriter
 from tests.recording.builders import header, rows
 from tests.recording.scenes import actors, lights, weather
 

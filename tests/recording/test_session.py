@@ -9,8 +9,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import DialogueMove, PhysicalAction, Role
-from dorothie_gym.recording import Event, EventType, Session, SessionError
+from dorothie_gym.recording import Event, EventType, Session
 from tests.recording.builders import header, physical, rows, session, utterance, write
 from tests.recording.dialogues import OKAY, TO_KFC, TURNING, talk
 

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import PhysicalAction, Role
-from dorothie_gym.recording import Event, EventType, Session, SessionError, SessionWriter
+from dorothie_gym.recording import Event, EventType, Session, SessionWriter
 from tests.recording.builders import header, physical, rows, write
 from tests.recording.dialogues import talk
 

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.recording import Corpus, SessionError
+from dorothie_gym.errors import SessionError
+from dorothie_gym.recording import Corpus
 from dorothie_gym.rollout import generate_corpus
 from tests.rollout.killing import begin, contents, kill_again_and_again
 

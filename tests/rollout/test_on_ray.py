@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.rollout import ProcessError, generate_corpus
+from dorothie_gym.errors import ProcessError
+from dorothie_gym.rollout import generate_corpus
 from dorothie_gym.rollout.closed_loop import RolloutSettings, roll_out
 from tests.rollout.killing import contents
 

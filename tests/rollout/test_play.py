@@ -7,10 +7,11 @@ import pytest
 
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
 from dorothie_gym.policies.policy import policy_seed
-from dorothie_gym.recording import Session, SessionError
+from dorothie_gym.recording import Session
 from dorothie_gym.rollout import play_session
 
 SECONDS = 6.0

@@ -2,7 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from dorothie_gym.rollout.processes import ProcessError, share_out
+from dorothie_gym.errors import ProcessError
+from dorothie_gym.rollout.processes import share_out
 from tests.rollout import workshop
 
 

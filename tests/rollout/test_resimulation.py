@@ -8,10 +8,11 @@ import pytest
 
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
-from dorothie_gym.recording import Decision, Session, SessionError, first_difference
+from dorothie_gym.recording import Decision, Session, first_difference
 from dorothie_gym.rollout import play_session, resimulate
 from dorothie_gym.wrappers.record_session import RecordSession
 

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dorothie_gym.ontology import OntologyError, WeatherParameter
+from dorothie_gym.errors import OntologyError
+from dorothie_gym.ontology import WeatherParameter
 from dorothie_gym.sim.ego.limits import MAX_BRAKING
 from dorothie_gym.sim.ego.obstacles import SIDE_MARGIN
 from dorothie_gym.sim.sensing.perception import detection_probability, position_error

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dorothie_gym.errors import StoryboardError
 from dorothie_gym.ontology import LandmarkName
-from dorothie_gym.tasks import StoryboardError, bind, catalogue, load_template, template_names
+from dorothie_gym.tasks import bind, catalogue, load_template, template_names
 from dorothie_gym.tasks.binding import SPACING, cast, spread_places
 
 from .builders import FakePlace, bound, grid_places, parse, plain, templates

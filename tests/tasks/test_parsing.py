@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dorothie_gym.tasks import StoryboardError, bind, load_template, parse_template, template_names
+from dorothie_gym.errors import StoryboardError
+from dorothie_gym.tasks import bind, load_template, parse_template, template_names
 from dorothie_gym.tasks.parsing import read_json
 
 from .builders import grid_places, parse, plain, templates

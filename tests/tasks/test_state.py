@@ -3,8 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dorothie_gym.errors import StoryboardError
 from dorothie_gym.ontology import GoalStatus
-from dorothie_gym.tasks import StoryboardError, TaskState, bind
+from dorothie_gym.tasks import TaskState, bind
 
 from .builders import bound, grid_places, parse, templates
 

@@ -1,6 +1,6 @@
 import pytest
 
-from dorothie_gym.tasks import StoryboardError
+from dorothie_gym.errors import StoryboardError
 
 from .builders import parse, plain
 

@@ -13,7 +13,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from dorothie_gym.recording import Event, Session, SessionError, SessionHeader
+from dorothie_gym.errors import SessionError
+from dorothie_gym.recording import Event, Session, SessionHeader
 from dorothie_gym.wrappers.record_session import RecordSession
 from tests.recording.builders import header, rows
 from tests.recording.dialogues import talk

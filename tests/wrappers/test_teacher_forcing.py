@@ -12,9 +12,10 @@ from gymnasium.utils.env_checker import check_env
 from dorothie_gym import EnvConfig, TeacherForcing, flatten
 from dorothie_gym.benchmark import NfDEnv, RfNEnv, TeacherForcedEnv, UfNEnv
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
-from dorothie_gym.recording import Session, SessionError, Task, View, task_points
+from dorothie_gym.recording import Session, Task, View, task_points
 from dorothie_gym.rollout import play_session
 
 SEED = 3

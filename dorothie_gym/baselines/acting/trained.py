@@ -20,10 +20,11 @@ from dorothie_gym.baselines.material import Material
 from dorothie_gym.baselines.outputs import Predicted
 from dorothie_gym.baselines.rows import build_model, find_row, retell
 from dorothie_gym.baselines.toto import TOTO, TOTOConfig
-from dorothie_gym.baselines.training.checkpoints import CheckpointError, restore
+from dorothie_gym.baselines.training.checkpoints import restore
 from dorothie_gym.benchmark.features import Columns, PointTable, TownGraph, points
 from dorothie_gym.benchmark.features.building import join
 from dorothie_gym.benchmark.features.extraction import extract, town_graph
+from dorothie_gym.errors import CheckpointError
 from dorothie_gym.maps import Town
 from dorothie_gym.recording import Task
 

@@ -6,7 +6,6 @@ from types import MappingProxyType
 from dorothie_gym.baselines.encoders.byte_pairs import PAD, BytePairs
 from dorothie_gym.baselines.encoders.encoder import (
     Encoder,
-    EncoderError,
     ImageEncoder,
     SpeechEncoder,
     TextEncoder,
@@ -22,6 +21,7 @@ from dorothie_gym.baselines.encoders.pretrained import (
     ResNetEncoder,
     has_minilm,
 )
+from dorothie_gym.errors import EncoderError
 
 TEXT_ENCODERS: Mapping[str, Callable[[], TextEncoder]] = MappingProxyType(
     {"hashing": HashingEncoder, "minilm": MiniLMEncoder, "bert": BertEncoder}

@@ -17,10 +17,6 @@ Vectors: TypeAlias = NDArray[np.float32]
 ItemT = TypeVar("ItemT", contravariant=True)
 
 
-class EncoderError(RuntimeError):
-    """An encoder is unknown, or what it needs (a package, weights) is not here; the message tells what to do."""
-
-
 class Encoder(Protocol[ItemT]):
     """Turns texts, sounds or pictures into vectors of one length, the same for the same item always.
 

@@ -17,7 +17,8 @@ import torch
 from numpy.typing import NDArray
 from torch.nn import functional as F
 
-from dorothie_gym.baselines.encoders.encoder import EncoderError, Vectors
+from dorothie_gym.baselines.encoders.encoder import Vectors
+from dorothie_gym.errors import EncoderError
 
 BATCH: Final = 64
 """Items that are encoded at once; of like length, so that little is padding."""

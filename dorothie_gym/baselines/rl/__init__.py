@@ -1,9 +1,10 @@
 """Reinforcement learning with stable-baselines3: training, evaluation, and weights that are no pickles."""
 
 from dorothie_gym.baselines.rl.evaluating import Outcome, evaluate_policy
-from dorothie_gym.baselines.rl.settings import ALGORITHMS, SettingsError, TrainingSettings, tuned_settings
+from dorothie_gym.baselines.rl.settings import ALGORITHMS, TrainingSettings, tuned_settings
 from dorothie_gym.baselines.rl.training import Run, Training
-from dorothie_gym.baselines.rl.weights import WeightsError, load_model
+from dorothie_gym.baselines.rl.weights import load_model
+from dorothie_gym.errors import ModelFileError, SettingsError
 
 __all__ = [
     "ALGORITHMS",
@@ -12,7 +13,7 @@ __all__ = [
     "SettingsError",
     "Training",
     "TrainingSettings",
-    "WeightsError",
+    "ModelFileError",
     "evaluate_policy",
     "load_model",
     "tuned_settings",

@@ -12,7 +12,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 import dorothie_gym  # noqa: F401  (its import registers the environments)
-from dorothie_gym.baselines.rl.settings import SettingsError, TrainingSettings
+from dorothie_gym.baselines.rl.settings import TrainingSettings
+from dorothie_gym.errors import SettingsError
 from dorothie_gym.spaces.limits import REACH
 
 if TYPE_CHECKING:

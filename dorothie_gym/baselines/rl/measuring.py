@@ -12,10 +12,11 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback
 
 from dorothie_gym.baselines.rl.environments import make_vector
-from dorothie_gym.baselines.rl.settings import SettingsError, TrainingSettings, tuned_settings
+from dorothie_gym.baselines.rl.settings import TrainingSettings, tuned_settings
 from dorothie_gym.baselines.rl.weights import make_model
 from dorothie_gym.bench.timing import Progress, cores, machine, quiet, rounded
 from dorothie_gym.envs.driving_session import DrivingSession
+from dorothie_gym.errors import SettingsError
 from dorothie_gym.policies.navigation.instructor import Instructor
 
 TARGET = 1000.0

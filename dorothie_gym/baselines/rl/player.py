@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.baselines.rl.settings import NAVIGATION, SettingsError
+from dorothie_gym.baselines.rl.settings import NAVIGATION
 from dorothie_gym.baselines.rl.weights import load_model
+from dorothie_gym.errors import SettingsError
 from dorothie_gym.policies.navigation import NavigationPolicy
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vector
 from dorothie_gym.spaces import SpaceLimits
@@ -23,7 +24,7 @@ def make_player(path: Path, limits: SpaceLimits) -> NavigationPolicy:
         limits: sizes of the spaces.
 
     Raises:
-        WeightsError: the files are missing or damaged.
+        ModelFileError: the files are missing or damaged.
         SettingsError: the model did not learn in `Navigation-v0`.
     """
     model, settings = load_model(path)

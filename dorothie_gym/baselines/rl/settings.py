@@ -9,6 +9,8 @@ from typing import Any
 
 import yaml
 
+from dorothie_gym.errors import SettingsError
+
 ALGORITHMS: Mapping[str, tuple[str, str]] = {
     "ppo": ("stable_baselines3", "PPO"),
     "maskable_ppo": ("sb3_contrib", "MaskablePPO"),
@@ -29,10 +31,6 @@ DEFAULT = "default"
 
 FINAL_RATE = "final_learning_rate"
 """Parameter of ours: the learning rate falls in a line from `learning_rate` to this."""
-
-
-class SettingsError(ValueError):
-    """Settings with which nothing can be trained; the message names the field and what it may be."""
 
 
 @dataclass(frozen=True, kw_only=True)

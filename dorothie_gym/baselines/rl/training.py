@@ -18,8 +18,9 @@ from dorothie_gym.baselines.rl.cloning import Cloned, CriticFirst, Tell, clone, 
 from dorothie_gym.baselines.rl.curve import draw_curve
 from dorothie_gym.baselines.rl.environments import Maker, make_vector
 from dorothie_gym.baselines.rl.evaluating import SEEDS_FROM, Outcome, act_with, evaluate_policy
-from dorothie_gym.baselines.rl.settings import SettingsError, TrainingSettings
+from dorothie_gym.baselines.rl.settings import TrainingSettings
 from dorothie_gym.baselines.rl.weights import DESCRIPTION, make_model, read_description, restore, save_model
+from dorothie_gym.errors import SettingsError
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS
 from dorothie_gym.recording import Fold
 
@@ -95,7 +96,7 @@ class Training:
             SettingsError: the folder has a run with other settings, or nothing can be trained with these.
             ProcessError: Ray is not installed, or there is no cluster at the address.
             SessionError: the corpus of the warm start cannot be read or played again.
-            WeightsError: the run in the folder is damaged.
+            ModelFileError: the run in the folder is damaged.
         """
         self.settings, self.folder = settings, folder
         self._watch, self._tell = watch or (lambda done, total, row: None), tell

@@ -17,17 +17,14 @@ from safetensors.torch import load_file, save_file
 
 from dorothie_gym.baselines.drivers import KIND
 from dorothie_gym.baselines.rl.environments import make_env
-from dorothie_gym.baselines.rl.settings import ALGORITHMS, FINAL_RATE, SettingsError, TrainingSettings
+from dorothie_gym.baselines.rl.settings import ALGORITHMS, FINAL_RATE, TrainingSettings
+from dorothie_gym.errors import ModelFileError, SettingsError
 
 TENSORS, DESCRIPTION = "model.safetensors", "model.json"
 """Files of a model in its folder."""
 
 FORMAT = 1
 """Version of the two files."""
-
-
-class WeightsError(ValueError):
-    """A model that cannot be read; the message names the file and what is wrong with it."""
 
 
 def make_model(settings: TrainingSettings, env: Any, *, log: Path | None = None) -> Any:
@@ -113,17 +110,17 @@ def read_description(folder: Path) -> dict[str, Any]:
     """What `model.json` in a folder says.
 
     Raises:
-        WeightsError: it is missing, or not as it must be.
+        ModelFileError: it is missing, or not as it must be.
     """
     path = folder / DESCRIPTION
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise WeightsError(f"{path}: there is no model; `dorothie-gym train-rl --out {folder}` makes one") from None
+        raise ModelFileError(f"{path}: there is no model; `dorothie-gym train-rl --out {folder}` makes one") from None
     except json.JSONDecodeError as error:
-        raise WeightsError(f"{path}, line {error.lineno}: {error.msg}") from None
+        raise ModelFileError(f"{path}, line {error.lineno}: {error.msg}") from None
     if not isinstance(found, dict) or found.get("format") != FORMAT:
-        raise WeightsError(f"{path}: format is not {FORMAT}; the model is of another version of dorothie_gym")
+        raise ModelFileError(f"{path}: format is not {FORMAT}; the model is of another version of dorothie_gym")
     return found
 
 
@@ -131,14 +128,14 @@ def restore(model: Any, folder: Path) -> None:
     """Gives a model the weights and optimisers that were saved in a folder, and its count of steps.
 
     Raises:
-        WeightsError: the files are missing or damaged, or of a model with other layers.
+        ModelFileError: the files are missing or damaged, or of a model with other layers.
     """
     description = read_description(folder)
     path = folder / TENSORS
     try:
         tensors = load_file(path)
     except (SafetensorError, OSError) as error:
-        raise WeightsError(f"{path}: cannot be read ({error})") from None
+        raise ModelFileError(f"{path}: cannot be read ({error})") from None
     variables = {name.split("/", 1)[1]: value for name, value in tensors.items() if name.startswith("variables/")}
     parameters = {
         name: _optimiser(name, description["optimisers"], tensors)
@@ -149,7 +146,7 @@ def restore(model: Any, folder: Path) -> None:
     try:
         model.set_parameters(parameters, exact_match=True, device="cpu")
     except (ValueError, RuntimeError, KeyError) as error:
-        raise WeightsError(f"{path}: does not fit the environment or the network ({error})") from None
+        raise ModelFileError(f"{path}: does not fit the environment or the network ({error})") from None
     for name, value in _variables(model):
         value.data.copy_(variables[name])
     model.num_timesteps, model._n_updates = int(description["steps"]), int(description["updates"])
@@ -162,7 +159,7 @@ def load_model(folder: str | Path) -> tuple[Any, TrainingSettings]:
         folder: of `train-rl`, or `model.json` or `model.safetensors` in it.
 
     Raises:
-        WeightsError: the files are missing or damaged.
+        ModelFileError: the files are missing or damaged.
         SettingsError: the environment that it was trained in cannot be made.
     """
     folder = Path(folder)

@@ -8,10 +8,11 @@ from typing import TypeAlias
 from dorothie_gym.baselines.rl.cloning import NOTHING, Lessons, Tell, sessions_of, silent
 from dorothie_gym.baselines.selfplay.seat import Mask, Vector
 from dorothie_gym.baselines.selfplay.seats import make_seat
+from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.policies.observation_parser import scalar
-from dorothie_gym.recording import Session, SessionError
+from dorothie_gym.recording import Session
 from dorothie_gym.rollout import watch_session
 from dorothie_gym.spaces import ActionDecoder, AdWizardAction, RoleAction, SpaceLimits
 

@@ -11,18 +11,17 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from dorothie_gym.baselines.rl.settings import SettingsError
 from dorothie_gym.baselines.selfplay.seats import Table, make_seat
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.navigation_config import TRAFFIC
+from dorothie_gym.errors import SettingsError, StoryboardError
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.spaces import ActionDict
-from dorothie_gym.tasks import StoryboardError
 
 _PARTICIPANT = AGENT_ROLES.index(Role.PARTICIPANT)
 

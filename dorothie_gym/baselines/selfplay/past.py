@@ -11,7 +11,7 @@ import torch
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 
-from dorothie_gym.baselines.rl.weights import WeightsError
+from dorothie_gym.errors import ModelFileError
 
 FILE: Final = "past.safetensors"
 
@@ -47,12 +47,12 @@ class Past:
         save_file(dict(flat), folder / FILE)
 
     def load(self, folder: Path) -> None:
-        """Reads what `save` has written; raises `WeightsError` where that cannot be done."""
+        """Reads what `save` has written; raises `ModelFileError` where that cannot be done."""
         path = folder / FILE
         try:
             tensors = load_file(path)
         except (SafetensorError, OSError) as error:
-            raise WeightsError(f"{path}: cannot be read ({error})") from None
+            raise ModelFileError(f"{path}: cannot be read ({error})") from None
         self._weights = [{} for _ in {name.split("/", 1)[0] for name in tensors}]
         for name, value in tensors.items():
             number, key = name.split("/", 1)

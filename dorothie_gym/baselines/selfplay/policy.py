@@ -11,11 +11,12 @@ import numpy as np
 import torch
 
 from dorothie_gym.baselines.rl.settings import TrainingSettings
-from dorothie_gym.baselines.rl.weights import DESCRIPTION, WeightsError, read_description, restore
+from dorothie_gym.baselines.rl.weights import DESCRIPTION, read_description, restore
 from dorothie_gym.baselines.selfplay.learner import draw, make_network
 from dorothie_gym.baselines.selfplay.seat import Seat
 from dorothie_gym.baselines.selfplay.seats import Table, make_seat, pad_masks, pad_vectors
 from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings
+from dorothie_gym.errors import ModelFileError
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy
@@ -90,12 +91,12 @@ def read_policy(path: Path, role: Role, limits: SpaceLimits) -> LearnedPolicy:
             padded = int(found["padded"][0]), int(found["padded"][1])
         settings: TrainingSettings = SelfPlaySettings(**found["settings"]).learner()
     except (KeyError, TypeError, ValueError, IndexError) as error:
-        raise WeightsError(f"{folder / DESCRIPTION}: is no model of self-play ({error!r})") from None
+        raise ModelFileError(f"{folder / DESCRIPTION}: is no model of self-play ({error!r})") from None
     if learned is not role:
-        raise WeightsError(f"{folder}: plays {learned}, not {role}")
+        raise ModelFileError(f"{folder}: plays {learned}, not {role}")
     table, place = Table.of(limits), AGENT_ROLES.index(role)
     if (size, actions) != (table.sizes[place], table.actions[place]):
-        raise WeightsError(
+        raise ModelFileError(
             f"{folder / DESCRIPTION}: takes in {size} numbers and has {actions} actions, {role} has "
             f"{table.sizes[place]} and {table.actions[place]}: the model is of another version of dorothie_gym"
         )

@@ -9,8 +9,9 @@ from typing import Any, Final
 
 import yaml
 
-from dorothie_gym.baselines.rl.settings import SettingsError, TrainingSettings
+from dorothie_gym.baselines.rl.settings import TrainingSettings
 from dorothie_gym.baselines.selfplay.loading import KIND
+from dorothie_gym.errors import SettingsError
 
 SELFPLAY: Final = KIND
 """Name of the algorithm at the command line."""

@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 from dorothie_gym.baselines.rl.cloning import Tell, silent
 from dorothie_gym.baselines.rl.evaluating import SEEDS_FROM, Act, Outcome, evaluate_policy
 from dorothie_gym.baselines.rl.training import CLONED, CURVE, PROGRESS, Run, Watch, check_same
-from dorothie_gym.baselines.rl.weights import DESCRIPTION, WeightsError, read_description, restore, save_model
+from dorothie_gym.baselines.rl.weights import DESCRIPTION, read_description, restore, save_model
 from dorothie_gym.baselines.selfplay.cloning import read_lessons
 from dorothie_gym.baselines.selfplay.curve import draw_curve
 from dorothie_gym.baselines.selfplay.game import AD_WIZARD, Game, Maker
 from dorothie_gym.baselines.selfplay.learner import draw
 from dorothie_gym.baselines.selfplay.settings import SELFPLAY, SelfPlaySettings
+from dorothie_gym.errors import ModelFileError
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.recording import Fold
 
@@ -90,7 +91,7 @@ class SelfPlay:
             SettingsError: the folder has a run with other settings, or nothing can be trained with these.
             ProcessError: Ray is not installed, or there is no cluster at the address.
             SessionError: the corpus of the warm start cannot be read or played again.
-            WeightsError: the run in the folder is damaged.
+            ModelFileError: the run in the folder is damaged.
         """
         self.settings, self.folder = settings, folder
         self._watch, self._tell = watch or (lambda done, total, row: None), tell
@@ -226,7 +227,7 @@ class SelfPlay:
         found = {role: read_description(self.folder / role) for role in AGENT_ROLES}
         steps = {int(description["steps"]) for description in found.values()}
         if len(steps) > 1:
-            raise WeightsError(f"{self.folder}: the models are of different steps ({sorted(steps)}); begin anew")
+            raise ModelFileError(f"{self.folder}: the models are of different steps ({sorted(steps)}); begin anew")
         for learner in self.game.learners:
             restore(learner.model, self.folder / AGENT_ROLES[learner.roles[0]])
         self.game.past.load(self.folder)

@@ -1,6 +1,5 @@
 """Training of models, and what is kept of it."""
 
-from dorothie_gym.baselines.training.checkpoints import CheckpointError
 from dorothie_gym.baselines.training.trainer import (
     BEST_FILE,
     LAST_FILE,
@@ -13,6 +12,7 @@ from dorothie_gym.baselines.training.trainer import (
     predict,
     train,
 )
+from dorothie_gym.errors import CheckpointError
 
 __all__ = [
     "BEST_FILE",

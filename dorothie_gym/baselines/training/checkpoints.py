@@ -14,13 +14,11 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor, nn
 
+from dorothie_gym.errors import CheckpointError
+
 _MODEL: Final = "model."
 _OPTIMISER: Final = "optimiser."
 _ABOUT: Final = "dorothie_gym"
-
-
-class CheckpointError(RuntimeError):
-    """A checkpoint is damaged, or of another model or corpus; the message names the file and what to do."""
 
 
 def save(

@@ -17,6 +17,7 @@ from dorothie_gym.baselines.inputs import Examples, Inputs, Labels
 from dorothie_gym.baselines.outputs import Predicted
 from dorothie_gym.baselines.training import checkpoints
 from dorothie_gym.benchmark.features import BatchSpec
+from dorothie_gym.errors import CheckpointError
 
 BEST_FILE: Final = "best.safetensors"
 """The weights of the epoch with the lowest validation loss."""
@@ -211,7 +212,7 @@ class _Run:
         written = checkpoints.about(path)
         for name, value in self.about.items():
             if written.get(name) != value:
-                raise checkpoints.CheckpointError(
+                raise CheckpointError(
                     f"{path}: was trained with another {name} than is asked for now; choose another folder or delete it"
                 )
         checkpoints.restore(path, self.model, self.optimiser)

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from dorothie_gym.benchmark.features.columns import GROUPS, NO_TEXT, Columns, Sessions, TownGraph
 from dorothie_gym.benchmark.features.extraction import SessionColumns, extract, town_graph
 from dorothie_gym.benchmark.features.store import keep, recall
-from dorothie_gym.maps import Town, TownError
+from dorothie_gym.errors import SessionError, TownError
+from dorothie_gym.maps import Town
 from dorothie_gym.maps.cache import compiler_digest
-from dorothie_gym.recording import FOLDS, Corpus, CorpusEntry, Fold, Session, SessionError
+from dorothie_gym.recording import FOLDS, Corpus, CorpusEntry, Fold, Session
 from dorothie_gym.recording.file_names import ACTIONS_FILE
 from dorothie_gym.recording.sdn.maps import find_town
 

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.benchmark.features.columns import GROUPS, Columns, TownGraph
+from dorothie_gym.errors import FeatureStoreError
 from dorothie_gym.maps.cache import cache_folder
 
 INDEX_FILE: Final = "columns.json"
@@ -35,10 +36,6 @@ MOST_ENTRIES: Final = 12
 """When there are more, those that were used longest ago are removed: an entry of 183 sessions takes up about 40 MB."""
 
 _log = logging.getLogger(__name__)
-
-
-class StoreError(ValueError):
-    """A folder holds no columns: it is damaged, or another program's."""
 
 
 def features_folder() -> Path | None:
@@ -57,7 +54,7 @@ def recall(key: str) -> Columns | None:
         os.utime(folder / key)
     except FileNotFoundError:
         return None
-    except (OSError, StoreError) as error:
+    except (OSError, FeatureStoreError) as error:
         _log.debug("the cached features %s are of no use and are built anew: %s", folder / key, error)
         return None
     return columns if columns.key == key else None
@@ -122,7 +119,7 @@ def read_columns(folder: Path) -> Columns:
 
     Raises:
         FileNotFoundError: there is nothing.
-        StoreError: a file is damaged or missing; the message names it.
+        FeatureStoreError: a file is damaged or missing; the message names it.
         OSError: a file cannot be read.
     """
     page = _page(folder / INDEX_FILE)
@@ -130,21 +127,21 @@ def read_columns(folder: Path) -> Columns:
     try:
         return _columns(page, arrays)
     except (KeyError, TypeError) as error:
-        raise StoreError(f"{folder}: {error} is missing") from None
+        raise FeatureStoreError(f"{folder}: {error} is missing") from None
 
 
 def _page(path: Path) -> dict[str, Any]:
     digest, _, text = path.read_text(encoding="utf-8").partition("\n")
     text = text.removesuffix("\n")
     if hashlib.sha256(text.encode()).hexdigest() != digest:
-        raise StoreError(f"{path}: does not fit its checksum")
+        raise FeatureStoreError(f"{path}: does not fit its checksum")
     page: dict[str, Any] = json.loads(text)
     return page
 
 
 def _array(path: Path, digest: str) -> NDArray[Any]:
     if not path.is_file() or _digest(path) != digest:
-        raise StoreError(f"{path}: is missing, or does not fit its checksum")
+        raise FeatureStoreError(f"{path}: is missing, or does not fit its checksum")
     if path.stat().st_size <= EMPTY:  # what is empty cannot be mapped
         empty: NDArray[Any] = np.load(path, allow_pickle=False)
         return empty

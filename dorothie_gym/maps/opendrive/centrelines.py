@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dorothie_gym.maps.errors import TownError
+from dorothie_gym.errors import TownError
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.opendrive.records import SIDEWALK, OpenDriveRecords, RoadRecord
 from dorothie_gym.maps.opendrive.topology import SHORTEST_LANE, Topology, runs_forward

@@ -9,7 +9,7 @@ from typing import NoReturn, TypeAlias
 import numpy as np
 from lxml import etree
 
-from dorothie_gym.maps.errors import TownError
+from dorothie_gym.errors import TownError
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.opendrive.geometry import (
     NO_CUBICS,

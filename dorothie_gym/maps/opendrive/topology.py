@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dorothie_gym.maps.errors import TownError
+from dorothie_gym.errors import TownError
 from dorothie_gym.maps.model import Lane, LaneLink, LinkType, wrap_degrees
 from dorothie_gym.maps.opendrive.records import ConnectionRecord, OpenDriveRecords, RoadRecord
 

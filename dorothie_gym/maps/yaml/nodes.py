@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 import yaml
 
-from dorothie_gym.maps.errors import TownError
+from dorothie_gym.errors import TownError
 
 _NULL, _BOOL, _MERGE = (f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "merge"))
 _PLAIN_NUMBER = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?")

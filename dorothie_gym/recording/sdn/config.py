@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from dorothie_gym.ontology import OntologyError, parse_landmark, parse_street
+from dorothie_gym.errors import OntologyError
+from dorothie_gym.ontology import parse_landmark, parse_street
 from dorothie_gym.recording.header import LandmarkRow, SessionHeader, SubgoalRow
 from dorothie_gym.recording.json_io import Fields
 from dorothie_gym.recording.sdn.files import CONFIG_FILE, DIALOG_FILE, OURS, Row, SdnLayout, number_of, plain, whole_of

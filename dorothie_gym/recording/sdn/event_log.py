@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from dorothie_gym.errors import OntologyError, SessionError
 from dorothie_gym.ontology import (
     LANE_SWITCH_LEFT,
     LANE_SWITCH_RIGHT,
     NAVIGATION_ACTIONS,
     ArgumentKind,
     MentalAction,
-    OntologyError,
     PhysicalAction,
     Role,
     parse_goal_status,
@@ -22,7 +22,6 @@ from dorothie_gym.ontology import (
     parse_physical_action,
     parse_role,
 )
-from dorothie_gym.recording.errors import SessionError
 from dorothie_gym.recording.events import Event, EventType, check_event
 from dorothie_gym.recording.sdn.files import FRAMES_EACH, MORE, OURS, Row, frame_of, more_of, number_of, plain, whole_of
 from dorothie_gym.recording.sdn.moves import MoveReader, read_speech

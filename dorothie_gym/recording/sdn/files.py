@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
-from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.errors import SessionError
 from dorothie_gym.recording.file_names import MAX_EVENTS, MAX_FRAME
 from dorothie_gym.recording.json_io import MAX_DEPTH, decode_text, read_bytes
 from dorothie_gym.recording.validation import ReadReport

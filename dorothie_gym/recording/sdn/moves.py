@@ -8,7 +8,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from dorothie_gym.ontology import DialogueAct, OntologyError, Role, parse_act, parse_move, parse_slot_value
+from dorothie_gym.errors import OntologyError
+from dorothie_gym.ontology import DialogueAct, Role, parse_act, parse_move, parse_slot_value
 from dorothie_gym.ontology import parse_slot as slot_of
 from dorothie_gym.recording.sdn.files import (
     MORE,

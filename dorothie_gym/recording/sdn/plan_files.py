@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
+from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology import (
     ExceptionKind,
     MentalAction,
-    OntologyError,
     Role,
     parse_exception,
     parse_goal_status,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.errors import SessionError
 from dorothie_gym.recording.events import Event
 from dorothie_gym.recording.file_names import MAX_FRAME
 from dorothie_gym.recording.header import SessionHeader

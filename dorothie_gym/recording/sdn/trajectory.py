@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.recording.errors import SessionError
+from dorothie_gym.errors import SessionError
 from dorothie_gym.recording.file_names import MAX_FRAME, MAX_FRAMES
 from dorothie_gym.recording.frames import read_frames, write_frames
 from dorothie_gym.recording.sdn.files import FRAMES_EACH, SDN_RATE, number_of, read_csv

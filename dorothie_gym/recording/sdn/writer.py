@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from dorothie_gym.errors import OntologyError
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import (
     SPEED_STEP,
@@ -21,7 +22,6 @@ from dorothie_gym.ontology import (
     parse_physical_action,
     parse_prop,
 )
-from dorothie_gym.ontology.vocabulary import OntologyError
 from dorothie_gym.recording.events import Event, EventType
 from dorothie_gym.recording.file_names import EVENTS_FILE
 from dorothie_gym.recording.folder import new_folder

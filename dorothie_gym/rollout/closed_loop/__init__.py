@@ -1,5 +1,6 @@
 """Agents in the loop: what is measured of sessions that they drive and talk in, and tables over many."""
 
+from dorothie_gym.errors import RolloutError
 from dorothie_gym.rollout.closed_loop.intervals import Interval, figures_of, interval_of
 from dorothie_gym.rollout.closed_loop.metrics import (
     METRICS,
@@ -21,7 +22,7 @@ from dorothie_gym.rollout.closed_loop.metrics import (
     Success,
     UtterancesPerSubgoal,
 )
-from dorothie_gym.rollout.closed_loop.results import RolloutError, RolloutResult, Row, read_result
+from dorothie_gym.rollout.closed_loop.results import RolloutResult, Row, read_result
 from dorothie_gym.rollout.closed_loop.running import RolloutPlan, RolloutSettings, parse_towns, roll_out
 from dorothie_gym.rollout.closed_loop.session_record import (
     MetException,

@@ -8,17 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from dorothie_gym.errors import RolloutError
 from dorothie_gym.ontology import Role
 from dorothie_gym.rendering.charts import INK, dress_percent_axes, empty_figure
 from dorothie_gym.rollout.closed_loop.metrics import Metric, RecoverySeconds
-from dorothie_gym.rollout.closed_loop.results import (
-    ALL_METRICS,
-    RESULT_FILE,
-    RolloutError,
-    RolloutResult,
-    figure_text,
-    read_result,
-)
+from dorothie_gym.rollout.closed_loop.results import ALL_METRICS, RESULT_FILE, RolloutResult, figure_text, read_result
 from dorothie_gym.rollout.closed_loop.running import COST_FILE, command_of, fold_of_towns
 
 OTHER: Final = "other"

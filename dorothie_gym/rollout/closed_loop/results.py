@@ -11,6 +11,7 @@ from typing import Any, Final
 from rich.console import Console
 from rich.table import Table
 
+from dorothie_gym.errors import RolloutError
 from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind
 from dorothie_gym.rollout.closed_loop.intervals import RESAMPLES, SEED, Interval, figures_of
 from dorothie_gym.rollout.closed_loop.metrics import METRICS, Metric, RecoverySeconds
@@ -23,10 +24,6 @@ RESULT_VERSION: Final = "1.0"
 
 NO_EXCEPTION: Final = "none"
 """Name of the row of sessions in which nothing unexpected happened."""
-
-
-class RolloutError(ValueError):
-    """A file of results cannot be read; the message names it and tells what to do."""
 
 
 @dataclass(frozen=True, kw_only=True)

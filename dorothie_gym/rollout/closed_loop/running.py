@@ -15,10 +15,11 @@ from typing import Any, Final
 import numpy as np
 
 from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, load_town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import ALL_SCRIPTED, Player
-from dorothie_gym.recording import SessionError, safe_name
+from dorothie_gym.recording import safe_name
 from dorothie_gym.recording.json_io import to_page
 from dorothie_gym.rollout.closed_loop.results import RESULT_FILE, RolloutResult, Row
 from dorothie_gym.rollout.closed_loop.session_record import measure

@@ -10,15 +10,15 @@ import pytest
 pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
-from dorothie_gym.baselines.rl import SettingsError, Training, TrainingSettings, tuned_settings  # noqa: E402
+from dorothie_gym.baselines.rl import Training, TrainingSettings, tuned_settings
 from dorothie_gym.baselines.rl.cloning import clone, read_lessons  # noqa: E402
 from dorothie_gym.baselines.rl.environments import make_env  # noqa: E402
 from dorothie_gym.baselines.rl.weights import make_model  # noqa: E402
 from dorothie_gym.engine.config import EnvConfig  # noqa: E402
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv  # noqa: E402
+from dorothie_gym.errors import SessionError, SettingsError
 from dorothie_gym.ontology import AGENT_ROLES  # noqa: E402
 from dorothie_gym.policies import make_policy  # noqa: E402
-from dorothie_gym.recording import SessionError  # noqa: E402
 from dorothie_gym.rollout import play_session  # noqa: E402
 
 NAVIGATION = "dorothie_gym/Navigation-v0"

@@ -7,10 +7,10 @@ from typer.testing import CliRunner
 
 pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 
-from dorothie_gym.baselines.rl import SettingsError  # noqa: E402
 from dorothie_gym.baselines.rl.measuring import SHARES, measure  # noqa: E402
 from dorothie_gym.bench.report import rl_report  # noqa: E402
 from dorothie_gym.cli.app import app  # noqa: E402
+from dorothie_gym.errors import SettingsError
 from dorothie_gym.policies.navigation.instructor import Instructor  # noqa: E402
 
 

@@ -15,7 +15,7 @@ pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 from dorothie_gym.baselines.rl import Training, tuned_settings  # noqa: E402
 from dorothie_gym.baselines.rl.on_ray import RayVecEnv  # noqa: E402
 from dorothie_gym.baselines.rl.workers import WorkerVecEnv  # noqa: E402
-from dorothie_gym.rollout import ProcessError  # noqa: E402
+from dorothie_gym.errors import ProcessError
 
 pytestmark = [pytest.mark.integrations, pytest.mark.timeout(900), pytest.mark.filterwarnings("ignore")]
 

@@ -12,9 +12,10 @@ pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
 import dorothie_gym.baselines  # noqa: E402, F401
-from dorothie_gym.baselines.rl import SettingsError, Training, TrainingSettings, WeightsError  # noqa: E402
+from dorothie_gym.baselines.rl import Training, TrainingSettings
 from dorothie_gym.engine.config import EnvConfig  # noqa: E402
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv  # noqa: E402
+from dorothie_gym.errors import ModelFileError, SettingsError
 from dorothie_gym.ontology import Role  # noqa: E402
 from dorothie_gym.policies import ALL_SCRIPTED, find_player  # noqa: E402
 from dorothie_gym.recording import Session  # noqa: E402
@@ -58,7 +59,7 @@ def test_only_drivers_play_and_only_the_co_wizard(tmp_path: Path) -> None:
     description = json.loads((tmp_path / "model.json").read_text())
     assert description["kind"] == "dorothie_gym-rl"
     (tmp_path / "model.safetensors").write_bytes(b"nothing")
-    with pytest.raises(WeightsError, match="model.safetensors"):
+    with pytest.raises(ModelFileError, match="model.safetensors"):
         find_player(str(tmp_path), Role.CO_WIZARD).make(Role.CO_WIZARD, limits)
 
 

@@ -11,17 +11,10 @@ import pytest
 pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
-from dorothie_gym.baselines.rl import (  # noqa: E402
-    ALGORITHMS,
-    SettingsError,
-    Training,
-    TrainingSettings,
-    WeightsError,
-    load_model,
-    tuned_settings,
-)
+from dorothie_gym.baselines.rl import ALGORITHMS, Training, TrainingSettings, load_model, tuned_settings
 from dorothie_gym.baselines.rl import training as training_module  # noqa: E402
 from dorothie_gym.baselines.rl.environments import make_vector  # noqa: E402
+from dorothie_gym.errors import ModelFileError, SettingsError
 
 DISCRETE = "dorothie_gym/Navigation-v0"
 SMALL: dict[str, dict[str, Any]] = {
@@ -169,14 +162,14 @@ def test_tuned_settings_can_be_read(algorithm: str) -> None:
 
 
 def test_damaged_models_are_told(tmp_path: Path) -> None:
-    with pytest.raises(WeightsError, match="there is no model"):
+    with pytest.raises(ModelFileError, match="there is no model"):
         load_model(tmp_path)
     Training(settings_for("ppo"), tmp_path).go()
     (tmp_path / "model.safetensors").write_bytes(b"nothing")
-    with pytest.raises(WeightsError, match="model.safetensors"):
+    with pytest.raises(ModelFileError, match="model.safetensors"):
         load_model(tmp_path)
     (tmp_path / "model.json").write_text("{", encoding="utf-8")
-    with pytest.raises(WeightsError, match=r"model\.json, line 1"):
+    with pytest.raises(ModelFileError, match=r"model\.json, line 1"):
         load_model(tmp_path)
 
 

@@ -14,11 +14,12 @@ from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings  # noqa: E
 from dorothie_gym.baselines.selfplay.training import SelfPlay  # noqa: E402
 from dorothie_gym.engine.config import EnvConfig  # noqa: E402
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv  # noqa: E402
+from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import load_town  # noqa: E402
 from dorothie_gym.ontology import AGENT_ROLES  # noqa: E402
 from dorothie_gym.policies import make_policy  # noqa: E402
 from dorothie_gym.policies.navigation import NavigationAction  # noqa: E402
-from dorothie_gym.recording import Corpus, SessionError  # noqa: E402
+from dorothie_gym.recording import Corpus
 from dorothie_gym.rollout import play_session  # noqa: E402
 
 PARTICIPANT, CO_WIZARD, AD_WIZARD = range(3)

@@ -6,12 +6,12 @@ import pytest
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
 from dorothie_gym import DuoWizardEnv  # noqa: E402
-from dorothie_gym.baselines.rl import SettingsError  # noqa: E402
 from dorothie_gym.baselines.selfplay.ad_wizard import AdWizardSeat, Caper  # noqa: E402
 from dorothie_gym.baselines.selfplay.co_wizard import CoWizardSeat, OtherAction  # noqa: E402
 from dorothie_gym.baselines.selfplay.env import SelfPlayEnv  # noqa: E402
 from dorothie_gym.baselines.selfplay.participant import ParticipantMemory, ParticipantSeat, Phrase  # noqa: E402
 from dorothie_gym.dialogue import Direction  # noqa: E402
+from dorothie_gym.errors import SettingsError
 from dorothie_gym.ontology import AGENT_ROLES, ActionValue, DialogueAct, DialogueMove, Role  # noqa: E402
 from dorothie_gym.policies.navigation import NavigationAction  # noqa: E402
 from dorothie_gym.spaces import ParticipantAction, Speech  # noqa: E402

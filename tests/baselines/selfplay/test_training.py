@@ -12,11 +12,11 @@ pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 import torch  # noqa: E402
 from safetensors.torch import load_file  # noqa: E402
 
-from dorothie_gym.baselines.rl import SettingsError, WeightsError  # noqa: E402
 from dorothie_gym.baselines.selfplay import training as training_module  # noqa: E402
 from dorothie_gym.baselines.selfplay.env import SelfPlayEnv  # noqa: E402
 from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings, selfplay_settings  # noqa: E402
 from dorothie_gym.baselines.selfplay.training import SelfPlay  # noqa: E402
+from dorothie_gym.errors import ModelFileError, SettingsError
 from dorothie_gym.ontology import AGENT_ROLES, Role  # noqa: E402
 
 SMALL: dict[str, Any] = {
@@ -149,7 +149,7 @@ def test_runs_of_other_settings_and_damaged_ones_are_left_alone(tmp_path: Path) 
     with pytest.raises(SettingsError, match="another shared"):
         SelfPlay(settings_for(shared=True), tmp_path)
     (tmp_path / "past.safetensors").write_bytes(b"nothing")
-    with pytest.raises(WeightsError, match=r"past\.safetensors"):
+    with pytest.raises(ModelFileError, match=r"past\.safetensors"):
         SelfPlay(settings_for(), tmp_path)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dorothie_gym.benchmark.features import build, building
-from dorothie_gym.benchmark.features.store import INDEX_FILE, StoreError, features_folder, keep, read_columns
-from dorothie_gym.recording import SessionError
+from dorothie_gym.benchmark.features.store import INDEX_FILE, features_folder, keep, read_columns
+from dorothie_gym.errors import FeatureStoreError, SessionError
 from tests.benchmark.features.test_layouts import assert_same
 from tests.recording.builders import write
 from tests.recording.dialogues import talk
@@ -82,7 +82,7 @@ def test_damaged_files_are_built_anew(corpus: Path, name: str, damage: str) -> N
     else:
         data[-3] ^= 1
         path.write_bytes(bytes(data) if damage == "changed" else bytes(data[:-9]))
-        with pytest.raises(StoreError, match=path.name.split(".npy")[0]):
+        with pytest.raises(FeatureStoreError, match=path.name.split(".npy")[0]):
             read_columns(entry())
     assert_same(first, build(corpus))
     assert_same(first, read_columns(entry()))

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from dorothie_gym.benchmark.features import BatchSpec, columns_of, gather, points
+from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import LABELS, PhysicalAction, Role
-from dorothie_gym.recording import Event, EventType, Session, SessionError, Task, task_points
+from dorothie_gym.recording import Event, EventType, Session, Task, task_points
 from dorothie_gym.recording.recorded_perception import last_perceived
 from dorothie_gym.recording.resampling import at_tenths
 from tests.recording.builders import physical, session, utterance

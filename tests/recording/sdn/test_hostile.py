@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from dorothie_gym.recording import Session, SessionError
+from dorothie_gym.errors import SessionError
+from dorothie_gym.recording import Session
 from dorothie_gym.recording.file_names import MAX_EVENTS
 from dorothie_gym.recording.sdn import read_sdn
 from tests.recording.sdn.builders import (

@@ -15,7 +15,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from dorothie_gym.analysis import PHENOMENA, Talk, inconsistencies
-from dorothie_gym.recording import Session, SessionError, read_session
+from dorothie_gym.errors import SessionError
+from dorothie_gym.recording import Session, read_session
 from tests.recording.builders import write
 from tests.recording.dialogues import talk
 from tests.recording.sdn.builders import hub, release, sample

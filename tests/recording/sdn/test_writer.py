@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import PhysicalAction, Role
-from dorothie_gym.recording import Event, EventType, Scene, SceneTable, Session, SessionError
+from dorothie_gym.recording import Event, EventType, Scene, SceneTable, Session
 from dorothie_gym.recording.sdn import SignVote, read_sdn, settle_sign, write_sdn
 from dorothie_gym.recording.sdn.files import SCENE_FILE
 from dorothie_gym.recording.surroundings import light_rows

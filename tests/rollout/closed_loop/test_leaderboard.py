@@ -9,10 +9,11 @@ from typer.testing import CliRunner
 
 from dorothie_gym.cli.app import app
 from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.errors import RolloutError
 from dorothie_gym.maps import SEEN_TOWNS
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED, Player
-from dorothie_gym.rollout.closed_loop import RolloutError, RolloutResult, RolloutSettings, Row
+from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutSettings, Row
 from dorothie_gym.rollout.closed_loop.leaderboard import leaderboard_page, read_entries
 from tests.rollout.closed_loop.drives import record
 

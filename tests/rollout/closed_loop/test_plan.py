@@ -5,7 +5,8 @@ import shlex
 import pytest
 
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, TownError
+from dorothie_gym.errors import TownError
+from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED, Player
 from dorothie_gym.rollout import plan_corpus

@@ -6,15 +6,9 @@ from typing import Any
 
 import pytest
 
+from dorothie_gym.errors import RolloutError
 from dorothie_gym.ontology import ExceptionKind
-from dorothie_gym.rollout.closed_loop import (
-    MetException,
-    RolloutError,
-    RolloutResult,
-    RolloutSettings,
-    Row,
-    read_result,
-)
+from dorothie_gym.rollout.closed_loop import MetException, RolloutResult, RolloutSettings, Row, read_result
 from tests.rollout.closed_loop.drives import record
 
 WEATHER = MetException(kind=ExceptionKind.WEATHER, met=1.0, seconds=4.0)

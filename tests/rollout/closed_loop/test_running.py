@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED, Player
-from dorothie_gym.recording import Corpus, Session, SessionError
+from dorothie_gym.recording import Corpus, Session
 from dorothie_gym.rollout.closed_loop import RolloutSettings, roll_out
 from tests.rollout.closed_loop.players import load_fainting
 

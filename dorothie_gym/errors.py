@@ -1,0 +1,142 @@
+"""Exceptions of dorothie_gym: one root, and one class for each kind of thing that can be wrong.
+
+Every class also derives from the built-in exception that callers expect (`ValueError` for bad input, `RuntimeError`
+for an environment that does not allow the work), so that `except ValueError` keeps working.
+
+```
+DorothieGymError
+├── OntologyError        a text, number or combination that the closed vocabularies do not contain
+├── TownError            a map cannot be read or used
+├── TownArchiveError     a cached town is damaged or of another format
+├── StoryboardError      a storyboard cannot be read, bound or played
+├── SessionError         a recorded session or corpus cannot be read or written
+├── PolicyLoadError      a policy name or file cannot be resolved
+├── PredictionError      predictions cannot be scored
+├── FeatureStoreError    cached features are damaged
+├── RolloutError         results of a rollout cannot be read
+├── SettingsError        settings of a training run are out of range
+├── ModelFileError       a saved model cannot be read
+├── CheckpointError      a training checkpoint is damaged or of another run
+├── EncoderError         an encoder is unknown, or its package or weights are missing
+├── PhraseFileError      a data file of the dialogue package is malformed
+├── CacheError           the cache folder cannot be written
+└── ProcessError         a worker process failed
+    └── BenchmarkProcessError   a measuring process ended early
+```
+"""
+
+from __future__ import annotations
+
+from reprlib import Repr
+from typing import Final
+
+MAX_SHOWN: Final = 120
+"""Characters of an offending value that a message shows."""
+
+
+class DorothieGymError(Exception):
+    """Root of all exceptions that dorothie_gym raises on purpose."""
+
+
+class OntologyError(DorothieGymError, ValueError):
+    """A text, number or combination that the closed vocabularies do not contain."""
+
+
+class TownError(DorothieGymError, ValueError):
+    """A map cannot be read or used.
+
+    Attributes:
+        source: the map's file or name.
+        element: the offending element, with its line where the format has lines.
+        reason: what is wrong, and what to do about it.
+    """
+
+    def __init__(self, source: str, element: str, reason: str) -> None:
+        # The three arguments go to `args` as they are, so that the error can be pickled and sent to other processes.
+        super().__init__(source, element, reason)
+        self.source, self.element, self.reason = source, element, reason
+
+    def __str__(self) -> str:
+        return f"{self.source}: {self.element}: {self.reason}"
+
+
+class TownArchiveError(DorothieGymError, ValueError):
+    """Bytes are not the archive of the expected town: damaged, of another format, or of another town."""
+
+
+class StoryboardError(DorothieGymError, ValueError):
+    """A storyboard cannot be read or bound, or does not allow the requested change.
+
+    Attributes:
+        template: name (or path) of the storyboard template.
+        field: where in the template, such as "subgoals[2].after" or "variables.P1".
+        reason: what is wrong, and what to do about it.
+    """
+
+    def __init__(self, template: str, field: str, reason: str) -> None:
+        super().__init__(f"storyboard {template}: {field}: {reason}")
+        self.template, self.field, self.reason = template, field, reason
+
+
+class SessionError(DorothieGymError, ValueError):
+    """A session cannot be written or read; the message names the file, the line and the field."""
+
+
+class PolicyLoadError(DorothieGymError, ValueError):
+    """A policy name or file cannot be resolved; the message gives the reason and the accepted values."""
+
+
+class PredictionError(DorothieGymError, ValueError):
+    """Predictions cannot be scored; the message names the file, the row or point, and what to do."""
+
+
+class FeatureStoreError(DorothieGymError, ValueError):
+    """A cache folder holds no readable features: it is damaged or of another program."""
+
+
+class RolloutError(DorothieGymError, ValueError):
+    """A file of rollout results cannot be read; the message names the file and what to do."""
+
+
+class SettingsError(DorothieGymError, ValueError):
+    """Settings of a training run are out of range; the message names the field and the allowed values."""
+
+
+class ModelFileError(DorothieGymError, ValueError):
+    """A saved model cannot be read; the message names the file and the fault."""
+
+
+class CheckpointError(DorothieGymError, RuntimeError):
+    """A checkpoint is damaged, or of another model or corpus; the message names the file and what to do."""
+
+
+class EncoderError(DorothieGymError, RuntimeError):
+    """An encoder is unknown, or its package or weights are missing; the message says what to install."""
+
+
+class PhraseFileError(DorothieGymError, ValueError):
+    """A data file of the dialogue package is malformed; the message names the file and the line."""
+
+
+class CacheError(DorothieGymError, RuntimeError):
+    """The cache folder cannot be written; the message names the environment variable to set."""
+
+
+class ProcessError(DorothieGymError, RuntimeError):
+    """A task failed in its worker process, or the process died; the message names the task and the cause."""
+
+
+class BenchmarkProcessError(ProcessError):
+    """A measuring process ended before it reported a result."""
+
+
+class _ShortRepr(Repr):
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxstring = self.maxother = self.maxlong = MAX_SHOWN
+
+
+def short_repr(value: object) -> str:
+    """Returns the `repr` of an offending value, cut to `MAX_SHOWN` characters."""
+    text = _ShortRepr().repr(value)
+    return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}..."
