@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 import torch
 
-from dorothie_gym import __version__
+from dorothie_gym._version import __version__
 from dorothie_gym.baselines.acting.description import Description, sha256_of
 from dorothie_gym.baselines.inputs import TASKS
 from dorothie_gym.baselines.material import TEST, TRAIN, VALIDATION, Material

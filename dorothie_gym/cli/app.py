@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from dorothie_gym import __version__
+from dorothie_gym._version import __version__
 from dorothie_gym.cli.bench import bench
 from dorothie_gym.cli.convert import convert
 from dorothie_gym.cli.evaluate import evaluate

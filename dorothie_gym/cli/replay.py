@@ -85,7 +85,7 @@ def _compare(session: Session, town: Town, template: Any) -> dict[str, Any]:
     """Plays a session again; returns what --json writes of it."""
     from dataclasses import asdict
 
-    from dorothie_gym import __version__
+    from dorothie_gym._version import __version__
     from dorothie_gym.recording import first_difference
     from dorothie_gym.rollout import resimulate
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, NotRequired, TypedDict
 
-from dorothie_gym import __version__
+from dorothie_gym._version import __version__
 from dorothie_gym.errors import OntologyError, SessionError
 from dorothie_gym.ontology import parse_landmark, parse_street
 from dorothie_gym.recording.json_io import Fields, canonical

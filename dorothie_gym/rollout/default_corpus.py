@@ -16,7 +16,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from dorothie_gym import __version__
+from dorothie_gym._version import __version__
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import CacheError
 from dorothie_gym.recording import FORMAT_VERSION

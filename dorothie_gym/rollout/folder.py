@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from dorothie_gym import __version__
+from dorothie_gym._version import __version__
 from dorothie_gym.errors import SessionError
 from dorothie_gym.recording import FORMAT_VERSION
 

@@ -1,0 +1,36 @@
+"""Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
+
+from ._version import __version__ as __version__
+from .benchmark.teacher_forced import NfDEnv as NfDEnv
+from .benchmark.teacher_forced import RfNEnv as RfNEnv
+from .benchmark.teacher_forced import UfNEnv as UfNEnv
+from .engine.config import EnvConfig as EnvConfig
+from .engine.config import RewardWeights as RewardWeights
+from .engine.scenario import Scenario as Scenario
+from .engine.scenario import draw_scenario as draw_scenario
+from .envs.duo_wizard_v0 import DuoWizardEnv as DuoWizardEnv
+from .envs.navigation_config import NavigationWeights as NavigationWeights
+from .envs.navigation_continuous_v0 import NavigationContinuousEnv as NavigationContinuousEnv
+from .envs.navigation_v0 import NavigationEnv as NavigationEnv
+from .envs.single_role_v0 import SingleRole as SingleRole
+from .errors import DorothieGymError as DorothieGymError
+from .maps import Town as Town
+from .maps import load_town as load_town
+from .ontology import Role as Role
+from .policies import Policy as Policy
+from .policies import make_policy as make_policy
+from .policies.navigation import NavigationAction as NavigationAction
+from .recording import Session as Session
+from .recording import load_sessions as load_sessions
+from .sim.config import WorldConfig as WorldConfig
+from .sim.town_env import TownEnv as TownEnv
+from .spaces import SpaceLimits as SpaceLimits
+from .spaces import noop as noop
+from .tasks import load_template as load_template
+from .tasks import template_names as template_names
+from .wrappers.flatten import FlattenAction as FlattenAction
+from .wrappers.flatten import FlattenObservation as FlattenObservation
+from .wrappers.flatten import flatten as flatten
+from .wrappers.identical_spaces import IdenticalSpaces as IdenticalSpaces
+from .wrappers.record_session import RecordSession as RecordSession
+from .wrappers.teacher_forcing import TeacherForcing as TeacherForcing
