@@ -1,5 +1,6 @@
 """What README.md shows runs as written."""
 
+import importlib
 import re
 from pathlib import Path
 
@@ -13,8 +14,9 @@ SNIPPETS = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8")
 
 @pytest.fixture(autouse=True)
 def a_default_corpus_that_is_played_fast(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dorothie_gym.rollout.default_corpus.SESSIONS", 2)
-    monkeypatch.setattr("dorothie_gym.rollout.default_corpus.CONFIG", EnvConfig(max_seconds=30.0))
+    module = importlib.import_module("dorothie_gym.rollout.default_corpus")  # the package has a function of this name
+    monkeypatch.setattr(module, "SESSIONS", 2)
+    monkeypatch.setattr(module, "CONFIG", EnvConfig(max_seconds=30.0))
 
 
 @pytest.mark.parametrize("snippet", SNIPPETS, ids=[f"snippet_{k}" for k in range(len(SNIPPETS))])
@@ -33,3 +35,17 @@ def test_readme_shows_the_promised_snippets() -> None:
 @pytest.mark.parametrize("link", re.findall(r"\]\(((?!http)[^)#]+)\)", README.read_text(encoding="utf-8")))
 def test_linked_file_exists(link: str) -> None:
     assert (README.parent / link).exists(), f"README.md links to {link}"
+
+
+@pytest.mark.parametrize("page", ["CONTRIBUTING.md", "CHANGELOG.md"])
+def test_links_of_the_other_pages_exist(page: str) -> None:
+    links = re.findall(r"\]\(((?!http)[^)#]+)", (README.parent / page).read_text(encoding="utf-8"))
+    assert [link for link in links if not (README.parent / link).exists()] == []
+
+
+def test_files_named_in_the_contributing_guide_exist() -> None:
+    text = (README.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    paths = re.findall(r"`((?:dorothie_gym|tests|docs|examples)/[\w/.]*)`", text)
+    examples = [path for path in paths if "harbour" in path]  # the town that the guide adds
+    assert len(paths) > 10 and len(examples) == 1
+    assert [path for path in paths if path not in examples and not (README.parent / path).exists()] == []

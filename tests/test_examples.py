@@ -1,0 +1,64 @@
+"""Each script in examples/ runs with small settings, and prints what its docstring announces."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.recording.builders import write
+from tests.recording.dialogues import talk
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES = ROOT / "examples"
+LONGEST = 80
+"""Lines of an example."""
+
+ARGUMENTS = {
+    "corpus_analysis": "--sessions 2 --seconds 20 --out made",
+    "custom_agent": "--decisions 40",
+    "dialogue_model": "--corpus corpus --out predictions.parquet",
+    "own_policy": "--sessions 1 --seconds 10",
+    "own_town": "--out mill_end --seconds 10",
+    "rl_navigation": "--steps 64 --rollout 32 --rounds 2 --episodes 1 --max-seconds 10",
+}
+PRINTED = {
+    "corpus_analysis": "words per utterance",
+    "custom_agent": "return",
+    "dialogue_model": "nfd_action_accuracy",
+    "own_policy": "steady speed",
+    "own_town": "sites for landmarks",
+    "rl_navigation": "64 steps: success",
+}
+
+
+def test_every_example_is_run() -> None:
+    assert sorted(path.stem for path in EXAMPLES.glob("*.py")) == sorted(ARGUMENTS) == sorted(PRINTED)
+
+
+@pytest.mark.parametrize("name", sorted(ARGUMENTS))
+def test_example_is_short_and_documented(name: str) -> None:
+    source = (EXAMPLES / f"{name}.py").read_text(encoding="utf-8")
+    docstring = ast.get_docstring(ast.parse(source))
+    assert docstring is not None
+    assert f"python examples/{name}.py" in docstring
+    assert re.search(r"takes? about", docstring), "the docstring does not say how long the example takes"
+    assert len(source.splitlines()) <= LONGEST
+
+
+@pytest.mark.parametrize("name", sorted(ARGUMENTS))
+def test_example_runs(name: str, tmp_path: Path) -> None:
+    for number, fold in enumerate(("train", "test/seen")):
+        write(tmp_path / "corpus" / fold / f"session_{number}", talk())
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "SDL_VIDEODRIVER": "dummy"}
+    run = subprocess.run(
+        [sys.executable, str(EXAMPLES / f"{name}.py"), *ARGUMENTS[name].split()],
+        cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=280, check=False,
+    )  # fmt: skip
+    assert run.returncode == 0, run.stderr
+    assert PRINTED[name] in run.stdout
