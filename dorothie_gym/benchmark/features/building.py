@@ -111,7 +111,7 @@ def _column(rows: Sequence[_Shifted], group: str, name: str) -> NDArray[Any]:
 
 # --- A corpus becomes columns ----------------------------------------------------------------------------------------
 
-_SOURCES: Final = ("ontology", "dialogue", "sessions", "evaluation/features", "world")
+_SOURCES: Final = ("ontology", "dialogue", "maps", "sim", "recording", "analysis", "benchmark/features")
 """Packages that decide what the columns of a session are."""
 
 _READ: Final = (".json", ".jsonl", ".csv", ".parquet", ".journal")
