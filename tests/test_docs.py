@@ -5,6 +5,7 @@ import importlib.util
 import json
 import re
 import sys
+import tomllib
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -157,6 +158,23 @@ def test_the_page_of_transcripts_shows_three_sessions_of_different_kinds() -> No
     assert environmental.count("(env)") >= 3 and task.count("(task)") >= 2
     for section in (easy, environmental, task):
         assert "dorothie-gym show S" in section and "Ended with success" in section
+
+
+def test_the_diagram_of_the_architecture_has_the_order_of_the_import_contract() -> None:
+    contract = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+    layers = next(each["layers"] for each in contract["contracts"] if each["type"] == "layers")
+    diagram = (DOCS / "architecture.md").read_text(encoding="utf-8").split("```")[1].splitlines()
+    lines = []
+    for layer in layers[:-1]:  # the last one holds modules, not packages
+        names = [name.strip().removeprefix("dorothie_gym.") for name in layer.split("|")]
+        found = {
+            next((k for k, line in enumerate(diagram) if re.search(rf"(^|\s){name}\s\s", line)), None)
+            for name in names
+            if name != "bench"
+        }
+        assert len(found) == 1, f"{layer} is not one line of the diagram"
+        lines += found
+    assert None not in lines and lines == sorted(lines)
 
 
 def test_every_page_is_in_the_navigation() -> None:
