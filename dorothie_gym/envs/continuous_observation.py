@@ -104,7 +104,7 @@ def _obstacle(world: World) -> list[float]:
 
 
 def _stop(heard: HeardInstruction) -> list[float]:
-    told = heard.told
+    told = heard.instruction
     if told is None or told.action is not ActionValue.STOP:
         return [0.0] * 3
     left = told.distance - heard.driven

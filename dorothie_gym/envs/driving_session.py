@@ -58,7 +58,7 @@ class DrivingSession:
 
     Attributes:
         stage: the session.
-        ways: ways on at the town's junctions.
+        exits: exits on at the town's junctions.
         instructor: who tells the way.
         heard: what the Co-Wizard remembers of it.
         seen: what all roles observe now.
@@ -68,11 +68,11 @@ class DrivingSession:
         truncated: whether time is up.
     """
 
-    def __init__(self, stage: Stage, config: NavigationConfig, ways: JunctionExits) -> None:
-        self.stage, self.ways, self._config = stage, ways, config
+    def __init__(self, stage: Stage, config: NavigationConfig, exits: JunctionExits) -> None:
+        self.stage, self.exits, self._config = stage, exits, config
         town = stage.world.town
-        self.instructor = Instructor(town, ways, config.guidance)  # type: ignore[arg-type]
-        self._viewpoint = NavigationEncoder(town, ways, config.max_seconds)
+        self.instructor = Instructor(town, exits, config.guidance)  # type: ignore[arg-type]
+        self._viewpoint = NavigationEncoder(town, exits, config.max_seconds)
         self._decoder = ActionDecoder(Role.AD_WIZARD, stage.limits)
         self._adversary = ScriptedAdWizard(stage.limits, rate=config.exceptions) if config.exceptions > 0.0 else None
         seed = policy_seed(stage.scenario.seed, Role.AD_WIZARD)
@@ -173,7 +173,7 @@ class DrivingSession:
             self._notes = [Mental(action=MentalAction.GOAL_UPDATE)]
         if said is None:
             return
-        self.heard = replace(self.heard, told=said, driven=0.0)
+        self.heard = replace(self.heard, instruction=said, driven=0.0)
         name = said.landmark
         if name is not None:
             self._note_goal(name, said.distance, by_name=said.action is None)
@@ -196,7 +196,7 @@ class DrivingSession:
 
     def _way_left(self) -> float:
         planner = self.stage.world.planner
-        return self.instructor.way_left.from_place(planner.lane, planner.station)
+        return self.instructor.cost_to_go.from_place(planner.lane, planner.station)
 
     def _progress(self) -> float:
         """By how much the way to the goal has got shorter [m]; to be asked before there is another goal."""
@@ -205,7 +205,7 @@ class DrivingSession:
 
     def _note_patience(self) -> None:
         now = self.stage.world.time
-        way = self.instructor.way_left
+        way = self.instructor.cost_to_go
         aim = way.goal, way.blocked
         if aim != self._aim or self._left < self._nearest - NEARER:
             self._aim, self._nearest, self._nearest_at = aim, self._left, now
@@ -313,11 +313,11 @@ class NavigationMask:
     """Tells which actions would be carried out, for the car of a session.
 
     Attributes:
-        ways: ways on at the town's junctions.
+        exits: exits on at the town's junctions.
     """
 
-    def __init__(self, world: World, ways: JunctionExits) -> None:
-        self._world, self.ways = world, ways
+    def __init__(self, world: World, exits: JunctionExits) -> None:
+        self._world, self.exits = world, exits
         self._prospect = Prospect(world)
 
     @property
@@ -342,8 +342,8 @@ class NavigationMask:
             leaves = planner.held or planner.manoeuvre[0] is not None
             mask[NavigationAction.LANE_FOLLOW] = leaves and not committed
         for action in UNDER_WAY:
-            mask[action] |= prepares(action, seen, self.ways)
+            mask[action] |= prepares(action, seen, self.exits)
         choice = None if committed else self.choice
         if choice is not None:
-            mask[FIRST_TURN:] = [way is not None for way in self.ways.after(choice[0])]
+            mask[FIRST_TURN:] = [way is not None for way in self.exits.by_sector(choice[0])]
         return mask

@@ -91,7 +91,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[Vector, Info]:
         """Begins a session; see `NavigationEnv.reset`."""
         drive = self.begin(seed, options)
-        self._controls = NavigationMask(drive.stage.world, drive.ways)
+        self._controls = NavigationMask(drive.stage.world, drive.exits)
         drive.stage.world.ego.manual = VehicleControl(throttle=0.0, steer=0.0, brake=0.0)
         return self._observe(drive), drive.info()
 
@@ -119,7 +119,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
 
     def _prepare(self, drive: DrivingSession) -> Physical | None:
         """The manoeuvre that was told, if it is not yet laid into the path."""
-        told, planner = drive.heard.told, drive.stage.world.planner
+        told, planner = drive.heard.instruction, drive.stage.world.planner
         if told is None or told.action not in _MANOEUVRES or planner.in_manoeuvre:
             return None
         action = _MANOEUVRES[told.action]
@@ -142,7 +142,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         if told.action is ActionValue.LANE_SWITCH:
             return LEFT if SECTORS[told.sector] > 0 else RIGHT
         choice = self._controls.choice
-        way = self._controls.ways.after(choice[0])[told.sector] if choice is not None else None
+        way = self._controls.exits.by_sector(choice[0])[told.sector] if choice is not None else None
         return None if way is None else way.angle
 
     def _keep_path(self, drive: DrivingSession) -> None:

@@ -98,7 +98,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
             options: `scenario` plays a given `Scenario`; other options are ignored.
         """
         drive = self.begin(seed, options)
-        self._controls = NavigationMask(drive.stage.world, drive.ways)
+        self._controls = NavigationMask(drive.stage.world, drive.exits)
         return self._observe(), self._info()
 
     def step(self, action: np.int64 | int) -> tuple[Vector, float, bool, bool, Info]:
@@ -111,7 +111,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
         drive = self.drive
         if not 0 <= int(action) < len(ACTIONS):
             raise ValueError(f"action is {action}; it must be in 0..{len(ACTIONS) - 1}, see NavigationAction")
-        physical = physical_of(NavigationAction(int(action)), drive.seen[Role.CO_WIZARD], drive.ways)
+        physical = physical_of(NavigationAction(int(action)), drive.seen[Role.CO_WIZARD], drive.exits)
         drive.play(CoWizardAction(physical=physical))
         if self.render_mode == "human":
             self.render()

@@ -1,4 +1,4 @@
-"""Reads the tables of observations into small records."""
+"""Observations read into typed records."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import GoalStatus, LandmarkName, ObjectClass, StreetName, WeatherParameter
+from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
 from dorothie_gym.spaces import LandmarkColumn, ObjectColumn, SubgoalColumn
 
 PARAMETERS = tuple(WeatherParameter)
@@ -19,7 +20,17 @@ PARAMETERS = tuple(WeatherParameter)
 
 @dataclass(frozen=True, kw_only=True)
 class SeenLandmark:
-    """A landmark on the map: its row, its name, where it stands [m] and the lane and station where one stops for it."""
+    """Landmark on the map.
+
+    Attributes:
+        row: row of the observation.
+        name: name.
+        x: position [m].
+        y: position [m].
+        lane: lane of the place where a car stops for it.
+        station: distance along that lane [m].
+        street: street of that lane.
+    """
 
     row: int
     name: LandmarkName
@@ -31,23 +42,23 @@ class SeenLandmark:
 
     @property
     def place(self) -> tuple[int, float]:
-        """Where one stops for it."""
+        """Lane and station at which a car stops for it."""
         return self.lane, self.station
 
 
 IN_VIEW = 45.0
-"""A landmark no farther than this can be pointed at [m]."""
+"""Largest distance, along each axis, of a landmark that utterances refer to [m]."""
 
 
 def nearest_landmark(landmarks: Sequence[SeenLandmark], x: float, y: float) -> SeenLandmark | None:
-    """The landmark closest to a point [m], None if none is in view from there."""
+    """Returns the landmark closest to a point [m]; None if none is in view from there."""
     near = [mark for mark in landmarks if abs(mark.x - x) < IN_VIEW and abs(mark.y - y) < IN_VIEW]
     return min(near, key=lambda mark: (math.hypot(mark.x - x, mark.y - y), mark.row), default=None)
 
 
 @dataclass(frozen=True, kw_only=True)
 class SeenSubgoal:
-    """A task as it stands; `landmark` is a row of the landmarks."""
+    """Subgoal with its present status; `landmark` is a row of the landmarks."""
 
     index: int
     live: bool
@@ -61,13 +72,13 @@ class SeenSubgoal:
 
     @property
     def open(self) -> bool:
-        """Whether it is still to be reached."""
+        """Whether the subgoal counts and has not been reached."""
         return self.live and not self.reached
 
 
 @dataclass(frozen=True, kw_only=True)
 class SeenObject:
-    """Something in sight: its class, place [m] and distance [m]."""
+    """Object in sight: its class, position [m] and distance [m]."""
 
     kind: ObjectClass
     x: float
@@ -76,14 +87,14 @@ class SeenObject:
 
 
 def street_of(observation: Mapping[str, Any], town: Town, lane: int) -> StreetName:
-    """Name of the street that a lane belongs to; UNKNOWN where it has none."""
+    """Returns the name of the street that a lane belongs to; UNKNOWN where it has none."""
     street = town.lanes[lane].street
     names = observation["street_names"]
     return StreetName(int(names[street])) if 0 <= street < len(names) else StreetName.UNKNOWN
 
 
 def read_landmarks(observation: Mapping[str, Any], town: Town) -> tuple[SeenLandmark, ...]:
-    """The rows of `landmarks` in use."""
+    """Returns the rows of `landmarks` in use."""
     return _landmarks(_bytes(observation["landmarks"]), tuple(observation["street_names"].tolist()), town)
 
 
@@ -106,7 +117,7 @@ def _landmarks(table: bytes, street_names: tuple[int, ...], town: Town) -> tuple
 
 
 def read_subgoals(observation: Mapping[str, Any]) -> tuple[SeenSubgoal, ...]:
-    """All rows of `subgoals`, those that are not in use as well: they are not live."""
+    """Returns all rows of `subgoals`; rows that are not in use are not live."""
     return _subgoals(_bytes(observation["subgoals"]))
 
 
@@ -130,7 +141,7 @@ def _subgoals(table: bytes) -> tuple[SeenSubgoal, ...]:
 
 
 def _bytes(table: Any) -> bytes:
-    """A table as what answers are remembered by: from one decision to the next most tables are the same."""
+    """Returns a table as a cache key; most tables are the same at successive decisions."""
     return np.asarray(table, dtype=np.float64).tobytes()
 
 
@@ -140,7 +151,7 @@ def _rows(table: bytes, columns: int) -> list[list[float]]:
 
 
 def read_objects(observation: Mapping[str, Any]) -> tuple[SeenObject, ...]:
-    """The rows of `objects` in use, nearest first."""
+    """Returns the rows of `objects` in use, nearest first."""
     column = ObjectColumn
     return tuple(
         SeenObject(
@@ -155,23 +166,38 @@ def read_objects(observation: Mapping[str, Any]) -> tuple[SeenObject, ...]:
 
 
 def weather(observation: Mapping[str, Any], parameter: WeatherParameter) -> float:
-    """A parameter of the weather."""
+    """Returns a parameter of the weather, in its own unit."""
     return float(observation["weather"][PARAMETERS.index(parameter)])
 
 
+def is_foggy(observation: Mapping[str, Any]) -> bool:
+    """Whether fog limits the view."""
+    return weather(observation, WeatherParameter.FOG_DENSITY) > FOG_LIMIT
+
+
+def is_rainy(observation: Mapping[str, Any]) -> bool:
+    """Whether it rains heavily."""
+    return weather(observation, WeatherParameter.PRECIPITATION) > RAIN_LIMIT
+
+
+def is_dark(observation: Mapping[str, Any]) -> bool:
+    """Whether the sun is below the horizon."""
+    return weather(observation, WeatherParameter.SUN_ALTITUDE_ANGLE) < 0.0
+
+
 def scalar(observation: Mapping[str, Any], name: str) -> float:
-    """A field of one number."""
+    """Returns the value of a field of one number."""
     return float(np.asarray(observation[name]).reshape(-1)[0])
 
 
 def place_on_lanes(
     town: Town, lanes: Sequence[int], x: float, y: float, width: float = 2.0
 ) -> tuple[int, float] | None:
-    """The first of some lanes on which a point lies, and the distance along it; None if it lies on none.
+    """Returns the first of some lanes on which a point lies, and the distance along it; None if it lies on none.
 
     Args:
         town: the map.
-        lanes: lanes to look at, in order.
+        lanes: lanes to try, in order.
         x: position [m].
         y: position [m].
         width: largest distance from the centre line [m].
@@ -186,12 +212,12 @@ def place_on_lanes(
 
 
 def place_on_path(town: Town, observation: Mapping[str, Any], ahead: float) -> tuple[int, float] | None:
-    """Lane and station of a point ahead on the path that the Ad-Wizard sees; None where the path does not reach it.
+    """Returns lane and station of a point ahead on the path that the Ad-Wizard sees; None beyond the path's end.
 
     Args:
         town: the map.
-        observation: of the Ad-Wizard.
-        ahead: how far [m].
+        observation: observation of the Ad-Wizard.
+        ahead: distance along the path [m].
     """
     lanes = [int(lane) - 1 for lane in observation["path_lanes"] if lane > 0]
     current = int(observation["lane"])

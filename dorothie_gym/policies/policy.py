@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, Generic, TypeVar
+from dataclasses import dataclass
+from typing import Any, Final, Generic, TypeVar
 
 import numpy as np
 
@@ -14,13 +15,19 @@ from dorothie_gym.spaces import ActionDict, SpaceLimits
 
 State = TypeVar("State")
 
+DECISION_INTERVAL: Final = 0.5
+"""Time between decisions at the default decision frequency of 2 Hz [s]."""
+
+_SEED_BRANCH: Final = 2
+"""Branch of the session's seed that policies draw from; the environment uses other branches."""
+
 
 class Policy(ABC, Generic[State]):
-    """Acts for a role on what that role observes.
+    """Chooses the actions of a role from its observations.
 
     Attributes:
-        role: whom it acts for.
-        limits: sizes of the spaces that it acts in.
+        role: role that the policy acts for.
+        limits: sizes of the role's spaces.
     """
 
     def __init__(self, role: Role, limits: SpaceLimits | None = None) -> None:
@@ -30,31 +37,45 @@ class Policy(ABC, Generic[State]):
 
     @abstractmethod
     def initial_state(self, seed: int, town: Town) -> State:
-        """What the policy knows before the first decision.
+        """Returns the state before the first decision.
 
         Args:
-            seed: all that is drawn by chance follows from it.
-            town: the map, which everybody knows; what stands in it comes with the observations.
+            seed: seed of all random draws of the policy.
+            town: the map, known to every role; landmarks are part of the observations.
         """
 
     @abstractmethod
     def step(self, observation: Mapping[str, Any], state: State) -> tuple[ActionDict, State]:
-        """Decides on an action.
+        """Chooses an action.
 
         Args:
-            observation: of the role, see `observation_space`.
-            state: as `initial_state` or the step before returned it; it is left as it is.
+            observation: observation of the role, see `observation_space`.
+            state: state that `initial_state` or the previous step returned; it is not changed.
 
         Returns:
             An action of the role's action space, and the state for the next decision.
         """
 
 
-_POLICIES = 2
-"""Branch of a session's seed; the environment draws from others."""
+@dataclass(frozen=True, kw_only=True)
+class DecisionClock:
+    """Time between decisions, measured from the times of the observations.
+
+    Attributes:
+        time: time of the last observation [s]; None before the first.
+        interval: time between the last two observations [s]; `DECISION_INTERVAL` until there are two.
+    """
+
+    time: float | None = None
+    interval: float = DECISION_INTERVAL
+
+    def ticked(self, now: float) -> DecisionClock:
+        """Advances the clock to the time of another observation [s]; rounds off floating-point residues."""
+        elapsed = round(now - self.time, 6) if self.time is not None else 0.0
+        return DecisionClock(time=now, interval=elapsed if elapsed > 0.0 else self.interval)
 
 
 def policy_seed(seed: int, role: Role) -> int:
-    """Returns the seed of a role's policy in the session of a seed: 32 bits, other ones for each role."""
-    branch = np.random.SeedSequence([seed, _POLICIES, AGENT_ROLES.index(role)])
+    """Returns the seed of a role's policy in the session of a seed: 32 bits, different for each role."""
+    branch = np.random.SeedSequence([seed, _SEED_BRANCH, AGENT_ROLES.index(role)])
     return int(branch.generate_state(1)[0])

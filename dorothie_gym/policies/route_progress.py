@@ -49,6 +49,18 @@ LIGHT_SIGHT = 60.0
 LAG = 0.56
 """Time that the brakes seem to take until they bite, measured at 3 to 11 m/s [s]."""
 
+NEAR_MISS = 150.0
+"""A car that leaves the route within this distance of the goal may have missed it [m]."""
+
+WAY_ROUND = 60.0
+"""A new route that is longer by more than this shows that the goal was missed [m]."""
+
+SAME_ROADBLOCK = 10.0
+"""Roadblocks closer together than this on a lane count as one [m]; cells of the router are about 10 m long."""
+
+CELL_BEHIND = 8.0
+"""Distance from a roadblock to a place in the following cell of the router [m]."""
+
 CANONICAL = {Direction.LEFT: 90.0, Direction.RIGHT: -90.0, Direction.STRAIGHT: 0.0, Direction.BACK: 180.0}
 """The angle that a direction means at a junction like a cross [degrees, positive left]."""
 
@@ -112,7 +124,7 @@ def default_successor(town: Town, lane: int) -> int | None:
     return min(exits, key=lambda way: (abs(way.angle), way.connector)).connector
 
 
-def way_ahead(town: Town, here: Place, place: Place, distance: float) -> float | None:
+def default_lane_distance(town: Town, here: Place, place: Place, distance: float) -> float | None:
     """Returns how far a place is along the lanes that a car takes by default [m]; None if it is not on them so near.
 
     Args:
@@ -344,6 +356,65 @@ class RouteProgress:
             if crossing is not None and leg.lane == crossing.exit.connector:
                 return False
         return False
+
+
+@dataclass(frozen=True, kw_only=True)
+class RouteState:
+    """Route of an agent, and what it knows about places that the planner must not use.
+
+    Attributes:
+        progress: route to the goal and the progress on it; None without a place to go to.
+        blocked: places behind roadblocks.
+        avoided: places excluded because the car missed the goal after passing them.
+        misses: number of times that the car has driven past the goal.
+    """
+
+    progress: RouteProgress | None = None
+    blocked: tuple[Place, ...] = ()
+    avoided: tuple[Place, ...] = ()
+    misses: int = 0
+
+    @property
+    def closed(self) -> tuple[Place, ...]:
+        """Places that the planner must not use."""
+        return self.blocked + self.avoided
+
+    def with_progress(self, progress: RouteProgress | None) -> RouteState:
+        """Sets the route, or gives it up (None)."""
+        return replace(self, progress=progress)
+
+    def for_new_goal(self) -> RouteState:
+        """Resets the misses of the previous goal; roadblocks stay known."""
+        return replace(self, misses=0, avoided=())
+
+    def replanned(self, town: Town, start: Place) -> RouteState:
+        """Plans another route to the same goal."""
+        assert self.progress is not None
+        return replace(self, progress=self.progress.replanned(town, start, self.closed))
+
+    def has_missed(self, before: float, station: float) -> bool:
+        """Whether the goal, `before` metres ahead on the former route, now needs a long way round."""
+        assert self.progress is not None
+        return before < NEAR_MISS and self.progress.left(station) > before + WAY_ROUND
+
+    def after_miss(self, town: Town, start: Place, former: RouteProgress) -> RouteState:
+        """Counts a drive past the goal; from the second one on, avoids the last lane change of the former route."""
+        counted = replace(self, misses=self.misses + 1)
+        way_in = former.way_in()
+        return counted.avoiding(town, start, way_in) if counted.misses > 1 and way_in is not None else counted
+
+    def avoiding(self, town: Town, start: Place, place: Place) -> RouteState:
+        """Excludes a place and plans another route."""
+        return replace(self, avoided=(*self.avoided, place)).replanned(town, start)
+
+    def knows_roadblock(self, place: Place) -> bool:
+        """Whether a roadblock at a place is one of those known."""
+        return any(lane == place[0] and abs(station - place[1]) < SAME_ROADBLOCK for lane, station in self.blocked)
+
+    def with_roadblock(self, town: Town, place: Place) -> RouteState:
+        """Adds a roadblock: its cell and the one behind it, because the car's own cell counts as free."""
+        behind = place[0], min(place[1] + CELL_BEHIND, town.lanes[place[0]].length)
+        return replace(self, blocked=(*self.blocked, place, behind))
 
 
 def first_new_street(

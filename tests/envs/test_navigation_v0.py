@@ -124,7 +124,7 @@ def test_the_reward_is_the_sum_of_its_terms(env: NavigationEnv) -> None:
 def test_progress_adds_up_to_the_way_that_was_left(env: NavigationEnv) -> None:
     """It is a difference of potentials: no way of driving about earns more than driving there."""
     env.reset(seed=0)
-    left, rng, total = env.drive.instructor.way_left, np.random.default_rng(1), 0.0
+    left, rng, total = env.drive.instructor.cost_to_go, np.random.default_rng(1), 0.0
     planner = env.drive.stage.world.planner
     before = left.from_place(planner.lane, planner.station)
     for _ in range(40):

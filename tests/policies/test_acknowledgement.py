@@ -5,9 +5,9 @@ from dorothie_gym.dialogue import Direction, understand
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import ActionValue, DialogueMove, Role
 from dorothie_gym.policies import ScriptedCoWizard, ScriptedParticipant
-from dorothie_gym.policies.co_wizard.acknowledgement import musing, take_up
+from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, plan_remark
 from dorothie_gym.policies.co_wizard.config import CoWizardStyle
-from dorothie_gym.policies.co_wizard.state import CoWizardState
+from dorothie_gym.policies.co_wizard.state import CoWizardState, Intentions
 from dorothie_gym.policies.policy import policy_seed
 
 
@@ -15,13 +15,15 @@ def mind_of(**style: float) -> CoWizardState:
     traits = {"echoes": 0.0, "checks": 0.0, "tells": 0.0, "silent": 0.0} | style
     env = DuoWizardEnv(town="brookside")
     env.reset(seed=0)
-    return CoWizardState(seed=0, town=env.town, style=CoWizardStyle(**traits))
+    return CoWizardState(
+        seed=0, town=env.town, style=CoWizardStyle(**traits), intentions=Intentions(speed=40, usual=40)
+    )
 
 
 def heard_moves(words: str, action: ActionValue, seed: int, **style: float) -> list[DialogueMove]:
     mind = mind_of(**style)
-    take_up(mind, action, understand(words), np.random.default_rng(seed))
-    return [item.act.move for item in mind.voice.queue]
+    acknowledge(mind, action, understand(words), np.random.default_rng(seed))
+    return [item.act.move for item in mind.speech.queue]
 
 
 def test_the_silent_say_nothing_to_a_command():
@@ -30,8 +32,8 @@ def test_the_silent_say_nothing_to_a_command():
 
 def test_who_repeats_says_which_way():
     mind = mind_of(echoes=1.0)
-    take_up(mind, ActionValue.J_TURN, understand("left at the next one"), np.random.default_rng(5))
-    told = [item for item in mind.voice.queue if item.act.slots]
+    acknowledge(mind, ActionValue.J_TURN, understand("left at the next one"), np.random.default_rng(5))
+    told = [item for item in mind.speech.queue if item.act.slots]
     assert told and told[0].wording.direction is Direction.LEFT
 
 
@@ -44,7 +46,7 @@ def test_a_stop_is_never_asked_back_about():
 
 @pytest.mark.parametrize(("rambles", "expected"), [(0.0, 0), (1.0, 1)])
 def test_only_who_rambles_tells_what_it_is_up_to(rambles, expected):
-    assert len(musing(mind_of(rambles=rambles), np.random.default_rng(1))) == expected
+    assert len(plan_remark(mind_of(rambles=rambles), np.random.default_rng(1))) == expected
 
 
 def test_sessions_have_speakers_of_different_styles_and_the_same_session_the_same():

@@ -7,7 +7,7 @@ import pytest
 
 from dorothie_gym.maps.routing import Entry
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role, Slot
-from dorothie_gym.policies.co_wizard.understanding_update import NUDGE
+from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE
 from dorothie_gym.policies.participant.arriving import WITHIN
 from dorothie_gym.policies.participant.guidance import RUN_UP, guide
 from dorothie_gym.policies.participant.replies import listen
@@ -45,7 +45,7 @@ class Guide(Human):
 
 def test_a_bit_further_never_leads_from_one_side_of_the_place_to_the_other() -> None:
     rolls_on = 0.6  # what the car needs to stop, measured
-    assert WITHIN - NUDGE - rolls_on > -WITHIN
+    assert WITHIN - NUDGE_DISTANCE - rolls_on > -WITHIN
 
 
 @pytest.mark.parametrize(("before", "told"), [(4.0, "bit"), (14.0, "10"), (26.0, "10"), (30.0, "20")])

@@ -65,8 +65,8 @@ def test_a_known_place_becomes_the_goal_with_a_plan():
     talk = Talk()
     name = next(mark.name for mark in talk.landmarks(hidden=False) if mark.name.label in ("KFC", "Ikea", "Coco"))
     talk.say(DialogueMove.INSTRUCT, name)
-    assert talk.state.goal is name and talk.state.exact and talk.state.journey is not None
-    assert talk.state.plan
+    assert talk.state.beliefs.goal is name and talk.state.beliefs.exact and talk.state.route.progress is not None
+    assert talk.state.beliefs.plan
 
 
 def test_a_place_that_is_not_on_the_map_is_said_to_be_unknown():
@@ -128,11 +128,11 @@ def test_a_step_leaves_the_state_it_was_given_as_it_was():
 def test_red_light_is_explained_and_makes_nobody_turn_round_or_ask():
     talk = Talk()
     talk.say(DialogueMove.INSTRUCT, talk.landmarks(hidden=False)[0].name)
-    assert talk.state.journey is not None
-    way, told = talk.state.journey.route, 0
+    assert talk.state.route.progress is not None
+    way, told = talk.state.route.progress.route, 0
     for seed in range(6):
         observation, state = dict(talk.observations["co_wizard"]), talk.state
-        state = replace(state, seed=seed, hazard_told=-100.0)
+        state = replace(state, seed=seed, dialogue=replace(state.dialogue, hazard_explained_at=-100.0))
         observation |= {
             "motion": np.int64(Motion.HAZARD),
             "hazard": np.int64(ObjectClass.TRAFFIC_LIGHT.value),
@@ -146,9 +146,9 @@ def test_red_light_is_explained_and_makes_nobody_turn_round_or_ask():
             allowed = (PhysicalAction.J_TURN, PhysicalAction.STOP)  # the turn is planned for afterwards
             assert done.physical is None or done.physical.action in allowed
             told += done.speech is not None and ObjectClass.TRAFFIC_LIGHT in done.speech.act.values(Slot.OBJECT)
-        assert state.journey is not None
-        assert state.journey.route == way
-        assert not state.halted
+        assert state.route.progress is not None
+        assert state.route.progress.route == way
+        assert not state.intentions.halted
     assert told > 0
 
 
@@ -156,29 +156,30 @@ def test_wish_is_not_given_up_at_a_red_light():
     talk = Talk()
     talk.say(DialogueMove.INSTRUCT, ActionValue.U_TURN, decisions=0)
     observation, state = dict(talk.observations["co_wizard"]), talk.state
-    state = replace(state, wish=Wish.SWITCH_LEFT, wish_until=float(observation["time"][0]) + 5.0)
+    until = float(observation["time"][0]) + 5.0
+    state = replace(state, intentions=state.intentions.switching(Wish.SWITCH_LEFT, until))
     observation |= {"motion": np.int64(Motion.HAZARD), "hazard": np.int64(ObjectClass.TRAFFIC_LIGHT.value)}
     for _ in range(100):
         observation["time"] = observation["time"] + 0.5
         _, state = talk.policy.step(observation, state)
-    assert state.wish is Wish.SWITCH_LEFT
+    assert state.intentions.wish is Wish.SWITCH_LEFT
     observation |= {"motion": np.int64(Motion.DRIVING), "hazard": np.int64(0)}
     for _ in range(40):
         observation["time"] = observation["time"] + 0.5
         _, state = talk.policy.step(observation, state)
-    assert state.wish is None
+    assert state.intentions.wish is None
 
 
 def test_a_proposed_way_is_taken_when_the_human_says_yes():
     talk = Talk(seed=2)
     talk.state = replace(talk.state, style=replace(talk.state.style, proposes=1.0))
-    while talk.state.proposed is None:
+    while talk.state.dialogue.proposed is None:
         assert len(talk.actions) < 60
         talk.step()
-    proposed = talk.state.proposed
+    proposed = talk.state.dialogue.proposed
     talk.say(DialogueMove.REPLY_Y, decisions=4)
-    assert talk.state.proposed is None
-    assert talk.state.directive == proposed
+    assert talk.state.dialogue.proposed is None
+    assert talk.state.intentions.directive == proposed
 
 
 def test_an_instruction_that_was_not_caught_is_asked_for_again_and_not_carried_out():
@@ -187,7 +188,7 @@ def test_an_instruction_that_was_not_caught_is_asked_for_again_and_not_carried_o
     known = talk.landmarks(hidden=False)[0]
     talk.say(DialogueMove.INSTRUCT, known.name, decisions=8)
     assert DialogueMove.CONFUSE in talk.moves()
-    assert talk.state.goal is None
+    assert talk.state.beliefs.goal is None
 
 
 def test_a_place_that_is_described_is_looked_for_in_its_street():
@@ -197,12 +198,12 @@ def test_a_place_that_is_described_is_looked_for_in_its_street():
     talk.state = replace(talk.state, style=replace(talk.state.style, mishears=0.0))
     talk.say(DialogueMove.INSTRUCT, hidden.name)
     talk.say(DialogueMove.EXPLAIN, street, wording=Wording(topic="where"), decisions=6)
-    assert talk.state.journey is not None and not talk.state.exact
-    assert talk.env.scenario.street_names[talk.env.town.lanes[talk.state.journey.goal[0]].street] is street
+    assert talk.state.route.progress is not None and not talk.state.beliefs.exact
+    assert talk.env.scenario.street_names[talk.env.town.lanes[talk.state.route.progress.goal[0]].street] is street
 
 
 def test_what_one_should_be_doing_is_as_good_as_a_command():
     talk = Talk()
     wording = Wording(direction=Direction.LEFT)
     talk.say(DialogueMove.EXPLAIN, ActionValue.J_TURN, wording=wording, decisions=5)
-    assert talk.state.directive is not None and talk.state.directive.direction is Direction.LEFT
+    assert talk.state.intentions.directive is not None and talk.state.intentions.directive.direction is Direction.LEFT

@@ -27,7 +27,7 @@ def driving_far() -> tuple[Talk, LandmarkName, LandmarkName]:
     }
     near, far = min(lengths, key=lengths.__getitem__), max(lengths, key=lengths.__getitem__)
     talk.say(M.INSTRUCT, far, decisions=4)
-    assert talk.state.goal is far
+    assert talk.state.beliefs.goal is far
     return talk, near, far
 
 
@@ -36,7 +36,7 @@ def said_about(talk: Talk, move: DialogueMove, name: LandmarkName) -> bool:
 
 
 def statuses(mind: CoWizardState) -> dict[LandmarkName, GoalStatus]:
-    return dict(mind.statuses)
+    return dict(mind.beliefs.statuses)
 
 
 @pytest.mark.parametrize(("answer", "accepted"), [(M.REPLY_Y, True), (M.REPLY_N, False)])
@@ -45,7 +45,7 @@ def test_the_car_proposes_a_nearer_task_first_and_goes_by_the_answer(answer, acc
     talk.say(M.INSTRUCT, near, GoalStatus.PENDING, decisions=14)
     assert said_about(talk, M.QUERY_YN, near)
     talk.say(answer, decisions=4)
-    assert talk.state.goal is (near if accepted else far)
+    assert talk.state.beliefs.goal is (near if accepted else far)
     assert statuses(talk.state)[far] is (GoalStatus.PENDING if accepted else GoalStatus.ONGOING)
 
 
@@ -54,10 +54,10 @@ def test_a_later_task_that_replaces_another_does_not_change_where_the_car_goes()
     talk.state = replace(talk.state, style=replace(talk.state.style, offers=0.0))
     talk.say(M.INSTRUCT, near, GoalStatus.PENDING, decisions=14)
     other = next(name for name in (LandmarkName.COCO, LandmarkName.SHELL) if name not in (near, far))
-    talk.state.voice = talk.state.voice.cleared()
+    talk.state.speech = talk.state.speech.cleared()
     wording = Wording(topic="changed_later", dropped=near)
     talk.say(M.INSTRUCT, near, other, GoalStatus.ABANDONED, GoalStatus.PENDING, wording=wording, decisions=16)
-    assert talk.state.goal is far
+    assert talk.state.beliefs.goal is far
     assert statuses(talk.state)[near] is GoalStatus.ABANDONED
     assert statuses(talk.state)[other] is GoalStatus.PENDING
 
@@ -76,7 +76,7 @@ def test_the_human_agrees_to_its_own_way_round_and_insists_on_it_otherwise(agree
 
 def test_the_car_that_has_not_got_an_answer_asks_again():
     talk, _, _ = driving_far()
-    talk.state = replace(talk.state, asked_at=float(talk.observations["co_wizard"]["time"][0]))
+    talk.state.dialogue = talk.state.dialogue.after_asking(float(talk.observations["co_wizard"]["time"][0]))
     talk.step(Speech(act=DialogueAct.of(M.REPLY_W), text="hm hm"))
     for _ in range(6):
         talk.step()

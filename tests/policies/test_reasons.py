@@ -7,7 +7,7 @@ from dorothie_gym.dialogue import understand
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, ObjectClass, PhysicalAction, Slot
 from dorothie_gym.policies.co_wizard.answers import answer_open
-from dorothie_gym.policies.co_wizard.driving import LONGEST_RED, drive, rest, see_green
+from dorothie_gym.policies.co_wizard.driving import drive, end_red_light_rest, rest
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.spaces import Motion
 from tests.policies.test_co_wizard import Talk
@@ -19,8 +19,8 @@ def on_the_way() -> Talk:
     talk = Talk()
     talk.state = replace(talk.state, style=replace(talk.state.style, mishears=0.0, checks=0.0, careful=1.0))
     talk.say(M.INSTRUCT, talk.landmarks(hidden=False)[0].name, decisions=6)
-    assert talk.state.exact
-    talk.state.voice = talk.state.voice.cleared()
+    assert talk.state.beliefs.exact
+    talk.state.speech = talk.state.speech.cleared()
     return talk
 
 
@@ -31,7 +31,7 @@ def view_of(talk: Talk, **changes) -> CoWizardView:
 def answer(talk: Talk, view: CoWizardView, *values) -> DialogueAct:
     act = DialogueAct.of(M.QUERY_W, *values)
     answer_open(talk.state, view, act, understand(""), np.random.default_rng(0))
-    return talk.state.voice.queue[0].act
+    return talk.state.speech.queue[0].act
 
 
 def test_asked_why_it_stands_the_car_tells_what_it_stands_for():
@@ -42,14 +42,16 @@ def test_asked_why_it_stands_the_car_tells_what_it_stands_for():
 
 def test_who_has_stopped_for_a_light_remembers_what_it_stands_for():
     talk = on_the_way()
-    talk.state.rest_for, talk.state.standing_since = ObjectClass.TRAFFIC_LIGHT, float(view_of(talk).time) - 9.0
+    since = float(view_of(talk).time) - 9.0
+    resting = talk.state.commands.resting(since, ObjectClass.TRAFFIC_LIGHT)
+    talk.state.commands = replace(resting, standing_since=since)
     stopped = view_of(talk, motion=np.int64(Motion.STOPPED), speed=np.zeros(1))
     assert answer(talk, stopped, ActionValue.STOP).slots == {ObjectClass.TRAFFIC_LIGHT}
 
 
 def test_asked_why_it_turns_round_the_car_names_where_it_wants_to_go():
     talk = on_the_way()
-    assert talk.state.goal in answer(talk, view_of(talk), ActionValue.U_TURN).slots
+    assert talk.state.beliefs.goal in answer(talk, view_of(talk), ActionValue.U_TURN).slots
 
 
 def test_asked_what_it_sees_the_car_names_what_is_in_sight():
@@ -73,8 +75,9 @@ def test_the_car_stops_for_a_red_light_and_goes_on_when_it_is_green(colour):
     town = talk.env.town
     lit = [lane for lane in town.lanes if town.light(lane.id, 0.0) is not None]
     lane, time = next((lane, time) for time in range(200) for lane in lit if town.light(lane.id, float(time)) is colour)
-    talk.state.standing_since = time - 3.0
-    talk.state.journey = talk.state.directive = None
+    talk.state.commands = replace(talk.state.commands, standing_since=time - 3.0)
+    talk.state.route = talk.state.route.with_progress(None)
+    talk.state.intentions = talk.state.intentions.directed(None)
     at_light = {
         "motion": np.int64(Motion.HAZARD), "hazard": np.int64(ObjectClass.TRAFFIC_LIGHT.value), "speed": np.zeros(1),
         "time": np.array([float(time)]), "lane": np.int64(lane.id), "station": np.array([lane.length - 4.0]),
@@ -82,9 +85,9 @@ def test_the_car_stops_for_a_red_light_and_goes_on_when_it_is_green(colour):
     }  # fmt: skip
     view = view_of(talk, **at_light)
     rest(talk.state, view, np.random.default_rng(0))
-    assert talk.state.rest_until == time + LONGEST_RED
-    see_green(talk.state, view)
+    assert talk.state.commands.rest_until == time + talk.state.config.red_light_time
+    end_red_light_rest(talk.state, view)
     red = colour is LightColour.RED
-    assert (talk.state.rest_until > time) is red
+    assert (talk.state.commands.rest_until > time) is red
     done = drive(talk.state, view)
     assert (done is not None and done.action is PhysicalAction.STOP) is red

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Final, Self
 
 from dorothie_gym.ontology import ObjectClass, PhysicalAction
-from dorothie_gym.policies.co_wizard.driving import DECISION, PASSED
+from dorothie_gym.policies.co_wizard.config import CoWizardConfig
 from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.policy import DECISION_INTERVAL
 from dorothie_gym.policies.route_progress import stopping_distance
 from dorothie_gym.spaces import Motion
 
@@ -94,4 +95,4 @@ class Watch:
 
 def _would_stop_at(place: float, speed: float) -> bool:
     """Whether it is time for a car at a speed [m/s] to stop at a place so far ahead [m]."""
-    return -PASSED < place < stopping_distance(speed) + DECISION * speed + NEAR
+    return -CoWizardConfig.passed < place < stopping_distance(speed) + DECISION_INTERVAL * speed + NEAR

@@ -29,7 +29,7 @@ from dorothie_gym.ontology import (
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import IN_VIEW
 from dorothie_gym.policies.policy import Policy
-from dorothie_gym.policies.route_progress import way_ahead
+from dorothie_gym.policies.route_progress import default_lane_distance
 from dorothie_gym.policies.speech import SpeechState, remark
 from dorothie_gym.recording import Task
 from dorothie_gym.recording.resampling import EACH
@@ -119,7 +119,7 @@ def _way_to_place(history: History, view: CoWizardView, town: Town) -> float | N
     """How far the place that was named last is along the way [m]; None where it is not near, or not on the map."""
     name = history.landmark
     named = next((landmark for landmark in view.landmarks if landmark.name.label == name), None)
-    return None if named is None else way_ahead(town, view.here, named.place, IN_VIEW)
+    return None if named is None else default_lane_distance(town, view.here, named.place, IN_VIEW)
 
 
 def _understood(model: TownModel, history: History, heard: tuple[Span, ...]) -> tuple[Span, ...]:

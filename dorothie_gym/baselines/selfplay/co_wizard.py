@@ -93,7 +93,7 @@ class CoWizardSeat(Seat[CoWizardMemory]):
         told = memory.told if memory.seen is None else memory.told.driven_on(memory.seen, observation)
         heard, named = listen(observation, Role.PARTICIPANT, memory.heard), memory.named
         if heard is not None and heard is not memory.heard:
-            told = replace(told, told=self._instruction(observation, heard), driven=0.0)
+            told = replace(told, instruction=self._instruction(observation, heard), driven=0.0)
             if heard.landmark is not None:
                 named, told = heard.landmark, replace(told, goal=self._place(observation, heard.landmark))
         return replace(memory, heard=heard, named=named, told=told, seen=observation)
@@ -170,7 +170,7 @@ class CoWizardSeat(Seat[CoWizardMemory]):
     def _sector(self, observation: Mapping[str, Any], angle: float) -> int:
         """The sector of the way on that comes closest to an angle [degrees]."""
         choice = self._ways.choice_ahead(observation)
-        ways = () if choice is None else self._ways.after(choice)
+        ways = () if choice is None else self._ways.by_sector(choice)
         misfits = {k: abs(float(wrap_degrees(way.angle - angle))) for k, way in enumerate(ways) if way is not None}
         return min(misfits, key=misfits.__getitem__) if misfits else nearest_sector(angle)
 

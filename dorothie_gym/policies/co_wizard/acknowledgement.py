@@ -1,4 +1,4 @@
-"""How the Co-Wizard shows that it has understood what it is to do."""
+"""Acknowledgements of instructions, and remarks about the present plan that go with them."""
 
 from __future__ import annotations
 
@@ -11,23 +11,20 @@ from dorothie_gym.ontology import ActionValue, DialogueMove
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.speech import Remark, remark
 
-CONFIRMS = 0.45
-"""Chance that a command that is not repeated is confirmed, not only acknowledged."""
-
 _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START})
-"""What is done at once is not asked back about."""
+"""Actions that are carried out at once and therefore never checked."""
 
 
-def take_up(mind: CoWizardState, action: ActionValue, words: ParsedText, rng: np.random.Generator) -> None:
-    """Acknowledges an action that was asked for: not at all, in a word, by repeating it, or by asking back.
+def acknowledge(state: CoWizardState, action: ActionValue, words: ParsedText, rng: np.random.Generator) -> None:
+    """Acknowledges an instruction: not at all, with a word, by repeating it, or by checking it.
 
     Args:
-        mind: of the Co-Wizard.
-        action: what it is to do.
-        words: how it was told to.
-        rng: for the choice.
+        state: working copy of the state.
+        action: action that was asked for.
+        words: words of the instruction.
+        rng: random generator of the decision.
     """
-    if rng.random() < mind.style.silent:
+    if rng.random() < state.style.silent:
         return
     wording = Wording(
         direction=words.direction,
@@ -36,14 +33,14 @@ def take_up(mind: CoWizardState, action: ActionValue, words: ParsedText, rng: np
         speed=words.speed if action is ActionValue.SPEED_CHANGE else None,
     )
     at_once = action in _AT_ONCE or words.further or words.distance is not None
-    if rng.random() < mind.style.checks * 0.25 and not at_once:
-        mind.voice = mind.voice.plan(remark(DialogueMove.CHECK, action, wording=wording))
-    elif rng.random() < mind.style.echoes:
-        mind.voice = mind.voice.plan(*_repeated(action, wording, rng))
+    if rng.random() < state.style.checks * 0.25 and not at_once:
+        state.say(remark(DialogueMove.CHECK, action, wording=wording))
+    elif rng.random() < state.style.echoes:
+        state.say(*_repeated(action, wording, rng))
     else:
-        move = DialogueMove.CONFIRM if rng.random() < CONFIRMS else DialogueMove.ACKNOWLEDGE
+        move = DialogueMove.CONFIRM if rng.random() < state.config.confirms else DialogueMove.ACKNOWLEDGE
         taken = remark(move, wording=Wording(topic="taken"))
-        mind.voice = mind.voice.plan(taken, *musing(mind, rng, joined=True))
+        state.say(taken, *plan_remark(state, rng, joined=True))
 
 
 def _repeated(action: ActionValue, wording: Wording, rng: np.random.Generator) -> tuple[Remark, ...]:
@@ -57,18 +54,18 @@ def _repeated(action: ActionValue, wording: Wording, rng: np.random.Generator) -
     return words, remark(DialogueMove.EXPLAIN, action, wording=wording, joined=True)
 
 
-def musing(mind: CoWizardState, rng: np.random.Generator, *, joined: bool = False) -> tuple[Remark, ...]:
-    """What it is up to, told now and then along with something else.
+def plan_remark(state: CoWizardState, rng: np.random.Generator, *, joined: bool = False) -> tuple[Remark, ...]:
+    """Returns a remark about the present plan, or nothing, by chance.
 
     Args:
-        mind: of the Co-Wizard.
-        rng: for the choice.
-        joined: whether it goes on from what is said before.
+        state: working copy of the state.
+        rng: random generator of the decision.
+        joined: whether the remark continues the one before.
     """
-    if rng.random() > mind.style.rambles:
+    if rng.random() > state.style.rambles:
         return ()
-    if mind.journey is not None and mind.exact:
+    if state.route.progress is not None and state.beliefs.exact:
         topic = "plan" if rng.random() < 0.4 else "eta"
     else:
-        topic = "search" if mind.goal is not None else "idle"
+        topic = "search" if state.beliefs.goal is not None else "idle"
     return (remark(DialogueMove.EXPLAIN, wording=Wording(topic=topic), joined=joined),)

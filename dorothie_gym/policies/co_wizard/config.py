@@ -1,4 +1,4 @@
-"""Traits of a scripted Co-Wizard."""
+"""Tunable numbers and traits of the scripted Co-Wizard."""
 
 from __future__ import annotations
 
@@ -6,30 +6,129 @@ from dataclasses import dataclass
 
 import numpy as np
 
-USUAL_SPEED = 40
-"""Cruise speed when nothing is said about it [km/h]."""
+from dorothie_gym.policies.guidance_config import BAD_WEATHER_SPEED, NUDGE_DISTANCE, USUAL_SPEED
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoWizardConfig:
+    """Tunable numbers of the scripted Co-Wizard.
+
+    No publication gives these values. They were set by hand in self-play in the built-in towns; a reason stands where
+    there is one.
+
+    Attributes:
+        turn_lead: distance to the junction at which a turn is commanded [m].
+        passed: distance behind the car from which on a place is not stopped at any more [m].
+        command_interval: time after which a command without effect is repeated [s].
+        straight_on_distance: distance to the junction at which a guided car goes straight on without an answer [m].
+        pause_distance: distance before a junction at which a car that does not know the way stops [m].
+        gentle_speed: speed of a gentle approach to a place or a turn [km/h].
+        turn_ease_distance: distance to the junction at which a style that eases into turns slows down [m].
+        gentle_distance: distance to the goal at which a gentle style slows down [m].
+        held_up_after: time after which a hazard that stops the car is a reason to stop for good [s].
+        place_sight: distance along the lanes ahead within which places are looked for [m].
+        rest_time: duration of a stop for something in the way [s].
+        red_light_time: longest duration of a stop for a red light [s].
+        replan_after: decisions off the route after which a new one is planned.
+        red_light_extension: time that a wish is kept after a red light [s].
+        roadblock_sight: distance at which an obstacle is noticed [m].
+        path_width: largest distance from the waypoints at which an obstacle is on the path [m].
+        detour_by_street: probability that a proposed detour is named by its street.
+        detour_answer_time: time after which a detour is taken without an answer [s].
+        street_lanes: largest number of lanes of a street that are compared to find the nearest.
+        confirms_changes: probability that a change of tasks is confirmed instead of acknowledged.
+        search_silence: time without navigation instructions after which a described place is searched for [s].
+        search_radius: distance to a guessed place at which the guess is given up [m].
+        wish_time: time after which a manoeuvre that finds no room is given up [s].
+        nudge_distance: distance driven for "a bit further" [m].
+        bad_weather_speed: speed proposed in fog or heavy rain [km/h].
+        recent_stop: time after a stop instruction within which the goal must be near [s].
+        open_road_speed: lower requested speeds are temporary [km/h].
+        slow_time: duration of a temporary speed [s].
+        answer_time: time after a question within which an utterance is taken for the answer [s].
+        long_standstill: standstill after which the first reason for it no longer counts [s].
+        plan_junctions: junctions of the route that are searched for turns to mention.
+        close_distance: distance within which a goal is called close [m].
+        ask_distance: distance to the junction at which the way is asked for [m].
+        ask_interval: time after which a question about the way is repeated [s].
+        goal_interval: time after which a question about the goal is repeated [s].
+        hazard_delay: standstill after which a hazard is explained [s].
+        hazard_interval: time between explanations of hazards [s].
+        first_word: time at the beginning that is left to the participant [s].
+        next_delay: silence after which a standing Co-Wizard asks for the next task [s].
+        start_delay: silence at the beginning after which it asks for the first one [s].
+        lost_variance: variance of the position above which localization counts as lost [m^2].
+        found_variance: variance of the position below which it is regained [m^2].
+        leaves_weather: probability that mentioning the weather is left to the participant.
+        confirms: probability that an instruction is confirmed instead of acknowledged.
+    """
+
+    turn_lead: float = 85.0
+    passed: float = 2.0
+    command_interval: float = 2.0
+    straight_on_distance: float = 24.0
+    pause_distance: float = 8.0
+    gentle_speed: int = 20
+    turn_ease_distance: float = 40.0
+    gentle_distance: float = 70.0
+    held_up_after: float = 0.4
+    place_sight: float = 80.0
+    rest_time: float = 4.0
+    red_light_time: float = 45.0
+    replan_after: int = 2
+    red_light_extension: float = 15.0
+    roadblock_sight: float = 70.0
+    path_width: float = 1.8
+    detour_by_street: float = 0.65
+    detour_answer_time: float = 6.0
+    street_lanes: int = 40
+    confirms_changes: float = 0.8
+    search_silence: float = 15.0
+    search_radius: float = 8.0
+    wish_time: float = 30.0
+    nudge_distance: float = NUDGE_DISTANCE
+    bad_weather_speed: int = BAD_WEATHER_SPEED
+    recent_stop: float = 40.0
+    open_road_speed: int = 20
+    slow_time: float = 40.0
+    answer_time: float = 12.0
+    long_standstill: float = 60.0
+    plan_junctions: int = 6
+    close_distance: float = 120.0
+    ask_distance: float = 75.0
+    ask_interval: float = 8.0
+    goal_interval: float = 10.0
+    hazard_delay: float = 5.0
+    hazard_interval: float = 20.0
+    first_word: float = 5.0
+    next_delay: float = 4.0
+    start_delay: float = 7.0
+    lost_variance: float = 36.0
+    found_variance: float = 9.0
+    leaves_weather: float = 0.45
+    confirms: float = 0.45
 
 
 @dataclass(frozen=True, kw_only=True)
 class CoWizardStyle:
-    """How a Co-Wizard talks in a session.
+    """Traits of a Co-Wizard in a session, drawn at its beginning.
 
     Attributes:
-        echoes: chance that an acknowledgement repeats what was asked for.
-        checks: chance that a place without a street is checked.
-        tells: chance that it says what it does by its own plan.
-        silent: chance that a plain instruction is not acknowledged.
-        asks: chance that it asks for the way where it might as well go straight on.
-        proposes: chance that it proposes a way at a junction instead of asking for one.
-        mishears: chance that it does not catch an instruction.
-        careful: chance that it stops before a junction to ask.
-        chats: chance that it answers small talk.
-        eases: whether it slows down well before it turns.
-        gentle: whether it slows down well before a place on the map.
-        rambles: chance that it tells what it is up to in the same breath as something else.
-        offers: chance that it proposes to do a task first that is on the way.
-        reassures: chance that it makes sure to have heard a description right.
-        pace: speed at which it drives when nothing is said about it [km/h].
+        echoes: probability that an acknowledgement repeats the instruction.
+        checks: probability that a place named without a street is checked.
+        tells: probability that a manoeuvre of its own plan is announced.
+        silent: probability that a plain instruction is not acknowledged.
+        asks: probability that the way is asked for where going straight on is possible.
+        proposes: probability that a way is proposed at a junction instead of asked for.
+        mishears: probability that an instruction is not understood.
+        careful: probability of a stop before a junction at which the way is asked for.
+        chats: probability that small talk is answered.
+        eases: whether the car slows down well before turns.
+        gentle: whether the car slows down well before a place on the map.
+        rambles: probability that the present plan is mentioned along with another remark.
+        offers: probability that a task on the way is proposed as the first one.
+        reassures: probability that a description is followed by a question whether it was understood.
+        pace: cruise speed where nothing is said about it [km/h].
     """
 
     echoes: float
@@ -50,7 +149,7 @@ class CoWizardStyle:
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> CoWizardStyle:
-        """A style by chance."""
+        """Draws a style."""
         return cls(
             echoes=float(rng.uniform(0.1, 0.4)),
             checks=float(rng.uniform(0.1, 0.4)),

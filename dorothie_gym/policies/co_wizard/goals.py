@@ -1,4 +1,4 @@
-"""What the Co-Wizard believes about places to go to: named, given up, guessed, reached."""
+"""Destinations of the Co-Wizard: named, postponed, described, guessed, reached and given up."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dorothie_gym.ontology import (
     SlotValue,
     StreetName,
 )
-from dorothie_gym.policies.co_wizard.acknowledgement import musing
+from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import place_ahead
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
@@ -26,66 +26,54 @@ from dorothie_gym.policies.route_progress import RouteProgress, streets_named
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.spaces import LanePosition, Mental
 
-MOST_LANES = 40
-"""So many lanes of a street are looked at for the one that is reached first."""
-
-CONFIRMS_CHANGES = 0.8
-"""Chance that a change of the tasks is confirmed, not only acknowledged."""
-
-STEERED = 15.0
-"""Who has been told the way no longer ago than this does not look for the place by itself [s]."""
-
-LOOKED = 8.0
-"""A place that has been guessed is given up when the car is this close to the guess [m]."""
-
 _COMMON = (LandmarkName.HOUSE, LandmarkName.PERSON)
+"""Names that several places bear."""
 
 
-def known(
-    mind: CoWizardState, view: CoWizardView, name: LandmarkName, streets: Sequence[StreetName]
+def known_landmark(
+    state: CoWizardState, view: CoWizardView, name: LandmarkName, streets: Sequence[StreetName]
 ) -> SeenLandmark | None:
-    """The landmark of that name on the map, on one of the streets if any is named; None if there is none."""
-    found = [mark for mark in view.landmarks if mark.name is name and mark.place not in mind.not_there]
+    """Returns the landmark of a name on the map, on one of the streets if any is named; None if there is none."""
+    found = [mark for mark in view.landmarks if mark.name is name and mark.place not in state.beliefs.ruled_out]
     fitting = [mark for mark in found if mark.street in streets]
     if fitting:
         return fitting[0]
-    # a place that only one can be is that one even if its street was not understood
+    # a unique name identifies the place even if the street was not understood
     return found[0] if found and (not streets or name not in _COMMON) else None
 
 
-def aim(mind: CoWizardState, view: CoWizardView, mark: SeenLandmark) -> None:
-    """Makes a place on the map the goal and plans the way."""
-    mind.goal, mind.place, mind.exact = mark.name, mark.place, True
-    mind.directive, mind.wish, mind.nudge = None, None, None
-    mind.misses, mind.avoided = 0, ()
-    mind.halted = mind.arrived = mind.creeping = False
-    mind.note(Mental(action=MentalAction.GOAL_UPDATE, goals=(mark.name,)))
-    mind.note_status(mark.name, GoalStatus.ONGOING)
-    plan_way(mind, view)
+def aim(state: CoWizardState, view: CoWizardView, mark: SeenLandmark) -> None:
+    """Makes a place on the map the goal and plans the route."""
+    goal = Mental(action=MentalAction.GOAL_UPDATE, goals=(mark.name,))
+    beliefs = state.beliefs.with_known_goal(mark.name, mark.place).with_update(goal)
+    state.beliefs = beliefs.with_status(mark.name, GoalStatus.ONGOING)
+    state.intentions = state.intentions.for_new_goal()
+    state.route = state.route.for_new_goal()
+    plan_route(state, view)
 
 
-def plan_way(mind: CoWizardState, view: CoWizardView) -> None:
-    """Plans a way to the goal, if its place is on the map."""
-    if mind.place is None or not mind.exact:
-        mind.journey = None
+def plan_route(state: CoWizardState, view: CoWizardView) -> None:
+    """Plans a route to the goal, if its place is on the map."""
+    place = state.beliefs.stop_place
+    if place is None:
+        state.route = state.route.with_progress(None)
         return
-    mind.journey = RouteProgress.plan(mind.town, view.here, mind.place, mind.blocked + mind.avoided)
-    note_plan(mind)
+    progress = RouteProgress.plan(state.town, view.here, place, state.route.closed)
+    state.route = state.route.with_progress(progress)
+    note_plan(state)
 
 
-def note_plan(mind: CoWizardState) -> None:
-    """Notes the junctions of the plan if they are not those noted last."""
-    route = mind.journey.route if mind.journey is not None else None
-    junctions = route.junctions(mind.town) if route is not None else ()
-    indices = {junction.id: index for index, junction in enumerate(mind.town.junctions)}
-    plan = tuple(indices[junction] for junction in junctions if junction in indices)
-    if plan != mind.plan and plan:
-        mind.plan = plan
-        mind.note(Mental(action=MentalAction.PLAN_UPDATE, plan=plan))
+def note_plan(state: CoWizardState) -> None:
+    """Queues a plan update if the junctions of the route are not those of the last update."""
+    progress = state.route.progress
+    route = progress.route if progress is not None else None
+    junctions = route.junctions(state.town) if route is not None else ()
+    indices = {junction.id: index for index, junction in enumerate(state.town.junctions)}
+    state.beliefs = state.beliefs.with_plan(tuple(indices[junction] for junction in junctions if junction in indices))
 
 
-def hear_goal(
-    mind: CoWizardState,
+def set_goal(
+    state: CoWizardState,
     view: CoWizardView,
     name: LandmarkName,
     streets: Sequence[StreetName],
@@ -94,202 +82,206 @@ def hear_goal(
     corrected: bool = False,
     sure: bool = True,
 ) -> None:
-    """Takes up a place that it is told to go to.
+    """Takes up a destination that the participant named.
 
     Args:
-        mind: of the Co-Wizard.
-        view: what it sees.
+        state: working copy of the state.
+        view: observation.
         name: the place.
         streets: streets named with it.
-        rng: for the words.
-        dropped: a place that is given up for it.
-        corrected: whether it had taken another place for it.
-        sure: whether it has understood the name; else it asks whether that was meant.
+        rng: random generator of the decision.
+        dropped: place that is given up for it.
+        corrected: whether the name corrects a misunderstanding.
+        sure: whether the name was understood; otherwise it is checked.
     """
-    mark = known(mind, view, name, streets)
+    mark = known_landmark(state, view, name, streets)
     if dropped is not None:
-        mind.note_status(dropped, GoalStatus.ABANDONED)
+        state.beliefs = state.beliefs.with_status(dropped, GoalStatus.ABANDONED)
     if mark is None:
-        _unknown(mind, view, name, streets, rng)
+        _set_unknown_goal(state, name, streets, rng)
         return
-    aim(mind, view, mark)
+    aim(state, view, mark)
     if dropped is not None:
         wording = Wording(topic="changed", dropped=dropped)
-        mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, name, wording=wording))
-        if mind.journey is not None and mind.journey.turns_round_first(mind.town, view.station):
-            mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, ActionValue.U_TURN, joined=True))
+        state.say(remark(DialogueMove.CONFIRM, name, wording=wording))
+        progress = state.route.progress
+        if progress is not None and progress.turns_round_first(state.town, view.station):
+            state.say(remark(DialogueMove.EXPLAIN, ActionValue.U_TURN, joined=True))
     elif corrected:
-        mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, name, wording=Wording(topic="sorry")))
-    elif not sure or not streets and rng.random() < mind.style.checks * (2.0 if name in _COMMON else 0.6):
-        mind.voice = mind.voice.plan(remark(DialogueMove.CHECK, name, mark.street))
+        state.say(remark(DialogueMove.CONFIRM, name, wording=Wording(topic="sorry")))
+    elif not sure or not streets and rng.random() < state.style.checks * (2.0 if name in _COMMON else 0.6):
+        state.say(remark(DialogueMove.CHECK, name, mark.street))
     else:
         values: list[SlotValue] = [name]
-        if streets and rng.random() < mind.style.echoes:
+        if streets and rng.random() < state.style.echoes:
             values.append(mark.street)
         move = DialogueMove.CONFIRM if rng.random() < 0.4 else DialogueMove.ACKNOWLEDGE
         words = remark(move, *values, wording=Wording(topic="taken"))
-        mind.voice = mind.voice.plan(words, *musing(mind, rng, joined=True))
+        state.say(words, *plan_remark(state, rng, joined=True))
 
 
-def _unknown(
-    mind: CoWizardState, view: CoWizardView, name: LandmarkName, streets: Sequence[StreetName], rng: np.random.Generator
+def _set_unknown_goal(
+    state: CoWizardState, name: LandmarkName, streets: Sequence[StreetName], rng: np.random.Generator
 ) -> None:
-    """The place is not on the map: says so, and goes where it is told to."""
-    again = mind.goal is name and not mind.exact
-    mind.described = again and mind.described
-    mind.goal, mind.place, mind.exact, mind.journey = name, None, False, None
-    mind.creeping, mind.arrived, mind.plan = False, False, ()
-    mind.note_status(name, GoalStatus.UNKNOWN)
+    """Takes up a destination that is not on the map and says so; the car then needs guidance."""
+    again = state.beliefs.goal is name and not state.beliefs.exact
+    state.beliefs = state.beliefs.with_unknown_goal(name).with_status(name, GoalStatus.UNKNOWN)
+    state.route = state.route.with_progress(None)
+    state.intentions = state.intentions.for_unknown_goal()
     if again:
-        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, name))
+        state.say(remark(DialogueMove.QUERY_W, name))
         return
     no_map = remark(DialogueMove.EXPLAIN, name, GoalStatus.UNKNOWN, wording=Wording(topic="no_map"))
     draw = rng.random()
     if draw < 0.25 and not streets:
         which = remark(DialogueMove.QUERY_W, name, StreetName.QUERIED, joined=True)
-        mind.voice = mind.voice.plan(no_map, which)
+        state.say(no_map, which)
     elif draw < 0.4:
-        mind.voice = mind.voice.plan(no_map, remark(DialogueMove.QUERY_W, name, joined=True))
+        state.say(no_map, remark(DialogueMove.QUERY_W, name, joined=True))
     elif draw < 0.6:
-        mind.voice = mind.voice.plan(no_map, remark(DialogueMove.INSTRUCT, joined=True, wording=Wording(topic="help")))
+        state.say(no_map, remark(DialogueMove.INSTRUCT, joined=True, wording=Wording(topic="help")))
     else:
-        mind.voice = mind.voice.plan(no_map)
+        state.say(no_map)
 
 
-def hear_later(mind: CoWizardState, view: CoWizardView, name: LandmarkName, rng: np.random.Generator) -> None:
-    """A place is to be gone to later: remembers it, asks when, or proposes to go there first if that is nearer."""
-    mind.note_status(name, GoalStatus.PENDING)
-    mark = known(mind, view, name, ())
-    if mind.goal is None or mind.goal is name:
-        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, name, GoalStatus.PENDING))
+def postpone(state: CoWizardState, view: CoWizardView, name: LandmarkName, rng: np.random.Generator) -> None:
+    """Notes a place to visit later: acknowledges it, asks for the order, or offers to go there first."""
+    state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
+    mark = known_landmark(state, view, name, ())
+    goal, progress = state.beliefs.goal, state.route.progress
+    if goal is None or goal is name:
+        state.say(remark(DialogueMove.ACKNOWLEDGE, name, GoalStatus.PENDING))
         return
-    if mark is not None and mind.journey is not None and rng.random() < mind.style.offers:
-        route = router(mind.town).route(view.here, mark.place, mind.blocked)
-        if route is not None and route.length < mind.journey.left(view.station):
-            mind.offer = name
-            mind.voice = mind.voice.plan(
+    if mark is not None and progress is not None and rng.random() < state.style.offers:
+        route = router(state.town).route(view.here, mark.place, state.route.blocked)
+        if route is not None and route.length < progress.left(view.station):
+            state.dialogue = state.dialogue.with_offer(name)
+            state.say(
                 remark(DialogueMove.EXPLAIN, name, wording=Wording(topic="nearer")),
                 remark(DialogueMove.QUERY_YN, name, wording=Wording(topic="first"), joined=True),
             )
             return
     if rng.random() < 0.5:
-        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, mind.goal, wording=Wording(topic="order")))
+        state.say(remark(DialogueMove.QUERY_W, goal, wording=Wording(topic="order")))
     else:
-        move = DialogueMove.CONFIRM if rng.random() < CONFIRMS_CHANGES else DialogueMove.ACKNOWLEDGE
-        mind.voice = mind.voice.plan(remark(move, name, GoalStatus.PENDING))
+        move = DialogueMove.CONFIRM if rng.random() < state.config.confirms_changes else DialogueMove.ACKNOWLEDGE
+        state.say(remark(move, name, GoalStatus.PENDING))
 
 
-def accept_offer(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Goes first to the place that it has proposed; the one under way is for later."""
-    name, mind.offer = mind.offer, None
-    mark = known(mind, view, name, ()) if name is not None else None
+def accept_offer(state: CoWizardState, view: CoWizardView) -> None:
+    """Goes first to the place that was offered; the present goal becomes pending."""
+    name = state.dialogue.offer
+    state.dialogue = state.dialogue.with_offer(None)
+    mark = known_landmark(state, view, name, ()) if name is not None else None
     if mark is None:
         return
-    if mind.goal is not None:
-        mind.note_status(mind.goal, GoalStatus.PENDING)
-    aim(mind, view, mark)
-    mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, mark.name, wording=Wording(topic="taken")))
+    if state.beliefs.goal is not None:
+        state.beliefs = state.beliefs.with_status(state.beliefs.goal, GoalStatus.PENDING)
+    aim(state, view, mark)
+    state.say(remark(DialogueMove.CONFIRM, mark.name, wording=Wording(topic="taken")))
 
 
-def hear_stop_ahead(mind: CoWizardState, view: CoWizardView, name: LandmarkName | None, distance: float) -> None:
-    """It is told to stop some way ahead, perhaps by a place: comes up to it slowly."""
+def approach_stop(state: CoWizardState, view: CoWizardView, name: LandmarkName | None, distance: float) -> None:
+    """Prepares a stop some way ahead, perhaps at a named place: approaches it slowly.
+
+    Args:
+        state: working copy of the state.
+        view: observation.
+        name: place named with the instruction, or None.
+        distance: distance that was said [m].
+    """
     if name is not None:
-        mark = known(mind, view, name, ())
+        mark = known_landmark(state, view, name, ())
         if mark is not None and mark.name not in _COMMON:
-            if mind.place != mark.place:
-                aim(mind, view, mark)
-            mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, name))
+            if state.beliefs.place != mark.place:
+                aim(state, view, mark)
+            state.say(remark(DialogueMove.ACKNOWLEDGE, name))
             return
-        mind.goal = name
-    mind.exact, mind.creeping, mind.halted, mind.arrived = False, True, False, False
-    mind.journey, mind.directive = None, None
-    # nearer than told: what is told is rounded, and a slow car can be stopped at the word
-    mind.note_place(mind.goal or LandmarkName.UNKNOWN, place_ahead(mind, view, max(distance - 12.0, 10.0)))
+    state.beliefs = state.beliefs.with_goal_ahead(name)
+    state.intentions = state.intentions.creeping_up()
+    state.route = state.route.with_progress(None)
+    # nearer than said: spoken distances are rounded, and a slow car can be stopped at once
+    guess = place_ahead(state, view, max(distance - 12.0, 10.0))
+    state.beliefs = state.beliefs.with_guess(state.beliefs.goal or LandmarkName.UNKNOWN, guess)
 
 
 def hear_description(
-    mind: CoWizardState, view: CoWizardView, streets: Sequence[StreetName], landmarks: Sequence[LandmarkName],
+    state: CoWizardState, view: CoWizardView, streets: Sequence[StreetName], landmarks: Sequence[LandmarkName],
     rng: np.random.Generator,
 ) -> None:  # fmt: skip
-    """It is told where a place is: notes a guess if a place close to it is on the map, and says that it has heard."""
-    if mind.goal is not None and not mind.exact:
-        mind.described = True
-        place = _described(mind, view, streets, landmarks)
-        if place is not None and view.time - mind.steered_at > STEERED:
-            guess = Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=mind.goal, place=_map_place(*place))
-            mind.note(guess)
-            mind.journey = RouteProgress.plan(mind.town, view.here, place, mind.blocked)
-            mind.directive = mind.wish = None
-            note_plan(mind)
-    if mind.goal is not None and not mind.exact and not mind.arrived:
-        mind.halted = False  # it goes where it is told to
-    values: tuple[SlotValue, ...] = tuple(streets[:1]) if rng.random() < mind.style.echoes else ()
-    mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, *values))
-    if rng.random() < mind.style.reassures:
-        mind.voice = mind.voice.plan(remark(DialogueMove.ALIGN, joined=True))
+    """Takes up a description of where the goal is: guesses the place if possible, and acknowledges."""
+    goal = state.beliefs.goal
+    if goal is not None and not state.beliefs.exact:
+        state.beliefs = state.beliefs.with_description()
+        place = _described_place(state, view, streets, landmarks)
+        if place is not None and view.time - state.dialogue.steered_at > state.config.search_silence:
+            where = LanePosition(lane=place[0], metres=round(place[1]))
+            guess = Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=goal, place=where)
+            state.beliefs = state.beliefs.with_update(guess)
+            progress = RouteProgress.plan(state.town, view.here, place, state.route.blocked)
+            state.route = state.route.with_progress(progress)
+            state.intentions = state.intentions.without_manoeuvres()
+            note_plan(state)
+        if not state.intentions.arrived:
+            state.intentions = state.intentions.resumed()
+    values: tuple[SlotValue, ...] = tuple(streets[:1]) if rng.random() < state.style.echoes else ()
+    state.say(remark(DialogueMove.ACKNOWLEDGE, *values))
+    if rng.random() < state.style.reassures:
+        state.say(remark(DialogueMove.ALIGN, joined=True))
 
 
-def _described(
-    mind: CoWizardState, view: CoWizardView, streets: Sequence[StreetName], landmarks: Sequence[LandmarkName]
+def _described_place(
+    state: CoWizardState, view: CoWizardView, streets: Sequence[StreetName], landmarks: Sequence[LandmarkName]
 ) -> Place | None:
-    """Where to look for a place: by the landmark it is close to, else where its street is reached first."""
-    near = next((mark for name in landmarks if (mark := known(mind, view, name, ())) is not None), None)
+    """Returns where to search for a place: at the landmark close to it, else where its street is reached first."""
+    near = next((mark for name in landmarks if (mark := known_landmark(state, view, name, ())) is not None), None)
     if near is not None:
         return near.place
     named = frozenset(index for street in streets for index in streets_named(view.raw["street_names"], street))
-    lanes = [lane for lane in mind.town.lanes if lane.street in named and not lane.in_junction]
+    lanes = [lane for lane in state.town.lanes if lane.street in named and not lane.in_junction]
     found: list[tuple[float, int]] = []
-    for lane in lanes[:MOST_LANES]:
-        route = router(mind.town).route(view.here, (lane.id, lane.length / 2), mind.blocked)
+    for lane in lanes[: state.config.street_lanes]:
+        route = router(state.town).route(view.here, (lane.id, lane.length / 2), state.route.blocked)
         if route is not None:
             found.append((route.length, lane.id))
     if not found:
         return None
     _, nearest = min(found)
-    return nearest, mind.town.lanes[nearest].length / 2
+    return nearest, state.town.lanes[nearest].length / 2
 
 
-def search_on(mind: CoWizardState, view: CoWizardView) -> None:
-    """Gives the guess of a place up when it has come there: from now on it has to be guided."""
-    if mind.journey is not None and not mind.exact and mind.journey.left(view.station) < LOOKED:
-        mind.journey = None
+def search_on(state: CoWizardState, view: CoWizardView) -> None:
+    """Gives up the guess of a place when the car has come there; from then on the car needs guidance."""
+    progress = state.route.progress
+    if progress is not None and not state.beliefs.exact and progress.left(view.station) < state.config.search_radius:
+        state.route = state.route.with_progress(None)
 
 
-def _map_place(lane: int, station: float) -> LanePosition:
-    return LanePosition(lane=lane, metres=round(station))
-
-
-def give_up(mind: CoWizardState, name: LandmarkName | None) -> None:
-    """A task is off; if it was the one under way, the car waits to be told what comes next."""
+def abandon(state: CoWizardState, name: LandmarkName | None) -> None:
+    """Gives up a task; without a name, or if it is the present one, the car waits for the next."""
     if name is not None:
-        mind.note_status(name, GoalStatus.ABANDONED)
-    if name is None or name is mind.goal:
-        leave_goal(mind)
+        state.beliefs = state.beliefs.with_status(name, GoalStatus.ABANDONED)
+    if name is None or name is state.beliefs.goal:
+        state.leave_goal()
 
 
-def complete(mind: CoWizardState, name: LandmarkName | None) -> None:
-    """A task is done."""
-    done = name if name is not None else mind.goal
+def complete(state: CoWizardState, name: LandmarkName | None) -> None:
+    """Finishes a task and lets the car stand."""
+    done = name if name is not None else state.beliefs.goal
     if done is not None:
-        mind.note_status(done, GoalStatus.COMPLETE)
-    if done in _COMMON and mind.place is not None and mind.exact:
-        mind.not_there = (*mind.not_there, mind.place)
-    leave_goal(mind)
-    mind.halted, mind.speed = True, mind.usual
-    mind.voice = mind.voice.cleared()
+        state.beliefs = state.beliefs.with_status(done, GoalStatus.COMPLETE)
+    if done in _COMMON and state.beliefs.exact:
+        state.beliefs = state.beliefs.with_place_ruled_out()
+    state.leave_goal()
+    state.intentions = state.intentions.halting().with_speed(state.intentions.usual)
+    state.speech = state.speech.cleared()
 
 
-def doubt(mind: CoWizardState) -> None:
-    """The place it took for the goal is not the one meant: it has to be guided."""
-    if mind.exact and mind.place is not None:
-        if mind.goal in _COMMON:
-            mind.not_there = (*mind.not_there, mind.place)
-        mind.place, mind.exact, mind.journey, mind.plan = None, False, None, ()
-    mind.arrived = False
-
-
-def leave_goal(mind: CoWizardState) -> None:
-    """There is no goal any more."""
-    mind.goal, mind.place, mind.exact, mind.journey = None, None, False, None
-    mind.directive, mind.nudge, mind.wish = None, None, None
-    mind.creeping, mind.arrived, mind.plan = False, False, ()
+def doubt(state: CoWizardState) -> None:
+    """Drops the place that was taken for the goal; the car needs guidance."""
+    if state.beliefs.exact and state.beliefs.place is not None:
+        if state.beliefs.goal in _COMMON:
+            state.beliefs = state.beliefs.with_place_ruled_out()
+        state.beliefs = state.beliefs.without_place()
+        state.route = state.route.with_progress(None)
+    state.intentions = state.intentions.departed()

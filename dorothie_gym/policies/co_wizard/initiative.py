@@ -15,269 +15,260 @@ from dorothie_gym.ontology import (
     PhysicalAction,
     SlotValue,
     StreetName,
-    WeatherParameter,
 )
-from dorothie_gym.policies.co_wizard.acknowledgement import musing
+from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.observation_parser import nearest_landmark, street_of, weather
+from dorothie_gym.policies.observation_parser import is_dark, is_foggy, is_rainy, nearest_landmark, street_of
 from dorothie_gym.policies.route_progress import Choice, direction_of
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.spaces import Motion, Physical
 
-ASK_DISTANCE = 75.0
-"""A way is asked for when the junction is this near [m]."""
+ANNOUNCED = {
+    PhysicalAction.J_TURN: ActionValue.J_TURN,
+    PhysicalAction.U_TURN: ActionValue.U_TURN,
+    PhysicalAction.LANE_SWITCH: ActionValue.LANE_SWITCH,
+}
+"""Manoeuvres that the Co-Wizard names, and the slot value of each."""
 
-ASK_AGAIN = 8.0
-"""A question about the way that has no answer is put again after this time [s]."""
-
-NO_ANSWER = 10.0
-"""So is one about what comes next, which takes longer to answer [s]."""
-
-REASON = 5.0
-"""A hazard is explained when it holds the car for longer than this [s]."""
-
-FIRST_WORD = 5.0
-"""The human is left to speak first until this time [s]."""
-
-TOLD_AGAIN = 20.0
-"""A hazard is not explained again within this time, even if the car has inched on [s]."""
-
-NEXT = 4.0
-"""Silence after which it asks what comes next [s]."""
-
-START = 7.0
-"""Silence at the beginning after which it asks where to go [s]."""
-
-
-def speak_up(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Plans at most one remark, if it has nothing to say yet."""
-    if not mind.voice.idle or view.speaking > 0.0:
-        return
-    for consider in (_give_up_wish, _ask_way, _say_arrived, _ask_goal, _explain_hazard, mind_weather, mind_place):
-        consider(mind, view, rng)
-        if not mind.voice.idle:
-            return
-
-
-def scene_of(mind: CoWizardState, view: CoWizardView) -> WordingContext:
-    """What is in view as it speaks: its street, a place on the map close ahead, and whether something is wrong."""
-    landmark = nearest_landmark(view.landmarks, *view.position)
-    street = street_of(view.raw, mind.town, view.lane)
-    return WordingContext(
-        street=street if street is not StreetName.UNKNOWN else None,
-        landmark=landmark.name if landmark is not None else None,
-        exception=mind.detour_at is not None or (view.motion is Motion.HAZARD and view.hazard is ObjectClass.STATIC),
-    )
-
-
-def _give_up_wish(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    if mind.wish is not None and view.time > mind.wish_until:
-        mind.wish = None
-        mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, wording=Wording(topic="refused")))
-
-
-def _ask_way(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    choice = view.choice
-    if choice is None or mind.halted or mind.creeping or mind.nudge is not None or view.time < FIRST_WORD:
-        return
-    if mind.wish is Wish.U_TURN or view.manoeuvring:
-        return
-    waiting = view.motion is Motion.WAITING or (mind.pausing and view.motion is Motion.STOPPED)
-    if not (waiting or choice.distance < ASK_DISTANCE) or wanted_exit(mind, view) is not None:
-        return
-    if mind.journey is not None:
-        crossing = mind.journey.next_crossing(mind.town, view.station)
-        if crossing is None or mind.journey.changes_before(crossing):
-            return  # the goal, or the place to turn round, comes first
-    if view.manoeuvre is PhysicalAction.J_TURN and not waiting:
-        return
-    asked = mind.asked == choice.lane
-    if (asked and not waiting) or view.time - max(mind.asked_at, mind.heard_at) < ASK_AGAIN * asked:
-        return
-    guided = mind.goal is not None and mind.journey is None
-    straight = any(way.type is LinkType.STRAIGHT for way in choice.exits)
-    if guided and straight and not waiting and mind.considered == choice.lane:
-        return
-    mind.considered = choice.lane
-    if guided and straight and not waiting and rng.random() > mind.style.asks:
-        return  # it goes straight on if it is not told otherwise
-    mind.asked, mind.asked_at = choice.lane, view.time
-    mind.pausing = mind.pausing or (mind.journey is None and bool(rng.random() < mind.style.careful))
-    if not asked and rng.random() < mind.style.proposes:
-        _propose_way(mind, view, choice, rng)
-    else:
-        mind.proposed = None
-        first = musing(mind, rng)
-        mind.voice = mind.voice.plan(*first, remark(DialogueMove.QUERY_W, ActionValue.QUERIED, joined=bool(first)))
-
-
-def _propose_way(mind: CoWizardState, view: CoWizardView, choice: Choice, rng: np.random.Generator) -> None:
-    """Asks whether one of the ways is meant."""
-    way = choice.exits[int(rng.integers(len(choice.exits)))]
-    direction = direction_of(way)
-    action = ActionValue.LANE_FOLLOW if direction is Direction.STRAIGHT else ActionValue.J_TURN
-    street = street_of(view.raw, mind.town, way.lane)
-    values: list[SlotValue] = [action]
-    if action is ActionValue.J_TURN and street is not StreetName.UNKNOWN and rng.random() < 0.3:
-        values.append(street)
-    move = DialogueMove.QUERY_YN if rng.random() < 0.7 else DialogueMove.CHECK
-    mind.proposed = Directive(direction=direction, junction=choice.junction)
-    first = musing(mind, rng)
-    question = remark(move, *values, wording=Wording(direction=direction), joined=bool(first))
-    mind.voice = mind.voice.plan(*first, question)
-
-
-def _say_arrived(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    if not (mind.arrived and mind.halted and view.standing) or mind.goal is None:
-        return
-    if mind.asked_at > mind.stop_sent_at:
-        return
-    mind.asked_at = view.time
-    arrived = Wording(topic="arrived")
-    if mind.exact and rng.random() < mind.style.echoes + 0.15:
-        mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, mind.goal, wording=arrived))
-    elif not mind.exact:
-        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_YN, wording=arrived))
-
-
-def _ask_goal(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    idle = mind.goal is None and mind.directive is None and mind.wish is None and mind.nudge is None
-    if not idle or mind.creeping:
-        mind.idle_since = view.time
-        return
-    if view.time - mind.idle_since < (NEXT if mind.halted else START):
-        return
-    silent = view.time - max(mind.asked_at, mind.voice.last_end)
-    if silent < NO_ANSWER and mind.asked_at > mind.heard_at or not (mind.halted or view.standing):
-        return
-    again = view.time - mind.asked_at < 2.0 * NO_ANSWER
-    mind.asked_at = view.time
-    draw = rng.random()
-    if again and draw < 0.5:
-        mind.voice = mind.voice.plan(remark(DialogueMove.ALIGN))
-    elif mind.statuses and draw < 0.25:
-        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, GoalStatus.QUERIED))
-    else:
-        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, LandmarkName.QUERIED))
-
-
-def _explain_hazard(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    resting = view.time < mind.rest_until
-    hazard = mind.rest_for if resting else view.hazard
-    if not (resting or view.motion is Motion.HAZARD) or mind.standing_since is None:
-        return
-    if hazard is ObjectClass.UNLABELED:
-        return
-    if view.time - mind.standing_since < REASON or view.time - mind.hazard_told < TOLD_AGAIN:
-        return
-    mind.hazard_told = view.time
-    if rng.random() < (0.85 if hazard is ObjectClass.TRAFFIC_LIGHT else 0.4):
-        return  # everybody sees a red light
-    values: tuple[SlotValue, ...] = (hazard,)
-    if resting or rng.random() < 0.3:
-        values = (ActionValue.STOP, hazard)
-    mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, *values), *musing(mind, rng, joined=True))
-
-
-def tell_action(mind: CoWizardState, view: CoWizardView, physical: Physical | None, rng: np.random.Generator) -> None:
-    """Says now and then what it does by its own plan."""
-    if physical is None or not mind.voice.idle or view.speaking > 0.0 or mind.directive is not None:
-        return
-    told = {
-        PhysicalAction.J_TURN: ActionValue.J_TURN,
-        PhysicalAction.U_TURN: ActionValue.U_TURN,
-        PhysicalAction.LANE_SWITCH: ActionValue.LANE_SWITCH,
-    }
-    action = told.get(physical.action)
-    if action is None or mind.wish is not None or rng.random() > mind.style.tells:
-        return
-    values: list[SlotValue] = [action]
-    direction = Direction.LEFT if physical.angle > 0 else Direction.RIGHT
-    if action is ActionValue.J_TURN:
-        way = wanted_exit(mind, view)
-        if way is None or direction_of(way) is Direction.STRAIGHT:
-            return
-        direction = direction_of(way)
-        street = street_of(view.raw, mind.town, way.lane)
-        if street is not StreetName.UNKNOWN and rng.random() < 0.6:
-            values.append(street)
-    mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, *values, wording=Wording(direction=direction)))
-
-
-THICK_FOG = 35.0
-"""Fog density from which one cannot see far (percent)."""
-
-HEAVY_RAIN = 55.0
-"""Precipitation from which one should slow down (percent)."""
-
-SLOW = 25
-"""Speed that it proposes in bad weather [km/h]."""
-
-LOST = 36.0
-"""Variance of the position from which it says that it is lost [m^2]."""
-
-FOUND = 9.0
-"""Variance below which it knows again where it is [m^2]."""
-
-
-LEAVES_IT = 0.45
-"""Chance that the human is left to remark on the weather."""
-
-_SEEN_OF_WEATHER = {
+_WEATHER_OBJECTS = {
     "fog": (ObjectClass.ROAD_LINE, ObjectClass.ROAD),
     "rain": (ObjectClass.WATER, ObjectClass.GROUND, ObjectClass.ROAD),
     "night": (ObjectClass.SKY,),
 }
-"""What one sees of it, or does not see any more."""
+"""Objects that become visible or invisible with each condition."""
 
 
-def dim_topic(view: CoWizardView) -> str | None:
-    """What keeps it from seeing far: "fog", "rain" or "night"; None for clear weather by day."""
-    if weather(view.raw, WeatherParameter.FOG_DENSITY) > THICK_FOG:
+def take_initiative(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
+    """Queues at most one remark, if none is queued or being said."""
+    if not state.speech.idle or view.speaking > 0.0:
+        return
+    for consider in (
+        _give_up_wish,
+        _ask_way,
+        _say_arrived,
+        _ask_goal,
+        _explain_hazard,
+        _mention_weather,
+        _mention_localization,
+    ):
+        consider(state, view, rng)
+        if not state.speech.idle:
+            return
+
+
+def scene_of(state: CoWizardState, view: CoWizardView) -> WordingContext:
+    """Returns the context that utterances may refer to: street, landmark nearby, and whether there is an exception."""
+    landmark = nearest_landmark(view.landmarks, *view.position)
+    street = street_of(view.raw, state.town, view.lane)
+    blocked = view.motion is Motion.HAZARD and view.hazard is ObjectClass.STATIC
+    return WordingContext(
+        street=street if street is not StreetName.UNKNOWN else None,
+        landmark=landmark.name if landmark is not None else None,
+        exception=state.dialogue.detour_asked_at is not None or blocked,
+    )
+
+
+def _give_up_wish(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
+    if state.intentions.wish is not None and view.time > state.intentions.wish_until:
+        state.intentions = state.intentions.without_wish()
+        state.say(remark(DialogueMove.EXPLAIN, wording=Wording(topic="refused")))
+
+
+def _ask_way(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
+    choice = view.choice
+    if choice is None or not _may_ask_way(state, view, choice):
+        return
+    progress, config, dialogue = state.route.progress, state.config, state.dialogue
+    waiting = _waits_for_way(state, view)
+    asked = dialogue.asked_lane == choice.lane
+    silence = view.time - max(dialogue.asked_at, dialogue.heard_at)
+    if (asked and not waiting) or silence < config.ask_interval * asked:
+        return
+    guided = state.beliefs.goal is not None and progress is None
+    straight = any(way.type is LinkType.STRAIGHT for way in choice.exits)
+    optional = guided and straight and not waiting
+    if optional and dialogue.considered_lane == choice.lane:
+        return
+    state.dialogue = dialogue.after_considering(choice.lane)
+    if optional and rng.random() > state.style.asks:
+        return  # without an answer the car goes straight on
+    state.dialogue = state.dialogue.after_asking_way(choice.lane, view.time)
+    pausing = state.intentions.pausing or (progress is None and bool(rng.random() < state.style.careful))
+    state.intentions = state.intentions.with_pause(pausing)
+    if not asked and rng.random() < state.style.proposes:
+        _propose_way(state, view, choice, rng)
+    else:
+        state.dialogue = state.dialogue.with_proposal(None)
+        first = plan_remark(state, rng)
+        state.say(*first, remark(DialogueMove.QUERY_W, ActionValue.QUERIED, joined=bool(first)))
+
+
+def _waits_for_way(state: CoWizardState, view: CoWizardView) -> bool:
+    """Whether the car stands before a junction because the way is unknown."""
+    return view.motion is Motion.WAITING or (state.intentions.pausing and view.motion is Motion.STOPPED)
+
+
+def _may_ask_way(state: CoWizardState, view: CoWizardView, choice: Choice) -> bool:
+    """Whether the way at a junction is unknown and the junction is near."""
+    intentions, progress = state.intentions, state.route.progress
+    busy = intentions.halted or intentions.creeping or intentions.nudge is not None
+    if busy or view.time < state.config.first_word or intentions.wish is Wish.U_TURN or view.manoeuvring:
+        return False
+    waiting = _waits_for_way(state, view)
+    near = waiting or choice.distance < state.config.ask_distance
+    if not near or wanted_exit(state, view) is not None:
+        return False
+    if progress is not None:
+        crossing = progress.next_crossing(state.town, view.station)
+        if crossing is None or progress.changes_before(crossing):
+            return False  # the goal or a U-turn comes before the junction
+    return waiting or view.manoeuvre is not PhysicalAction.J_TURN
+
+
+def _propose_way(state: CoWizardState, view: CoWizardView, choice: Choice, rng: np.random.Generator) -> None:
+    """Asks whether one of the exits is meant."""
+    way = choice.exits[int(rng.integers(len(choice.exits)))]
+    direction = direction_of(way)
+    action = ActionValue.LANE_FOLLOW if direction is Direction.STRAIGHT else ActionValue.J_TURN
+    street = street_of(view.raw, state.town, way.lane)
+    values: list[SlotValue] = [action]
+    if action is ActionValue.J_TURN and street is not StreetName.UNKNOWN and rng.random() < 0.3:
+        values.append(street)
+    move = DialogueMove.QUERY_YN if rng.random() < 0.7 else DialogueMove.CHECK
+    state.dialogue = state.dialogue.with_proposal(Directive(direction=direction, junction=choice.junction))
+    first = plan_remark(state, rng)
+    question = remark(move, *values, wording=Wording(direction=direction), joined=bool(first))
+    state.say(*first, question)
+
+
+def _say_arrived(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
+    goal, stays = state.beliefs.goal, state.intentions.arrived and state.intentions.halted and view.standing
+    if not stays or goal is None or state.dialogue.asked_at > state.commands.stop_sent_at:
+        return
+    state.dialogue = state.dialogue.after_asking(view.time)
+    arrived = Wording(topic="arrived")
+    if state.beliefs.exact and rng.random() < state.style.echoes + 0.15:
+        state.say(remark(DialogueMove.EXPLAIN, goal, wording=arrived))
+    elif not state.beliefs.exact:
+        state.say(remark(DialogueMove.QUERY_YN, wording=arrived))
+
+
+def _ask_goal(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
+    intentions, dialogue, config = state.intentions, state.dialogue, state.config
+    idle = (
+        state.beliefs.goal is None
+        and intentions.directive is None
+        and intentions.wish is None
+        and intentions.nudge is None
+    )
+    if not idle or intentions.creeping:
+        state.dialogue = dialogue.busy(view.time)
+        return
+    if view.time - dialogue.idle_since < (config.next_delay if intentions.halted else config.start_delay):
+        return
+    silent = view.time - max(dialogue.asked_at, dialogue.speech.last_end)
+    unanswered = silent < config.goal_interval and dialogue.asked_at > dialogue.heard_at
+    if unanswered or not (intentions.halted or view.standing):
+        return
+    again = view.time - dialogue.asked_at < 2.0 * config.goal_interval
+    state.dialogue = dialogue.after_asking(view.time)
+    draw = rng.random()
+    if again and draw < 0.5:
+        state.say(remark(DialogueMove.ALIGN))
+    elif state.beliefs.statuses and draw < 0.25:
+        state.say(remark(DialogueMove.QUERY_W, GoalStatus.QUERIED))
+    else:
+        state.say(remark(DialogueMove.QUERY_W, LandmarkName.QUERIED))
+
+
+def _explain_hazard(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
+    commands, config = state.commands, state.config
+    resting = view.time < commands.rest_until
+    hazard = commands.rest_for if resting else view.hazard
+    if not (resting or view.motion is Motion.HAZARD) or commands.standing_since is None:
+        return
+    if hazard is ObjectClass.UNLABELED or view.time - commands.standing_since < config.hazard_delay:
+        return
+    if view.time - state.dialogue.hazard_explained_at < config.hazard_interval:
+        return
+    state.dialogue = state.dialogue.after_explaining_hazard(view.time)
+    if rng.random() < (0.85 if hazard is ObjectClass.TRAFFIC_LIGHT else 0.4):
+        return  # most hazards, red lights above all, are obvious to the participant
+    values: tuple[SlotValue, ...] = (hazard,)
+    if resting or rng.random() < 0.3:
+        values = (ActionValue.STOP, hazard)
+    state.say(remark(DialogueMove.EXPLAIN, *values), *plan_remark(state, rng, joined=True))
+
+
+def visibility_topic(view: CoWizardView) -> str | None:
+    """Returns the condition that limits the view: "fog", "rain" or "night"; None for clear weather by day."""
+    if is_foggy(view.raw):
         return "fog"
-    if weather(view.raw, WeatherParameter.PRECIPITATION) > HEAVY_RAIN:
+    if is_rainy(view.raw):
         return "rain"
-    return "night" if weather(view.raw, WeatherParameter.SUN_ALTITUDE_ANGLE) < 0.0 else None
+    return "night" if is_dark(view.raw) else None
 
 
-def mind_weather(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Remarks on fog, rain or darkness, and asks whether to slow down or switch on the lights."""
-    topic = dim_topic(view)
+def _mention_weather(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
+    """Mentions fog, rain or darkness once; proposes to slow down, or switches on the lights."""
+    topic = visibility_topic(view)
     bad = topic in ("fog", "rain")
-    dark = weather(view.raw, WeatherParameter.SUN_ALTITUDE_ANGLE) < 0.0 and not view.lights
+    dark = is_dark(view.raw) and not view.lights
     if not bad and not dark:
-        mind.weather_told = False
+        state.dialogue = state.dialogue.with_weather_mentioned(False)
         return
-    if mind.weather_told or view.standing:
+    if state.dialogue.weather_mentioned or view.standing:
         return
-    mind.weather_told = True
-    if rng.random() < LEAVES_IT:
-        return  # the human may remark on it
-    things = _SEEN_OF_WEATHER[topic or "night"]
+    state.dialogue = state.dialogue.with_weather_mentioned(True)
+    if rng.random() < state.config.leaves_weather:
+        return
+    things = _WEATHER_OBJECTS[topic or "night"]
     draw = int(rng.random() * (len(things) + 1))
     values = (things[draw],) if draw < len(things) else ()
-    mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, *values, wording=Wording(topic=topic)))
-    if bad and mind.speed > SLOW:
-        mind.slower_asked = True
-        wording = Wording(faster=False, speed=SLOW)
-        question = remark(DialogueMove.QUERY_YN, ActionValue.SPEED_CHANGE, wording=wording, joined=True)
-        mind.voice = mind.voice.plan(question)
+    state.say(remark(DialogueMove.EXPLAIN, *values, wording=Wording(topic=topic)))
+    speed = state.config.bad_weather_speed
+    if bad and state.intentions.speed > speed:
+        state.dialogue = state.dialogue.with_slowing(True)
+        wording = Wording(faster=False, speed=speed)
+        state.say(remark(DialogueMove.QUERY_YN, ActionValue.SPEED_CHANGE, wording=wording, joined=True))
     elif dark:
-        mind.lights = True
+        state.intentions = state.intentions.with_lights(True)
         wording = Wording(lights=True)
-        mind.voice = mind.voice.plan(
-            remark(DialogueMove.EXPLAIN, ActionValue.LIGHT_CHANGE, wording=wording, joined=True)
-        )
+        state.say(remark(DialogueMove.EXPLAIN, ActionValue.LIGHT_CHANGE, wording=wording, joined=True))
 
 
-def mind_place(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Says so when it does not know any more where it is."""
+def _mention_localization(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
+    """Reports once that the position has become uncertain."""
     covariance = view.raw["pose_covariance"]
     variance = float(covariance[0][0]) + float(covariance[1][1])
-    if variance < FOUND:
-        mind.lost_told = False
-    elif variance > LOST and not mind.lost_told:
-        mind.lost_told = True
-        mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, wording=Wording(topic="no_gps")))
+    if variance < state.config.found_variance:
+        if state.dialogue.lost_mentioned:
+            state.dialogue = state.dialogue.with_lost_mentioned(False)
+    elif variance > state.config.lost_variance and not state.dialogue.lost_mentioned:
+        state.dialogue = state.dialogue.with_lost_mentioned(True)
+        state.say(remark(DialogueMove.EXPLAIN, wording=Wording(topic="no_gps")))
+
+
+def announce_action(
+    state: CoWizardState, view: CoWizardView, physical: Physical | None, rng: np.random.Generator
+) -> None:
+    """Announces a manoeuvre of the own plan, by chance."""
+    spoken = not state.speech.idle or view.speaking > 0.0
+    if physical is None or spoken or state.intentions.directive is not None:
+        return
+    action = ANNOUNCED.get(physical.action)
+    if action is None or state.intentions.wish is not None or rng.random() > state.style.tells:
+        return
+    values: list[SlotValue] = [action]
+    direction = Direction.LEFT if physical.angle > 0 else Direction.RIGHT
+    if action is ActionValue.J_TURN:
+        way = wanted_exit(state, view)
+        if way is None or direction_of(way) is Direction.STRAIGHT:
+            return
+        direction = direction_of(way)
+        street = street_of(view.raw, state.town, way.lane)
+        if street is not StreetName.UNKNOWN and rng.random() < 0.6:
+            values.append(street)
+    state.say(remark(DialogueMove.EXPLAIN, *values, wording=Wording(direction=direction)))

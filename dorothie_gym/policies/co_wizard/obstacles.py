@@ -1,4 +1,4 @@
-"""Obstacles across the road: seen, told, and driven round."""
+"""Obstacles across the road: detection, announcement and detour."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from dorothie_gym.dialogue import Wording
 from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, SlotValue
-from dorothie_gym.policies.co_wizard.goals import plan_way
+from dorothie_gym.policies.co_wizard.goals import plan_route
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import SeenObject, place_on_lanes
@@ -16,75 +16,59 @@ from dorothie_gym.policies.route_progress import first_new_street, lanes_ahead
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.spaces import Motion
 
-SIGHT = 70.0
-"""An obstacle is noticed when it is this near [m]."""
 
-ON_PATH = 1.8
-"""An obstacle closer than this to the waypoints is on the path [m]."""
-
-NAMES_STREET = 0.65
-"""Chance that it proposes a way round by the name of its street."""
-
-WAIT = 6.0
-"""So long an answer about a way round is waited for [s]."""
-
-
-def watch_road(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Looks for obstacles on the path, tells of a new one, and goes round it."""
-    if mind.detour_at is not None and view.time - mind.detour_at > WAIT:
-        detour(mind, view, rng)
-    thing = _on_path(view)
+def watch_road(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
+    """Looks for obstacles on the path, announces a new one, and asks about a detour or takes it."""
+    asked_at = state.dialogue.detour_asked_at
+    if asked_at is not None and view.time - asked_at > state.config.detour_answer_time:
+        take_detour(state, view, rng)
+    thing = _obstacle_on_path(state, view)
     if thing is None or view.manoeuvring:
         return
-    lanes = lanes_ahead(mind.town, view.lane, view.station, SIGHT)
-    if mind.journey is not None:
-        lanes = (*lanes, *(leg.lane for leg in mind.journey.legs[:5] if leg.lane not in lanes))
-    place = place_on_lanes(mind.town, lanes, thing.x, thing.y, width=2.2)
-    if place is None or any(other[0] == place[0] and abs(other[1] - place[1]) < 10.0 for other in mind.blocked):
+    lanes = lanes_ahead(state.town, view.lane, view.station, state.config.roadblock_sight)
+    if state.route.progress is not None:
+        lanes = (*lanes, *(leg.lane for leg in state.route.progress.legs[:5] if leg.lane not in lanes))
+    place = place_on_lanes(state.town, lanes, thing.x, thing.y, width=2.2)
+    if place is None or state.route.knows_roadblock(place):
         return
-    length = mind.town.lanes[place[0]].length
-    # the cell behind the obstacle as well: the car's own cell counts as free
-    mind.blocked = (*mind.blocked, place, (place[0], min(place[1] + 8.0, length)))
-    mind.hazard_told = view.time
-    mind.directive, mind.nudge = None, None
-    mind.voice = mind.voice.cleared().plan(
-        remark(DialogueMove.EXPLAIN, ObjectClass.STATIC, wording=Wording(topic="blocked"), urgent=True)
-    )
-    if mind.journey is not None:
-        mind.detour_at = view.time
-        values = _way_round(mind, view, rng)
-        question = remark(DialogueMove.QUERY_YN, *values, wording=Wording(topic="detour"), joined=True)
-        mind.voice = mind.voice.plan(question)
+    state.route = state.route.with_roadblock(state.town, place)
+    state.dialogue = state.dialogue.after_explaining_hazard(view.time)
+    blocked = remark(DialogueMove.EXPLAIN, ObjectClass.STATIC, wording=Wording(topic="blocked"), urgent=True)
+    state.speech = state.speech.cleared().plan(blocked)
+    if state.route.progress is not None:
+        state.dialogue = state.dialogue.with_detour_question(view.time)
+        values = _proposed_detour(state, view, rng)
+        state.say(remark(DialogueMove.QUERY_YN, *values, wording=Wording(topic="detour"), joined=True))
     else:
-        mind.asked_at = view.time
-        mind.voice = mind.voice.plan(remark(DialogueMove.QUERY_W, ActionValue.QUERIED, joined=True))
-    mind.halted = True
+        state.dialogue = state.dialogue.after_asking(view.time)
+        state.say(remark(DialogueMove.QUERY_W, ActionValue.QUERIED, joined=True))
+    state.intentions = state.intentions.blocked()
 
 
-def _way_round(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> tuple[SlotValue, ...]:
-    """What it proposes: a street, turning round, or just some other way."""
-    assert mind.journey is not None
-    way = mind.journey.replanned(mind.town, view.here, mind.blocked)
-    street = first_new_street(view.raw, mind.town, view.lane, way)
-    if street is not None and rng.random() < NAMES_STREET:
+def _proposed_detour(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> tuple[SlotValue, ...]:
+    """Returns the slots of a proposed detour: a street, a U-turn, or nothing in particular."""
+    assert state.route.progress is not None
+    route = state.route.progress.replanned(state.town, view.here, state.route.blocked)
+    street = first_new_street(view.raw, state.town, view.lane, route)
+    if street is not None and rng.random() < state.config.detour_by_street:
         return (street,)
-    return (ActionValue.U_TURN,) if way.turns_round_first(mind.town, view.station) and rng.random() < 0.5 else ()
+    return (ActionValue.U_TURN,) if route.turns_round_first(state.town, view.station) and rng.random() < 0.5 else ()
 
 
-def _on_path(view: CoWizardView) -> SeenObject | None:
-    """The nearest obstacle on the planned waypoints."""
+def _obstacle_on_path(state: CoWizardState, view: CoWizardView) -> SeenObject | None:
+    """Returns the nearest obstacle on the planned waypoints."""
     for thing in view.objects:
-        if thing.kind is not ObjectClass.STATIC or thing.distance > SIGHT:
+        if thing.kind is not ObjectClass.STATIC or thing.distance > state.config.roadblock_sight:
             continue
-        if _gap(view.waypoints, thing) < ON_PATH:
+        if _distance_to_path(view.waypoints, thing) < state.config.path_width:
             return thing
         if view.motion is Motion.HAZARD and view.hazard is ObjectClass.STATIC:
             return thing
     return None
 
 
-def _gap(waypoints: np.ndarray, thing: SeenObject) -> float:
-    """Distance of an obstacle from the line through the waypoints [m]."""
+def _distance_to_path(waypoints: np.ndarray, thing: SeenObject) -> float:
+    """Returns the distance of an obstacle from the line through the waypoints [m]."""
     if len(waypoints) < 2:
         return math.inf
     begin, step = waypoints[:-1], np.diff(waypoints, axis=0)  # (n - 1, 2)
@@ -93,14 +77,16 @@ def _gap(waypoints: np.ndarray, thing: SeenObject) -> float:
     return float(np.hypot(*(offset - np.clip(share, 0.0, 1.0)[:, None] * step).T).min())
 
 
-def detour(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Takes another way, and says which."""
-    mind.detour_at, mind.halted = None, False
-    plan_way(mind, view)
-    if mind.journey is None or mind.journey.route is None:
+def take_detour(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
+    """Plans another route and announces it."""
+    state.dialogue = state.dialogue.with_detour_question(None)
+    state.intentions = state.intentions.resumed()
+    plan_route(state, view)
+    progress = state.route.progress
+    if progress is None or progress.route is None:
         return
-    street = first_new_street(view.raw, mind.town, view.lane, mind.journey)
+    street = first_new_street(view.raw, state.town, view.lane, progress)
     if street is not None:
-        mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, street, wording=Wording(topic="detour")))
-    if mind.journey.turns_round_first(mind.town, view.station) and rng.random() < 0.6:
-        mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, ActionValue.U_TURN, joined=street is not None))
+        state.say(remark(DialogueMove.CONFIRM, street, wording=Wording(topic="detour")))
+    if progress.turns_round_first(state.town, view.station) and rng.random() < 0.6:
+        state.say(remark(DialogueMove.EXPLAIN, ActionValue.U_TURN, joined=street is not None))

@@ -1,4 +1,4 @@
-"""The scripted Co-Wizard, decision by decision."""
+"""Decision loop of the scripted Co-Wizard."""
 
 from __future__ import annotations
 
@@ -12,153 +12,147 @@ import numpy as np
 from dorothie_gym.dialogue import draw_style
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ObjectClass, Role
-from dorothie_gym.policies.co_wizard.config import CoWizardStyle
-from dorothie_gym.policies.co_wizard.driving import creep, drive, rest, see_green
+from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
+from dorothie_gym.policies.co_wizard.driving import creep, drive, end_red_light_rest, rest
 from dorothie_gym.policies.co_wizard.goals import note_plan, search_on
-from dorothie_gym.policies.co_wizard.initiative import scene_of, speak_up, tell_action
+from dorothie_gym.policies.co_wizard.initiative import announce_action, scene_of, take_initiative
 from dorothie_gym.policies.co_wizard.obstacles import watch_road
-from dorothie_gym.policies.co_wizard.state import CoWizardState
+from dorothie_gym.policies.co_wizard.state import CoWizardState, DialogueState, Intentions
 from dorothie_gym.policies.co_wizard.understanding_update import listen
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import Policy
 from dorothie_gym.policies.speech import SpeechState
 from dorothie_gym.spaces import ActionDict, CoWizardAction, Mental, Motion, Physical, SpaceLimits
 
-ASTRAY = 2
-"""After so many decisions off the plan it is made anew."""
-
-CLOSE_BY = 150.0
-"""Who leaves the way with the goal nearer than this, [m]"""
-
-AROUND = 60.0
-"""and then is farther from it by more than this, has missed it [m]."""
-
-AFTER_RED = 15.0
-"""A manoeuvre that was asked for is not given up before this time after a red light [s]."""
-
 
 class ScriptedCoWizard(Policy[CoWizardState]):
-    """A car's mind that is told where to go: it believes, plans, drives, asks, confirms and explains.
+    """Rule-based Co-Wizard: understands instructions, plans on its beliefs, drives, asks, confirms and explains.
 
-    It knows the map without hidden places. Places it knows it drives to by its own plan; to others it is guided by
-    words. What it believes it notes by mental actions.
+    It knows the map without hidden places. It drives to places on the map by its own route; to others it is guided by
+    the participant. Mental actions record its beliefs.
     """
 
-    def __init__(self, limits: SpaceLimits | None = None, style: CoWizardStyle | None = None) -> None:
+    def __init__(
+        self,
+        limits: SpaceLimits | None = None,
+        style: CoWizardStyle | None = None,
+        config: CoWizardConfig | None = None,
+    ) -> None:
         """Prepares the policy.
 
         Args:
             limits: sizes of the spaces.
-            style: how it talks; drawn for each session where None.
+            style: traits; None draws them for each session.
+            config: tunable numbers; None takes the defaults.
         """
         super().__init__(Role.CO_WIZARD, limits)
-        self._style = style
+        self._style, self._config = style, CoWizardConfig() if config is None else config
 
     def initial_state(self, seed: int, town: Town) -> CoWizardState:
-        """A Co-Wizard that has not been told anything yet."""
+        """Returns the state before anything was said."""
         rng = np.random.default_rng((seed, 0))
         style = CoWizardStyle.draw(rng) if self._style is None else self._style
-        voice = SpeechState(role=Role.CO_WIZARD, style=draw_style(Role.CO_WIZARD, rng))
-        return CoWizardState(seed=seed, town=town, style=style, voice=voice, speed=style.pace, usual=style.pace)
+        speech = SpeechState(role=Role.CO_WIZARD, style=draw_style(Role.CO_WIZARD, rng))
+        return CoWizardState(
+            seed=seed,
+            town=town,
+            style=style,
+            config=self._config,
+            dialogue=DialogueState(speech=speech),
+            intentions=Intentions(speed=style.pace, usual=style.pace),
+        )
 
     def step(self, observation: Mapping[str, Any], state: CoWizardState) -> tuple[ActionDict, CoWizardState]:
         """Listens, looks, drives, and says something or nothing."""
-        attention = attend(observation, state)
-        mind, view = attention.mind, attention.view
-        rest(mind, view, attention.rng)
-        see_green(mind, view)
-        return respond(attention, drive(mind, view)).encode(self.limits), mind
+        decision = attend(observation, state)
+        updated, view = decision.state, decision.view
+        rest(updated, view, decision.rng)
+        end_red_light_rest(updated, view)
+        return respond(decision, drive(updated, view)).encode(self.limits), updated
 
 
 class PendingDecision(NamedTuple):
-    """A decision in progress: the mind, which is brought up to date, what is seen, and chance."""
+    """Decision in progress: the updated state, the observation, and the random generator of the decision."""
 
-    mind: CoWizardState
+    state: CoWizardState
     view: CoWizardView
     rng: np.random.Generator
 
 
 def attend(observation: Mapping[str, Any], state: CoWizardState) -> PendingDecision:
-    """Listens and looks: the first part of a decision, before anything is done or said.
+    """Updates the state from an observation: the first part of a decision, before acting and speaking.
 
     Args:
-        observation: of the Co-Wizard.
-        state: its mind; it is left as it is.
+        observation: observation of the Co-Wizard.
+        state: state of the previous decision; it is not changed.
     """
-    mind = copy(state)
-    mind.count += 1
-    rng = np.random.default_rng((mind.seed, mind.count))
-    view = CoWizardView.read(observation, mind.town)
-    _notice(mind, view)
-    listen(mind, view, rng)
-    watch_road(mind, view, rng)
-    search_on(mind, view)
-    creep(mind, view)
-    return PendingDecision(mind, view, rng)
+    updated = copy(state)
+    updated.count += 1
+    rng = np.random.default_rng((updated.seed, updated.count))
+    view = CoWizardView.read(observation, updated.town)
+    updated.clock = updated.clock.ticked(view.time)
+    _update_route(updated, view)
+    listen(updated, view, rng)
+    watch_road(updated, view, rng)
+    search_on(updated, view)
+    creep(updated, view)
+    return PendingDecision(updated, view, rng)
 
 
-def respond(attention: PendingDecision, physical: Physical | None) -> CoWizardAction:
-    """Says something or nothing, and notes what is believed: the last part of a decision.
+def respond(decision: PendingDecision, physical: Physical | None) -> CoWizardAction:
+    """Chooses speech and belief update: the last part of a decision.
 
     Args:
-        attention: of `attend`.
-        physical: what the car does.
+        decision: result of `attend`; its state is updated.
+        physical: physical action of the decision.
     """
-    mind, view, rng = attention
-    tell_action(mind, view, physical, rng)
-    speak_up(mind, view, rng)
-    scene = None if mind.voice.idle else scene_of(mind, view)
-    speech, mind.voice = mind.voice.speak(view.time, view.speaking, rng, scene)
-    return CoWizardAction(speech=speech, physical=physical, mental=_next_note(mind))
+    state, view, rng = decision
+    announce_action(state, view, physical, rng)
+    take_initiative(state, view, rng)
+    scene = None if state.speech.idle else scene_of(state, view)
+    speech, state.speech = state.speech.speak(view.time, view.speaking, rng, scene)
+    return CoWizardAction(speech=speech, physical=physical, mental=_next_update(state))
 
 
-def _notice(mind: CoWizardState, view: CoWizardView) -> None:
-    """Brings plan and directive up to where the car is."""
-    if not view.standing:
-        mind.standing_since = None
-    elif mind.standing_since is None:
-        mind.standing_since = view.time
+def _update_route(state: CoWizardState, view: CoWizardView) -> None:
+    """Updates standstill, directive and route with the position of the car."""
+    state.commands = state.commands.observed(view.time, standing=view.standing)
     if view.motion is Motion.HAZARD and view.hazard is ObjectClass.TRAFFIC_LIGHT:
-        mind.wish_until = max(mind.wish_until, view.time + AFTER_RED)  # there is no place for it before
-    _pass_junction(mind, view)
-    if mind.journey is None or view.manoeuvring:
+        # the manoeuvre cannot begin before the light is green
+        state.intentions = state.intentions.wishing_until(view.time + state.config.red_light_extension)
+    _pass_junction(state, view)
+    if state.route.progress is None or view.manoeuvring:
         return
-    before = mind.journey.left(view.station)
-    mind.journey = mind.journey.followed(mind.town, view.lane, view.station)
-    if mind.journey.astray >= ASTRAY:
-        _plan_anew(mind, view, before)
+    before = state.route.progress.left(view.station)
+    state.route = state.route.with_progress(state.route.progress.followed(state.town, view.lane, view.station))
+    assert state.route.progress is not None
+    if state.route.progress.astray >= state.config.replan_after:
+        former = state.route.progress
+        state.route = state.route.replanned(state.town, view.here)
+        if state.route.has_missed(before, view.station):
+            state.route = state.route.after_miss(state.town, view.here, former)
+        note_plan(state)
 
 
-def _plan_anew(mind: CoWizardState, view: CoWizardView, before: float) -> None:
-    """Plans another way; who has missed the goal again and again does not come to it as before."""
-    assert mind.journey is not None
-    former = mind.journey
-    mind.journey = former.replanned(mind.town, view.here, mind.blocked + mind.avoided)
-    if before < CLOSE_BY and mind.journey.left(view.station) > before + AROUND:
-        mind.misses += 1
-        way_in = former.way_in()
-        if mind.misses > 1 and way_in is not None:
-            mind.avoided = (*mind.avoided, way_in)
-            mind.journey = former.replanned(mind.town, view.here, mind.blocked + mind.avoided)
-    note_plan(mind)
-
-
-def _pass_junction(mind: CoWizardState, view: CoWizardView) -> None:
-    """Drops a directive when its junction has been passed, or counts down to it."""
-    directive = mind.directive
+def _pass_junction(state: CoWizardState, view: CoWizardView) -> None:
+    """Drops a directive when its junction has been passed, or counts down the junctions to skip."""
+    directive = state.intentions.directive
     if directive is None or view.choice is None or view.manoeuvring:
         return
     if directive.junction == view.junction:
         return
     passed = directive.junction >= 0
     if passed and directive.skip == 0:
-        mind.directive = None
+        state.intentions = state.intentions.directed(None)
     else:
-        mind.directive = replace(directive, skip=max(directive.skip - passed, 0), junction=view.junction)
+        updated = replace(directive, skip=max(directive.skip - passed, 0), junction=view.junction)
+        state.intentions = state.intentions.directed(updated)
 
 
-def _next_note(mind: CoWizardState) -> Mental | None:
-    if not mind.notes:
+def _next_update(state: CoWizardState) -> Mental | None:
+    """Takes the next belief update off the queue."""
+    if not state.beliefs.updates:
         return None
-    first, mind.notes = mind.notes[0], mind.notes[1:]
+    first = state.beliefs.updates[0]
+    state.beliefs = state.beliefs.after_sending()
     return first

@@ -1,15 +1,21 @@
-"""State of the scripted Co-Wizard between decisions."""
+"""State of the scripted Co-Wizard between decisions: dialogue, beliefs, route, intentions and commands.
+
+Each group is frozen. Its methods are the only places where its fields change, and each returns a new group. A step
+works on a shallow copy of `CoWizardState` and replaces whole groups in it; the state handed in is not changed.
+"""
 
 from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import (
+    DialogueAct,
     GoalStatus,
     LandmarkName,
     MentalAction,
@@ -17,14 +23,15 @@ from dorothie_gym.ontology import (
     Role,
     StreetName,
 )
-from dorothie_gym.policies.co_wizard.config import USUAL_SPEED, CoWizardStyle
-from dorothie_gym.policies.route_progress import RouteProgress
-from dorothie_gym.policies.speech import SpeechState
+from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
+from dorothie_gym.policies.policy import DecisionClock
+from dorothie_gym.policies.route_progress import RouteState
+from dorothie_gym.policies.speech import Remark, SpeechState
 from dorothie_gym.spaces import LanePosition, Mental
 
 
 class Wish(enum.Enum):
-    """A manoeuvre that the human asked for and that waits for its place."""
+    """Manoeuvre that the participant asked for and that has not begun yet."""
 
     U_TURN = "u_turn"
     SWITCH_LEFT = "switch_left"
@@ -33,13 +40,13 @@ class Wish(enum.Enum):
 
 @dataclass(frozen=True, kw_only=True)
 class Directive:
-    """A turn that the human asked for.
+    """Turn that the participant asked for.
 
     Attributes:
-        direction: which way; None if only a street was named.
+        direction: direction of the turn; None if only a street was named.
         street: the street named, UNKNOWN if none was.
-        skip: opportunities to leave out before it is taken.
-        junction: the next junction with a choice when it was heard, -1 if there was none.
+        skip: junctions to pass before the turn is taken.
+        junction: the next junction with a choice when the directive was heard, -1 if there was none.
     """
 
     direction: Direction | None
@@ -48,134 +55,443 @@ class Directive:
     junction: int = -1
 
 
-@dataclass(kw_only=True)
-class CoWizardState:
-    """Beliefs and memory of the Co-Wizard; a step works on a copy, and every field holds an immutable value.
+@dataclass(frozen=True, kw_only=True)
+class DialogueState:
+    """Course of the dialogue: what is queued for speech, what was asked, and what was mentioned.
 
     Attributes:
-        seed: of all chance.
-        town: the map.
-        style: how it talks.
-        count: decisions taken.
-        voice: what it means to say.
-        goal: landmark it is to go to.
-        place: where it believes the goal to be.
-        exact: whether that is from the map; else it is a guess.
-        journey: way to the goal, if its place is on the map.
-        plan: junctions of the plan as noted last.
-        directive: turn asked for.
-        wish: manoeuvre asked for.
-        wish_until: when it is given up [s].
-        halted: whether the car is to stand.
-        nudge: place to go on to and stop at again.
-        creeping: whether the place is close and its guess is carried along.
-        told_to_stop_at: when it was last told to stop [s].
-        speed: cruise speed aimed at [km/h].
-        slow_until: until when a speed for the moment only is kept [s].
-        usual: cruise speed on open road, as told last [km/h].
-        not_there: places of houses and people that were done with, or that were not the ones meant.
-        lights: lights aimed at, None if nothing was said.
-        notes: belief updates still to be made.
-        statuses: what became of landmarks.
-        blocked: places that cannot be passed.
-        detour_at: since when an answer about a way round is waited for [s].
-        turn_sent: lane and angle of the last turn commanded.
-        turn_sent_at: when [s].
-        commanded_at: when a lane switch or U-turn was last commanded [s].
-        stop_sent_at: when Stop was last commanded [s].
-        asked: lane before the junction that was asked about.
-        considered: lane before the junction at which it has decided whether to ask.
-        asked_at: when the last question was put [s].
-        standing_since: since when the car has been standing [s].
-        hazard_told: when a hazard was last explained [s].
-        arrived: whether the car has stopped at its goal and waits for what comes next.
-        idle_since: since when it has known nothing to do [s].
-        heard_at: when the human last spoke [s].
-        proposed: way that it has proposed and waits for an answer to.
-        misses: how often it has driven past the goal.
-        avoided: places that it does not come by any more, for it missed the goal when it did.
-        rest_until: until when it stands for something in the way [s].
-        rest_for: what that is.
-        pausing: whether it stops before the junction ahead until it is told the way.
-        rested: whether it has decided whether to stop for good at the present hazard.
-        weather_told: whether it has remarked on the weather as it is.
-        slower_asked: whether it has proposed to slow down and waits for an answer.
-        offer: place that it has proposed to go to first and waits for an answer about.
-        missed: act that it has not caught.
-        lost_told: whether it has said that it does not know where it is.
-        described: whether it has been told where the goal is, which is not on the map.
-        steered_at: when it was last told what to do next [s].
+        speech: remarks queued and said.
+        heard_at: time of the last utterance of the participant [s].
+        asked_at: time of the last question of the Co-Wizard [s].
+        asked_lane: lane before the junction that the last question about the way referred to, -1 for none.
+        considered_lane: lane before the junction for which asking has been decided on, -1 for none.
+        idle_since: start of the period without any task or instruction [s].
+        steered_at: time of the last navigation instruction [s].
+        told_to_stop_at: time of the last instruction to stop [s].
+        proposed: turn proposed to the participant and not answered yet.
+        offer: place proposed as the first destination and not answered yet.
+        proposes_slowing: whether a proposal to slow down has not been answered yet.
+        detour_asked_at: time of the open question about a detour [s]; None where none is open.
+        hazard_explained_at: time of the last explanation of a hazard [s].
+        weather_mentioned: whether the present bad weather has been mentioned.
+        lost_mentioned: whether the present loss of localization has been mentioned.
     """
 
-    seed: int
-    town: Town
-    style: CoWizardStyle
-    count: int = 0
-    voice: SpeechState = field(default_factory=lambda: SpeechState(role=Role.CO_WIZARD))
+    speech: SpeechState = field(default_factory=lambda: SpeechState(role=Role.CO_WIZARD))
+    heard_at: float = -math.inf
+    asked_at: float = -math.inf
+    asked_lane: int = -1
+    considered_lane: int = -1
+    idle_since: float = 0.0
+    steered_at: float = -math.inf
+    told_to_stop_at: float = -math.inf
+    proposed: Directive | None = None
+    offer: LandmarkName | None = None
+    proposes_slowing: bool = False
+    detour_asked_at: float | None = None
+    hazard_explained_at: float = -math.inf
+    weather_mentioned: bool = False
+    lost_mentioned: bool = False
+
+    def with_speech(self, speech: SpeechState) -> DialogueState:
+        """Replaces the queued and said remarks."""
+        return replace(self, speech=speech)
+
+    def after_hearing(self, now: float, acts: Sequence[DialogueAct]) -> DialogueState:
+        """Notes an utterance of the participant at `now` [s]."""
+        return replace(self, heard_at=now, idle_since=now, speech=self.speech.heard_other(now, acts))
+
+    def after_asking(self, now: float) -> DialogueState:
+        """Notes a question of the Co-Wizard at `now` [s]."""
+        return replace(self, asked_at=now)
+
+    def after_considering(self, lane: int) -> DialogueState:
+        """Notes that asking for the way at the end of a lane has been decided on."""
+        return replace(self, considered_lane=lane)
+
+    def after_asking_way(self, lane: int, now: float) -> DialogueState:
+        """Notes a question about the way at the end of a lane."""
+        return replace(self, asked_lane=lane, asked_at=now)
+
+    def after_steering(self, now: float) -> DialogueState:
+        """Notes a navigation instruction at `now` [s]."""
+        return replace(self, steered_at=now)
+
+    def after_stop_instruction(self, now: float) -> DialogueState:
+        """Notes an instruction to stop at `now` [s]."""
+        return replace(self, told_to_stop_at=now)
+
+    def busy(self, now: float) -> DialogueState:
+        """Restarts the period without a task at `now` [s]."""
+        return replace(self, idle_since=now)
+
+    def with_proposal(self, directive: Directive | None) -> DialogueState:
+        """Opens the proposal of a turn; None withdraws it."""
+        return replace(self, proposed=directive)
+
+    def with_offer(self, place: LandmarkName | None) -> DialogueState:
+        """Opens the proposal of a first destination; None withdraws it."""
+        return replace(self, offer=place)
+
+    def with_slowing(self, proposed: bool) -> DialogueState:
+        """Opens or closes the proposal to slow down."""
+        return replace(self, proposes_slowing=proposed)
+
+    def after_refusal(self) -> DialogueState:
+        """Closes all proposals."""
+        return replace(self, proposed=None, offer=None, proposes_slowing=False)
+
+    def with_detour_question(self, asked_at: float | None) -> DialogueState:
+        """Opens the question about a detour at a time [s]; None closes it."""
+        return replace(self, detour_asked_at=asked_at)
+
+    def after_explaining_hazard(self, now: float) -> DialogueState:
+        """Notes that a hazard was explained at `now` [s]."""
+        return replace(self, hazard_explained_at=now)
+
+    def with_weather_mentioned(self, mentioned: bool) -> DialogueState:
+        """Sets whether the present weather has been mentioned."""
+        return replace(self, weather_mentioned=mentioned)
+
+    def with_lost_mentioned(self, mentioned: bool) -> DialogueState:
+        """Sets whether the present loss of localization has been mentioned."""
+        return replace(self, lost_mentioned=mentioned)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BeliefState:
+    """Beliefs about destinations, and the belief updates that the environment has not received yet.
+
+    Attributes:
+        goal: landmark of the present destination.
+        place: believed place of the goal.
+        exact: whether `place` is taken from the map; otherwise it is a guess.
+        described: whether the participant has described where the goal, which is not on the map, lies.
+        statuses: known status of landmarks.
+        plan: junctions of the route as sent in the last plan update.
+        ruled_out: places of houses and people that were visited, or that were not the ones meant.
+        updates: belief updates (mental actions) to be sent, the next first.
+    """
+
     goal: LandmarkName | None = None
     place: Place | None = None
     exact: bool = False
-    journey: RouteProgress | None = None
+    described: bool = False
     plan: tuple[int, ...] = ()
+    statuses: tuple[tuple[LandmarkName, GoalStatus], ...] = ()
+    ruled_out: tuple[Place, ...] = ()
+    updates: tuple[Mental, ...] = ()
+
+    @property
+    def stop_place(self) -> Place | None:
+        """Place of the goal if it is known from the map."""
+        return self.place if self.exact else None
+
+    def with_update(self, update: Mental) -> BeliefState:
+        """Queues a belief update, unless an equal one is queued already."""
+        return self if update in self.updates else replace(self, updates=(*self.updates, update))
+
+    def after_sending(self) -> BeliefState:
+        """Removes the first queued update."""
+        return replace(self, updates=self.updates[1:])
+
+    def with_status(self, landmark: LandmarkName, status: GoalStatus) -> BeliefState:
+        """Sets the status of a landmark and queues the update."""
+        statuses = (*(pair for pair in self.statuses if pair[0] is not landmark), (landmark, status))
+        update = Mental(action=MentalAction.STATUS_UPDATE, landmark=landmark, status=status)
+        return replace(self, statuses=statuses).with_update(update)
+
+    def with_known_goal(self, landmark: LandmarkName, place: Place) -> BeliefState:
+        """Sets a goal whose place is on the map."""
+        return replace(self, goal=landmark, place=place, exact=True)
+
+    def with_unknown_goal(self, landmark: LandmarkName) -> BeliefState:
+        """Sets a goal whose place is not on the map; a description of the same goal stays valid."""
+        again = self.goal is landmark and not self.exact
+        return replace(self, goal=landmark, place=None, exact=False, described=again and self.described, plan=())
+
+    def with_goal_ahead(self, landmark: LandmarkName | None) -> BeliefState:
+        """Marks the goal as close ahead at a place that is not exactly known; `landmark` renames it."""
+        return replace(self, goal=self.goal if landmark is None else landmark, exact=False)
+
+    def with_guess(self, landmark: LandmarkName, place: Place) -> BeliefState:
+        """Sets the guessed place of a landmark and queues the updates; earlier guesses are not sent any more."""
+        where = LanePosition(lane=place[0], metres=round(place[1]))
+        guess = Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=landmark, place=where)
+        others = (update for update in self.updates if update.action is not MentalAction.KNOWLEDGE_UPDATE)
+        updated = replace(self, place=place, updates=(*others, guess))
+        return updated.with_update(Mental(action=MentalAction.GOAL_UPDATE, goals=(landmark,)))
+
+    def with_plan(self, junctions: tuple[int, ...]) -> BeliefState:
+        """Sets the plan, junctions on the route, and queues the update unless it is empty or was sent already."""
+        if junctions == self.plan or not junctions:
+            return self
+        return replace(self, plan=junctions).with_update(Mental(action=MentalAction.PLAN_UPDATE, plan=junctions))
+
+    def with_description(self) -> BeliefState:
+        """Notes that the participant has described where the goal lies."""
+        return replace(self, described=True)
+
+    def with_place_ruled_out(self) -> BeliefState:
+        """Excludes the present place from the places of its landmark's name."""
+        return self if self.place is None else replace(self, ruled_out=(*self.ruled_out, self.place))
+
+    def without_place(self) -> BeliefState:
+        """Forgets the place of the goal and the plan that led there."""
+        return replace(self, place=None, exact=False, plan=())
+
+    def without_goal(self) -> BeliefState:
+        """Removes the goal."""
+        return replace(self, goal=None, place=None, exact=False, plan=())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Intentions:
+    """Driving goals of the next seconds.
+
+    Attributes:
+        directive: turn asked for.
+        wish: manoeuvre asked for.
+        wish_until: time at which the manoeuvre is given up [s].
+        halted: whether the car is to stand.
+        nudge: place a little further on at which the car is to stop again.
+        creeping: whether the goal is close and its guessed place is carried along ahead of the car.
+        arrived: whether the car has stopped at its goal and waits for the next task.
+        pausing: whether the car stops before the junction ahead until the way is known.
+        speed: target cruise speed [km/h].
+        slow_until: time at which a temporary speed ends [s].
+        usual: cruise speed on open road [km/h].
+        lights: target state of the head lights; None if nothing was said about them.
+    """
+
     directive: Directive | None = None
     wish: Wish | None = None
     wish_until: float = 0.0
     halted: bool = False
     nudge: Place | None = None
     creeping: bool = False
-    told_to_stop_at: float = -math.inf
-    speed: int = USUAL_SPEED
+    arrived: bool = False
+    pausing: bool = False
+    speed: int
     slow_until: float = math.inf
-    usual: int = USUAL_SPEED
-    not_there: tuple[Place, ...] = ()
+    usual: int
     lights: bool | None = None
-    notes: tuple[Mental, ...] = ()
-    statuses: tuple[tuple[LandmarkName, GoalStatus], ...] = ()
-    blocked: tuple[Place, ...] = ()
-    detour_at: float | None = None
+
+    def resumed(self) -> Intentions:
+        """Ends a halt."""
+        return replace(self, halted=False)
+
+    def started(self) -> Intentions:
+        """Ends a halt and a stay at the goal."""
+        return replace(self, halted=False, arrived=False)
+
+    def halting(self) -> Intentions:
+        """Lets the car stand; other intentions stay."""
+        return replace(self, halted=True)
+
+    def stopped(self) -> Intentions:
+        """Carries out an instruction to stop: lets the car stand and drops nudge and manoeuvre."""
+        return replace(self, halted=True, nudge=None, wish=None)
+
+    def stopped_at_place(self, *, arrived: bool) -> Intentions:
+        """Lets the car stand at a place; `arrived` tells whether it has a goal."""
+        return replace(self, halted=True, nudge=None, arrived=arrived)
+
+    def blocked(self) -> Intentions:
+        """Drops directive and nudge and lets the car stand before an obstacle."""
+        return replace(self, directive=None, nudge=None, halted=True)
+
+    def turning(self, directive: Directive) -> Intentions:
+        """Carries out an instruction to turn."""
+        return replace(self, directive=directive, wish=None, halted=False, nudge=None, creeping=False, arrived=False)
+
+    def directed(self, directive: Directive | None) -> Intentions:
+        """Sets the directive, or drops it (None); other intentions stay."""
+        return replace(self, directive=directive)
+
+    def turning_round(self, until: float, *, creeping: bool) -> Intentions:
+        """Carries out an instruction to turn round, given up after `until` [s]."""
+        return replace(
+            self, wish=Wish.U_TURN, wish_until=until, creeping=creeping, directive=None, halted=False, nudge=None,
+            arrived=False,
+        )  # fmt: skip
+
+    def switching(self, wish: Wish, until: float) -> Intentions:
+        """Carries out an instruction to switch lanes, given up after `until` [s]."""
+        return replace(self, wish=wish, wish_until=until, halted=False)
+
+    def wishing_until(self, until: float) -> Intentions:
+        """Extends the time for the manoeuvre to `until` at least [s]."""
+        return replace(self, wish_until=max(self.wish_until, until))
+
+    def without_wish(self) -> Intentions:
+        """Drops the manoeuvre."""
+        return replace(self, wish=None)
+
+    def without_nudge(self) -> Intentions:
+        """Drops the nudge."""
+        return replace(self, nudge=None)
+
+    def without_manoeuvres(self) -> Intentions:
+        """Drops directive and manoeuvre."""
+        return replace(self, directive=None, wish=None)
+
+    def nudged(self, place: Place) -> Intentions:
+        """Goes on to a place close ahead, to stop there again."""
+        return replace(self, nudge=place, halted=False)
+
+    def proceeding(self) -> Intentions:
+        """Carries out an instruction to go on along the lane."""
+        return replace(self, halted=False, arrived=False, creeping=False, wish=None)
+
+    def creeping_up(self) -> Intentions:
+        """Comes up slowly to a place close ahead whose exact position is unknown."""
+        return replace(self, creeping=True, halted=False, arrived=False, directive=None)
+
+    def for_new_goal(self) -> Intentions:
+        """Drops what was intended for another goal and ends a halt."""
+        return replace(self, directive=None, wish=None, nudge=None, halted=False, arrived=False, creeping=False)
+
+    def for_unknown_goal(self) -> Intentions:
+        """Ends the approach to the previous goal."""
+        return replace(self, creeping=False, arrived=False)
+
+    def without_goal(self) -> Intentions:
+        """Drops everything that was intended for the goal; a halt stays."""
+        return replace(self, directive=None, nudge=None, wish=None, creeping=False, arrived=False)
+
+    def departed(self) -> Intentions:
+        """Ends the stay at the goal; a halt stays."""
+        return replace(self, arrived=False)
+
+    def with_pause(self, pausing: bool) -> Intentions:
+        """Sets whether to stop before the junction ahead."""
+        return replace(self, pausing=pausing)
+
+    def with_speed(self, speed: int) -> Intentions:
+        """Sets the target cruise speed [km/h]; the usual one stays."""
+        return replace(self, speed=speed)
+
+    def with_asked_speed(self, speed: int, open_road: int, until: float) -> Intentions:
+        """Sets the cruise speed that was asked for [km/h].
+
+        Args:
+            speed: asked for [km/h].
+            open_road: lower speeds are temporary [km/h].
+            until: end of a temporary speed [s].
+        """
+        usual = speed if speed >= open_road else self.usual
+        return replace(self, speed=speed, usual=usual, slow_until=until)
+
+    def with_lights(self, on: bool) -> Intentions:
+        """Sets the target state of the head lights."""
+        return replace(self, lights=on)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommandState:
+    """Commands given to the car and their observed effect.
+
+    Attributes:
+        standing_since: start of the present standstill [s]; None while the car moves.
+        turn_sent: lane and angle of the last turn commanded [-, degrees].
+        turn_sent_at: time of that command [s].
+        manoeuvre_sent_at: time of the last lane switch or U-turn command [s].
+        stop_sent_at: time of the last Stop command [s].
+        rest_until: end of a stop because of something in the way [s].
+        rest_for: what the car stops for.
+        rest_decided: whether stopping at the present hazard has been decided on.
+    """
+
+    standing_since: float | None = 0.0
     turn_sent: tuple[int, int] = (-1, 0)
     turn_sent_at: float = -math.inf
-    commanded_at: float = -math.inf
+    manoeuvre_sent_at: float = -math.inf
     stop_sent_at: float = -math.inf
-    asked: int = -1
-    considered: int = -1
-    asked_at: float = -math.inf
-    standing_since: float | None = 0.0
-    hazard_told: float = -math.inf
-    arrived: bool = False
-    idle_since: float = 0.0
-    heard_at: float = -math.inf
-    proposed: Directive | None = None
-    misses: int = 0
-    avoided: tuple[Place, ...] = ()
     rest_until: float = -math.inf
     rest_for: ObjectClass = ObjectClass.UNLABELED
-    pausing: bool = False
-    rested: bool = False
-    weather_told: bool = False
-    slower_asked: bool = False
-    offer: LandmarkName | None = None
-    missed: bool = False
-    lost_told: bool = False
-    described: bool = False
-    steered_at: float = -math.inf
+    rest_decided: bool = False
 
-    def note(self, mental: Mental) -> None:
-        """Adds a belief update, unless the same one waits already."""
-        if mental not in self.notes:
-            self.notes = (*self.notes, mental)
+    def observed(self, now: float, *, standing: bool) -> CommandState:
+        """Brings the standstill up to date."""
+        if not standing:
+            return self if self.standing_since is None else replace(self, standing_since=None)
+        return replace(self, standing_since=now) if self.standing_since is None else self
 
-    def note_status(self, landmark: LandmarkName, status: GoalStatus) -> None:
-        """Remembers what became of a landmark."""
-        self.statuses = (*(pair for pair in self.statuses if pair[0] is not landmark), (landmark, status))
-        self.note(Mental(action=MentalAction.STATUS_UPDATE, landmark=landmark, status=status))
+    def after_stop(self, now: float) -> CommandState:
+        """Notes a Stop command."""
+        return replace(self, stop_sent_at=now)
 
-    def note_place(self, landmark: LandmarkName, place: Place) -> None:
-        """Marks a guess of where a landmark is, and makes it the goal."""
-        self.place = place
-        where = LanePosition(lane=place[0], metres=round(place[1]))
-        self.notes = (
-            *(note for note in self.notes if note.action is not MentalAction.KNOWLEDGE_UPDATE),
-            Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=landmark, place=where),
-        )
-        self.note(Mental(action=MentalAction.GOAL_UPDATE, goals=(landmark,)))
+    def after_manoeuvre(self, now: float) -> CommandState:
+        """Notes a lane switch or U-turn command."""
+        return replace(self, manoeuvre_sent_at=now)
+
+    def after_turn(self, turn: tuple[int, int], now: float) -> CommandState:
+        """Notes a turn command: lane and angle [degrees]."""
+        return replace(self, turn_sent=turn, turn_sent_at=now)
+
+    def with_rest_decided(self, decided: bool) -> CommandState:
+        """Sets whether stopping at the present hazard has been decided on."""
+        return replace(self, rest_decided=decided)
+
+    def resting(self, until: float, hazard: ObjectClass) -> CommandState:
+        """Stops for a hazard until a time [s]."""
+        return replace(self, rest_until=until, rest_for=hazard)
+
+    def rested(self, now: float) -> CommandState:
+        """Ends the stop for a hazard."""
+        return replace(self, rest_until=now)
+
+
+@dataclass(kw_only=True)
+class CoWizardState:
+    """State of the scripted Co-Wizard; a step works on a shallow copy.
+
+    Attributes:
+        seed: seed of all random draws.
+        town: the map.
+        style: traits drawn for the session.
+        config: tunable numbers.
+        count: number of decisions taken.
+        clock: time between decisions.
+        dialogue: course of the dialogue.
+        beliefs: beliefs about destinations.
+        route: route to the goal.
+        intentions: driving goals of the next seconds.
+        commands: commands given to the car.
+    """
+
+    seed: int
+    town: Town
+    style: CoWizardStyle
+    config: CoWizardConfig = field(default_factory=CoWizardConfig)
+    count: int = 0
+    clock: DecisionClock = field(default_factory=DecisionClock)
+    dialogue: DialogueState = field(default_factory=DialogueState)
+    beliefs: BeliefState = field(default_factory=BeliefState)
+    route: RouteState = field(default_factory=RouteState)
+    intentions: Intentions
+    commands: CommandState = field(default_factory=CommandState)
+
+    @property
+    def speech(self) -> SpeechState:
+        """Remarks queued and said."""
+        return self.dialogue.speech
+
+    @speech.setter
+    def speech(self, speech: SpeechState) -> None:
+        self.dialogue = self.dialogue.with_speech(speech)
+
+    def say(self, *remarks: Remark) -> None:
+        """Queues remarks at the end."""
+        self.speech = self.speech.plan(*remarks)
+
+    def say_first(self, *remarks: Remark) -> None:
+        """Queues remarks in front."""
+        self.speech = self.speech.plan_first(*remarks)
+
+    def leave_goal(self) -> None:
+        """Removes the goal, its route and all that was intended for it."""
+        self.beliefs = self.beliefs.without_goal()
+        self.route = self.route.with_progress(None)
+        self.intentions = self.intentions.without_goal()

@@ -1,4 +1,4 @@
-"""What the Co-Wizard makes of the human's words."""
+"""State update from an utterance of the participant: one reaction for each dialogue move and each action named."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from dorothie_gym.dialogue import Direction, ParsedText, Wording
 from dorothie_gym.ontology import (
+    SPEED_STEP,
     ActionValue,
     DialogueAct,
     DialogueMove,
@@ -16,237 +17,240 @@ from dorothie_gym.ontology import (
     ObjectClass,
     Role,
     Slot,
+    SlotValue,
     StreetName,
 )
-from dorothie_gym.policies.co_wizard.acknowledgement import musing, take_up
+from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, plan_remark
 from dorothie_gym.policies.co_wizard.answers import answer_open, answer_yes_no
 from dorothie_gym.policies.co_wizard.driving import place_ahead
 from dorothie_gym.policies.co_wizard.goals import (
-    CONFIRMS_CHANGES,
+    abandon,
     accept_offer,
+    approach_stop,
     complete,
     doubt,
-    give_up,
     hear_description,
-    hear_goal,
-    hear_later,
-    hear_stop_ahead,
-    plan_way,
+    plan_route,
+    postpone,
+    set_goal,
 )
-from dorothie_gym.policies.co_wizard.obstacles import detour
+from dorothie_gym.policies.co_wizard.obstacles import take_detour
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.policies.utterance_input import HeardUtterance, heard_utterance
 
-NUDGE = 3.0
-"""How far "a bit further" is: less than from where a car is short of a place to where it is past it [m]."""
+STRAIGHT_ON_DISTANCE = 60.0
+"""Distance to a junction within which "go on" means straight across it [m]."""
 
-WISH_TIME = 30.0
-"""A manoeuvre that finds no place for this long is given up [s]."""
+SLOWER_DISTANCE = 20.0
+"""Distance to a goal off the map that "slower" without a reason is taken to mean [m]."""
 
-_MOVES = frozenset(
+ASKED_SPEED_CHANGE = 10
+"""Change of the cruise speed for "faster" and "slower" without a number [km/h]."""
+
+SPEED_RANGE = (10, 60)
+"""Range of cruise speeds that the Co-Wizard accepts [km/h]."""
+
+_STEERING = frozenset(
     {ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH, ActionValue.START}
 )
-_STOPS = frozenset({ActionValue.STOP, ActionValue.LANE_FOLLOW})
-SLOW = 25
-"""Speed in bad weather [km/h]."""
-
-JUST_PASSED = 40.0
-"""A place that the car was to stop at no longer ago than this must be near [s]."""
-
-OPEN_ROAD = 20
-"""A lower speed is for the moment only [km/h]."""
-
-MOMENT = 40.0
-"""So long a speed for the moment only is kept [s]."""
-
-ASKED_LATELY = 12.0
-"""What is said no longer than this after a question should answer it [s]."""
-
-_ASKING = frozenset({DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK})
-
-_CAN_BE_REPEATED = _ASKING | {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W}
-
+_STOP_AHEAD = frozenset({ActionValue.STOP, ActionValue.LANE_FOLLOW})
+_QUESTIONS = frozenset({DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK})
+_REPEATABLE = _QUESTIONS | {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W}
 _UNNAMED = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
 
 
-def listen(mind: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Takes in what the human has said since the last decision: believes, prepares actions and answers."""
-    last = mind.voice.last
+def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
+    """Updates the state with what the participant has said since the last decision, and queues answers."""
+    last = state.speech.last
     heard = heard_utterance(view.raw, Role.PARTICIPANT, last.act.move if last is not None else None)
     if heard is None:
         return
-    mind.heard_at = mind.idle_since = view.time
-    mind.voice = mind.voice.heard_other(view.time, heard.acts)
-    before = mind.voice.queue
-    if _mishears(mind, heard, rng):
-        mind.voice = mind.voice.plan_first(remark(DialogueMove.CONFUSE))
+    state.dialogue = state.dialogue.after_hearing(view.time, heard.acts)
+    before = state.speech.queue
+    if _mishears(state, heard, rng):
+        state.say_first(remark(DialogueMove.CONFUSE))
         return
     for act in heard.acts:
         react = _REACTIONS.get(act.move)
         if react is not None:
-            react(mind, view, act, heard.words, rng)
-    # of several acknowledgements for one utterance the first will do
-    added = mind.voice.queue[len(before) :]
+            react(state, view, act, heard.words, rng)
+    # one plain acknowledgement is enough for an utterance
+    added = state.speech.queue[len(before) :]
     kept = tuple(
         item for k, item in enumerate(added) if not k or item.act.move is not DialogueMove.ACKNOWLEDGE or item.act.slots
     )
-    mind.voice = mind.voice.cleared().plan(*before, *kept)
+    state.speech = state.speech.cleared().plan(*before, *kept)
 
 
-def _mishears(mind: CoWizardState, heard: HeardUtterance, rng: np.random.Generator) -> bool:
-    """Whether it does not catch what it is told: nothing urgent, and nothing that it would not be told again."""
+def _mishears(state: CoWizardState, heard: HeardUtterance, rng: np.random.Generator) -> bool:
+    """Whether an instruction is not understood; never an urgent one, nor one that would not be repeated."""
     act = heard.acts[0]
     if len(heard.acts) > 1 or act.move is not DialogueMove.INSTRUCT or act.values(Slot.STATUS):
         return False
     plain = ActionValue.J_TURN in act.values(Slot.ACTION) or bool(act.values(Slot.LANDMARK))
-    return plain and not act.values(Slot.ACTION)[1:] and rng.random() < mind.style.mishears
+    return plain and not act.values(Slot.ACTION)[1:] and rng.random() < state.style.mishears
 
 
 def _instruction(
-    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     landmarks = tuple(name for name in act.values(Slot.LANDMARK) if name not in _UNNAMED)
     actions = tuple(value for value in act.values(Slot.ACTION) if value in _OBEYED)
     streets = tuple(name for name in act.values(Slot.STREET) if isinstance(name, StreetName))
     if not actions and landmarks:
-        _told_place(mind, view, act, words, rng)
-    elif words.distance is not None and not view.standing and _STOPS & set(actions):
+        _instructed_place(state, view, act, words, rng)
+    elif words.distance is not None and not view.standing and _STOP_AHEAD & set(actions):
         name = landmarks[0] if landmarks and isinstance(landmarks[0], LandmarkName) else None
-        hear_stop_ahead(mind, view, name, float(words.distance))
-        if mind.voice.idle and rng.random() > mind.style.silent:
-            mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+        approach_stop(state, view, name, float(words.distance))
+        if state.speech.idle and rng.random() > state.style.silent:
+            state.say(remark(DialogueMove.ACKNOWLEDGE))
     elif actions:
-        if mind.arrived and _MOVES & set(actions) and not words.further:
-            doubt(mind)
-        mind.proposed = None
-        if _MOVES & set(actions):
-            mind.steered_at = view.time
-        if _MOVES & set(actions) and not mind.exact:
-            mind.journey = None  # it is guided, and need not look for the place by itself
+        if state.intentions.arrived and _STEERING & set(actions) and not words.further:
+            doubt(state)
+        state.dialogue = state.dialogue.with_proposal(None)
+        if _STEERING & set(actions):
+            state.dialogue = state.dialogue.after_steering(view.time)
+            if not state.beliefs.exact:  # the car is guided and need not search for the place
+                state.route = state.route.with_progress(None)
         for action in actions:
-            _OBEYED[action](mind, view, act, words)
-        take_up(mind, actions[0], words, rng)
+            _OBEYED[action](state, view, act, words)
+        acknowledge(state, actions[0], words, rng)
     elif streets:
-        _told_street(mind, view, streets[0])
-    elif mind.detour_at is not None:
-        detour(mind, view, rng)
-    elif not act.slots and mind.goal is None:
-        mind.voice = mind.voice.plan(remark(DialogueMove.CONFUSE))  # what it is to do it has not understood
+        _instructed_street(state, view, streets[0])
+    elif state.dialogue.detour_asked_at is not None:
+        take_detour(state, view, rng)
+    elif not act.slots and state.beliefs.goal is None:
+        state.say(remark(DialogueMove.CONFUSE))
 
 
-def _told_place(
-    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+def _instructed_place(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    landmarks = [name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName)]
+    landmarks = _landmarks(act)
     statuses, streets = act.values(Slot.STATUS), act.values(Slot.STREET)
+    known = state.beliefs.exact or state.beliefs.described
     if GoalStatus.ABANDONED in statuses:
-        dropped = next((name for name in words.dropped if name in landmarks), landmarks[0])
-        others = [name for name in landmarks if name is not dropped]
-        if others and GoalStatus.PENDING in statuses:
-            mind.note_status(dropped, GoalStatus.ABANDONED)
-            mind.note_status(others[0], GoalStatus.PENDING)
-            wording = Wording(topic="changed", dropped=dropped)
-            mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, others[0], wording=wording))
-        elif others:
-            hear_goal(mind, view, others[0], _streets(streets), rng, dropped=dropped)
-        else:
-            give_up(mind, dropped)
-            move = DialogueMove.CONFIRM if rng.random() < CONFIRMS_CHANGES else DialogueMove.ACKNOWLEDGE
-            mind.voice = mind.voice.plan(remark(move, dropped, GoalStatus.ABANDONED))
+        _abandoned_place(state, view, act, words, rng)
     elif GoalStatus.PENDING in statuses:
-        hear_later(mind, view, landmarks[0], rng)
-    elif landmarks[0] is mind.goal and (mind.exact or mind.described) and not mind.arrived and not streets:
-        mind.halted = False
-        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, landmarks[0]))
+        postpone(state, view, landmarks[0], rng)
+    elif landmarks[0] is state.beliefs.goal and known and not state.intentions.arrived and not streets:
+        state.intentions = state.intentions.resumed()
+        state.say(remark(DialogueMove.ACKNOWLEDGE, landmarks[0]))
     else:
-        hear_goal(mind, view, landmarks[0], _streets(streets), rng, sure=landmarks[0] not in words.guessed)
+        set_goal(state, view, landmarks[0], _named(streets), rng, sure=landmarks[0] not in words.guessed)
 
 
-def _streets(values: tuple[object, ...]) -> tuple[StreetName, ...]:
+def _abandoned_place(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    """Gives up a place, for another one now, for another one later, or for none."""
+    landmarks = _landmarks(act)
+    dropped = next((name for name in words.dropped if name in landmarks), landmarks[0])
+    others = [name for name in landmarks if name is not dropped]
+    if others and GoalStatus.PENDING in act.values(Slot.STATUS):
+        beliefs = state.beliefs.with_status(dropped, GoalStatus.ABANDONED)
+        state.beliefs = beliefs.with_status(others[0], GoalStatus.PENDING)
+        wording = Wording(topic="changed", dropped=dropped)
+        state.say(remark(DialogueMove.CONFIRM, others[0], wording=wording))
+    elif others:
+        set_goal(state, view, others[0], _named(act.values(Slot.STREET)), rng, dropped=dropped)
+    else:
+        abandon(state, dropped)
+        move = DialogueMove.CONFIRM if rng.random() < state.config.confirms_changes else DialogueMove.ACKNOWLEDGE
+        state.say(remark(move, dropped, GoalStatus.ABANDONED))
+
+
+def _landmarks(act: DialogueAct) -> list[LandmarkName]:
+    return [name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName)]
+
+
+def _named(values: tuple[SlotValue, ...]) -> tuple[StreetName, ...]:
+    """Returns the streets among slot values, without "unknown" and "queried"."""
     unnamed = (StreetName.UNKNOWN, StreetName.QUERIED)
     return tuple(name for name in values if isinstance(name, StreetName) and name not in unnamed)
 
 
-def _told_street(mind: CoWizardState, view: CoWizardView, street: StreetName) -> None:
-    if mind.detour_at is not None:
-        mind.detour_at, mind.halted = None, False
-        plan_way(mind, view)
-        mind.voice = mind.voice.plan(remark(DialogueMove.CONFIRM, street, wording=Wording(topic="detour")))
+def _instructed_street(state: CoWizardState, view: CoWizardView, street: StreetName) -> None:
+    if state.dialogue.detour_asked_at is not None:
+        state.dialogue = state.dialogue.with_detour_question(None)
+        state.intentions = state.intentions.resumed()
+        plan_route(state, view)
+        state.say(remark(DialogueMove.CONFIRM, street, wording=Wording(topic="detour")))
         return
-    mind.directive, mind.halted = Directive(direction=None, street=street, junction=view.junction), False
-    mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, street))
+    directive = Directive(direction=None, street=street, junction=view.junction)
+    state.intentions = state.intentions.directed(directive).resumed()
+    state.say(remark(DialogueMove.ACKNOWLEDGE, street))
 
 
-# --- what actions mean ----------------------------------------------------------------------------------------------
+# --- instructed actions ---------------------------------------------------------------------------------------------
 
 
-def _do_turn(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    streets = _streets(act.values(Slot.STREET))
-    skip = max((words.ordinal or 1) - 1, 0)
-    mind.directive = Directive(
+def _do_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
+    streets = _named(act.values(Slot.STREET))
+    directive = Directive(
         direction=words.direction,
         street=streets[0] if streets else StreetName.UNKNOWN,
-        skip=skip,
+        skip=max((words.ordinal or 1) - 1, 0),
         junction=view.junction,
     )
-    mind.wish, mind.halted, mind.nudge, mind.creeping, mind.arrived = None, False, None, False, False
+    state.intentions = state.intentions.turning(directive)
 
 
-def _do_follow(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    close = mind.halted or mind.creeping or view.standing
+def _do_follow(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
+    close = state.intentions.halted or state.intentions.creeping or view.standing
     if close and (words.further or words.distance is not None):
-        distance = float(words.distance) if words.distance is not None else NUDGE
-        mind.nudge, mind.halted = place_ahead(mind, view, distance), False
+        distance = float(words.distance) if words.distance is not None else state.config.nudge_distance
+        state.intentions = state.intentions.nudged(place_ahead(state, view, distance))
         return
     choice = view.choice
-    mind.halted, mind.arrived, mind.creeping, mind.wish = False, False, False, None
-    if choice is not None and (words.direction is Direction.STRAIGHT or choice.distance < 60.0):
-        mind.directive = Directive(direction=Direction.STRAIGHT, junction=choice.junction)
+    state.intentions = state.intentions.proceeding()
+    if choice is not None and (words.direction is Direction.STRAIGHT or choice.distance < STRAIGHT_ON_DISTANCE):
+        straight = Directive(direction=Direction.STRAIGHT, junction=choice.junction)
+        state.intentions = state.intentions.directed(straight)
 
 
-def _do_u_turn(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    mind.wish, mind.wish_until = Wish.U_TURN, view.time + WISH_TIME
-    # who has been stopped for a place that is not on the map and then is turned round has gone past it
-    mind.creeping = mind.goal is not None and not mind.exact and view.time - mind.told_to_stop_at < JUST_PASSED
-    mind.directive, mind.halted, mind.nudge, mind.arrived = None, False, None, False
-    mind.detour_at = None
+def _do_u_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
+    # a car that was stopped for a place off the map and now is to turn round has gone past it
+    guided = state.beliefs.goal is not None and not state.beliefs.exact
+    creeping = guided and view.time - state.dialogue.told_to_stop_at < state.config.recent_stop
+    state.intentions = state.intentions.turning_round(view.time + state.config.wish_time, creeping=creeping)
+    state.dialogue = state.dialogue.with_detour_question(None)
 
 
-def _do_switch(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    right = words.direction is Direction.RIGHT
-    mind.wish, mind.wish_until = Wish.SWITCH_RIGHT if right else Wish.SWITCH_LEFT, view.time + WISH_TIME
-    mind.halted = False
+def _do_switch(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
+    wish = Wish.SWITCH_RIGHT if words.direction is Direction.RIGHT else Wish.SWITCH_LEFT
+    state.intentions = state.intentions.switching(wish, view.time + state.config.wish_time)
 
 
-def _do_stop(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    mind.told_to_stop_at = view.time
-    mind.halted, mind.nudge, mind.wish = True, None, None
+def _do_stop(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
+    state.dialogue = state.dialogue.after_stop_instruction(view.time)
+    state.intentions = state.intentions.stopped()
 
 
-def _do_start(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    mind.halted = mind.arrived = False
+def _do_start(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
+    state.intentions = state.intentions.started()
 
 
-def _do_speed(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    if words.speed is None and words.faster is False and not mind.exact:
-        # nobody says why: the place that is not on the map must be near
-        hear_stop_ahead(mind, view, None, 20.0)
+def _do_speed(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
+    if words.speed is None and words.faster is False and not state.beliefs.exact:
+        # without a reason given, the goal that is not on the map must be near
+        approach_stop(state, view, None, SLOWER_DISTANCE)
         return
     if words.speed is not None:
-        mind.speed = words.speed
+        asked = words.speed
     else:
-        mind.speed = round(view.cruise) + (10 if words.faster else -10)
-    mind.speed = min(max(5 * round(mind.speed / 5), 10), 60)
-    if mind.speed >= OPEN_ROAD:
-        mind.usual = mind.speed
-    mind.slow_until = view.time + MOMENT
+        asked = round(view.cruise) + (ASKED_SPEED_CHANGE if words.faster else -ASKED_SPEED_CHANGE)
+    low, high = SPEED_RANGE
+    asked = min(max(int(SPEED_STEP) * round(asked / int(SPEED_STEP)), low), high)
+    until = view.time + state.config.slow_time
+    state.intentions = state.intentions.with_asked_speed(asked, state.config.open_road_speed, until)
 
 
-def _do_lights(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    mind.lights = words.lights is not False
+def _do_lights(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
+    state.intentions = state.intentions.with_lights(words.lights is not False)
 
 
 _OBEYED: dict[ActionValue, Callable[[CoWizardState, CoWizardView, DialogueAct, ParsedText], None]] = {
@@ -265,130 +269,137 @@ _OBEYED: dict[ActionValue, Callable[[CoWizardState, CoWizardView, DialogueAct, P
 
 
 def _explanation(
-    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    landmarks = [name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName)]
-    statuses = act.values(Slot.STATUS)
+    landmarks, statuses = _landmarks(act), act.values(Slot.STATUS)
     name = landmarks[0] if landmarks else None
-    if _MOVES & set(act.values(Slot.ACTION)):
-        _instruction(mind, view, act, words, rng)  # "you should be turning left" is as good as a command
+    if _STEERING & set(act.values(Slot.ACTION)):
+        _instruction(state, view, act, words, rng)  # "you should be turning left" counts as an instruction
     elif GoalStatus.COMPLETE in statuses:
-        complete(mind, name)
+        complete(state, name)
         if rng.random() < 0.5:
-            mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+            state.say(remark(DialogueMove.ACKNOWLEDGE))
     elif GoalStatus.ABANDONED in statuses:
-        give_up(mind, name)
+        abandon(state, name)
         values = (name, GoalStatus.ABANDONED) if name is not None else ()
-        move = DialogueMove.CONFIRM if values and rng.random() < CONFIRMS_CHANGES else DialogueMove.ACKNOWLEDGE
-        mind.voice = mind.voice.plan(remark(move, *values))
+        confirms = values and rng.random() < state.config.confirms_changes
+        state.say(remark(DialogueMove.CONFIRM if confirms else DialogueMove.ACKNOWLEDGE, *values))
     elif act.values(Slot.STREET):
-        hear_description(mind, view, _streets(act.values(Slot.STREET)), landmarks, rng)
+        hear_description(state, view, _named(act.values(Slot.STREET)), landmarks, rng)
     elif "wrong" in words.text.lower():
-        mind.journey = None if not mind.exact else mind.journey
-        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, wording=Wording(topic="sorry")))
+        if not state.beliefs.exact:
+            state.route = state.route.with_progress(None)
+        state.say(remark(DialogueMove.ACKNOWLEDGE, wording=Wording(topic="sorry")))
     elif GoalStatus.PENDING in statuses and name is not None:
-        mind.note_status(name, GoalStatus.PENDING)
-        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+        state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
+        state.say(remark(DialogueMove.ACKNOWLEDGE))
     elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.25:
-        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+        state.say(remark(DialogueMove.ACKNOWLEDGE))
 
 
 def _reply(
-    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """An answer to an open question, or an amplification: something to do, or where something is."""
-    late = act.move is DialogueMove.REPLY_W and view.choice is not None and mind.asked not in (-1, view.choice.lane)
-    if late and mind.exact and words.turns:
+    """Takes up an answer to an open question, or a clarification: an action, a direction or a place."""
+    asked_elsewhere = view.choice is not None and state.dialogue.asked_lane not in (-1, view.choice.lane)
+    if act.move is DialogueMove.REPLY_W and asked_elsewhere and state.beliefs.exact and words.turns:
         return  # the junction that was asked about lies behind, and the way is known by now
     if act.values(Slot.ACTION):
-        _instruction(mind, view, act, words, rng)
+        _instruction(state, view, act, words, rng)
     elif words.turns:
-        mind.proposed = None
-        mind.journey = mind.journey if mind.exact else None
-        _do_turn(mind, view, act, words)
-        take_up(mind, ActionValue.J_TURN, words, rng)
+        state.dialogue = state.dialogue.with_proposal(None)
+        if not state.beliefs.exact:
+            state.route = state.route.with_progress(None)
+        _do_turn(state, view, act, words)
+        acknowledge(state, ActionValue.J_TURN, words, rng)
     elif act.values(Slot.STREET) or act.values(Slot.LANDMARK):
-        landmarks = [name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName)]
-        clarified = act.move is DialogueMove.CLARIFY and landmarks and mind.goal is not landmarks[0]
-        if clarified:
-            hear_goal(mind, view, landmarks[0], _streets(act.values(Slot.STREET)), rng, corrected=True)
-        elif (mind.goal is None or mind.arrived) and landmarks:
-            hear_goal(mind, view, landmarks[0], _streets(act.values(Slot.STREET)), rng)
-        else:
-            hear_description(mind, view, _streets(act.values(Slot.STREET)), landmarks, rng)
-    elif view.time - mind.asked_at < ASKED_LATELY and words.order is None and not act.slots:
-        mind.voice = mind.voice.plan(remark(DialogueMove.CONFUSE))  # no answer to what it has asked
+        _reply_with_place(state, view, act, rng)
+    elif view.time - state.dialogue.asked_at < state.config.answer_time and words.order is None and not act.slots:
+        state.say(remark(DialogueMove.CONFUSE))  # it does not answer the question
     elif rng.random() < 0.5:
-        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE))
+        state.say(remark(DialogueMove.ACKNOWLEDGE))
+
+
+def _reply_with_place(state: CoWizardState, view: CoWizardView, act: DialogueAct, rng: np.random.Generator) -> None:
+    landmarks, streets, goal = _landmarks(act), _named(act.values(Slot.STREET)), state.beliefs.goal
+    if act.move is DialogueMove.CLARIFY and landmarks and goal is not landmarks[0]:
+        set_goal(state, view, landmarks[0], streets, rng, corrected=True)
+    elif (goal is None or state.intentions.arrived) and landmarks:
+        set_goal(state, view, landmarks[0], streets, rng)
+    else:
+        hear_description(state, view, streets, landmarks, rng)
 
 
 def _yes(
-    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    if mind.offer is not None:
-        accept_offer(mind, view, rng)
-    elif mind.detour_at is not None:
-        detour(mind, view, rng)
-    elif mind.proposed is not None:
-        if mind.proposed.junction == view.junction and mind.directive is None:
-            mind.directive, mind.halted = mind.proposed, False
-        mind.proposed = None
-    elif mind.slower_asked:
-        mind.slower_asked, mind.speed = False, SLOW
-        wording = Wording(faster=False, speed=SLOW)
-        mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, ActionValue.SPEED_CHANGE, wording=wording))
+    dialogue = state.dialogue
+    if dialogue.offer is not None:
+        accept_offer(state, view)
+    elif dialogue.detour_asked_at is not None:
+        take_detour(state, view, rng)
+    elif dialogue.proposed is not None:
+        if dialogue.proposed.junction == view.junction and state.intentions.directive is None:
+            state.intentions = state.intentions.directed(dialogue.proposed).resumed()
+        state.dialogue = dialogue.with_proposal(None)
+    elif dialogue.proposes_slowing:
+        state.dialogue = dialogue.with_slowing(False)
+        speed = state.config.bad_weather_speed
+        state.intentions = state.intentions.with_speed(speed)
+        wording = Wording(faster=False, speed=speed)
+        state.say(remark(DialogueMove.EXPLAIN, ActionValue.SPEED_CHANGE, wording=wording))
 
 
-def _no(mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator) -> None:
-    mind.proposed = mind.offer = None
-    mind.slower_asked = False
-    if mind.arrived:
-        doubt(mind)
+def _no(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    state.dialogue = state.dialogue.after_refusal()
+    if state.intentions.arrived:
+        doubt(state)
     if words.turns and not act.values(Slot.ACTION):
-        _do_turn(mind, view, act, words)
+        _do_turn(state, view, act, words)
 
 
 def _alignment(
-    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    understood = mind.goal is not None or mind.directive is not None
-    if understood:
-        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE, wording=Wording(topic="align")))
+    if state.beliefs.goal is not None or state.intentions.directive is not None:
+        state.say(remark(DialogueMove.ACKNOWLEDGE, wording=Wording(topic="align")))
     else:
-        mind.voice = mind.voice.plan(remark(DialogueMove.CONFUSE))
+        state.say(remark(DialogueMove.CONFUSE))
 
 
 def _check(
-    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     landmarks, streets = act.values(Slot.LANDMARK), act.values(Slot.STREET)
-    right = not landmarks or mind.goal in landmarks
+    right = not landmarks or state.beliefs.goal in landmarks
     if streets and not landmarks:
-        right = street_of(view.raw, mind.town, view.lane) in streets
+        right = street_of(view.raw, state.town, view.lane) in streets
     move = DialogueMove.CONFIRM if right else DialogueMove.REPLY_N
-    mind.voice = mind.voice.plan(remark(move), *musing(mind, rng, joined=True))
+    state.say(remark(move), *plan_remark(state, rng, joined=True))
 
 
 def _confusion(
-    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    told = [item for item in mind.voice.said if item.act.move in _CAN_BE_REPEATED]
-    if not told:
+    """Repeats the last remark that can be repeated."""
+    said = [item for item in state.speech.said if item.act.move in _REPEATABLE]
+    if not said:
         return
-    last = told[-1]
-    open_question = last.act.move in _ASKING or not last.act.slots
-    move = last.act.move if open_question else DialogueMove.CLARIFY
-    mind.voice = mind.voice.plan(remark(move, *last.act.slots, wording=last.wording))
+    last = said[-1]
+    repeats = last.act.move in _QUESTIONS or not last.act.slots
+    move = last.act.move if repeats else DialogueMove.CLARIFY
+    state.say(remark(move, *last.act.slots, wording=last.wording))
 
 
 def _small_talk(
-    mind: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    if view.time - mind.asked_at < ASKED_LATELY and mind.goal is None:
-        mind.voice = mind.voice.plan(remark(DialogueMove.CONFUSE))  # an answer was expected
-    elif rng.random() < mind.style.chats:
-        move = DialogueMove.IRRELEVANT if rng.random() < 0.6 else DialogueMove.ACKNOWLEDGE
-        mind.voice = mind.voice.plan(remark(move))
+    if view.time - state.dialogue.asked_at < state.config.answer_time and state.beliefs.goal is None:
+        state.say(remark(DialogueMove.CONFUSE))  # an answer was expected
+    elif rng.random() < state.style.chats:
+        state.say(remark(DialogueMove.IRRELEVANT if rng.random() < 0.6 else DialogueMove.ACKNOWLEDGE))
 
 
 _REACTIONS: dict[

@@ -15,6 +15,7 @@ from dorothie_gym.ontology import (
     ObjectClass,
     PhysicalAction,
 )
+from dorothie_gym.policies.guidance_config import STANDING_SPEED
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenObject, read_landmarks, read_objects, scalar
 from dorothie_gym.policies.route_progress import Choice, is_choice, next_choice
 from dorothie_gym.spaces import ExitColumn, Motion
@@ -22,7 +23,26 @@ from dorothie_gym.spaces import ExitColumn, Motion
 
 @dataclass(frozen=True, kw_only=True)
 class CoWizardView:
-    """An observation of the Co-Wizard, read; `lane` and `station` are corrected by the turn options."""
+    """Observation of the Co-Wizard.
+
+    Attributes:
+        raw: the observation as received.
+        time: time of the session [s].
+        speed: speed of the car [m/s].
+        lane: lane of the car, corrected by the turn options.
+        station: distance along the lane, corrected by the turn options [m].
+        speaking: remaining duration of the own utterance [s].
+        motion: state of motion.
+        hazard: class of what the car brakes or stands for; UNLABELED for nothing.
+        manoeuvre: manoeuvre prepared or under way.
+        angle: its angle [degrees].
+        cruise: cruise speed [km/h].
+        lights: whether the head lights are on.
+        choice: next junction with a choice.
+        landmarks: landmarks on the map.
+        objects: objects in sight.
+        waypoints: points of the planned path (n, 2) [m].
+    """
 
     raw: Mapping[str, Any]
     time: float
@@ -43,7 +63,7 @@ class CoWizardView:
 
     @classmethod
     def read(cls, observation: Mapping[str, Any], town: Town) -> CoWizardView:
-        """Reads what every decision needs."""
+        """Reads an observation."""
         manoeuvre = int(observation["manoeuvre"])
         waypoints = observation["waypoints"]
         view = cls(
@@ -68,23 +88,23 @@ class CoWizardView:
 
     @property
     def position(self) -> tuple[float, float]:
-        """Where it believes the car to be [m]."""
+        """Estimated position of the car [m]."""
         x, y = self.raw["pose"][:2]
         return float(x), float(y)
 
     @property
     def here(self) -> Place:
-        """Where the car is."""
+        """Lane and station of the car."""
         return self.lane, self.station
 
     @property
     def standing(self) -> bool:
         """Whether the car stands."""
-        return self.speed < 0.3
+        return self.speed < STANDING_SPEED
 
     @property
     def junction(self) -> int:
-        """The next junction with a choice, -1 if there is none."""
+        """Id of the next junction with a choice, -1 if there is none."""
         return self.choice.junction if self.choice is not None else -1
 
     @property
@@ -94,7 +114,7 @@ class CoWizardView:
 
 
 def _located(view: CoWizardView, town: Town) -> CoWizardView:
-    """The view with its place corrected: the turn options ahead are known even where the position has drifted."""
+    """Corrects lane and station by the turn options ahead, which are known even where the position has drifted."""
     believed = next_choice(town, view.lane, view.station)
     rows = [row for row in view.raw["exits"] if row[ExitColumn.PRESENT]]
     if not rows:
@@ -116,7 +136,7 @@ def _located(view: CoWizardView, town: Town) -> CoWizardView:
 
 @lru_cache(maxsize=16)
 def _lanes_by_exits(town: Town) -> Mapping[tuple[int, ...], tuple[int, ...]]:
-    """For the lanes that the exits of a junction lead to, the lanes that have those exits."""
+    """Returns the lanes before junctions by the lanes that their exits lead to."""
     found: dict[tuple[int, ...], list[int]] = {}
     for lane in town.lanes:
         if is_choice(town, lane.id):

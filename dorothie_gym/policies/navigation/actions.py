@@ -1,4 +1,4 @@
-"""What the driver can do: one number a decision, and which numbers would not be refused."""
+"""Discrete driving actions, and their meaning as physical actions of the Co-Wizard."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LEFT, RIGHT = 90, -90
 
 
 class NavigationAction(enum.IntEnum):
-    """An action of `Navigation-v0`; the last eight take the way on at the next junction that lies in a sector."""
+    """Action of `Navigation-v0`; the last eight take the exit in a sector of the next junction with a choice."""
 
     NOTHING = 0
     LANE_FOLLOW = 1
@@ -39,12 +39,12 @@ class NavigationAction(enum.IntEnum):
 
     @property
     def sector(self) -> int | None:
-        """The sector of a turn, see `ways.SECTORS`; None for other actions."""
+        """Sector of a turn, an index of `junction_exits.SECTORS`; None for other actions."""
         return int(self) - FIRST_TURN if int(self) >= FIRST_TURN else None
 
     @classmethod
     def turn(cls, sector: int) -> NavigationAction:
-        """The action that turns into a sector."""
+        """Returns the action that turns into a sector."""
         return cls(FIRST_TURN + sector)
 
 
@@ -52,7 +52,7 @@ FIRST_TURN = 10
 ACTIONS = tuple(NavigationAction)
 assert len(ACTIONS) == FIRST_TURN + len(SECTORS)
 
-PLAIN: Final[Mapping[int, Physical]] = {
+PLAIN_ACTIONS: Final[Mapping[int, Physical]] = {
     NavigationAction.LANE_FOLLOW: Physical(action=PhysicalAction.LANE_FOLLOW),
     NavigationAction.SWITCH_LEFT: Physical(action=PhysicalAction.LANE_SWITCH, angle=LEFT),
     NavigationAction.SWITCH_RIGHT: Physical(action=PhysicalAction.LANE_SWITCH, angle=RIGHT),
@@ -62,7 +62,7 @@ PLAIN: Final[Mapping[int, Physical]] = {
     NavigationAction.FASTER: Physical(action=PhysicalAction.SPEED_CHANGE, up=True),
     NavigationAction.SLOWER: Physical(action=PhysicalAction.SPEED_CHANGE, up=False),
 }
-"""What the car is told to do by the actions that mean the same everywhere."""
+"""Physical actions of the actions that do not depend on the observation."""
 
 
 UNDER_WAY = {
@@ -70,45 +70,45 @@ UNDER_WAY = {
     NavigationAction.SWITCH_RIGHT: (PhysicalAction.LANE_SWITCH, RIGHT),
     NavigationAction.U_TURN: (PhysicalAction.U_TURN, 0),
 }
-"""Manoeuvres, and what `LocalPlanner.manoeuvre` is while they are prepared or driven."""
+"""Manoeuvres, and the value of `LocalPlanner.manoeuvre` while they are prepared or driven."""
 
 
-def physical_of(action: NavigationAction, seen: Mapping[str, Any], ways: JunctionExits) -> Physical | None:
-    """What the Co-Wizard does for an action; None for nothing.
+def physical_of(action: NavigationAction, observation: Mapping[str, Any], exits: JunctionExits) -> Physical | None:
+    """Maps an action to a physical action; None for no action.
 
-    What is being prepared just goes on when it is asked for again: drivers may ask for what they want as long as they
-    want it. A turn into a sector without a way on is a turn with the sector's angle: the car refuses it, or takes the
-    way that fits best.
+    A manoeuvre that is being prepared continues when it is chosen again, so a driver may repeat an action until it
+    takes effect. A turn into a sector without an exit becomes a turn by the sector's angle: the car refuses it, or
+    takes the exit that fits best.
 
     Args:
-        action: what was chosen.
-        seen: what the Co-Wizard observes.
-        ways: ways on at the town's junctions.
+        action: action chosen.
+        observation: observation of the Co-Wizard.
+        exits: exits of the town's junctions.
     """
-    if action is NavigationAction.NOTHING or prepares(action, seen, ways):
+    if action is NavigationAction.NOTHING or prepares(action, observation, exits):
         return None
     if action is NavigationAction.LIGHTS:
-        return Physical(action=PhysicalAction.LIGHT_CHANGE, up=not seen["lights"])
+        return Physical(action=PhysicalAction.LIGHT_CHANGE, up=not observation["lights"])
     sector = action.sector
     if sector is None:
-        return PLAIN[action]
-    angle = _angle_of(sector, seen, ways)
+        return PLAIN_ACTIONS[action]
+    angle = _angle_of(sector, observation, exits)
     return Physical(action=PhysicalAction.J_TURN, angle=SECTORS[sector] if angle is None else angle)
 
 
-def prepares(action: NavigationAction, seen: Mapping[str, Any], ways: JunctionExits) -> bool:
-    """Whether an action is what the car is about to do anyway."""
-    if int(seen["motion"]) == Motion.STOPPED:
+def prepares(action: NavigationAction, observation: Mapping[str, Any], exits: JunctionExits) -> bool:
+    """Whether the car prepares or carries out an action already."""
+    if int(observation["motion"]) == Motion.STOPPED:
         return False
     manoeuvre = UNDER_WAY.get(action)
     if action.sector is not None:
-        angle = _angle_of(action.sector, seen, ways)
+        angle = _angle_of(action.sector, observation, exits)
         manoeuvre = None if angle is None else (PhysicalAction.J_TURN, angle)
-    return manoeuvre == (int(seen["manoeuvre"]), int(seen["manoeuvre_angle"][0]))
+    return manoeuvre == (int(observation["manoeuvre"]), int(observation["manoeuvre_angle"][0]))
 
 
-def _angle_of(sector: int, seen: Mapping[str, Any], ways: JunctionExits) -> int | None:
-    """Angle of the turn into a sector at the next choice of ways [degrees]; None where no way leads there."""
-    choice = ways.choice_ahead(seen)
-    way = ways.after(choice)[sector] if choice is not None else None
+def _angle_of(sector: int, observation: Mapping[str, Any], exits: JunctionExits) -> int | None:
+    """Returns the angle of the exit in a sector of the next junction [degrees]; None where the sector has none."""
+    choice = exits.choice_ahead(observation)
+    way = exits.by_sector(choice)[sector] if choice is not None else None
     return None if way is None else way.angle

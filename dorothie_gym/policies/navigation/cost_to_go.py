@@ -1,4 +1,4 @@
-"""How far it still is to a goal, from anywhere in a town."""
+"""Cost of the cheapest route to a goal, from anywhere in a town."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from functools import lru_cache
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place, router
 
-PASSED = 2.0
-"""A goal that lies no farther behind than this counts as reached and not as passed [m]."""
+REACHED_BEHIND = 2.0
+"""Largest distance behind the car at which a goal counts as reached instead of passed [m]."""
 
 
 class CostToGo:
-    """Cost of the cheapest way to a goal, in metres at 40 km/h; what the router takes for it (`Router.route`).
+    """Cost of the cheapest route to a goal in metres at 40 km/h, as computed by `Router.route`.
 
     Attributes:
         goal: lane and distance along it [m], or None.
@@ -28,7 +28,7 @@ class CostToGo:
         self._costs: list[float] = []
 
     def aim(self, goal: Place | None, blocked: tuple[Place, ...] = ()) -> bool:
-        """Sets the goal; returns whether anything is different from before."""
+        """Sets the goal and the blocked places; returns whether anything changed."""
         if (goal, blocked) == (self.goal, self.blocked):
             return False
         self.goal, self.blocked = goal, blocked
@@ -40,7 +40,7 @@ class CostToGo:
         return True
 
     def from_place(self, lane: int, station: float) -> float:
-        """What is left from a place [m]; infinite where no way leads to the goal, or there is none.
+        """Returns the cost from a place [m]; infinite where no route leads to the goal, or there is no goal.
 
         Costs are known where the router's cells begin; in between they are interpolated.
         """
@@ -51,29 +51,29 @@ class CostToGo:
         passed = False
         if lane == goal_lane:
             ahead = goal_station - station
-            if -PASSED <= ahead <= size:
+            if -REACHED_BEHIND <= ahead <= size:
                 return abs(ahead)
             passed = ahead < 0.0 and int(station / size) == int(goal_station / size)
         k = min(int(max(station, 0.0) / size), count - 1)
         share = min(max(station, 0.0) / size - k, 1.0)
-        # in the goal's own cell but behind the goal, what is left follows from where the cell ends
+        # in the goal's own cell but behind the goal, the cost follows from the end of the cell
         here = math.inf if passed else self._costs[first + k]
         if k + 1 < count:
             ahead = self._costs[first + k + 1]
             if math.isinf(here):
                 return ahead + (1.0 - share) * size
             return here if math.isinf(ahead) else here + share * (ahead - here)
-        return self._behind(lane) + (1.0 - share) * size if math.isinf(here) else here - share * size
+        return self._after_lane(lane) + (1.0 - share) * size if math.isinf(here) else here - share * size
 
-    def _behind(self, lane: int) -> float:
-        """What is left from where a lane goes on."""
+    def _after_lane(self, lane: int) -> float:
+        """Returns the cost from the end of a lane."""
         starts = [self._cells[way.connector][0] for way in self._town.exits(lane)]
         return min((self._costs[start] for start in starts), default=math.inf)
 
 
 @lru_cache(maxsize=16)
 def _cells(town: Town) -> tuple[tuple[int, int, float], ...]:
-    """Of each lane: the number of its first cell, how many it has, and how long each is [m]."""
+    """Returns for each lane: number of its first cell, number of cells, and length of each [m]."""
     found = []
     for lane in town.lanes:
         first = router(town).cell(lane.id, 0.0)

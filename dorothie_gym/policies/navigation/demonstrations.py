@@ -1,4 +1,4 @@
-"""Watches somebody play the Co-Wizard, and sees what a driver of `Navigation-v0` would see, and should do."""
+"""Demonstrations for drivers of `Navigation-v0`, recorded from sessions of other Co-Wizards."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.navigation.actions import LEFT, NavigationAction, prepares
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits
 from dorothie_gym.policies.navigation.navigation_policy import (
-    PLAIN,
+    PLAIN_STYLE,
     DriverInputs,
     NavigationPolicyState,
     has_nothing_to_do,
@@ -27,8 +27,8 @@ from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vec
 from dorothie_gym.policies.route_progress import lanes_beside
 from dorothie_gym.spaces import CoWizardAction, Motion, Physical
 
-NEAR_GOAL = 30.0
-"""Who stops this near before the place it goes to stops for it [m]."""
+STOP_FOR_GOAL = 30.0
+"""Distance to the destination within which a stop is attributed to it [m]."""
 
 _PLAIN_ACTIONS = {
     PhysicalAction.LANE_FOLLOW: NavigationAction.LANE_FOLLOW,
@@ -39,7 +39,7 @@ _PLAIN_ACTIONS = {
 
 
 class Demonstration(NamedTuple):
-    """A decision: what the driver observes (161,), the mask (18,), and what was done."""
+    """Demonstrated decision: the driver's observation (161,), its mask (18,), and the action taken."""
 
     observation: Vector
     mask: NDArray[np.bool_]
@@ -47,79 +47,79 @@ class Demonstration(NamedTuple):
 
 
 class DemonstrationRecorder:
-    """Sits beside a Co-Wizard for a session: it hears and sees the same, and notes what the other does.
+    """Converts the decisions of another Co-Wizard in a session to demonstrations.
 
-    It learns nothing from decisions at which a driver would not be asked, see `has_nothing_to_do`, nor from stops of
-    the other's own: scripted Co-Wizards stop before a junction to ask for the way, or to wait for what is in the way.
+    Two kinds of decisions are left out: those at which a driver would not be asked, see `has_nothing_to_do`, and stops
+    that nobody asked for, because scripted Co-Wizards stop before a junction to ask for the way, or behind obstacles.
     """
 
     def __init__(self, town: Town, max_seconds: float = MAX_SECONDS) -> None:
         """Prepares for a session in a town; `max_seconds` is the time limit of the driver's environment [s]."""
-        self._seat = DriverInputs(town, max_seconds)
-        mind = ScriptedCoWizard(style=PLAIN).initial_state(0, town)
-        self._watched = NavigationPolicyState(mind=mind, speed=mind.speed)
+        self._inputs = DriverInputs(town, max_seconds)
+        co_wizard = ScriptedCoWizard(style=PLAIN_STYLE).initial_state(0, town)
+        self._state = NavigationPolicyState(co_wizard=co_wizard, speed=co_wizard.intentions.speed)
         self._stopped_by_itself = False
 
-    def record(self, seen: Mapping[str, Any], done: CoWizardAction) -> Demonstration | None:
-        """Watches a decision.
+    def record(self, observation: Mapping[str, Any], done: CoWizardAction) -> Demonstration | None:
+        """Converts a decision.
 
         Args:
-            seen: what the Co-Wizard observed.
-            done: what it did then.
+            observation: observation of the Co-Wizard.
+            done: its action.
 
         Returns:
-            What there is to learn from it; None for nothing.
+            The demonstration, or None for a decision that is left out.
         """
-        attention = attend(seen, self._watched.mind)
-        watched = self._watched = self._seat.note(self._watched, attention.mind, attention.view, seen)
-        action = action_of(done.physical, seen, self._seat.ways)
-        respond(attention, done.physical)
-        standing = int(seen["motion"]) == Motion.STOPPED
+        decision = attend(observation, self._state.co_wizard)
+        state = self._state = self._inputs.update(self._state, decision.state, decision.view, observation)
+        action = action_of(done.physical, observation, self._inputs.exits)
+        respond(decision, done.physical)
+        standing = int(observation["motion"]) == Motion.STOPPED
         if action is NavigationAction.STOP:
-            self._stopped_by_itself = not _has_to_stop(attention.mind, attention.view)
+            self._stopped_by_itself = not _has_to_stop(decision.state, decision.view)
         elif not standing:
             self._stopped_by_itself = False
-        if self._stopped_by_itself or has_nothing_to_do(watched):
+        if self._stopped_by_itself or has_nothing_to_do(state):
             return None
-        observation, mask = self._seat.observe(watched)
-        mask[action] = True  # what was done could be done
-        return Demonstration(observation, mask, action)
+        vector, mask = self._inputs.observe(state)
+        mask[action] = True  # an action that was taken is feasible, even where the estimate differs
+        return Demonstration(vector, mask, action)
 
 
-def _has_to_stop(mind: CoWizardState, view: CoWizardView) -> bool:
-    """Whether the car was told to stop, or is close to where it is to."""
-    place = mind.nudge or (mind.place if mind.exact else None)
-    left = distance_ahead(mind, view, place) if place is not None else None
-    return mind.halted or (left is not None and left < NEAR_GOAL)
+def _has_to_stop(state: CoWizardState, view: CoWizardView) -> bool:
+    """Whether the car was told to stop, or is close to its destination."""
+    place = state.intentions.nudge or state.beliefs.stop_place
+    left = distance_ahead(state, view, place) if place is not None else None
+    return state.intentions.halted or (left is not None and left < STOP_FOR_GOAL)
 
 
-def action_of(physical: Physical | None, seen: Mapping[str, Any], ways: JunctionExits) -> NavigationAction:
-    """The action that comes to the same; what the player sets as it is asked for, speed and lights, is nothing.
+def action_of(physical: Physical | None, observation: Mapping[str, Any], exits: JunctionExits) -> NavigationAction:
+    """Maps a physical action to the equivalent `NavigationAction`; speed and light changes map to `NOTHING`.
 
     Args:
-        physical: what the Co-Wizard does.
-        seen: what it observes.
-        ways: ways on at the town's junctions.
+        physical: physical action of the Co-Wizard, or None.
+        observation: observation of the Co-Wizard.
+        exits: exits of the town's junctions.
     """
     if physical is None:
         return NavigationAction.NOTHING
     if physical.action is PhysicalAction.J_TURN:
-        return _turn(physical.angle, seen, ways)
+        return _turn_of(physical.angle, observation, exits)
     if physical.action is PhysicalAction.LANE_SWITCH:
         left = physical.angle * LEFT > 0
         action = NavigationAction.SWITCH_LEFT if left else NavigationAction.SWITCH_RIGHT
     else:
         action = _PLAIN_ACTIONS.get(physical.action, NavigationAction.NOTHING)
-    return NavigationAction.NOTHING if prepares(action, seen, ways) else action
+    return NavigationAction.NOTHING if prepares(action, observation, exits) else action
 
 
-def _turn(angle: int, seen: Mapping[str, Any], ways: JunctionExits) -> NavigationAction:
-    """The turn into the sector of the exit that fits an angle best [degrees]."""
-    choice = ways.choice_ahead(seen)
+def _turn_of(angle: int, observation: Mapping[str, Any], exits: JunctionExits) -> NavigationAction:
+    """Returns the turn into the sector of the exit whose angle is closest [degrees]."""
+    choice = exits.choice_ahead(observation)
     if choice is None:
         return NavigationAction.NOTHING
-    town = ways.town
-    exits = [way for lane in (choice, *lanes_beside(town, choice)) for way in town.exits(lane)]
-    best = min(exits, key=lambda way: abs(wrap_degrees(way.angle - angle)))
-    sector = ways.sector_of(choice, best.connector)
+    town = exits.town
+    ways = [way for lane in (choice, *lanes_beside(town, choice)) for way in town.exits(lane)]
+    best = min(ways, key=lambda way: abs(wrap_degrees(way.angle - angle)))
+    sector = exits.sector_of(choice, best.connector)
     return NavigationAction.NOTHING if sector is None else NavigationAction.turn(sector)

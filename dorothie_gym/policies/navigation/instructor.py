@@ -1,4 +1,4 @@
-"""A participant who only tells the way: what it says and when, without words, from what the participant observes."""
+"""Instructor of the navigation environments: dialogue acts that guide the car, without words."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from typing import NamedTuple
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Entry, Place
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.policies.feasibility import slowing_distance
+from dorothie_gym.policies.guidance_config import GuidanceConfig
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits, nearest_sector
 from dorothie_gym.policies.observation_parser import (
@@ -22,39 +24,31 @@ from dorothie_gym.policies.observation_parser import (
     scalar,
     street_of,
 )
-from dorothie_gym.policies.route_progress import RouteJunction, RouteProgress
+from dorothie_gym.policies.route_progress import RouteJunction, RouteProgress, RouteState
+from dorothie_gym.sim.ego.planner import U_TURN_SPEED
 from dorothie_gym.spaces import ObjectColumn, Observation
 
-TELL_DISTANCE = 110.0
-"""A turn is told when it is this near [m]."""
 
-SWITCH_DISTANCE = 80.0
-"""A lane switch is told when it is this near [m]."""
+@dataclass(frozen=True, kw_only=True)
+class InstructorConfig(GuidanceConfig):
+    """Tunable numbers of the instructor, in addition to those of all guidance.
 
-STOP_DISTANCE = 95.0
-"""That the car is to stop is told when the place is this near [m]."""
+    Attributes:
+        switch_distance: distance at which a lane switch is announced [m].
+        reaction_time: time from an instruction to its effect [s].
+        u_turn_speed_squared: square of the speed of a U-turn [m^2/s^2]; the local planner's.
+    """
 
-AGAIN = 9.0
-"""What has not been done is told again after this time [s]."""
-
-SIGHT = 80.0
-"""A roadblock is noticed from here [m]."""
-
-WITHIN = 1.9
-"""A car that stands this close to the place has arrived [m]."""
-
-COMFORTABLE, U_TURN_SPEED = 3.0, 3.5
-"""With which the car slows down for a U-turn [m/s^2], and to which [m/s]."""
-
-REACTION = 1.5
-"""Time from telling to doing [s]."""
+    switch_distance: float = 80.0
+    reaction_time: float = 1.5
+    u_turn_speed_squared: float = U_TURN_SPEED**2
 
 
 class Guidance(enum.StrEnum):
-    """How the participant says where to go."""
+    """Level at which the participant guides."""
 
     TURNS = "turns"
-    """Turn by turn, before each junction; at the end, how far it is to where the car is to stop."""
+    """Turn by turn, before each junction; at the end, the distance to the place where the car is to stop."""
 
     GOALS = "goals"
     """By the name of the next goal; turn by turn only to places that are not on the Co-Wizard's map."""
@@ -62,13 +56,13 @@ class Guidance(enum.StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class NavigationInstruction:
-    """What was said last.
+    """Instruction given to a driver.
 
     Attributes:
         act: move and slots: the action, and the street or landmark where one is named.
-        sector: which way, as one of `ways.SECTORS`; None where the act has no direction.
-        distance: how far ahead it is to be done, as said [m].
-        time: when it was said [s].
+        sector: direction, as an index of `junction_exits.SECTORS`; None where the act has no direction.
+        distance: distance to the place where it is to be carried out, as said [m].
+        time: time at which it was given [s].
     """
 
     act: DialogueAct
@@ -78,22 +72,29 @@ class NavigationInstruction:
 
     @property
     def action(self) -> ActionValue | None:
-        """The action that the act asks for."""
+        """Action asked for."""
         return next((value for value in self.act.slots if isinstance(value, ActionValue)), None)
 
     @property
     def landmark(self) -> LandmarkName | None:
-        """The landmark that it names."""
+        """Landmark named."""
         return next((value for value in self.act.slots if isinstance(value, LandmarkName)), None)
 
     @property
     def street(self) -> StreetName | None:
-        """The street that it names."""
+        """Street named."""
         return next((value for value in self.act.slots if isinstance(value, StreetName)), None)
 
 
 class GuidanceStep(NamedTuple):
-    """Something to be told: what tells it apart from others, and what an `NavigationInstruction` has of it."""
+    """Step of the guidance before it is said.
+
+    Attributes:
+        key: identity of the step; two steps with the same key are the same instruction, repeated.
+        values: slot values.
+        sector: direction as an index of `junction_exits.SECTORS`, or None.
+        distance: distance to where it is to be carried out [m].
+    """
 
     key: tuple[object, ...]
     values: tuple[ActionValue | StreetName | LandmarkName, ...]
@@ -102,180 +103,180 @@ class GuidanceStep(NamedTuple):
 
 
 class Instructor:
-    """Tells the way to one subgoal after another.
+    """Participant that guides the car to one subgoal after another.
 
     Attributes:
-        journey: way to the present goal, or None when there is nothing left to do.
-        goal: the landmark that the car is told the way to.
-        blocked: roadblocks that were seen.
-        way_left: of the present goal; also what progress is measured by.
-        told: what was said last.
+        goal: landmark of the present subgoal, or None when all are done.
+        route: route to it, and the roadblocks seen.
+        cost_to_go: cost of the route to it from anywhere; progress is measured by it.
+        instruction: last instruction given.
     """
 
-    def __init__(self, town: Town, ways: JunctionExits, guidance: Guidance) -> None:
-        self._town, self._ways, self._guidance = town, ways, guidance
-        self.journey: RouteProgress | None = None
+    def __init__(self, town: Town, exits: JunctionExits, guidance: Guidance) -> None:
+        self._town, self._exits, self._guidance, self._config = town, exits, guidance, InstructorConfig()
         self.goal: SeenLandmark | None = None
-        self.blocked: tuple[Place, ...] = ()
-        self.way_left = CostToGo(town)
-        self.told: NavigationInstruction | None = None
+        self.route = RouteState()
+        self.cost_to_go = CostToGo(town)
+        self.instruction: NavigationInstruction | None = None
         self._target: SeenSubgoal | None = None
         self._key: tuple[object, ...] = ()
         self._subgoals = b""
 
+    @property
+    def blocked(self) -> tuple[Place, ...]:
+        """Places behind the roadblocks seen."""
+        return self.route.blocked
+
     def instruct(
-        self, seen: Observation, known: frozenset[Place], *, waits: bool, turning: float
+        self, observation: Observation, known: frozenset[Place], *, waits: bool, turning: float
     ) -> NavigationInstruction | None:
-        """Says something, or nothing.
+        """Gives an instruction if one is due.
 
         Args:
-            seen: what the participant observes.
+            observation: observation of the participant.
             known: places of the landmarks on the Co-Wizard's map.
             waits: whether the car was told to stop, and stands.
-            turning: what is left of a lane switch or U-turn that it is in the middle of [m]; 0 where it is in none.
+            turning: remaining length of the lane switch or U-turn under way [m]; 0 where there is none.
 
         Returns:
-            What is said now; None if nothing is.
+            The instruction, or None.
         """
-        place = int(seen["lane"]), scalar(seen, "station")
-        self._take_target(seen, place)
-        if self.journey is None or self.goal is None:
+        place = int(observation["lane"]), scalar(observation, "station")
+        self._choose_target(observation, place)
+        if self.route.progress is None or self.goal is None:
             return None
-        self._note_roadblocks(seen, place)
+        self._note_roadblocks(observation, place)
         if not turning:
             self._follow(place)
         if self._guidance is Guidance.GOALS and self.goal.place in known:
-            said: GuidanceStep | None = self._name_goal()
+            step: GuidanceStep | None = GuidanceStep(("goal", self.goal.row), (self.goal.name,))
+        elif turning:
+            step = self._stop_after_manoeuvre(place, turning, waits=waits)
         else:
-            said = (
-                self._tell_landing(place, turning, waits=waits) if turning else self._tell_way(seen, place, waits=waits)
-            )
-        if said is None:
+            step = self._next_step(observation, place, waits=waits)
+        if step is None:
             return None
-        now = scalar(seen, "time")
-        if said.key == self._key and self.told is not None and now - self.told.time < AGAIN:
+        now, last = scalar(observation, "time"), self.instruction
+        if step.key == self._key and last is not None and now - last.time < self._config.repeat_after:
             return None
-        self._key = said.key
-        act = DialogueAct.of(DialogueMove.INSTRUCT, *said.values)
-        self.told = NavigationInstruction(act=act, sector=said.sector, distance=said.distance, time=now)
-        return self.told
+        self._key = step.key
+        act = DialogueAct.of(DialogueMove.INSTRUCT, *step.values)
+        self.instruction = NavigationInstruction(act=act, sector=step.sector, distance=step.distance, time=now)
+        return self.instruction
 
-    # --- where to go ------------------------------------------------------------------------------------------------
+    # --- destination ------------------------------------------------------------------------------------------------
 
-    def _take_target(self, seen: Observation, place: Place) -> None:
-        """Keeps the present subgoal while it is open; otherwise takes the closest one that may be reached now."""
-        table = seen["subgoals"].tobytes()
+    def _choose_target(self, observation: Observation, place: Place) -> None:
+        """Keeps the present subgoal while it is open; otherwise chooses the closest one that may be reached now."""
+        table = observation["subgoals"].tobytes()
         if table == self._subgoals:
-            return  # nothing has changed, as in most decisions
+            return  # unchanged, as at most decisions
         self._subgoals = table
-        landmarks = {mark.row: mark for mark in read_landmarks(seen, self._town)}
-        subgoals = read_subgoals(seen)
+        landmarks = {mark.row: mark for mark in read_landmarks(observation, self._town)}
+        subgoals = read_subgoals(observation)
         if self._target is not None:
             now = subgoals[self._target.index]
             if now.open and now.allowed and now.landmark == self._target.landmark:
                 return
-        self._target, self.goal, self.journey, self._key = None, None, None, ()
-        best = math.inf
+        self._target, self.goal, self._key = None, None, ()
+        best, progress = math.inf, None
         for subgoal in subgoals:
             mark = landmarks.get(subgoal.landmark)
             if not (subgoal.open and subgoal.allowed) or mark is None:
                 continue
-            journey = RouteProgress.plan(self._town, place, mark.place, self.blocked)
-            cost = journey.route.cost if journey.route is not None else math.inf
+            planned = RouteProgress.plan(self._town, place, mark.place, self.blocked)
+            cost = planned.route.cost if planned.route is not None else math.inf
             if self._target is None or cost < best:
-                best, self._target, self.goal, self.journey = cost, subgoal, mark, journey
-        self.way_left.aim(self.goal.place if self.goal is not None else None, self.blocked)
+                best, self._target, self.goal, progress = cost, subgoal, mark, planned
+        self.route = self.route.with_progress(progress)
+        self.cost_to_go.aim(self.goal.place if self.goal is not None else None, self.blocked)
 
-    def _note_roadblocks(self, seen: Observation, place: Place) -> None:
-        assert self.journey is not None and self.goal is not None
-        if not (seen["objects"][:, ObjectColumn.KIND] == ObjectClass.STATIC.value).any():
+    def _note_roadblocks(self, observation: Observation, place: Place) -> None:
+        """Adds the roadblocks that have come into sight, and plans around them."""
+        assert self.route.progress is not None and self.goal is not None
+        if not (observation["objects"][:, ObjectColumn.KIND] == ObjectClass.STATIC.value).any():
             return
-        lanes = [leg.lane for leg in self.journey.legs[:6]]
-        for thing in read_objects(seen):
-            if thing.kind is not ObjectClass.STATIC or thing.distance > SIGHT:
+        lanes = [leg.lane for leg in self.route.progress.legs[:6]]
+        for thing in read_objects(observation):
+            if thing.kind is not ObjectClass.STATIC or thing.distance > self._config.roadblock_sight:
                 continue
             found = place_on_lanes(self._town, lanes, thing.x, thing.y)
-            if found is None or (found[0] == place[0] and found[1] < place[1]):
+            if found is None or (found[0] == place[0] and found[1] < place[1]) or self.route.knows_roadblock(found):
                 continue
-            if any(there[0] == found[0] and abs(there[1] - found[1]) < 10.0 for there in self.blocked):
-                continue
-            # the cell behind the roadblock as well: the car's own cell counts as free
-            behind = found[0], min(found[1] + 8.0, self._town.lanes[found[0]].length)
-            self.blocked = (*self.blocked, found, behind)
-            self.journey = self.journey.replanned(self._town, place, self.blocked)
-            self.way_left.aim(self.goal.place, self.blocked)
+            self.route = self.route.with_roadblock(self._town, found).replanned(self._town, place)
+            self.cost_to_go.aim(self.goal.place, self.blocked)
 
     def _follow(self, place: Place) -> None:
-        assert self.journey is not None
-        self.journey = self.journey.followed(self._town, *place)
-        if self.journey.lost(place[1]):
-            self.journey = self.journey.replanned(self._town, place)
-            self._key = ()
+        """Updates the progress on the route, and plans another one when the car has left it."""
+        assert self.route.progress is not None
+        progress = self.route.progress.followed(self._town, *place)
+        if progress.lost(place[1]):
+            progress, self._key = progress.replanned(self._town, place), ()
+        self.route = self.route.with_progress(progress)
 
-    # --- what to say ------------------------------------------------------------------------------------------------
+    # --- steps ------------------------------------------------------------------------------------------------------
 
-    def _name_goal(self) -> GuidanceStep:
-        assert self.goal is not None
-        return GuidanceStep(("goal", self.goal.row), (self.goal.name,))
-
-    def _tell_way(self, seen: Observation, place: Place, *, waits: bool) -> GuidanceStep | None:
-        """The next step, if it is time to tell it; a car that has been stopped is told to go on."""
-        journey = self.journey
-        assert journey is not None
-        if journey.astray:
+    def _next_step(self, observation: Observation, place: Place, *, waits: bool) -> GuidanceStep | None:
+        """Returns the next step on the route if it is near; a stopped car is sent on."""
+        progress = self.route.progress
+        assert progress is not None
+        if progress.astray:
             return None
         lane, station = place
-        crossing, manoeuvre = journey.next_crossing(self._town, station), journey.next_manoeuvre(station)
+        crossing, manoeuvre = progress.next_crossing(self._town, station), progress.next_manoeuvre(station)
         if manoeuvre is not None and (crossing is None or manoeuvre[1] < crossing.distance):
             entry, distance = manoeuvre
-            alone = crossing is None or journey.needs_switch(self._town, lane, station, crossing)
-            step = self._tell_manoeuvre(seen, lane, entry, distance) if alone or entry is Entry.U_TURN else None
+            alone = crossing is None or progress.needs_switch(self._town, lane, station, crossing)
+            own_step = alone or entry is Entry.U_TURN
+            step = self._manoeuvre_step(observation, lane, entry, distance) if own_step else None
             if step is not None:
                 return step
             if crossing is None or entry is Entry.U_TURN:
-                return _go_on(waits)
+                return _send_on(waits)
         if crossing is None:
-            return self._tell_stop(journey.left(station), waits=waits)
-        return self._tell_turn(seen, crossing) if crossing.distance <= TELL_DISTANCE else _go_on(waits)
+            return self._stop_step(progress.left(station), waits=waits)
+        near = crossing.distance <= self._config.turn_distance
+        return self._turn_step(observation, crossing) if near else _send_on(waits)
 
-    def _tell_turn(self, seen: Observation, crossing: RouteJunction) -> GuidanceStep:
-        sector = self._ways.sector_of(crossing.lane, crossing.exit.connector)
-        street = street_of(seen, self._town, crossing.exit.lane)
+    def _turn_step(self, observation: Observation, crossing: RouteJunction) -> GuidanceStep:
+        sector = self._exits.sector_of(crossing.lane, crossing.exit.connector)
+        street = street_of(observation, self._town, crossing.exit.lane)
         values = (ActionValue.J_TURN, street) if street is not StreetName.UNKNOWN else (ActionValue.J_TURN,)
         return GuidanceStep(("turn", crossing.lane, crossing.exit.connector), values, sector, crossing.distance)
 
-    def _tell_manoeuvre(self, seen: Observation, lane: int, entry: Entry, distance: float) -> GuidanceStep | None:
-        """A U-turn, or a lane switch that is not made on the way into a turn."""
+    def _manoeuvre_step(
+        self, observation: Observation, lane: int, entry: Entry, distance: float
+    ) -> GuidanceStep | None:
+        """Returns a U-turn, or a lane switch that is not part of a turn, if it is near."""
+        config = self._config
         if entry is Entry.U_TURN:
-            speed = scalar(seen, "speed")
-            braking = max(speed**2 - U_TURN_SPEED**2, 0.0) / (2.0 * COMFORTABLE)
-            near = distance <= REACTION * speed + braking
+            speed = scalar(observation, "speed")
+            near = distance <= config.reaction_time * speed + slowing_distance(speed, config.u_turn_speed_squared)
             return GuidanceStep(("round", lane), (ActionValue.U_TURN,), None, distance) if near else None
-        if distance > SWITCH_DISTANCE:
+        if distance > config.switch_distance:
             return None
         left = entry is Entry.CHANGE_LEFT
-        return GuidanceStep(
-            ("lane", lane, left), (ActionValue.LANE_SWITCH,), nearest_sector(90.0 if left else -90.0), distance
-        )
+        sector = nearest_sector(90.0 if left else -90.0)
+        return GuidanceStep(("lane", lane, left), (ActionValue.LANE_SWITCH,), sector, distance)
 
-    def _tell_landing(self, place: Place, turning: float, *, waits: bool) -> GuidanceStep | None:
-        """In the middle of a manoeuvre: that the goal is right behind it, while there is time to stop for it."""
+    def _stop_after_manoeuvre(self, place: Place, turning: float, *, waits: bool) -> GuidanceStep | None:
+        """Returns a stop for a goal right behind the manoeuvre under way, while there is time to stop."""
         assert self.goal is not None
         lane, station = self.goal.place
-        left = station - place[1]  # a car in a manoeuvre counts as being where that ends
-        if lane == place[0] and -WITHIN <= left <= STOP_DISTANCE:
-            return self._tell_stop(left + turning, waits=waits)
-        return _go_on(waits)
+        left = station - place[1]  # a car in a manoeuvre is reported at the manoeuvre's end
+        if lane == place[0] and -self._config.arrived_within <= left <= self._config.stop_distance:
+            return self._stop_step(left + turning, waits=waits)
+        return _send_on(waits)
 
-    def _tell_stop(self, left: float, *, waits: bool) -> GuidanceStep | None:
-        """That the car is to stop in so many metres; one that stands elsewhere than at the place is told to go on."""
+    def _stop_step(self, left: float, *, waits: bool) -> GuidanceStep | None:
+        """Returns a stop in so many metres; a car that stands elsewhere than at the goal is sent on."""
         assert self.goal is not None
         if waits:
-            return None if abs(left) <= WITHIN else _go_on(waits, left)
-        if left > STOP_DISTANCE:
+            return None if abs(left) <= self._config.arrived_within else _send_on(waits, left)
+        if left > self._config.stop_distance:
             return None
         return GuidanceStep(("stop", self.goal.row), (ActionValue.STOP, self.goal.name), None, max(left, 0.0))
 
 
-def _go_on(waits: bool, distance: float = 0.0) -> GuidanceStep | None:
+def _send_on(waits: bool, distance: float = 0.0) -> GuidanceStep | None:
     return GuidanceStep(("on",), (ActionValue.START,), None, distance) if waits else None

@@ -1,4 +1,4 @@
-"""The ways on at a junction, in eighths of a circle: the same eight places in observations, words and actions."""
+"""Exits of junctions by direction: eight sectors, used alike by observations, instructions and actions."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from dorothie_gym.policies.route_progress import is_choice, lanes_beside, next_c
 from dorothie_gym.spaces import ExitColumn
 
 SECTORS = tuple(range(-180, 180, 45))
-"""Middles of the eighths [degrees, positive left]: back, sharp right, right, half right, ahead, ..."""
+"""Middles of the sectors [degrees, positive left]: back, sharp right, right, half right, straight, ..."""
 
-SECTOR = 45.0
-"""Width of an eighth [degrees]."""
+SECTOR_WIDTH = 45.0
+"""Width of a sector [degrees]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SectorExit:
-    """A way on at a junction.
+    """Exit of a junction in a sector.
 
     Attributes:
-        angle: of the exit that leads there, from the car's own lane where one does [degrees, positive left].
+        angle: angle of the exit, from the car's own lane where that has one [degrees, positive left].
         lane: lane behind the junction.
-        own: whether it leads there from the car's own lane; otherwise the car has to change lanes before.
-        connectors: lanes across the junction that lead there, from all lanes of the direction.
+        own: whether the exit can be reached from the own lane; otherwise the car has to change lanes before.
+        connectors: lanes across the junction that lead to the exit, from all lanes of the direction.
     """
 
     angle: int
@@ -36,10 +36,10 @@ class SectorExit:
 
 
 class JunctionExits:
-    """Looks up the ways on behind lanes of a town; each is found once.
+    """Lookup of the exits behind each lane of a town; computed on first use.
 
-    Every way has one of the eight `SECTORS`: the one closest to its angle, or where that is taken by another way that
-    fits it better, one beside it. Lanes of one direction share their ways, so that a sector means the same on all.
+    Every exit has one of the eight `SECTORS`: the one closest to its angle, or a neighbour where another exit fits
+    that one better. Lanes of one direction share their exits, so that a sector means the same on all of them.
 
     Attributes:
         town: the map.
@@ -50,35 +50,35 @@ class JunctionExits:
         self._found: dict[int, tuple[SectorExit | None, ...]] = {}
         self._lanes = _lanes_by_exits(town)
 
-    def after(self, lane: int) -> tuple[SectorExit | None, ...]:
-        """Ways on behind a lane (8,), by sector."""
+    def by_sector(self, lane: int) -> tuple[SectorExit | None, ...]:
+        """Returns the exits behind a lane (8,), by sector."""
         found = self._found.get(lane)
         if found is None:
             found = self._found[lane] = self._find(lane)
         return found
 
-    def choice_ahead(self, seen: Mapping[str, Any]) -> int | None:
-        """The lane at whose end the Co-Wizard has to choose a way; None where it comes to no junction with a choice.
+    def choice_ahead(self, observation: Mapping[str, Any]) -> int | None:
+        """Returns the lane before the next junction with a choice; None where the car comes to none.
 
-        Its turn options tell it, wherever the Co-Wizard believes to be; only where several lanes have the same ones,
-        or where there are more than are observed, its place decides.
+        The turn options of the Co-Wizard's observation identify the lane, even where the position has drifted. The
+        position decides only where several lanes have the same options, or more than are observed.
         """
-        rows = seen["exits"]
+        rows = observation["exits"]
         rows = rows[rows[:, ExitColumn.PRESENT] > 0.0]
         if not len(rows):
             return None
         lanes = self._lanes.get(tuple((int(row[ExitColumn.LANE]), int(row[ExitColumn.ANGLE])) for row in rows), ())
         if len(lanes) == 1:
             return lanes[0]
-        believed = next_choice(self.town, int(seen["lane"]), float(seen["station"][0]))
+        believed = next_choice(self.town, int(observation["lane"]), float(observation["station"][0]))
         if believed is not None and (not lanes or believed.lane in lanes):
             return believed.lane
         return next(iter(lanes), None)
 
     def sector_of(self, lane: int, connector: int) -> int | None:
-        """Sector of the way that a connector at the end of a lane takes, or None if it is no way on from there."""
-        for k, way in enumerate(self.after(lane)):
-            if way is not None and connector in way.connectors:
+        """Returns the sector of the exit that a connector at the end of a lane leads to; None if it leads to none."""
+        for k, found in enumerate(self.by_sector(lane)):
+            if found is not None and connector in found.connectors:
                 return k
         return None
 
@@ -88,24 +88,24 @@ class JunctionExits:
             for way in self.town.exits(source):
                 if way.junction_id >= 0:
                     roads.setdefault(self.town.lanes[way.lane].road_id, []).append((source, way))
-        sectors = _assign({road: ways[0][1].angle for road, ways in roads.items()})
+        sectors = _assign_sectors({road: exits[0][1].angle for road, exits in roads.items()})
         table: list[SectorExit | None] = [None] * len(SECTORS)
         for road, sector in sectors.items():
-            ways = roads[road]
-            own = [way for source, way in ways if source == lane]
-            chosen = (own or [way for _, way in ways])[0]
-            connectors = frozenset(way.connector for _, way in ways)
+            exits = roads[road]
+            own = [way for source, way in exits if source == lane]
+            chosen = (own or [way for _, way in exits])[0]
+            connectors = frozenset(way.connector for _, way in exits)
             table[sector] = SectorExit(angle=chosen.angle, lane=chosen.lane, own=bool(own), connectors=connectors)
         return tuple(table)
 
 
 def nearest_sector(angle: float) -> int:
-    """Number of the sector whose middle is closest to an angle [degrees, positive left]."""
-    return round((angle + 180.0) / SECTOR) % len(SECTORS)
+    """Returns the number of the sector whose middle is closest to an angle [degrees, positive left]."""
+    return round((angle + 180.0) / SECTOR_WIDTH) % len(SECTORS)
 
 
 def _lanes_by_exits(town: Town) -> dict[tuple[tuple[int, int], ...], list[int]]:
-    """Lanes that end at a junction with a choice, by their exits: the lanes that those lead to, and their angles."""
+    """Returns the lanes before junctions with a choice by their exits: lane behind the junction and angle of each."""
     found: dict[tuple[tuple[int, int], ...], list[int]] = {}
     for lane in town.lanes:
         if is_choice(town, lane.id) and not lane.in_junction:
@@ -113,16 +113,16 @@ def _lanes_by_exits(town: Town) -> dict[tuple[tuple[int, int], ...], list[int]]:
     return found
 
 
-def _assign(angles: dict[int, int]) -> dict[int, int]:
-    """A sector for each way, those that fit best first; ways beyond the eighth are left out."""
+def _assign_sectors(angles: dict[int, int]) -> dict[int, int]:
+    """Assigns a sector to each road by the angle of its exit, best fit first; roads beyond the eighth get none."""
     count = len(SECTORS)
 
-    def misfit(key: int, sector: int) -> float:
-        return abs(float(wrap_degrees(angles[key] - SECTORS[sector])))
+    def misfit(road: int, sector: int) -> float:
+        return abs(float(wrap_degrees(angles[road] - SECTORS[sector])))
 
     taken: dict[int, int] = {}
-    for key in sorted(angles, key=lambda key: (misfit(key, nearest_sector(angles[key])), key)):
+    for road in sorted(angles, key=lambda road: (misfit(road, nearest_sector(angles[road])), road)):
         free = [sector for sector in range(count) if sector not in taken.values()]
         if free:
-            taken[key] = min(free, key=lambda sector: (misfit(key, sector), sector))
+            taken[road] = min(free, key=lambda sector: (misfit(road, sector), sector))
     return taken

@@ -1,4 +1,4 @@
-"""What the driver observes: one short vector of numbers within -1 and 1, made of what the Co-Wizard may know."""
+"""Observation vector of `Navigation-v0`: numbers in [-1, 1] computed from the observation of the Co-Wizard."""
 
 from __future__ import annotations
 
@@ -41,28 +41,28 @@ DECISION_FREQUENCY = 2.0
 """Default number of driving decisions per second [Hz]."""
 
 OBJECTS = 6
-"""Bodies that are shown, the nearest first."""
+"""Number of objects in the vector, the nearest first."""
 
 KINDS = (ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC)
-"""Classes of bodies that are told apart; all others count as the first."""
+"""Classes of objects that the vector distinguishes; all others count as the first."""
 
 FAST = 25.0
-"""Speeds are shares of this [m/s]: 90 km/h."""
+"""Unit of speeds: 90 km/h [m/s]."""
 
 FAR = 100.0
-"""Distances of junctions, instructions and hazards are shares of this [m]."""
+"""Unit of distances to junctions, instructions and hazards [m]."""
 
 CLOSE = 10.0
-"""Distances that have to be met to the metre are told as shares of this once more [m]."""
+"""Second, finer unit of distances that have to be met to the metre [m]."""
 
 DETOUR = 200.0
-"""How much longer a way is than another is a share of this [m]."""
+"""Unit of differences between routes [m]."""
 
 ACROSS = 500.0
-"""Places on the map are told as shares of this [m]."""
+"""Unit of positions on the map [m]."""
 
 RECENT = 10.0
-"""The age of an instruction is a share of this [s]."""
+"""Unit of the age of an instruction [s]."""
 
 _WEATHER = tuple((parameter.low, parameter.high - parameter.low) for parameter in WeatherParameter)
 _MANOEUVRES = (PhysicalAction.LANE_SWITCH, PhysicalAction.U_TURN, PhysicalAction.J_TURN)
@@ -74,94 +74,94 @@ FIELDS: Mapping[str, int] = MappingProxyType(
         "cruise": 1,  # cruise speed, share of 90 km/h
         "motion": len(Motion),  # one-hot, see `Motion`
         "manoeuvre": len(_MANOEUVRES),  # one-hot: lane switch, U-turn, turn that is planned or under way
-        "hazard": 2,  # whether the car brakes or stands for something, and how far that is, of FAR
+        "hazard": 2,  # whether the car brakes or stands for something, and its distance, of FAR
         "lights": 1,  # whether the head lights are on
         "lane": 4,  # whether it is in a junction, has a lane to the left, to the right; speed limit, of FAST
         "uncertainty": 2,  # standard deviations of the estimated place [10 m] and heading [0.1 rad]
-        "junction": 2,  # whether there is a choice ahead, and how far, of FAR
-        "exits": 3 * len(SECTORS),  # by sector: whether a way leads there; it is planned; its street was named
-        "traffic_light": 1 + len(_COLOURS),  # at the end of this lane: how far, of FAR; one-hot green, yellow, red
-        "said": 1 + len(DialogueMove),  # whether anything was said, one-hot move of it
-        "said_action": len(ActionValue),  # one-hot: the action that was asked for
-        "said_sector": len(SECTORS),  # one-hot: which way
-        "said_landmark": len(LandmarkName),  # one-hot: the place that was named
-        "said_distance": 2,  # what is left of the distance that was said, of FAR and of CLOSE; below 0 it is passed
-        "said_age": 1,  # time since, of RECENT
-        "goal": 3,  # whether its place is known; how far ahead and to the right it lies, of ACROSS
-        "goal_distance": 3,  # way left to it, of ACROSS; on its own lane: how far ahead, of FAR and of CLOSE
-        "detours": 3 + len(SECTORS),  # longer by U-turn, switch left, switch right, and each exit; of DETOUR
+        "junction": 2,  # whether there is a junction with a choice ahead, and its distance, of FAR
+        "exits": 3 * len(SECTORS),  # by sector: whether there is an exit; it is planned; its street was named
+        "traffic_light": 1 + len(_COLOURS),  # at the end of this lane: distance, of FAR; one-hot green, yellow, red
+        "said": 1 + len(DialogueMove),  # whether an instruction was heard, one-hot move
+        "said_action": len(ActionValue),  # one-hot: action asked for
+        "said_sector": len(SECTORS),  # one-hot: sector
+        "said_landmark": len(LandmarkName),  # one-hot: landmark named
+        "said_distance": 2,  # remaining distance, of FAR and of CLOSE; negative behind the place
+        "said_age": 1,  # age of the instruction, of RECENT
+        "goal": 3,  # whether its place is known; its position ahead and to the right, of ACROSS
+        "goal_distance": 3,  # cost to go, of ACROSS; on its own lane: distance ahead, of FAR and of CLOSE
+        "detours": 3 + len(SECTORS),  # added cost of U-turn, switch left, switch right, and each exit; of DETOUR
         "objects": OBJECTS * (3 + len(KINDS)),  # distance [50 m], sine and cosine of bearing, one-hot class; 0: none
         "weather": len(_WEATHER),  # each as a share of its range
-        "time": 1,  # share of the time there is
+        "time": 1,  # share of the time limit
     }
 )
-"""Fields of the observation and their sizes, in order. Shares are clipped to -1..1; what is unknown is 0."""
+"""Fields of the observation and their sizes, in order. Values are clipped to -1..1; unknown values are 0."""
 
 
 def layout(fields: Mapping[str, int] = FIELDS) -> dict[str, slice]:
-    """Where in the observation each field is: by default those of `NavigationEnv`, in order and with their sizes."""
+    """Returns the slice of the observation for each field; by default for the fields of `NavigationEnv`."""
     ends = np.cumsum(list(fields.values())).tolist()
     return {name: slice(end - size, end) for (name, size), end in zip(fields.items(), ends, strict=True)}
 
 
 def navigation_space() -> spaces.Space[Vector]:
-    """The observation space: a vector of all `FIELDS`."""
+    """Returns the observation space: a vector of all `FIELDS`."""
     space: spaces.Space[Vector] = spaces.Box(-1.0, 1.0, (sum(FIELDS.values()),), dtype=np.float32)
     return space
 
 
 @dataclass(frozen=True, kw_only=True)
 class HeardInstruction:
-    """What the Co-Wizard remembers of what was said.
+    """Last instruction as a driver remembers it.
 
     Attributes:
-        told: the last instruction, or None.
-        driven: how far the car has come since [m].
+        instruction: the last instruction, or None.
+        driven: distance driven since [m].
         goal: place of the goal that was named and is on the Co-Wizard's map, or None.
     """
 
-    told: NavigationInstruction | None = None
+    instruction: NavigationInstruction | None = None
     driven: float = 0.0
     goal: Place | None = None
 
     def driven_on(self, before: Mapping[str, Any], now: Mapping[str, Any]) -> HeardInstruction:
-        """The same after a decision; how far the car has come in it follows from its speeds before and after it."""
+        """Adds the distance driven between two observations, computed from the speeds in both."""
         seconds = float(now["time"][0] - before["time"][0])
         return replace(self, driven=self.driven + seconds * float(before["speed"][0] + now["speed"][0]) / 2.0)
 
 
 class NavigationEncoder:
-    """Makes observations for a driver in a town, be it in `NavigationEnv` or in `DuoWizardEnv`.
+    """Encoder of observations for a driver in a town, in `NavigationEnv` as in `DuoWizardEnv`.
 
-    Everything follows from the Co-Wizard's observation in `DuoWizardEnv`, from the map, and from what was said: what
-    the Co-Wizard does not know is nowhere in it.
+    The vector depends only on the Co-Wizard's observation in `DuoWizardEnv`, the map, and the instructions: it holds
+    nothing that the Co-Wizard does not know.
     """
 
-    def __init__(self, town: Town, ways: JunctionExits, max_seconds: float) -> None:
-        self._town, self._ways, self._max_seconds = town, ways, max_seconds
+    def __init__(self, town: Town, exits: JunctionExits, max_seconds: float) -> None:
+        self._town, self._exits, self._max_seconds = town, exits, max_seconds
         self._oncoming = oncoming_lanes(town)
-        self._way_left = CostToGo(town)
+        self._cost_to_go = CostToGo(town)
 
     def observe(self, seen: Mapping[str, Any], heard: HeardInstruction, blocked: tuple[Place, ...]) -> Vector:
-        """The observation.
+        """Encodes an observation.
 
         Args:
-            seen: what the Co-Wizard observes.
-            heard: what it remembers.
-            blocked: roadblocks that it knows of.
+            seen: observation of the Co-Wizard.
+            heard: last instruction.
+            blocked: places behind the roadblocks known.
 
         Returns:
-            Numbers (n,) of `navigation_space`.
+            Vector (n,) of `navigation_space`.
         """
         lane, station = int(seen["lane"]), float(seen["station"][0])
-        choice = self._ways.choice_ahead(seen)
-        ways = self._ways.after(choice) if choice is not None else (None,) * len(SECTORS)
-        self._way_left.aim(heard.goal, blocked if heard.goal is not None else ())
+        choice = self._exits.choice_ahead(seen)
+        ways = self._exits.by_sector(choice) if choice is not None else (None,) * len(SECTORS)
+        self._cost_to_go.aim(heard.goal, blocked if heard.goal is not None else ())
         values = [
             *self._car(seen, lane),
             *self._junction(seen, heard, ways, choice),
             *self._light(lane, station, float(seen["time"][0])),
-            *_said(heard, float(seen["time"][0])),
+            *_instruction(heard, float(seen["time"][0])),
             *self._goal(seen, heard, lane, station),
             *self._detours(heard, ways, lane, station),
             *_objects(seen),
@@ -199,7 +199,7 @@ class NavigationEncoder:
         distance = float(seen["exits"][0, ExitColumn.DISTANCE])
         turning = int(seen["manoeuvre"]) == PhysicalAction.J_TURN
         angle = int(seen["manoeuvre_angle"][0])
-        street = heard.told.street if heard.told is not None else None
+        street = heard.instruction.street if heard.instruction is not None else None
         values = [1.0, distance / FAR]
         for way in ways:
             if way is None:
@@ -223,7 +223,7 @@ class NavigationEncoder:
         here_x, here_y, heading = (float(value) for value in seen["pose"])
         dx, dy = float(x) - here_x, float(y) - here_y
         sine, cosine = math.sin(heading), math.cos(heading)
-        left = self._way_left.from_place(lane, station)
+        left = self._cost_to_go.from_place(lane, station)
         ahead = heard.goal[1] - station if lane == heard.goal[0] else math.inf
         return [
             1.0,
@@ -237,10 +237,10 @@ class NavigationEncoder:
     def _detours(
         self, heard: HeardInstruction, ways: tuple[SectorExit | None, ...], lane: int, station: float
     ) -> list[float]:
-        """How much longer the way to the goal gets by what may be done, where the goal is known."""
+        """Returns by how much each manoeuvre and exit lengthens the route to the goal; zeros where no goal is known."""
         if heard.goal is None:
             return [0.0] * (3 + len(SECTORS))
-        town, left = self._town, self._way_left.from_place
+        town, left = self._town, self._cost_to_go.from_place
         stay = left(lane, station)
         oncoming = self._oncoming.at(lane, station)
         others = [math.inf if oncoming is None else left(oncoming.lane, oncoming.station)]
@@ -250,31 +250,31 @@ class NavigationEncoder:
             others.append(math.inf if beside is None else left(beside, float(town.lanes[beside].project(position)[0])))
         costs = [math.inf if way is None else left(way.lane, 0.0) for way in ways]
         best = min(costs)
-        return [*(_longer(other, stay) for other in others), *(_longer(cost, best) for cost in costs)]
+        return [*(_added_cost(other, stay) for other in others), *(_added_cost(cost, best) for cost in costs)]
 
 
-def _longer(way: float, than: float) -> float:
-    """How much longer a way is than another, of `DETOUR`, from -1 to 1; 1 where there is none."""
-    if not math.isfinite(way):
+def _added_cost(cost: float, than: float) -> float:
+    """Returns by how much a cost exceeds another, of `DETOUR`, from -1 to 1; 1 for an infinite cost."""
+    if not math.isfinite(cost):
         return 1.0
-    return max(min((way - than) / DETOUR, 1.0), -1.0) if math.isfinite(than) else -1.0
+    return max(min((cost - than) / DETOUR, 1.0), -1.0) if math.isfinite(than) else -1.0
 
 
-def _said(heard: HeardInstruction, time: float) -> list[float]:
-    told = heard.told
-    if told is None:
+def _instruction(heard: HeardInstruction, time: float) -> list[float]:
+    given = heard.instruction
+    if given is None:
         count = ("said", "said_action", "said_sector", "said_landmark", "said_distance", "said_age")
         return [0.0] * sum(FIELDS[name] for name in count)
-    left = told.distance - heard.driven
+    left = given.distance - heard.driven
     return [
         1.0,
-        *_one_hot(int(told.act.move), len(DialogueMove)),
-        *_one_hot(-1 if told.action is None else told.action.value, len(ActionValue)),
-        *_one_hot(-1 if told.sector is None else told.sector, len(SECTORS)),
-        *_one_hot(-1 if told.landmark is None else told.landmark.value, len(LandmarkName)),
+        *_one_hot(int(given.act.move), len(DialogueMove)),
+        *_one_hot(-1 if given.action is None else given.action.value, len(ActionValue)),
+        *_one_hot(-1 if given.sector is None else given.sector, len(SECTORS)),
+        *_one_hot(-1 if given.landmark is None else given.landmark.value, len(LandmarkName)),
         left / FAR,
         left / CLOSE,
-        (time - told.time) / RECENT,
+        (time - given.time) / RECENT,
     ]
 
 

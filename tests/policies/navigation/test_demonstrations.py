@@ -61,10 +61,10 @@ def test_an_action_that_was_carried_out_is_read_back(env: NavigationEnv) -> None
         for _ in range(60):
             action = NavigationAction(rng.choice(np.flatnonzero(info["action_mask"])))
             seen = env.drive.seen[Role.CO_WIZARD]
-            physical = physical_of(action, seen, env.drive.ways)
+            physical = physical_of(action, seen, env.drive.exits)
             set_as_asked = action in (NavigationAction.FASTER, NavigationAction.SLOWER, NavigationAction.LIGHTS)
             expected = NavigationAction.NOTHING if set_as_asked or physical is None else action
-            assert action_of(physical, seen, env.drive.ways) is expected
+            assert action_of(physical, seen, env.drive.exits) is expected
             told += expected is not NavigationAction.NOTHING
             _, _, over, cut, info = env.step(action)
             if over or cut:

@@ -33,7 +33,7 @@ def test_lanes_beside_one_another_share_their_sectors(town: str) -> None:
     ways = JunctionExits(model)
     for link in model.links:
         if link.type.is_lane_change and not model.lanes[link.source].in_junction:
-            mine, theirs = (ways.after(lane) for lane in (link.source, link.target))
+            mine, theirs = (ways.by_sector(lane) for lane in (link.source, link.target))
             assert [way is None for way in mine] == [way is None for way in theirs]
 
 

@@ -135,7 +135,7 @@ def test_the_mask_is_nearly_that_of_the_environment() -> None:
     same = total = 0
     for seed in range(4):
         observation, info = env.reset(seed=seed)
-        likely = EstimatedActionMask(env.town, env.drive.ways)
+        likely = EstimatedActionMask(env.town, env.drive.exits)
         for _ in range(80):
             mask = likely.mask(env.drive.seen[Role.CO_WIZARD])
             same, total = same + int((mask == info["action_mask"]).sum()), total + len(mask)

@@ -1,0 +1,44 @@
+"""Feasibility of manoeuvres as far as a role's observation tells.
+
+The scripted Co-Wizard and the estimated action mask share these functions. The engine knows the planned path and
+decides exactly (`LocalPlanner`); its mask differs where the pose is inaccurate or a roadblock leaves too little room.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from dorothie_gym.maps import LinkType, Town
+from dorothie_gym.maps.lane_neighbours import oncoming_lanes
+from dorothie_gym.policies.route_progress import BRAKING, SWITCH_ROOM, U_TURN_SPEED_SQUARED
+
+MOVING_SPEED: Final = 0.5
+"""Speed above which the path of a manoeuvre begins some way ahead of the car [m/s]."""
+
+LEAD: Final = 1.0
+"""Distance from a moving car to the beginning of the path of a manoeuvre [m]."""
+
+
+def slowing_distance(speed: float, target_squared: float = U_TURN_SPEED_SQUARED) -> float:
+    """Returns the distance in which the car slows down for a U-turn [m].
+
+    Args:
+        speed: present speed [m/s].
+        target_squared: square of the speed of the U-turn [m^2/s^2].
+    """
+    return max(speed**2 - target_squared, 0.0) / (2 * BRAKING)
+
+
+def u_turn_start(station: float, speed: float, target_squared: float = U_TURN_SPEED_SQUARED) -> float:
+    """Returns the station at which a U-turn commanded now would begin [m]; arguments as of `slowing_distance`."""
+    return station + slowing_distance(speed, target_squared) + LEAD * (speed > MOVING_SPEED)
+
+
+def can_turn_round(town: Town, lane: int, start: float) -> bool:
+    """Whether there is an oncoming lane beside a lane at the start of a U-turn [m], or at its end if that is nearer."""
+    return oncoming_lanes(town).at(lane, min(start, town.lanes[lane].length)) is not None
+
+
+def can_switch_lane(town: Town, lane: int, station: float, side: LinkType, room: float = SWITCH_ROOM) -> bool:
+    """Whether a lane has a neighbour on a side, and more than `room` metres are left to change to it."""
+    return town.neighbour(lane, side) is not None and town.lanes[lane].length - station > room

@@ -1,0 +1,42 @@
+"""Numbers shared by the scripted agents: speeds in bad weather, and distances and times of spoken guidance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+STANDING_SPEED = 0.3
+"""Speed below which the agents regard the car as standing [m/s]; the engine's own limit for arrivals is stricter."""
+
+FOG_LIMIT = 35.0
+"""Fog density above which the agents call the view poor [%]."""
+
+RAIN_LIMIT = 55.0
+"""Precipitation above which the agents call the rain heavy [%]."""
+
+BAD_WEATHER_SPEED = 25
+"""Cruise speed that the agents propose in fog or heavy rain [km/h]."""
+
+USUAL_SPEED = 40
+"""Cruise speed on open road where nothing is said about it [km/h]; the speed that route costs assume."""
+
+NUDGE_DISTANCE = 3.0
+"""Distance meant by "a bit further" [m]; shorter than the stretch around a goal that counts as arrived."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GuidanceConfig:
+    """Distances and times of turn-by-turn guidance, for everyone who gives it or expects it.
+
+    Attributes:
+        turn_distance: distance to a junction at which a turn is announced [m]; about 10 s at the usual speed.
+        stop_distance: distance to the goal at which stopping is announced [m].
+        repeat_after: time after which an instruction without effect is repeated [s].
+        roadblock_sight: distance at which a roadblock on the route is noticed [m].
+        arrived_within: distance to the goal within which a standing car has arrived [m]; the engine accepts 2 m.
+    """
+
+    turn_distance: float = 110.0
+    stop_distance: float = 95.0
+    repeat_after: float = 9.0
+    roadblock_sight: float = 80.0
+    arrived_within: float = 1.9
