@@ -1,4 +1,4 @@
-"""What a speaker means to say next, and when it is its turn."""
+"""Speech of an agent: remarks queued and said, and the time when it may speak."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, SlotValue
 from dorothie_gym.spaces import Speech
 
 PAUSE = 0.8
-"""Silence left between an utterance and the next one of the same speaker [s]."""
+"""Silence between an utterance and the next one of the same speaker [s]."""
 
 ANSWER_TIME = 3.0
-"""Silence left after something that wants an answer [s]."""
+"""Silence after a move that wants an answer [s]."""
 
 LONGEST_BREATH = 3
-"""Most acts that are worded together."""
+"""Largest number of acts that are worded together."""
 
 MEMORY = 6
-"""So many of its latest remarks a speaker remembers."""
+"""Number of the latest remarks that are remembered."""
 
 _WANTS_ANSWER = frozenset(
     {DialogueMove.INSTRUCT, DialogueMove.ALIGN, DialogueMove.CHECK, DialogueMove.QUERY_YN, DialogueMove.QUERY_W}
@@ -32,15 +32,15 @@ _WANTS_ANSWER = frozenset(
 
 @dataclass(frozen=True, kw_only=True)
 class Remark:
-    """Something to be said.
+    """Dialogue act that is to be said.
 
     Attributes:
-        act: what it does.
+        act: move and slots.
         wording: particulars for the words.
-        text: the words, where they are settled already.
+        text: the words, if they are chosen already.
         joined: whether it is said in the same breath as the remark before.
-        urgent: whether it may be said without leaving the other time to answer.
-        expires: not said after this time [s].
+        urgent: whether it may be said without leaving the other speaker time to answer.
+        expires: time after which it is no longer said [s].
     """
 
     act: DialogueAct
@@ -59,7 +59,7 @@ def remark(
     urgent: bool = False,
     expires: float = math.inf,
 ) -> Remark:
-    """A remark from a move and its slot values."""
+    """Returns a remark with a move and its slot values; other arguments as of `Remark`."""
     return Remark(
         act=DialogueAct.of(move, *values),
         wording=wording if wording is not None else Wording(),
@@ -71,18 +71,18 @@ def remark(
 
 @dataclass(frozen=True, kw_only=True)
 class SpeechState:
-    """A speaker's intentions; frozen, so every change gives a new one.
+    """Remarks queued and said; frozen, so every change returns a new state.
 
     Attributes:
-        role: who speaks.
-        queue: remarks to come, the next first.
-        quiet_until: nothing that is not urgent is said before this time [s].
-        last: what was said last, None at first.
-        last_end: when that was over [s].
-        style: how the speaker puts things; None for the middle of all.
-        said: the latest remarks, the last one at the end.
-        heard: values that the other has just named: they may be referred to by "that one".
-        other: the other's last move, None at first.
+        role: speaker.
+        queue: remarks to be said, the next first.
+        quiet_until: time before which only urgent remarks are said [s].
+        last: last remark said, None at first.
+        last_end: end of its utterance [s].
+        style: traits of the wording; None for an average speaker.
+        said: latest remarks said, the last one at the end.
+        heard: slot values that the other speaker has just named, which may be referred to by "that one".
+        other: last move of the other speaker, None at first.
     """
 
     role: Role
@@ -97,31 +97,39 @@ class SpeechState:
 
     @property
     def idle(self) -> bool:
-        """Whether nothing waits to be said."""
+        """Whether no remark is queued."""
         return not self.queue
 
     def has_just_spoken(self, now: float, within: float) -> bool:
-        """Whether the last words were over no longer than `within` ago [s], or are still being said."""
+        """Whether the last utterance ended no longer than `within` ago [s], or has not ended yet."""
         return now - self.last_end < within
 
     def plan(self, *remarks: Remark) -> SpeechState:
-        """The same with remarks added at the end."""
+        """Queues remarks at the end."""
         return replace(self, queue=(*self.queue, *remarks))
 
     def plan_first(self, *remarks: Remark) -> SpeechState:
-        """The same with remarks added in front: an answer comes before what one wanted to say anyway."""
+        """Queues remarks in front, as for an answer."""
         return replace(self, queue=(*remarks, *self.queue))
 
+    def with_second(self, item: Remark) -> SpeechState:
+        """Inserts a remark behind the first one."""
+        return replace(self, queue=(self.queue[0], item, *self.queue[1:]))
+
+    def led_by(self, item: Remark) -> SpeechState:
+        """Queues a remark in front and joins the first one to it."""
+        return replace(self, queue=(item, replace(self.queue[0], joined=True), *self.queue[1:]))
+
     def cleared(self) -> SpeechState:
-        """The same with nothing left to say."""
+        """Drops the queued remarks."""
         return replace(self, queue=())
 
     def hold(self, until: float) -> SpeechState:
-        """The same, silent until a time [s] at least."""
+        """Extends the silence to a time [s]."""
         return replace(self, quiet_until=max(self.quiet_until, until))
 
     def heard_other(self, now: float, acts: Sequence[DialogueAct] = ()) -> SpeechState:
-        """The same after the other has said `acts`: one need not wait for an answer any more."""
+        """Notes an utterance of the other speaker, which ends the silence left for an answer."""
         values = frozenset(value for act in acts for value in act.slots)
         move = acts[-1].move if acts else self.other
         return replace(self, quiet_until=min(self.quiet_until, now), heard=values, other=move)
@@ -129,18 +137,18 @@ class SpeechState:
     def speak(
         self, now: float, speaking: float, rng: np.random.Generator, scene: WordingContext | None = None
     ) -> tuple[Speech | None, SpeechState]:
-        """Takes the next remark if it is its turn.
+        """Says the next remark if it is due.
 
-        Remarks that are joined to it are worded with it, so that one leads over to the next.
+        Remarks that are joined to it are worded together with it, so that their words connect.
 
         Args:
             now: time [s].
-            speaking: how long the own words still go on [s].
-            rng: for the words.
-            scene: what is in view; what has been said is added.
+            speaking: remaining duration of the own utterance [s].
+            rng: random generator for the words.
+            scene: context that the words may refer to; the latest acts are added.
 
         Returns:
-            What is said now, or None, and what remains.
+            The utterance, or None, and the new state.
         """
         queue = _alive(self.queue, now)
         if not queue:
@@ -166,7 +174,7 @@ class SpeechState:
     def _worded(
         self, queue: tuple[Remark, ...], rng: np.random.Generator, scene: WordingContext, goes_on: bool
     ) -> tuple[Remark, ...]:
-        """The queue with words for the next remark and those joined to it."""
+        """Chooses the words of the next remark and of those joined to it."""
         count = 1 + len(list(itertools.takewhile(lambda item: item.joined and not item.text, queue[1:])))
         breath = queue[: min(count, LONGEST_BREATH)]
         joined = self.last.act.move if goes_on and self.last is not None else None
@@ -183,10 +191,10 @@ class SpeechState:
 
 
 def _alive(queue: tuple[Remark, ...], now: float) -> tuple[Remark, ...]:
+    """Drops expired remarks, and those joined to them."""
     kept: list[Remark] = []
     dropped = False
     for item in queue:
-        # what goes on from a remark that is no longer said is not said either
         dropped = item.expires < now or (item.joined and dropped)
         if not dropped:
             kept.append(item)

@@ -11,7 +11,7 @@ from dorothie_gym.policies.co_wizard.state import CoWizardState, Intentions
 from dorothie_gym.policies.policy import policy_seed
 
 
-def mind_of(**style: float) -> CoWizardState:
+def state_of(**style: float) -> CoWizardState:
     traits = {"echoes": 0.0, "checks": 0.0, "tells": 0.0, "silent": 0.0} | style
     env = DuoWizardEnv(town="brookside")
     env.reset(seed=0)
@@ -21,9 +21,9 @@ def mind_of(**style: float) -> CoWizardState:
 
 
 def heard_moves(words: str, action: ActionValue, seed: int, **style: float) -> list[DialogueMove]:
-    mind = mind_of(**style)
-    acknowledge(mind, action, understand(words), np.random.default_rng(seed))
-    return [item.act.move for item in mind.speech.queue]
+    state = state_of(**style)
+    acknowledge(state, action, understand(words), np.random.default_rng(seed))
+    return [item.act.move for item in state.speech.queue]
 
 
 def test_the_silent_say_nothing_to_a_command():
@@ -31,9 +31,9 @@ def test_the_silent_say_nothing_to_a_command():
 
 
 def test_who_repeats_says_which_way():
-    mind = mind_of(echoes=1.0)
-    acknowledge(mind, ActionValue.J_TURN, understand("left at the next one"), np.random.default_rng(5))
-    told = [item for item in mind.speech.queue if item.act.slots]
+    state = state_of(echoes=1.0)
+    acknowledge(state, ActionValue.J_TURN, understand("left at the next one"), np.random.default_rng(5))
+    told = [item for item in state.speech.queue if item.act.slots]
     assert told and told[0].wording.direction is Direction.LEFT
 
 
@@ -46,13 +46,13 @@ def test_a_stop_is_never_asked_back_about():
 
 @pytest.mark.parametrize(("rambles", "expected"), [(0.0, 0), (1.0, 1)])
 def test_only_who_rambles_tells_what_it_is_up_to(rambles, expected):
-    assert len(plan_remark(mind_of(rambles=rambles), np.random.default_rng(1))) == expected
+    assert len(plan_remark(state_of(rambles=rambles), np.random.default_rng(1))) == expected
 
 
 def test_sessions_have_speakers_of_different_styles_and_the_same_session_the_same():
     env = DuoWizardEnv(town="brookside")
     env.reset(seed=0)
     for policy, role in ((ScriptedParticipant(), Role.PARTICIPANT), (ScriptedCoWizard(), Role.CO_WIZARD)):
-        styles = [policy.initial_state(policy_seed(seed, role), env.town).voice.style for seed in range(8)]
+        styles = [policy.initial_state(policy_seed(seed, role), env.town).speech.style for seed in range(8)]
         assert len({style.idiolect for style in styles}) == 8
-        assert styles[3] == policy.initial_state(policy_seed(3, role), env.town).voice.style
+        assert styles[3] == policy.initial_state(policy_seed(3, role), env.town).speech.style

@@ -8,8 +8,8 @@ import pytest
 from dorothie_gym.maps.routing import Entry
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role, Slot
 from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE
-from dorothie_gym.policies.participant.arriving import WITHIN
-from dorothie_gym.policies.participant.guidance import RUN_UP, guide
+from dorothie_gym.policies.participant.config import ParticipantConfig
+from dorothie_gym.policies.participant.guidance import guide
 from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.route_progress import RouteProgress
 from tests.policies.said import with_words
@@ -23,36 +23,38 @@ class Guide(Human):
 
     def __init__(self, before: float, speed: float = 0.0) -> None:
         super().__init__()
-        assert self.mind.goal is not None
-        self.mind.guiding = True
-        self.put(self.mind.goal.lane, self.mind.goal.station - before, speed)
+        assert self.state.errand.goal is not None
+        self.state.set_guiding(True)
+        self.put(self.state.errand.goal.lane, self.state.errand.goal.station - before, speed)
 
     def put(self, lane: int, station: float, speed: float) -> None:
-        assert self.mind.goal is not None
+        assert self.state.errand.goal is not None
         where = self.env.town.lanes[lane]
         self.observation |= {
             "time": np.array([50.0]), "speed": np.array([speed]),
             "lane": np.int64(lane), "station": np.array([station]),
             "pose": np.array([*where.position(station), where.heading_at(station)]),
         }  # fmt: skip
-        self.mind.journey = RouteProgress.plan(self.env.town, (lane, station), self.mind.goal.place)
-        self.mind.standing_since = None if speed else 40.0
+        progress = RouteProgress.plan(self.env.town, (lane, station), self.state.errand.goal.place)
+        self.state.route = self.state.route.with_progress(progress)
+        self.state.motion = replace(self.state.motion, standing_since=None if speed else 40.0)
 
     def says(self) -> list[ActionValue]:
-        guide(self.mind, self.view, self.rng)
-        return [value for item in self.mind.voice.queue for value in item.act.values(Slot.ACTION)]
+        guide(self.state, self.view, self.rng)
+        return [value for item in self.state.speech.queue for value in item.act.values(Slot.ACTION)]
 
 
 def test_a_bit_further_never_leads_from_one_side_of_the_place_to_the_other() -> None:
     rolls_on = 0.6  # what the car needs to stop, measured
-    assert WITHIN - NUDGE_DISTANCE - rolls_on > -WITHIN
+    within = ParticipantConfig.arrived_within
+    assert within - NUDGE_DISTANCE - rolls_on > -within
 
 
 @pytest.mark.parametrize(("before", "told"), [(4.0, "bit"), (14.0, "10"), (26.0, "10"), (30.0, "20")])
 def test_a_car_that_stands_before_the_place_is_told_a_distance_that_does_not_lead_past_it(before, told) -> None:
     human = Guide(before)
     assert human.says() == [ActionValue.LANE_FOLLOW]
-    distance = human.mind.voice.queue[0].wording.distance
+    distance = human.state.speech.queue[0].wording.distance
     assert (distance is None) is (told == "bit")
     if distance is not None:
         assert 10 * round(distance / 10) <= before
@@ -67,7 +69,7 @@ def test_is_this_it_before_the_place_is_answered_by_no_and_a_bit_further() -> No
 def test_where_to_is_not_answered_again_by_who_has_just_said_it() -> None:
     human = Human()
     human.observation["time"] = np.array([60.0])
-    human.mind.voice = replace(human.mind.voice, last_end=58.0)  # the place was named in the last breath
+    human.state.speech = replace(human.state.speech, last_end=58.0)  # the place was named in the last breath
     human.hears(M.QUERY_W, LandmarkName.QUERIED)
     assert human.moves() == []
 
@@ -75,37 +77,40 @@ def test_where_to_is_not_answered_again_by_who_has_just_said_it() -> None:
 @pytest.mark.parametrize("uptake", [True, False])
 def test_what_takes_up_an_instruction_is_not_nodded_at(uptake: bool) -> None:
     human = Human()
-    human.mind.style = replace(human.mind.style, nods=1.0)
+    human.state.style = replace(human.state.style, nods=1.0)
     turning = DialogueAct.of(M.EXPLAIN, ActionValue.J_TURN)
     acts = (DialogueAct.of(M.ACKNOWLEDGE), turning) if uptake else (turning,)
     raw = with_words(human.observation, Role.CO_WIZARD, "okay, turning left", *acts)
-    listen(human.mind, replace(human.view, raw=raw), human.rng)
+    listen(human.state, replace(human.view, raw=raw), human.rng)
     assert (M.ACKNOWLEDGE in human.moves()) is not uptake
 
 
 def test_who_turns_round_for_a_place_keeps_road_enough_to_stop() -> None:
     human = Guide(1.0)
     longest = max(human.env.town.lanes, key=lambda lane: lane.length)
-    human.mind.goal = replace(human.mind.goal, lane=longest.id, station=longest.length / 2)
+    goal = replace(human.state.errand.goal, lane=longest.id, station=longest.length / 2)
+    human.state.errand = replace(human.state.errand, goal=goal)
+    run_up = human.state.config.run_up
     told: dict[bool, list[bool]] = {True: [], False: []}
     for lane in human.env.town.lanes:
-        for station in np.arange(2.0, lane.length - RUN_UP - 15.0, 4.0):
+        for station in np.arange(2.0, lane.length - run_up - 15.0, 4.0):
             human.put(lane.id, float(station), 8.0)
-            journey = human.mind.journey
+            journey = human.state.route.progress
             assert journey is not None
             rest = journey.run_up()
             manoeuvre = journey.next_manoeuvre(float(station))
             if rest is None or rest[1] or manoeuvre is None or manoeuvre[1] > 12.0:
                 continue
-            if RUN_UP / 2 < rest[0] < RUN_UP + 5.0 or not journey.turns_round_on(lane.id):
+            if run_up / 2 < rest[0] < run_up + 5.0 or not journey.turns_round_on(lane.id):
                 continue
-            human.mind.voice, human.mind.guided = human.mind.voice.cleared(), None
-            told[rest[0] > RUN_UP].append(ActionValue.U_TURN in human.says())
+            human.state.speech = human.state.speech.cleared()
+            human.state.guidance = replace(human.state.guidance, step=None)
+            told[rest[0] > run_up].append(ActionValue.U_TURN in human.says())
     assert told[True] and all(told[True])
     assert told[False] and not any(told[False])
 
 
 def test_the_run_up_of_a_way_without_a_u_turn_is_none() -> None:
     human = Guide(10.0)
-    assert human.mind.journey is not None and human.mind.journey.run_up() is None
-    assert Entry.U_TURN not in {leg.entry for leg in human.mind.journey.legs}
+    assert human.state.route.progress is not None and human.state.route.progress.run_up() is None
+    assert Entry.U_TURN not in {leg.entry for leg in human.state.route.progress.legs}

@@ -15,33 +15,38 @@ def with_tasks(human: Human, **changes) -> ParticipantView:
     """What it sees when one of the tasks, `index`, has changed."""
     index = changes.pop("index")
     tasks = tuple(
-        replace(task, **changes) if task.index == index else task for task in human.mind.subgoals if task.live
+        replace(task, **changes) if task.index == index else task for task in human.state.errand.subgoals if task.live
     )
-    human.mind.subgoals = tuple(task for task in human.mind.subgoals if task.live)
+    keep_live_subgoals(human)
     return replace(human.view, subgoals=tasks)
+
+
+def keep_live_subgoals(human: Human) -> None:
+    live = tuple(task for task in human.state.errand.subgoals if task.live)
+    human.state.errand = human.state.errand.with_subgoals(live)
 
 
 def another_task(human: Human):
     """An open task other than the one under way, at a place of another name."""
-    assert human.mind.goal is not None
+    assert human.state.errand.goal is not None
     view = human.view
     for task in view.subgoals:
         place = view.landmark(task.landmark)
-        if task.open and task.index != human.mind.target and place is not None:
-            if place.name is not human.mind.goal.name:
+        if task.open and task.index != human.state.errand.target and place is not None:
+            if place.name is not human.state.errand.goal.name:
                 return task, place
     raise AssertionError("there is no other task")
 
 
 def planned(human: Human) -> list[tuple[DialogueMove, frozenset]]:
-    return [(item.act.move, item.act.slots) for item in human.mind.voice.queue]
+    return [(item.act.move, item.act.slots) for item in human.state.speech.queue]
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_car_is_told_of_a_task_that_is_dropped(seed):
     human = Human()
     task, place = another_task(human)
-    note_tasks(human.mind, with_tasks(human, index=task.index, live=False), np.random.default_rng(seed))
+    note_tasks(human.state, with_tasks(human, index=task.index, live=False), np.random.default_rng(seed))
     move, slots = planned(human)[0]
     assert move in (M.INSTRUCT, M.EXPLAIN)
     assert {place.name, GoalStatus.ABANDONED} <= slots
@@ -49,32 +54,32 @@ def test_the_car_is_told_of_a_task_that_is_dropped(seed):
 
 def test_the_task_under_way_is_left_when_it_is_dropped():
     human = Human()
-    note_tasks(human.mind, with_tasks(human, index=human.mind.target, live=False), human.rng)
-    assert human.mind.goal is None
-    assert human.mind.goes_on
+    note_tasks(human.state, with_tasks(human, index=human.state.errand.target, live=False), human.rng)
+    assert human.state.errand.goal is None
+    assert human.state.errand.goes_on
 
 
 def test_what_is_done_is_said_after_a_breath():
     human = Human()
-    view = with_tasks(human, index=human.mind.target, reached=True)
-    note_tasks(human.mind, view, human.rng)
+    view = with_tasks(human, index=human.state.errand.target, reached=True)
+    note_tasks(human.state, view, human.rng)
     assert GoalStatus.COMPLETE in planned(human)[0][1]
-    assert human.mind.voice.speak(view.time, 0.0, human.rng)[0] is None
-    assert human.mind.voice.speak(view.time + 20.0, 0.0, human.rng)[0] is not None
+    assert human.state.speech.speak(view.time, 0.0, human.rng)[0] is None
+    assert human.state.speech.speak(view.time + 20.0, 0.0, human.rng)[0] is not None
 
 
 def interrupted(seed: int) -> tuple[Human, object]:
     """A human to whom a task comes up that is nearer than the one under way."""
     human = Human()
     task, place = another_task(human)
-    human.mind.journey = replace(human.mind.journey, goal=(human.mind.journey.goal[0], 1e5))
-    human.mind.subgoals = tuple(
-        replace(item, live=False) if item.index == task.index else item for item in human.mind.subgoals
-    )
-    left = human.mind.journey.left(human.view.station)
-    assert route_length(human.mind, human.view, place) < max(left, 1e4)
-    human.mind.journey = Far(human.mind.journey)
-    note_tasks(human.mind, human.view, np.random.default_rng(seed))
+    progress = human.state.route.progress
+    progress = replace(progress, goal=(progress.goal[0], 1e5))
+    subgoals = (replace(item, live=item.live and item.index != task.index) for item in human.state.errand.subgoals)
+    human.state.errand = human.state.errand.with_subgoals(tuple(subgoals))
+    left = progress.left(human.view.station)
+    assert route_length(human.state, human.view, place) < max(left, 1e4)
+    human.state.route = human.state.route.with_progress(Far(progress))
+    note_tasks(human.state, human.view, np.random.default_rng(seed))
     return human, place
 
 
@@ -92,31 +97,32 @@ class Far:
 
 
 def test_a_new_task_on_the_way_is_done_first_and_the_other_is_resumed():
-    human, place = next(found for seed in range(20) if (found := interrupted(seed))[0].mind.put_off)
+    human, place = next(found for seed in range(20) if (found := interrupted(seed))[0].state.errand.put_off)
     told = planned(human)
-    assert human.mind.goal == place
+    assert human.state.errand.goal == place
     assert GoalStatus.ONGOING in told[0][1] and place.name in told[0][1]
     assert GoalStatus.PENDING in told[1][1]
-    former = next(iter(human.mind.put_off))
+    former = next(iter(human.state.errand.put_off))
     view = human.view
-    done = tuple(replace(task, reached=task.index == human.mind.target) for task in view.subgoals)
-    human.mind.target = human.mind.goal = None
-    choose_target(human.mind, replace(view, subgoals=tuple(t for t in done if t.index == former)), human.rng)
-    again = announcement(human.mind, view, human.rng)
+    done = tuple(replace(task, reached=task.index == human.state.errand.target) for task in view.subgoals)
+    human.state.errand = replace(human.state.errand, target=None, goal=None)
+    choose_target(human.state, replace(view, subgoals=tuple(t for t in done if t.index == former)), human.rng)
+    again = announcement(human.state, view, human.rng)
     assert again.wording.topic == "resume" and GoalStatus.ONGOING in again.act.slots
 
 
 def test_a_later_task_that_changes_is_told_by_both_names():
     human = Human()
     task, place = another_task(human)
-    names = {place.name, human.mind.goal.name}
+    names = {place.name, human.state.errand.goal.name}
     other = next(mark for mark in human.view.landmarks if mark.name not in names)
     view = with_tasks(human, index=task.index, landmark=other.row)
     told = []
     for seed in range(10):
-        human.mind.voice, human.mind.subgoals = human.mind.voice.cleared(), human.view.subgoals
-        human.mind.subgoals = tuple(t for t in human.mind.subgoals if t.live)
-        note_tasks(human.mind, view, np.random.default_rng(seed))
+        human.state.speech = human.state.speech.cleared()
+        human.state.errand = human.state.errand.with_subgoals(human.view.subgoals)
+        keep_live_subgoals(human)
+        note_tasks(human.state, view, np.random.default_rng(seed))
         told += planned(human)
     assert told
     assert all({place.name, other.name, GoalStatus.ABANDONED, GoalStatus.PENDING} == slots for _, slots in told)

@@ -35,8 +35,8 @@ def said_about(talk: Talk, move: DialogueMove, name: LandmarkName) -> bool:
     return any(a.speech and a.speech.act.move is move and name in a.speech.act.slots for a in talk.actions)
 
 
-def statuses(mind: CoWizardState) -> dict[LandmarkName, GoalStatus]:
-    return dict(mind.beliefs.statuses)
+def statuses(state: CoWizardState) -> dict[LandmarkName, GoalStatus]:
+    return dict(state.beliefs.statuses)
 
 
 @pytest.mark.parametrize(("answer", "accepted"), [(M.REPLY_Y, True), (M.REPLY_N, False)])
@@ -65,13 +65,13 @@ def test_a_later_task_that_replaces_another_does_not_change_where_the_car_goes()
 @pytest.mark.parametrize("agrees", [True, False])
 def test_the_human_agrees_to_its_own_way_round_and_insists_on_it_otherwise(agrees):
     human = Human()
-    own = first_new_street(human.observation, human.env.town, human.view.lane, human.mind.journey)
+    own = first_new_street(human.observation, human.env.town, human.view.lane, human.state.route.progress)
     assert own is not None
     other = next(name for name in StreetName if name not in (own, StreetName.UNKNOWN, StreetName.QUERIED))
     human.hears(M.QUERY_YN, own if agrees else other)
     assert human.moves() == ([M.REPLY_Y] if agrees else [M.REPLY_N, M.INSTRUCT])
     if not agrees:
-        assert own in human.mind.voice.queue[1].act.values(Slot.STREET)
+        assert own in human.state.speech.queue[1].act.values(Slot.STREET)
 
 
 def test_the_car_that_has_not_got_an_answer_asks_again():
@@ -85,7 +85,7 @@ def test_the_car_that_has_not_got_an_answer_asks_again():
 
 def test_which_of_two_tasks_comes_first_is_told():
     human = Human()
-    human.hears(M.QUERY_W, human.mind.goal.name, wording=Wording(topic="order"))
-    first, *others = human.mind.voice.queue
+    human.hears(M.QUERY_W, human.state.errand.goal.name, wording=Wording(topic="order"))
+    first, *others = human.state.speech.queue
     assert first.act.move is M.REPLY_W
-    assert all(human.mind.goal.name in item.act.slots for item in others)
+    assert all(human.state.errand.goal.name in item.act.slots for item in others)

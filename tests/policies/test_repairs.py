@@ -8,7 +8,7 @@ from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, Role
 from dorothie_gym.policies import ScriptedParticipant
 from dorothie_gym.policies.participant.config import ParticipantStyle
-from dorothie_gym.policies.participant.repairs import misunderstood, not_caught
+from dorothie_gym.policies.participant.repairs import correction, has_missed
 from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.speech import remark
@@ -26,10 +26,10 @@ class Human:
         observations, _ = self.env.reset(seed=seed)
         self.observation = dict(observations["participant"])
         policy = ScriptedParticipant(self.env.limits, style=CALM)
-        self.mind = policy.initial_state(seed, self.env.town)
-        _, self.mind = policy.step(self.observation, self.mind)
-        assert self.mind.goal is not None and self.mind.told
-        self.mind.voice = replace(self.mind.voice.cleared(), last_end=-100.0)  # it has stopped speaking long ago
+        self.state = policy.initial_state(seed, self.env.town)
+        _, self.state = policy.step(self.observation, self.state)
+        assert self.state.errand.goal is not None and self.state.errand.told
+        self.state.speech = replace(self.state.speech.cleared(), last_end=-100.0)  # it has stopped speaking long ago
         self.rng = np.random.default_rng(0)
 
     @property
@@ -37,69 +37,69 @@ class Human:
         return ParticipantView.read(self.observation, self.env.town)
 
     def another_place(self) -> LandmarkName:
-        assert self.mind.goal is not None
-        return next(name for name in (LandmarkName.KFC, LandmarkName.IKEA) if name is not self.mind.goal.name)
+        assert self.state.errand.goal is not None
+        return next(name for name in (LandmarkName.KFC, LandmarkName.IKEA) if name is not self.state.errand.goal.name)
 
     def hears(self, move: DialogueMove, *values, wording: Wording | None = None) -> None:
         said = heard(self.observation, Role.CO_WIZARD, move, *values, wording=wording)
-        listen(self.mind, self.view_of(said), self.rng)
+        listen(self.state, self.view_of(said), self.rng)
 
     def view_of(self, said) -> ParticipantView:
         return replace(self.view, raw=with_words(self.observation, Role.CO_WIZARD, said.words.text, *said.acts))
 
     def moves(self) -> list[DialogueMove]:
-        return [item.act.move for item in self.mind.voice.queue]
+        return [item.act.move for item in self.state.speech.queue]
 
 
 @pytest.mark.parametrize("move", [M.ACKNOWLEDGE, M.CONFIRM])
 def test_a_car_that_takes_up_another_place_is_told_the_right_one_again(move):
     human = Human()
     human.hears(move, human.another_place())
-    clarified = [item.act for item in human.mind.voice.queue if item.act.move is M.CLARIFY]
-    assert clarified and human.mind.goal.name in clarified[0].slots
+    clarified = [item.act for item in human.state.speech.queue if item.act.move is M.CLARIFY]
+    assert clarified and human.state.errand.goal.name in clarified[0].slots
 
 
 def test_a_car_that_takes_up_the_right_place_is_not_corrected():
     human = Human()
-    human.hears(M.ACKNOWLEDGE, human.mind.goal.name)
+    human.hears(M.ACKNOWLEDGE, human.state.errand.goal.name)
     assert M.CLARIFY not in human.moves()
 
 
 def test_a_place_that_was_to_be_given_up_may_be_repeated():
     human = Human()
     other = human.another_place()
-    dropped = remark(M.INSTRUCT, human.mind.goal.name, wording=Wording(dropped=other))
-    human.mind.voice = replace(human.mind.voice, said=(dropped,))
+    dropped = remark(M.INSTRUCT, human.state.errand.goal.name, wording=Wording(dropped=other))
+    human.state.speech = replace(human.state.speech, said=(dropped,))
     said = heard(human.observation, Role.CO_WIZARD, M.CONFIRM, other)
-    assert misunderstood(human.mind, human.view, said.acts[0], said.words) is None
+    assert correction(human.state, human.view, said.acts[0], said.words) is None
 
 
 def test_a_car_that_takes_up_the_other_side_is_told_the_side_again():
     human = Human()
     left = remark(M.INSTRUCT, ActionValue.J_TURN, wording=Wording(direction=Direction.LEFT))
-    human.mind.voice = replace(human.mind.voice, said=(left,), last_end=human.view.time)
+    human.state.speech = replace(human.state.speech, said=(left,), last_end=human.view.time)
     wrong = heard(human.observation, Role.CO_WIZARD, M.CONFIRM, ActionValue.J_TURN, wording=Wording(direction="right"))
     right = heard(human.observation, Role.CO_WIZARD, M.CONFIRM, ActionValue.J_TURN, wording=Wording(direction="left"))
-    again = misunderstood(human.mind, human.view, wrong.acts[0], wrong.words)
+    again = correction(human.state, human.view, wrong.acts[0], wrong.words)
     assert again is not None and again.act.move is M.CLARIFY and again.wording.direction is Direction.LEFT
-    assert misunderstood(human.mind, human.view, right.acts[0], right.words) is None
+    assert correction(human.state, human.view, right.acts[0], right.words) is None
 
 
 @pytest.mark.parametrize(("ended", "caught"), [(0.0, False), (30.0, True)])
 def test_only_what_is_said_into_ones_own_words_is_not_caught(ended, caught):
     human = Human()
     human.observation["time"] = np.array([40.0])
-    human.mind.voice = replace(human.mind.voice, last_end=40.0 - ended)
-    question = heard(human.observation, Role.CO_WIZARD, M.CHECK, human.mind.goal.name)
-    assert not_caught(human.mind, human.view, question, human.rng) is not caught
+    human.state.speech = replace(human.state.speech, last_end=40.0 - ended)
+    question = heard(human.observation, Role.CO_WIZARD, M.CHECK, human.state.errand.goal.name)
+    assert has_missed(human.state, human.view, question, human.rng) is not caught
 
 
 def test_a_question_that_was_not_caught_is_answered_once_it_is_made_clear():
     human = Human()
     human.observation["time"] = np.array([40.0])
-    human.mind.voice = replace(human.mind.voice, last_end=40.0)
-    human.hears(M.CHECK, human.mind.goal.name)
+    human.state.speech = replace(human.state.speech, last_end=40.0)
+    human.hears(M.CHECK, human.state.errand.goal.name)
     assert human.moves() == [M.CONFUSE]
-    human.mind.voice = replace(human.mind.voice.cleared(), last_end=0.0)
-    human.hears(M.CLARIFY, human.mind.goal.name)
+    human.state.speech = replace(human.state.speech.cleared(), last_end=0.0)
+    human.hears(M.CLARIFY, human.state.errand.goal.name)
     assert M.CONFIRM in human.moves()

@@ -1,4 +1,4 @@
-"""The scripted human: knows the tasks and all places, and gets them done by talk."""
+"""Scripted participant: knows the tasks and all places, and gets the tasks done by dialogue."""
 
 from dorothie_gym.policies.participant.policy import ScriptedParticipant
 

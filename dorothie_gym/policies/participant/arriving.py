@@ -1,4 +1,4 @@
-"""Talking the car up to the very place: slower, stop, a bit further."""
+"""Guidance on the last stretch to the place: slower, stop, a bit further."""
 
 from __future__ import annotations
 
@@ -14,132 +14,129 @@ from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.route_progress import stopping_distance
 from dorothie_gym.policies.speech import Remark, remark
 
-DECISION = 0.5
-"""Time between decisions [s]."""
+STOP_REPEAT = 5.0
+"""Time after which the stop instruction is repeated [s]."""
 
-FASTEST = 11.0
-"""The car is not expected to get faster than this [m/s]."""
+GAIN_RANGE = (-2.0, 2.0)
+"""Range of accelerations that are extrapolated [m/s^2]."""
 
-NEAR = 95.0
-"""A place is announced when it is this near [m]."""
+SHOUTS = 3
+"""Number of short wordings that are compared when there is only time for a shout."""
 
-SLOW_WITHIN = 20.0
-"""A car that has been told of the place is slow from here on [m]."""
+STANDING_RANGE = 45.0
+"""Distance to the place within which a standing car is told how to go on [m]."""
 
-SLOW_SPEED = 5.0
-"""A car that is this slow need not be told to come up slowly [m/s]."""
-
-SOON_AT = 8.0
-"""A car that has just set off or turned will soon be this fast [m/s]."""
-
-TOO_SHORT = 4.0
-"""Who has missed a place before rather stops the car up to this much before it [m]."""
-
-SETS_OFF, PULL = 0.6, 3.0
-"""A car that gains more speed than the first has just set off, and goes on gaining as much as the second [m/s^2]."""
-
-READY = 1.6
-"""A car that has been standing for longer than this is told how to go on [s]."""
-
-SHORTER = 8.0
-"""A distance is said to be this much less than it is, for it is said in tens, and the car rolls on [m]."""
-
-INCHES_ON = 7.0
-"""A car that has been told to go a bit further is left alone for this long [s]."""
-
-LATE_STOP = 1.0
-"""Who would stop the car further behind the place than this says less [m]."""
-
-LAST_STRETCH = 60.0
-"""With no junction and no manoeuvre before the place, nothing else is talked about from here on [m]."""
-
-WITHIN = 1.9
-"""A car that stands this close to the place has arrived [m]."""
-
-
-def approach(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> bool:
-    """Talks the car up to the place when nothing but the last stretch is left; tells whether that is so."""
-    journey = mind.journey
-    assert journey is not None
-    if journey.next_crossing(mind.town, view.station) is not None or journey.next_manoeuvre(view.station) is not None:
-        return False
-    left = journey.left(view.station)
-    if view.standing:
-        return _from_standing(mind, view, left)
-    if not mind.guiding or view.time - mind.nudged_at < INCHES_ON:
-        return left < NEAR  # a car that is told to go on a bit stops by itself
-    if not mind.stop_text:
-        mind.stop_text = word_act(_STOP, Role.PARTICIPANT, rng, Wording(here=True), style=mind.voice.style)
-    if _room_to_stop(mind, view, left, mind.stop_text)[0] < -LATE_STOP:
-        # there is only time for a shout
-        shouts = [word_act(_STOP, Role.PARTICIPANT, rng, Wording(), style=_SHOUTING) for _ in range(3)]
-        mind.stop_text = min(*shouts, mind.stop_text, key=speech_seconds)
-    if _time_to_stop(mind, view, left):
-        if view.time - mind.stopped_at > 5.0 and left > 0.0:
-            mind.stopped_at = view.time
-            mind.voice = mind.voice.plan(Remark(act=_STOP, text=mind.stop_text, urgent=True))
-        return True
-    if not mind.announced and left < NEAR and view.speed > SLOW_SPEED and mind.goal is not None:
-        if left > 3.5 * max(view.speed, SOON_AT) + 20.0:
-            wording = Wording(distance=max(left - view.speed * 3.0, 10.0))
-            words = remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, mind.goal.name, wording=wording, urgent=True)
-            mind.announced, mind.voice = True, mind.voice.plan(words)
-        elif left > 3.0 * max(view.speed, SOON_AT) + 12.0:
-            slower = remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=Wording(faster=False), urgent=True)
-            mind.announced, mind.voice = True, mind.voice.plan(slower)
-    return left < NEAR
-
+PATIENT_TIME = 6.0
+"""Standstill after which a car at the place, or one that is not guided, is told how to go on [s]."""
 
 _STOP = DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.STOP)
 _SHOUTING = SpeakerStyle(register=Register.BLUNT, chattiness=0.0, indirectness=0.0)
 
 
-def about_to_arrive(mind: ParticipantState, view: ParticipantView) -> bool:
-    """Whether nothing but the last stretch to the place is left."""
-    journey = mind.journey
-    if journey is None or journey.left(view.station) > LAST_STRETCH:
+def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> bool:
+    """Guides the car on the last stretch; returns whether it is on it."""
+    progress, config = state.route.progress, state.config
+    assert progress is not None
+    if (
+        progress.next_crossing(state.town, view.station) is not None
+        or progress.next_manoeuvre(view.station) is not None
+    ):
         return False
-    return journey.next_crossing(mind.town, view.station) is None and journey.next_manoeuvre(view.station) is None
+    left = progress.left(view.station)
+    if view.standing:
+        return _guide_standing(state, view, left)
+    close = left < config.stop_distance
+    if not state.guidance.guiding or view.time - state.guidance.nudged_at < config.nudge_time:
+        return close  # a car that is told to go on a little stops by itself
+    if not state.guidance.stop_text:
+        text = word_act(_STOP, Role.PARTICIPANT, rng, Wording(here=True), style=state.speech.style)
+        state.guidance = state.guidance.with_stop_text(text)
+    if _room_to_stop(state, view, left)[0] < -config.late_stop:
+        # there is only time for a shout
+        shouts = [word_act(_STOP, Role.PARTICIPANT, rng, Wording(), style=_SHOUTING) for _ in range(SHOUTS)]
+        shortest = min(*shouts, state.guidance.stop_text, key=speech_seconds)
+        state.guidance = state.guidance.with_stop_text(shortest)
+    if _is_time_to_stop(state, view, left):
+        if view.time - state.guidance.stopped_at > STOP_REPEAT and left > 0.0:
+            state.guidance = state.guidance.after_stopping(view.time)
+            state.say(Remark(act=_STOP, text=state.guidance.stop_text, urgent=True))
+        return True
+    if close and not state.guidance.announced and view.speed > config.slow_speed:
+        _announce_place(state, view, left)
+    return close
 
 
-def _time_to_stop(mind: ParticipantState, view: ParticipantView, left: float) -> bool:
+def _announce_place(state: ParticipantState, view: ParticipantView, left: float) -> None:
+    """Announces the place with its distance [m], or asks the car to slow down where the time is too short for that."""
+    goal, speed = state.errand.goal, max(view.speed, state.config.soon_speed)
+    if goal is None:
+        return
+    if left > 3.5 * speed + 20.0:
+        wording = Wording(distance=max(left - view.speed * 3.0, 10.0))
+        words = remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, goal.name, wording=wording, urgent=True)
+    elif left > 3.0 * speed + 12.0:
+        words = remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=Wording(faster=False), urgent=True)
+    else:
+        return
+    state.guidance = state.guidance.with_announced(True)
+    state.say(words)
+
+
+def about_to_arrive(state: ParticipantState, view: ParticipantView) -> bool:
+    """Whether only the end of the last stretch is left."""
+    progress = state.route.progress
+    if progress is None or progress.left(view.station) > state.config.arrival_distance:
+        return False
+    return progress.next_crossing(state.town, view.station) is None and progress.next_manoeuvre(view.station) is None
+
+
+def _is_time_to_stop(state: ParticipantState, view: ParticipantView, left: float) -> bool:
     """Whether the words, begun now, stop the car closer to the place than if begun at the next decision."""
-    if mind.announced and left > SLOW_WITHIN:
-        return False  # it is about to slow down
-    room, after = _room_to_stop(mind, view, left, mind.stop_text)
-    return room <= (TOO_SHORT if mind.misses else 0.0) or room < -after
+    if state.guidance.announced and left > state.config.slow_distance:
+        return False  # the car is about to slow down
+    room, after = _room_to_stop(state, view, left)
+    return room <= (state.config.short_stop if state.route.misses else 0.0) or room < -after
 
 
-def _room_to_stop(mind: ParticipantState, view: ParticipantView, left: float, text: str) -> tuple[float, float]:
-    """How far before the place the car stands if told so now, and at the next decision [m]; negative: behind it."""
-    delay = math.ceil(speech_seconds(text) / DECISION - 1e-6) * DECISION
-    gain = min(max((view.speed - mind.speed_before) / DECISION, -2.0), 2.0)
-    if gain > SETS_OFF:
-        gain = PULL
-    now, top = view.speed, max(FASTEST, view.speed)
-    soon = min(max(now + gain * DECISION, 0.0), top)
+def _room_to_stop(state: ParticipantState, view: ParticipantView, left: float) -> tuple[float, float]:
+    """Returns the distance before the place at which the car stops [m]: told now, and told at the next decision.
+
+    Negative distances lie behind the place. The words take effect when they are over; until then the present
+    acceleration is extrapolated.
+    """
+    interval, config = state.clock.interval, state.config
+    delay = math.ceil(speech_seconds(state.guidance.stop_text) / interval - 1e-6) * interval
+    gain = min(max((view.speed - state.motion.speed) / interval, GAIN_RANGE[0]), GAIN_RANGE[1])
+    if gain > config.start_pull:
+        gain = config.pull
+    now, top = view.speed, max(config.top_speed, view.speed)
+    soon = min(max(now + gain * interval, 0.0), top)
     rooms = []
-    for speed, ahead in ((now, left), (soon, left - (now + soon) / 2 * DECISION)):
+    for speed, ahead in ((now, left), (soon, left - (now + soon) / 2 * interval)):
         then = min(max(speed + gain * delay, 0.0), top)
         rooms.append(ahead - (speed + then) / 2 * delay - stopping_distance(then))
     return rooms[0], rooms[1]
 
 
-def _from_standing(mind: ParticipantState, view: ParticipantView, left: float) -> bool:
-    if mind.standing_since is None or left > 45.0:
+def _guide_standing(state: ParticipantState, view: ParticipantView, left: float) -> bool:
+    """Tells a standing car how to go on; returns whether it is close to the place."""
+    since, config = state.motion.standing_since, state.config
+    if since is None or left > STANDING_RANGE:
         return False
-    waited = view.time - max(mind.standing_since, mind.nudged_at, mind.voice.last_end, mind.heard_at)
-    if waited > 6.0 if abs(left) <= WITHIN or not mind.guiding else waited > READY:
-        mind.voice = mind.voice.plan(inch_on(mind, view))
+    waited = view.time - max(since, state.guidance.nudged_at, state.speech.last_end, state.conversation.heard_at)
+    patient = abs(left) <= config.arrived_within or not state.guidance.guiding
+    if waited > (PATIENT_TIME if patient else config.ready_time):
+        state.say(inch_on(state, view))
     return True
 
 
-def inch_on(mind: ParticipantState, view: ParticipantView) -> Remark:
-    """What to say to a car that stands a little before the place."""
-    assert mind.journey is not None
-    mind.nudged_at = view.time
-    left = mind.journey.left(view.station)
+def inch_on(state: ParticipantState, view: ParticipantView) -> Remark:
+    """Returns the instruction for a car that stands a little before the place."""
+    assert state.route.progress is not None
+    state.guidance = state.guidance.after_nudging(view.time)
+    left = state.route.progress.left(view.station)
     if left > 30.0:
-        mind.announced = False
-    wording = Wording(distance=max(left - SHORTER, 10.0)) if left > 9.0 else Wording(topic="further")
+        state.guidance = state.guidance.with_announced(False)
+    shortened = max(left - state.config.distance_reserve, 10.0)
+    wording = Wording(distance=shortened) if left > 9.0 else Wording(topic="further")
     return remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording=wording)

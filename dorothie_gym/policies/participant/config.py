@@ -1,4 +1,4 @@
-"""Traits of a scripted participant."""
+"""Tunable numbers and traits of the scripted participant."""
 
 from __future__ import annotations
 
@@ -6,25 +6,150 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dorothie_gym.policies.guidance_config import BAD_WEATHER_SPEED, USUAL_SPEED, GuidanceConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParticipantConfig(GuidanceConfig):
+    """Tunable numbers of the scripted participant, in addition to those of all guidance.
+
+    No publication gives these values. They were set by hand in self-play in the built-in towns; a reason stands where
+    there is one.
+
+    Attributes:
+        red_light_time: standstill after which a red light no longer explains it [s].
+        last_stretch: distance to the goal within which a standstill is not attributed to a light [m].
+        start_time: time that a car is given to start after a light has turned green [s].
+        wait_distance: distance to the goal within which the car is not halted for news about tasks [m].
+        thinking_time: duration of such a halt [s].
+        report_delay: range of the delay before the completion of a task is reported [s].
+        next_task_delay: pause before the next task where it does not follow at once [s].
+        goes_first: probability that a new task on the way is done before the present one.
+        tells_ahead: probability that the change of a later task is mentioned at once.
+        leaves_route: probability that the choice of the route is left to the car in words.
+        unanswered_after: silence after which the car is asked whether it has understood [s].
+        guides_at_once: probability that guidance to an unknown place begins right after its description.
+        tells_looks: probability that a place is also described by what stands there.
+        near_landmark: distance between a landmark and the goal within which it helps to describe the goal [m].
+        turn_late_distance: distance at which a turn is announced even if the car has not asked [m].
+        switch_time: time that the car is given for a lane change before the next instruction [s].
+        take_over_distance: distance to a described goal at which guidance begins [m].
+        corner_distance: distance to a junction within which a goal right behind it is easily missed [m].
+        behind_corner: distance from the junction to such a goal [m].
+        careful_speed: speed asked for where the goal is easily missed [km/h].
+        run_up: least distance from a U-turn to the goal [m].
+        run_up_per_lane: additional distance for each lane change in between [m].
+        lane_return_time: time after which a repeated lane change counts as a return to the lane [s].
+        most_u_turns: U-turns for one goal after which another route is used.
+        off_route: decisions off the route after which a new one is planned.
+        missed_within: distance to the goal below which leaving the route counts as a miss [m].
+        wrong_turn_detour: increase of the distance after which a wrong turn is pointed out [m].
+        lost_detour: increase over the least distance after which the car counts as lost [m].
+        lost_standstill: standstill after which guidance takes over [s].
+        top_speed: largest speed expected of the car [m/s].
+        slow_distance: distance to the goal within which an announced stop is timed [m].
+        slow_speed: speed below which slowing down is not asked for [m/s].
+        soon_speed: speed expected of a car that has just started or turned [m/s].
+        short_stop: distance before the goal at which the car is stopped after a miss [m].
+        start_pull: acceleration above which a car has just started [m/s^2].
+        pull: acceleration expected of such a car [m/s^2].
+        ready_time: standstill after which the car is told how to go on [s].
+        distance_reserve: distance by which spoken distances are shortened, because they are rounded to tens and the car
+            rolls on [m].
+        nudge_time: time for which a car told to go on a little is left alone [s].
+        late_stop: distance behind the goal beyond which the stop instruction is shortened [m].
+        arrival_distance: distance to the goal within which nothing else is talked about [m].
+        elsewhere_distance: distance to the goal beyond which a standing car is elsewhere [m].
+        explains_order: probability that the order of two tasks is told by naming the first one.
+        nods_first: probability that a remark begins with an acknowledgement of what was heard meanwhile.
+        just_said: time after an answer within which the same question needs no other one [s].
+        unsure: probability that a yes is preceded by hesitation.
+        checked_within: time within which a question refers to the last instruction [s].
+        repeat_memory: time within which a repetition by the car refers to the last utterance [s].
+        bad_weather_speed: speed asked for in fog or heavy rain [km/h].
+        usual_speed: speed asked for when the weather has cleared up [km/h].
+        weather_notice: time that the car is given to mention the weather first [s].
+        long_stop: standstill after which the reason may be asked for [s].
+        wonder_interval: least time between questions about unexpected behaviour [s].
+        asks_unseen: probability that a question about objects names one that may not be in sight.
+        excuse_time: time for which an explanation excuses a standstill [s].
+    """
+
+    red_light_time: float = 60.0
+    last_stretch: float = 45.0
+    start_time: float = 8.0
+    wait_distance: float = 80.0
+    thinking_time: float = 9.0
+    report_delay: tuple[float, float] = (0.5, 2.5)
+    next_task_delay: float = 9.0
+    goes_first: float = 0.6
+    tells_ahead: float = 0.8
+    leaves_route: float = 0.06
+    unanswered_after: float = 8.0
+    guides_at_once: float = 0.12
+    tells_looks: float = 0.5
+    near_landmark: float = 90.0
+    turn_late_distance: float = 60.0
+    switch_time: float = 13.0
+    take_over_distance: float = 130.0
+    corner_distance: float = 50.0
+    behind_corner: float = 55.0
+    careful_speed: float = 15.0
+    run_up: float = 45.0
+    run_up_per_lane: float = 50.0
+    lane_return_time: float = 30.0
+    most_u_turns: int = 3
+    off_route: int = 3
+    missed_within: float = 15.0
+    wrong_turn_detour: float = 60.0
+    lost_detour: float = 350.0
+    lost_standstill: float = 40.0
+    top_speed: float = 11.0
+    slow_distance: float = 20.0
+    slow_speed: float = 5.0
+    soon_speed: float = 8.0
+    short_stop: float = 4.0
+    start_pull: float = 0.6
+    pull: float = 3.0
+    ready_time: float = 1.6
+    distance_reserve: float = 8.0
+    nudge_time: float = 7.0
+    late_stop: float = 1.0
+    arrival_distance: float = 60.0
+    elsewhere_distance: float = 40.0
+    explains_order: float = 0.85
+    nods_first: float = 0.85
+    just_said: float = 5.0
+    unsure: float = 0.08
+    checked_within: float = 8.0
+    repeat_memory: float = 15.0
+    bad_weather_speed: float = float(BAD_WEATHER_SPEED)
+    usual_speed: float = float(USUAL_SPEED)
+    weather_notice: float = 3.0
+    long_stop: float = 8.0
+    wonder_interval: float = 25.0
+    asks_unseen: float = 0.4
+    excuse_time: float = 30.0
+
 
 @dataclass(frozen=True, kw_only=True)
 class ParticipantStyle:
-    """How a participant talks in a session.
+    """Traits of a participant in a session, drawn at its beginning.
 
     Attributes:
-        guides: chance that a place which the car may know is guided to turn by turn all the same.
-        names_goal: chance that the place is named when guiding.
-        names_street: chance that a street is added to a place or a turn.
-        hurries: chance that the next task follows in the same breath as the report of the last.
-        patience: standing time after which it asks why [s].
-        chat: seconds between remarks beside the matter, on average [s].
-        waits: chance that the way is told only when the car asks, or when it is nearly too late.
-        hints: chance that a step is not commanded, but said to be what one should do.
-        reasons: chance that a reason is given with a place, or a step.
-        aligns: chance that it makes sure to have been understood.
-        nods: chance that what the car explains is acknowledged.
-        curious: chance that it asks why the car does something unexpected.
-        puzzled: chance that it asks again what the car has said into its own words.
+        guides: probability of guidance to a place that the car may know.
+        names_goal: probability that the goal is named before guidance.
+        names_street: probability that a street is added to a place or a turn.
+        hurries: probability that the next task follows in the same breath as the report of the last.
+        patience: standstill after which the reason is asked for [s].
+        chat: mean time between remarks beside the task [s].
+        waits: probability that a turn is told only when the car asks, or shortly before the junction.
+        hints: probability that a step is phrased as an explanation instead of an instruction.
+        reasons: probability that a reason is given with a place or a step.
+        aligns: probability of a question whether an utterance was understood.
+        nods: probability that explanations of the car are acknowledged.
+        curious: probability of a question why the car does something unexpected.
+        puzzled: probability that words of the car said during an own utterance have to be repeated.
     """
 
     guides: float
@@ -43,7 +168,7 @@ class ParticipantStyle:
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> ParticipantStyle:
-        """A style by chance: two in five guide most of the way themselves."""
+        """Draws a style; two in five guide most of the way."""
         return cls(
             guides=0.2 if rng.random() < 0.4 else 0.02,
             names_goal=float(rng.uniform(0.4, 1.0)),

@@ -1,4 +1,4 @@
-"""Telling the way: turns, turning round, lanes, and stopping at the very place."""
+"""Turn-by-turn guidance: turns, U-turns, lane changes, and the return to the route."""
 
 from __future__ import annotations
 
@@ -10,325 +10,307 @@ import numpy as np
 from dorothie_gym.dialogue import Direction, Wording, speech_seconds, word_act
 from dorothie_gym.maps.routing import Entry
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, Slot, SlotValue, StreetName
+from dorothie_gym.policies.feasibility import slowing_distance
 from dorothie_gym.policies.observation_parser import street_of
-from dorothie_gym.policies.participant.arriving import NEAR, READY, SLOW_SPEED, WITHIN, about_to_arrive, approach
-from dorothie_gym.policies.participant.state import ParticipantState
+from dorothie_gym.policies.participant.arriving import about_to_arrive, approach
+from dorothie_gym.policies.participant.state import ParticipantState, StepKey
 from dorothie_gym.policies.participant.view import ParticipantView
-from dorothie_gym.policies.route_progress import (
-    BRAKING,
-    END_ROOM,
-    U_TURN_SPEED_SQUARED,
-    Choice,
-    RouteJunction,
-    find_exit,
-    next_choice,
-)
+from dorothie_gym.policies.route_progress import END_ROOM, Choice, RouteJunction, find_exit, next_choice
 from dorothie_gym.policies.speech import Remark, remark
 
-TELL_DISTANCE = 110.0
-"""A turn is told when it is this near [m]."""
+ANNOUNCING_TIME = 1.5
+"""Time that the car drives on while a U-turn is being announced [s]."""
 
-CLOSE_BY = 150.0
-"""A car that leaves the way with the place nearer than this, [m]"""
+U_TURN_WAIT = 4.0
+"""Standstill on the lane of a U-turn after which the U-turn is announced although it is not near [s]."""
 
-AROUND = 60.0
-"""and then is farther from it by more than this, has gone past it [m]."""
-
-TOO_LATE = 60.0
-"""A turn is told when it is this near, even if the car has not asked [m]."""
-
-AGAIN = 9.0
-"""What has not been done is told again after this time [s]."""
-
-SWITCHING = 13.0
-"""The car is given this long for a lane change before the next one is told [s]."""
-
-TAKES_OVER = 130.0
-"""A car that looks for a place by itself is guided from here on [m]."""
-
-CORNER, RIGHT_BEHIND = 50.0, 55.0
-"""At a junction nearer than the first, a place no further behind it than the second is easily missed [m]."""
-
-CAREFUL = 15.0
-"""Speed that the car is told to go at when it has missed a place before [km/h]."""
-
-RUN_UP, RUN_UP_FOR_LANE = 45.0, 50.0
-"""A place is to be so far behind a U-turn that leads to it, and so much farther for each lane change between [m]."""
-
-COMES_BACK = 30.0
-"""A car that is told again after this time to leave a lane has come back to it [s]."""
-
-CIRCLES = 3
-"""After having the car turned round so often for a place, the participant leads it there some other way."""
+WRONG_WAY_EXPIRES = 4.0
+"""Time within which a wrong turn is pointed out [s]."""
 
 
-def follow_journey(mind: ParticipantState, view: ParticipantView) -> None:
-    """Brings the way up to date, and plans anew where the car has left it."""
-    if mind.journey is None or view.turning:
+def follow_route(state: ParticipantState, view: ParticipantView) -> None:
+    """Updates the progress on the route, and plans another one where the car has left it."""
+    former = state.route.progress
+    if former is None or view.turning:
         return
-    before = mind.journey.left(view.station)
-    mind.journey = mind.journey.followed(mind.town, view.lane, view.station)
-    passed = view.standing and mind.journey.left(view.station) < -WITHIN
+    config = state.config
+    before = former.left(view.station)
+    former = former.followed(state.town, view.lane, view.station)
+    state.route = state.route.with_progress(former)
+    passed = view.standing and former.left(view.station) < -config.arrived_within
     if passed:
-        mind.guiding = True
-    if mind.journey.astray >= 3 or passed:
-        former = mind.journey
-        mind.journey = former.replanned(mind.town, view.place, mind.blocked + mind.avoided)
-        gone_past = before < CLOSE_BY and mind.journey.left(view.station) > before + AROUND
-        if mind.guiding and (before < 15.0 or gone_past):
-            mind.misses, mind.eased = mind.misses + 1, False
-            way_in = former.way_in()
-            if mind.misses > 1 and way_in is not None:
-                mind.avoided = (*mind.avoided, way_in)
-                mind.journey = former.replanned(mind.town, view.place, mind.blocked + mind.avoided)
-        mind.announced, mind.stop_text = False, ""
-        missed = mind.guiding and mind.guided is not None and mind.guided[0] == "turn"
-        if missed and mind.journey.left(view.station) > before + 60.0 and math.isfinite(before):
-            mind.voice = mind.voice.cleared().plan(
-                remark(DialogueMove.EXPLAIN, wording=Wording(topic="wrong_way"), expires=view.time + 4.0)
-            )
-    mind.best = min(mind.best, mind.journey.left(view.station))
+        state.set_guiding(True)
+    if former.astray >= config.off_route or passed:
+        state.route = state.route.replanned(state.town, view.place)
+        missed = before < config.missed_within or state.route.has_missed(before, view.station)
+        if state.guidance.guiding and missed:
+            state.guidance = state.guidance.after_miss()
+            state.route = state.route.after_miss(state.town, view.place, former)
+        state.guidance = state.guidance.for_another_approach()
+        _point_out_wrong_turn(state, view, before)
+    assert state.route.progress is not None
+    state.guidance = state.guidance.with_distance(state.route.progress.left(view.station))
 
 
-def watch(mind: ParticipantState, view: ParticipantView) -> None:
-    """Takes over a car that goes far out of its way or does not get on by itself."""
-    if mind.guiding or mind.journey is None or not mind.told:
+def _point_out_wrong_turn(state: ParticipantState, view: ParticipantView, before: float) -> None:
+    """Says so if the car has not taken the turn that it was told."""
+    guidance, progress = state.guidance, state.route.progress
+    assert progress is not None
+    told_turn = guidance.guiding and guidance.step is not None and guidance.step[0] == "turn"
+    farther = progress.left(view.station) > before + state.config.wrong_turn_detour and math.isfinite(before)
+    if told_turn and farther:
+        expires = view.time + WRONG_WAY_EXPIRES
+        state.say_only(remark(DialogueMove.EXPLAIN, wording=Wording(topic="wrong_way"), expires=expires))
+
+
+def watch(state: ParticipantState, view: ParticipantView) -> None:
+    """Begins to guide a car that goes far out of its way or stands for long."""
+    progress, config = state.route.progress, state.config
+    if state.guidance.guiding or progress is None or not state.errand.told:
         return
-    if mind.described and mind.journey.left(view.station) < TAKES_OVER:
-        mind.guiding = True
+    left = progress.left(view.station)
+    if state.errand.described and left < config.take_over_distance:
+        state.set_guiding(True)
         return
-    standing = 0.0 if mind.standing_since is None else view.time - mind.standing_since
-    lost = mind.journey.left(view.station) > mind.best + 350.0
+    lost = left > state.guidance.best + config.lost_detour
     if lost:
-        mind.voice = mind.voice.plan(remark(DialogueMove.EXPLAIN, wording=Wording(topic="wrong_way")))
-    if lost or (standing > 40.0 and view.time > mind.excused_until):
-        mind.guiding = True
+        state.say(remark(DialogueMove.EXPLAIN, wording=Wording(topic="wrong_way")))
+    stuck = state.motion.standstill(view.time) > config.lost_standstill and view.time > state.motion.excused_until
+    if lost or stuck:
+        state.set_guiding(True)
 
 
-def guide(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Says what is to be done next, if it is time to."""
-    if mind.journey is None or not mind.told or view.turning or mind.journey.astray:
+def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
+    """Gives the next step if it is due."""
+    progress, config = state.route.progress, state.config
+    if progress is None or not state.errand.told or view.turning or progress.astray:
         return
-    _stop_circling(mind, view)
-    if not _may_speak(mind, view):
+    _stop_circling(state, view)
+    if not _may_speak(state, view) or approach(state, view, rng) or not state.guidance.guiding:
         return
-    if approach(mind, view, rng) or not mind.guiding:
-        return
-    step = next_step(mind, view, DialogueMove.INSTRUCT, rng)
+    step = next_step(state, view, DialogueMove.INSTRUCT, rng)
     if step is None:
         return
     key, distance, words = step
-    if _ease(mind, view) or (key[0] == "round" and _takes_a_run_up(mind, view)):
+    if _ease(state, view) or (key[0] == "round" and _takes_run_up(state, view)):
         return
-    near = distance < (_turning_distance(mind, view) if key[0] == "round" else TELL_DISTANCE)
-    if _left_to_ask(mind, view, key, distance, words.wording.direction is Direction.STRAIGHT, rng):
+    near = distance < (_u_turn_distance(state, view) if key[0] == "round" else config.turn_distance)
+    if _is_left_to_ask(state, view, key, distance, words.wording.direction is Direction.STRAIGHT, rng):
         return
-    waited = view.time - max(mind.guided_at, mind.heard_at)
-    on_its_lane = key[0] == "round" and mind.journey.turns_round_on(view.lane)
-    if on_its_lane and mind.standing_since is not None and view.time - mind.standing_since > 4.0:
+    progress = state.route.progress
+    assert progress is not None
+    waited = view.time - max(state.guidance.step_at, state.conversation.heard_at)
+    on_its_lane = key[0] == "round" and progress.turns_round_on(view.lane)
+    if on_its_lane and state.motion.standstill(view.time) > U_TURN_WAIT:
         near = True
-    stuck = view.standing and waited > AGAIN and view.time > mind.excused_until
+    stuck = view.standing and waited > config.repeat_after and view.time > state.motion.excused_until
     if not near and stuck:
         key, words = ("on", view.lane, 0), remark(DialogueMove.INSTRUCT, ActionValue.START)
         near = True
-    overdue = stuck or (key[0] != "turn" and waited > AGAIN)
-    if key[0] == "lane" and (view.time - mind.guided_at < SWITCHING or view.time < mind.excused_until):
+    overdue = stuck or (key[0] != "turn" and waited > config.repeat_after)
+    switching = view.time - state.guidance.step_at < config.switch_time
+    if key[0] == "lane" and (switching or view.time < state.motion.excused_until):
         return
-    if near and (mind.guided != key or overdue):
-        again = mind.guided == key
-        if key[0] in ("turn", "lane") and not again and rng.random() < mind.style.hints:
+    again = state.guidance.step == key
+    if near and (not again or overdue):
+        if key[0] in ("turn", "lane") and not again and rng.random() < state.style.hints:
             words = replace(words, act=DialogueAct(DialogueMove.EXPLAIN, words.act.slots))
-        note_told(mind, view, key)
-        mind.voice = mind.voice.plan(*_rounded_off(mind, words, again, rng))
+        note_step(state, view, key)
+        state.say(*_rounded_off(state, words, again, rng))
 
 
-def _stop_circling(mind: ParticipantState, view: ParticipantView) -> None:
-    """Leads the car another way that it was turned round for, or told to change lanes on, again and again."""
-    assert mind.journey is not None
-    in_vain = sum(lane == view.lane for lane, _ in mind.changes) > 1
-    if mind.rounds < CIRCLES and not in_vain:
+def _stop_circling(state: ParticipantState, view: ParticipantView) -> None:
+    """Chooses another route after repeated U-turns for the target, or repeated lane changes on a lane."""
+    progress, guidance = state.route.progress, state.guidance
+    assert progress is not None
+    in_vain = sum(lane == view.lane for lane, _ in guidance.lane_changes) > 1
+    if guidance.u_turns < state.config.most_u_turns and not in_vain:
         return
-    way_in = (view.lane, mind.town.lanes[view.lane].length / 2) if in_vain else mind.journey.way_in()
-    mind.rounds, mind.changes = 0, tuple(told for told in mind.changes if told[0] != view.lane)
+    way_in = (view.lane, state.town.lanes[view.lane].length / 2) if in_vain else progress.way_in()
+    state.guidance = guidance.without_circling(view.lane)
     if way_in is not None:
-        mind.avoided = (*mind.avoided, way_in)
-        mind.journey = mind.journey.replanned(mind.town, view.place, mind.blocked + mind.avoided)
+        state.route = state.route.avoiding(state.town, view.place, way_in)
 
 
-def _may_speak(mind: ParticipantState, view: ParticipantView) -> bool:
-    """Whether it is free to say a step: close to the place there is no time for anything else."""
-    if mind.guiding and about_to_arrive(mind, view):
-        mind.voice = mind.voice.cleared()
-    return mind.voice.idle and view.speaking <= 0.0
+def _may_speak(state: ParticipantState, view: ParticipantView) -> bool:
+    """Whether a step may be said now; close to the place, other remarks are dropped."""
+    if state.guidance.guiding and about_to_arrive(state, view):
+        state.speech = state.speech.cleared()
+    return state.speech.idle and view.speaking <= 0.0
 
 
-def _rounded_off(mind: ParticipantState, words: Remark, again: bool, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """A step with what else is said in the same breath: a reason before it, or a question whether it was heard."""
+def _rounded_off(state: ParticipantState, words: Remark, again: bool, rng: np.random.Generator) -> tuple[Remark, ...]:
+    """Returns a step with what is said in the same breath: a hint, or a question whether it was understood."""
     draw = rng.random()
     if words.act.values(Slot.ACTION) == (ActionValue.U_TURN,):
-        # it is not to miss the moment: the shorter of what comes to mind
-        drawn = [word_act(words.act, Role.PARTICIPANT, rng, words.wording, style=mind.voice.style) for _ in range(2)]
+        # the moment must not be missed: the shorter of two wordings
+        drawn = [word_act(words.act, Role.PARTICIPANT, rng, words.wording, style=state.speech.style) for _ in range(2)]
         return (replace(words, text=min(drawn, key=speech_seconds)),)
     if again and rng.random() < 0.25:
         return words, remark(DialogueMove.ALIGN, joined=True)
-    if draw < mind.style.aligns:
+    if draw < state.style.aligns:
         return words, remark(DialogueMove.ALIGN, joined=True)
-    if draw < mind.style.aligns + 0.7 * mind.style.reasons:
+    if draw < state.style.aligns + 0.7 * state.style.reasons:
         return words, remark(DialogueMove.EXPLAIN, joined=True, wording=Wording(topic="hint"))
     return (words,)
 
 
-def _left_to_ask(
-    mind: ParticipantState,
+def _is_left_to_ask(
+    state: ParticipantState,
     view: ParticipantView,
-    key: tuple[str, int, int],
+    key: StepKey,
     distance: float,
     goes_straight: bool,
     rng: np.random.Generator,
 ) -> bool:
-    """Whether the way at a junction is kept back until the car asks; that it goes straight on need not be said."""
-    if key[0] != "turn" or mind.guided == key:
+    """Whether a turn is told only when the car asks; going straight on need not be told at all."""
+    if key[0] != "turn" or state.guidance.step == key:
         return False
-    standing = 0.0 if mind.standing_since is None else view.time - mind.standing_since
-    if mind.drawn_for != key:
-        mind.drawn_for, mind.left_to_ask = key, bool(rng.random() < mind.style.waits)
-    if not mind.left_to_ask or standing > AGAIN:
+    if state.guidance.considered != key:
+        state.guidance = state.guidance.with_consideration(key, bool(rng.random() < state.style.waits))
+    if not state.guidance.left_to_ask or state.motion.standstill(view.time) > state.config.repeat_after:
         return False
-    return distance > TOO_LATE or goes_straight
+    return distance > state.config.turn_late_distance or goes_straight
 
 
-def _ease(mind: ParticipantState, view: ParticipantView) -> bool:
-    """Has the car slow down for a place that is easily missed: one missed before, or one right behind a manoeuvre."""
-    assert mind.journey is not None
-    if mind.eased or mind.journey.left(view.station) > NEAR or view.speed < SLOW_SPEED:
+def _ease(state: ParticipantState, view: ParticipantView) -> bool:
+    """Tells the car to slow down for a place that was missed before, or is easily missed behind a manoeuvre."""
+    progress, config = state.route.progress, state.config
+    assert progress is not None
+    far = progress.left(view.station) > config.stop_distance
+    if state.guidance.eased or far or view.speed < config.slow_speed:
         return False
-    if not mind.misses and not _hidden_behind(mind, view):
+    if not state.route.misses and not _is_easily_missed(state, view):
         return False
-    mind.eased = True
-    wording = Wording(faster=False, speed=CAREFUL)
-    mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=wording))
+    state.guidance = state.guidance.after_easing()
+    wording = Wording(faster=False, speed=config.careful_speed)
+    state.say(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=wording))
     return True
 
 
-def _hidden_behind(mind: ParticipantState, view: ParticipantView) -> bool:
-    """Whether there is hardly time to stop the car between the next junction, or lane change, and the place."""
-    assert mind.journey is not None
-    left = mind.journey.left(view.station)
-    crossing = mind.journey.next_crossing(mind.town, view.station)
+def _is_easily_missed(state: ParticipantState, view: ParticipantView) -> bool:
+    """Whether there is hardly time to stop between the next junction, or lane change, and the place."""
+    progress, step, config = state.route.progress, state.guidance.step, state.config
+    assert progress is not None
+    left = progress.left(view.station)
+    crossing = progress.next_crossing(state.town, view.station)
     if crossing is None:
-        manoeuvre = mind.journey.next_manoeuvre(view.station)
+        manoeuvre = progress.next_manoeuvre(view.station)
         return manoeuvre is not None and manoeuvre[0] is not Entry.U_TURN
-    told = mind.guided is not None and mind.guided[0] == "turn"
-    return told and crossing.distance < CORNER and left - crossing.distance < RIGHT_BEHIND
+    told = step is not None and step[0] == "turn"
+    return told and crossing.distance < config.corner_distance and left - crossing.distance < config.behind_corner
 
 
-def _turning_distance(mind: ParticipantState, view: ParticipantView) -> float:
-    """How far ahead turning round is told, so that the car turns about where it is planned."""
-    assert mind.journey is not None
-    if not mind.journey.turns_round_on(view.lane):
-        return 1.5 * view.speed
-    # what the car drives while it is being told, and while it slows down
-    return 1.5 * view.speed + max(view.speed**2 - U_TURN_SPEED_SQUARED, 0.0) / (2 * BRAKING)
+def _u_turn_distance(state: ParticipantState, view: ParticipantView) -> float:
+    """Returns the distance at which a U-turn is announced [m]: driven during the announcement and while braking."""
+    assert state.route.progress is not None
+    announcing = ANNOUNCING_TIME * view.speed
+    if not state.route.progress.turns_round_on(view.lane):
+        return announcing
+    return announcing + slowing_distance(view.speed)
 
 
-def _takes_a_run_up(mind: ParticipantState, view: ParticipantView) -> bool:
-    """Whether to go on for now: a car that turned round here would be past the place before it could be stopped."""
-    assert mind.journey is not None
-    after = mind.journey.run_up()
-    crosses = mind.journey.next_crossing(mind.town, view.station) is not None
-    if after is None or crosses or not mind.journey.turns_round_on(view.lane):
+def _takes_run_up(state: ParticipantState, view: ParticipantView) -> bool:
+    """Whether to drive on for now, because a car that turned round here would pass the place before it could stop."""
+    progress, config = state.route.progress, state.config
+    assert progress is not None
+    after = progress.run_up()
+    crosses = progress.next_crossing(state.town, view.station) is not None
+    if after is None or crosses or not progress.turns_round_on(view.lane):
         return False
     rest, changes = after
-    room = mind.town.lanes[view.lane].length - view.station - _turning_distance(mind, view)
-    missing = RUN_UP + changes * RUN_UP_FOR_LANE - rest
-    if missing < 0.0 or room < END_ROOM + view.speed or not _turns_better(mind, view, min(missing, room - END_ROOM)):
+    room = state.town.lanes[view.lane].length - view.station - _u_turn_distance(state, view)
+    missing = config.run_up + changes * config.run_up_per_lane - rest
+    if missing < 0.0 or room < END_ROOM + view.speed or not _turns_better(state, view, min(missing, room - END_ROOM)):
         return False
-    if mind.journey.next_manoeuvre(view.station) == (Entry.U_TURN, 0.0):
-        mind.journey = mind.journey.replanned(mind.town, view.place, mind.blocked + mind.avoided)
-    _send_on(mind, view)
+    if progress.next_manoeuvre(view.station) == (Entry.U_TURN, 0.0):
+        state.route = state.route.replanned(state.town, view.place)
+    _send_on(state, view)
     return True
 
 
-def _turns_better(mind: ParticipantState, view: ParticipantView, farther: float) -> bool:
-    """Whether a car that drives on a bit [m] can turn round there, too, and has more road for it before the place."""
-    assert mind.journey is not None
-    later = mind.journey.replanned(mind.town, (view.lane, view.station + farther), mind.blocked + mind.avoided)
-    now, then = mind.journey.run_up(), later.run_up()
+def _turns_better(state: ParticipantState, view: ParticipantView, farther: float) -> bool:
+    """Whether a U-turn farther ahead [m] is possible, too, and leaves more road before the place."""
+    progress = state.route.progress
+    assert progress is not None
+    later = progress.replanned(state.town, (view.lane, view.station + farther), state.route.closed)
+    now, then = progress.run_up(), later.run_up()
     return now is not None and then is not None and later.turns_round_on(view.lane) and then[0] > now[0] + farther / 2
 
 
-def _send_on(mind: ParticipantState, view: ParticipantView) -> None:
-    """Has a car that stands drive on, to turn round later."""
-    waited = view.time - max(mind.guided_at, mind.heard_at, mind.voice.last_end)
-    if view.standing and waited > READY and view.time > mind.excused_until:
-        note_told(mind, view, ("on", view.lane, 0))
-        mind.voice = mind.voice.plan(remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW))
+def _send_on(state: ParticipantState, view: ParticipantView) -> None:
+    """Lets a standing car drive on, to turn round later."""
+    waited = view.time - max(state.guidance.step_at, state.conversation.heard_at, state.speech.last_end)
+    if view.standing and waited > state.config.ready_time and view.time > state.motion.excused_until:
+        note_step(state, view, ("on", view.lane, 0))
+        state.say(remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW))
 
 
-def note_told(mind: ParticipantState, view: ParticipantView, key: tuple[str, int, int]) -> None:
-    """Remembers what the car has been told to do."""
-    mind.repeats = mind.repeats + 1 if mind.guided == key else 0
-    mind.rounds += key[0] == "round"
-    if key[0] == "lane" and all(lane != key[1] or view.time - told > COMES_BACK for lane, told in mind.changes):
-        mind.changes = (*mind.changes, (key[1], view.time))
-    mind.guided, mind.guided_at = key, view.time
+def note_step(state: ParticipantState, view: ParticipantView, key: StepKey) -> None:
+    """Notes a step that the car is told."""
+    state.guidance = state.guidance.after_step(key, view.time, state.config.lane_return_time)
 
 
 def next_step(
-    mind: ParticipantState, view: ParticipantView, move: DialogueMove, rng: np.random.Generator
-) -> tuple[tuple[str, int, int], float, Remark] | None:
-    """What is to be done next: a key for it, how far ahead [m], and the words.
+    state: ParticipantState, view: ParticipantView, move: DialogueMove, rng: np.random.Generator
+) -> tuple[StepKey, float, Remark] | None:
+    """Returns the next step on the route: its identity, its distance [m], and the remark; None without a route.
 
     Args:
-        mind: of the participant.
-        view: what it sees.
+        state: working copy of the state.
+        view: observation.
         move: an instruction, an answer to an open question, or a clarification.
-        rng: for the words.
+        rng: random generator of the decision.
     """
-    journey = mind.journey
-    if journey is None:
+    progress = state.route.progress
+    if progress is None:
         return None
-    crossing = journey.next_crossing(mind.town, view.station)
-    manoeuvre = journey.next_manoeuvre(view.station)
+    crossing = progress.next_crossing(state.town, view.station)
+    manoeuvre = progress.next_manoeuvre(view.station)
     if manoeuvre is not None and manoeuvre[0] is Entry.U_TURN:
         if crossing is None or manoeuvre[1] < crossing.distance:
             return ("round", 0, 0), manoeuvre[1], remark(move, ActionValue.U_TURN)
     switch = manoeuvre is not None and (
         crossing is None
-        or (manoeuvre[1] < crossing.distance and journey.needs_switch(mind.town, view.lane, view.station, crossing))
+        or (manoeuvre[1] < crossing.distance and progress.needs_switch(state.town, view.lane, view.station, crossing))
     )
     if crossing is not None and not switch:
         key = ("turn", crossing.lane, crossing.exit.connector)
-        return key, crossing.distance, _turn(mind, view, move, crossing, rng)
+        return key, crossing.distance, _turn_remark(state, view, move, crossing, rng)
     if manoeuvre is not None:
         left = manoeuvre[0] is Entry.CHANGE_LEFT
         wording = Wording(direction=Direction.LEFT if left else Direction.RIGHT)
         return ("lane", view.lane, int(left)), manoeuvre[1], remark(move, ActionValue.LANE_SWITCH, wording=wording)
-    return ("on", view.lane, 0), journey.left(view.station), remark(move, ActionValue.LANE_FOLLOW)
+    return ("on", view.lane, 0), progress.left(view.station), remark(move, ActionValue.LANE_FOLLOW)
 
 
-def _turn(
-    mind: ParticipantState, view: ParticipantView, move: DialogueMove, crossing: RouteJunction, rng: np.random.Generator
+def _turn_remark(
+    state: ParticipantState,
+    view: ParticipantView,
+    move: DialogueMove,
+    crossing: RouteJunction,
+    rng: np.random.Generator,
 ) -> Remark:
     direction = crossing.direction
     action = ActionValue.J_TURN
     if direction is Direction.STRAIGHT and (move is not DialogueMove.INSTRUCT or rng.random() < 0.6):
         action = ActionValue.LANE_FOLLOW
     values: list[SlotValue] = [action]
-    street = street_of(view.raw, mind.town, crossing.exit.lane)
+    street = street_of(view.raw, state.town, crossing.exit.lane)
     helps = street is not StreetName.UNKNOWN and direction is not Direction.STRAIGHT
-    if helps and (_ambiguous(mind, view, crossing) or rng.random() < mind.style.names_street * 0.6):
+    if helps and (_is_ambiguous(state, view, crossing) or rng.random() < state.style.names_street * 0.6):
         values.append(street)
     first = crossing.distance < 60.0 or rng.random() < 0.5
     ordinal = 1 if first and len(values) == 1 and action is ActionValue.J_TURN and rng.random() < 0.5 else None
     return remark(move, *values, wording=Wording(direction=direction, ordinal=ordinal))
 
 
-def _ambiguous(mind: ParticipantState, view: ParticipantView, crossing: RouteJunction) -> bool:
+def _is_ambiguous(state: ParticipantState, view: ParticipantView, crossing: RouteJunction) -> bool:
     """Whether the direction alone means another exit."""
-    choice = next_choice(mind.town, view.lane, view.station)
+    choice = next_choice(state.town, view.lane, view.station)
     own = choice is not None and choice.lane == crossing.lane
-    asked = choice if own else Choice(lane=crossing.lane, distance=0.0, exits=mind.town.exits(crossing.lane))
+    asked = choice if own else Choice(lane=crossing.lane, distance=0.0, exits=state.town.exits(crossing.lane))
     assert asked is not None
-    meant = find_exit(mind.town, asked, crossing.direction)
-    return meant is not None and mind.town.lanes[meant.lane].road_id != mind.town.lanes[crossing.exit.lane].road_id
+    meant = find_exit(state.town, asked, crossing.direction)
+    lanes = state.town.lanes
+    return meant is not None and lanes[meant.lane].road_id != lanes[crossing.exit.lane].road_id

@@ -1,4 +1,4 @@
-"""What the participant makes of the car's words."""
+"""Replies of the participant to the utterances of the car."""
 
 from __future__ import annotations
 
@@ -21,102 +21,90 @@ from dorothie_gym.ontology import (
     SlotValue,
 )
 from dorothie_gym.policies.observation_parser import SeenSubgoal
-from dorothie_gym.policies.participant.arriving import NEAR, about_to_arrive, inch_on
+from dorothie_gym.policies.participant.arriving import about_to_arrive, inch_on
 from dorothie_gym.policies.participant.goals import announcement, describe, reason_topic, route_length, switch_target
-from dorothie_gym.policies.participant.guidance import next_step, note_told
+from dorothie_gym.policies.participant.guidance import next_step, note_step
 from dorothie_gym.policies.participant.reactions import note_blocked
-from dorothie_gym.policies.participant.repairs import misunderstood, not_caught
+from dorothie_gym.policies.participant.repairs import correction, has_missed
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.route_progress import first_new_street
 from dorothie_gym.policies.speech import LONGEST_BREATH, Remark, remark
 from dorothie_gym.policies.utterance_input import heard_utterance
 
-ELSEWHERE = 40.0
-"""A car that stands farther than this from the target has not come to it [m]."""
-
-SAYS_IT_ALL = 0.85
-"""Chance that the order of two tasks is told by naming the first one as well."""
-
-NODS_FIRST = 0.85
-"""Chance that something that is about to be said begins with a word for what the car has said meanwhile."""
-
-JUST_TOLD = 5.0
-"""A question that was put while the answer was being given needs no other one [s]."""
-
-UNSURE = 0.08
-"""Chance that a yes does not come at once."""
-
-ASKED_BACK = 8.0
-"""What the car asks back about it has been told no longer ago than this [s]."""
-
 _FREE = frozenset({ActionValue.LIGHT_CHANGE, ActionValue.SPEED_CHANGE, ActionValue.START})
-"""What the car may do as it likes."""
+"""Actions that are left to the car."""
 
 _WAYS = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH})
-"""Actions that lead somewhere else."""
+"""Actions that determine the way."""
 
-_UPTAKES = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
+_ACKNOWLEDGEMENTS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 
 _AFTER_A_NOD = frozenset({DialogueMove.EXPLAIN, DialogueMove.INSTRUCT})
+"""Moves that may follow an acknowledgement in the same breath."""
 
 _AHEAD = frozenset({ActionValue.LANE_FOLLOW, ActionValue.J_TURN})
 
 
-def listen(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Takes in what the car has said since the last decision, and prepares answers."""
+def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
+    """Takes in what the car has said since the last decision, and queues replies."""
     heard = heard_utterance(view.raw, Role.CO_WIZARD)
     if heard is None:
         return
-    mind.heard_at = view.time
-    mind.voice = mind.voice.heard_other(view.time, heard.acts)
-    if heard.acts and not_caught(mind, view, heard, rng):
+    state.conversation = state.conversation.after_hearing(view.time, heard.acts)
+    if heard.acts and has_missed(state, view, heard, rng):
         return
-    if mind.puzzled_by is not None:
+    puzzled_by = state.conversation.puzzled_by
+    if puzzled_by is not None:
         made_clear = any(act.move is DialogueMove.CLARIFY for act in heard.acts)
-        heard, mind.puzzled_by = (mind.puzzled_by if made_clear else heard), None
+        heard = puzzled_by if made_clear else heard
+        state.conversation = state.conversation.with_puzzle(None)
     asked = any(act.move is DialogueMove.QUERY_W for act in heard.acts)
-    before = mind.voice
+    before = state.speech
     for act in heard.acts:
         answer = _ANSWERS.get(act.move)
         if asked and GoalStatus.UNKNOWN in act.slots:
-            continue  # the question that follows is what is answered
+            continue  # the question that follows is answered instead
         if answer is not None:
-            answer(mind, view, act, heard.words, rng)
-    if mind.voice is before and any(act.move is DialogueMove.EXPLAIN for act in heard.acts):
-        _nod(mind, view, rng, alone=heard.acts[0].move not in _UPTAKES)  # what takes up an instruction needs no nod
+            answer(state, view, act, heard.words, rng)
+    if state.speech is before and any(act.move is DialogueMove.EXPLAIN for act in heard.acts):
+        # an utterance that takes up an instruction needs no acknowledgement of its own
+        _nod(state, view, rng, alone=heard.acts[0].move not in _ACKNOWLEDGEMENTS)
+
+
+# --- questions that want a yes or no --------------------------------------------------------------------------------
 
 
 def _check(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     landmarks, streets = act.values(Slot.LANDMARK), act.values(Slot.STREET)
-    if mind.goal is not None and landmarks:
-        right = landmarks == (mind.goal.name,) and streets in ((), (mind.goal.street,))
+    goal = state.errand.goal
+    if goal is not None and landmarks:
+        right = landmarks == (goal.name,) and streets in ((), (goal.street,))
         if not right:
-            mind.voice = mind.voice.plan_first(
-                remark(DialogueMove.REPLY_N),
-                remark(DialogueMove.INSTRUCT, mind.goal.name, mind.goal.street, joined=True),
-            )
+            again = remark(DialogueMove.INSTRUCT, goal.name, goal.street, joined=True)
+            state.say_first(remark(DialogueMove.REPLY_N), again)
             return
-    elif act.values(Slot.ACTION) and not _fits(mind, view, act, words, rng):
-        _refuse_with_step(mind, view, rng)
+    elif act.values(Slot.ACTION) and not _fits(state, view, act, words, rng):
+        _refuse_with_step(state, view, rng)
         return
     if landmarks:
-        mind.guiding = False  # it knows the place
-    mind.voice = mind.voice.plan_first(remark(DialogueMove.CONFIRM), *_more(mind, rng))
+        state.set_guiding(False)  # the car knows the place
+    state.say_first(remark(DialogueMove.CONFIRM), *_addition(state, rng))
 
 
 def _fits(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> bool:
-    """Whether an action that the car names is what is to be done next, or what it has just been told to do."""
-    step = next_step(mind, view, DialogueMove.INSTRUCT, rng)
+    """Whether an action named by the car is the next step, or what the car has just been told to do."""
+    step = next_step(state, view, DialogueMove.INSTRUCT, rng)
     actions = set(act.values(Slot.ACTION))
     if step is None or actions & _FREE:
         return True
-    told = next((item for item in reversed(mind.voice.said) if item.act.values(Slot.ACTION)), None)
-    if told is not None and mind.voice.has_just_spoken(view.time, ASKED_BACK) and actions & set(told.act.slots):
+    told = next((item for item in reversed(state.speech.said) if item.act.values(Slot.ACTION)), None)
+    lately = state.speech.has_just_spoken(view.time, state.config.checked_within)
+    if told is not None and lately and actions & set(told.act.slots):
         return told.wording.direction in (None, words.direction)
     meant, wanted = set(step[2].act.values(Slot.ACTION)), step[2].wording.direction
     if wanted is Direction.STRAIGHT:
@@ -124,60 +112,63 @@ def _fits(
     return bool(actions & meant) and (wanted is None or words.direction is wanted)
 
 
-def _more(mind: ParticipantState, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """What is added to a yes now and then."""
-    if rng.random() >= mind.style.reasons:
+def _addition(state: ParticipantState, rng: np.random.Generator) -> tuple[Remark, ...]:
+    """Returns a hint or reason to add to an answer, or nothing, by chance."""
+    if rng.random() >= state.style.reasons:
         return ()
-    topic = "hint" if mind.guiding or rng.random() < 0.5 else reason_topic(mind)
+    topic = "hint" if state.guidance.guiding or rng.random() < 0.5 else reason_topic(state)
     return (remark(DialogueMove.EXPLAIN, joined=True, wording=Wording(topic=topic)),)
 
 
-def _refuse_with_step(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    step = next_step(mind, view, DialogueMove.INSTRUCT, rng)
+def _refuse_with_step(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
+    """Says no, and names the right step unless a stop is being told anyway."""
+    step = next_step(state, view, DialogueMove.INSTRUCT, rng)
     refusal = remark(DialogueMove.REPLY_N)
-    if step is None or view.time - mind.stopped_at < JUST_TOLD or (step[0][0] == "on" and step[1] < NEAR):
-        # it is to stop here, or right ahead, and is told so
-        mind.voice = mind.voice.plan_first(refusal)
+    just_stopped = view.time - state.guidance.stopped_at < state.config.just_said
+    if step is None or just_stopped or (step[0][0] == "on" and step[1] < state.config.stop_distance):
+        state.say_first(refusal)
         return
     key, _, words = step
-    note_told(mind, view, key)
-    mind.voice = mind.voice.plan_first(refusal, replace(words, joined=True))
+    note_step(state, view, key)
+    state.say_first(refusal, replace(words, joined=True))
 
 
 def _yes_or_no(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     objects, landmarks = act.values(Slot.OBJECT), act.values(Slot.LANDMARK)
-    offered = _offered(mind, view, landmarks)
+    offered = _offered_subgoal(state, view, landmarks)
     if offered is not None:
-        _judge_offer(mind, view, offered)
+        _answer_offer(state, view, offered)
     elif act.values(Slot.STREET) and not landmarks and not act.values(Slot.ACTION):
-        _judge_street(mind, view, act)
+        _answer_street(state, view, act)
     elif objects:
         seen = any(thing.kind in objects for thing in view.objects)
-        mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y if seen else DialogueMove.REPLY_N))
-    elif landmarks and mind.goal is not None:
-        if mind.goal.name in landmarks and _elsewhere(mind, view):
-            _not_here(mind, view)
-        elif mind.goal.name in landmarks:
-            mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y))
+        state.say_first(remark(DialogueMove.REPLY_Y if seen else DialogueMove.REPLY_N))
+    elif landmarks and state.errand.goal is not None:
+        if state.errand.goal.name in landmarks and _is_elsewhere(state, view):
+            _deny_arrival(state)
+        elif state.errand.goal.name in landmarks:
+            state.say_first(remark(DialogueMove.REPLY_Y))
         else:
-            again = announcement(mind, view, rng)
-            mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_N), replace(again, joined=True))
+            again = announcement(state, view, rng)
+            state.say_first(remark(DialogueMove.REPLY_N), replace(again, joined=True))
     elif set(act.values(Slot.ACTION)) & _WAYS:
-        mind.guiding = True
-        _judge_proposal(mind, view, act, words, rng)
-    elif not act.slots and _just_short(mind, view):
-        mind.voice = mind.voice.cleared().plan(remark(DialogueMove.REPLY_N), replace(inch_on(mind, view), joined=True))
-    elif rng.random() < UNSURE:
-        mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_U), remark(DialogueMove.REPLY_Y))
+        state.set_guiding(True)
+        _answer_proposal(state, view, act, words, rng)
+    elif not act.slots and _is_just_short(state, view):
+        state.say_only(remark(DialogueMove.REPLY_N), replace(inch_on(state, view), joined=True))
+    elif rng.random() < state.config.unsure:
+        state.say_first(remark(DialogueMove.REPLY_U), remark(DialogueMove.REPLY_Y))
     else:
-        mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y), *_more(mind, rng))
+        state.say_first(remark(DialogueMove.REPLY_Y), *_addition(state, rng))
 
 
-def _offered(mind: ParticipantState, view: ParticipantView, landmarks: tuple[SlotValue, ...]) -> SeenSubgoal | None:
-    """The task, other than the one under way, that the car proposes to do first."""
-    if mind.goal is None or mind.goal.name in landmarks:
+def _offered_subgoal(
+    state: ParticipantState, view: ParticipantView, landmarks: tuple[SlotValue, ...]
+) -> SeenSubgoal | None:
+    """Returns the subgoal, other than the target, that the car proposes to do first."""
+    if state.errand.goal is None or state.errand.goal.name in landmarks:
         return None
     for subgoal in view.subgoals:
         landmark = view.landmark(subgoal.landmark)
@@ -186,204 +177,218 @@ def _offered(mind: ParticipantState, view: ParticipantView, landmarks: tuple[Slo
     return None
 
 
-def _judge_offer(mind: ParticipantState, view: ParticipantView, offered: SeenSubgoal) -> None:
-    """Lets the car go to the place that it proposes if that is nearer, else insists on the one under way."""
-    assert mind.goal is not None
+def _answer_offer(state: ParticipantState, view: ParticipantView, offered: SeenSubgoal) -> None:
+    """Accepts a subgoal that is nearer than the target, and insists on the target otherwise."""
+    goal, progress = state.errand.goal, state.route.progress
+    assert goal is not None
     landmark = view.landmark(offered.landmark)
-    left = mind.journey.left(view.station) if mind.journey is not None else math.inf
-    if landmark is not None and route_length(mind, view, landmark) < left:
-        switch_target(mind, view, offered, landmark)
-        mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y))
+    left = progress.left(view.station) if progress is not None else math.inf
+    if landmark is not None and route_length(state, view, landmark) < left:
+        switch_target(state, view, offered, landmark)
+        state.say_first(remark(DialogueMove.REPLY_Y))
         return
-    first = remark(DialogueMove.INSTRUCT, mind.goal.name, wording=Wording(topic="first"), joined=True)
-    mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_N), first)
+    first = remark(DialogueMove.INSTRUCT, goal.name, wording=Wording(topic="first"), joined=True)
+    state.say_first(remark(DialogueMove.REPLY_N), first)
 
 
-def _judge_street(mind: ParticipantState, view: ParticipantView, act: DialogueAct) -> None:
-    """Agrees to a way round that is the participant's own, or insists on that."""
-    own = first_new_street(view.raw, mind.town, view.lane, mind.journey)
+def _answer_street(state: ParticipantState, view: ParticipantView, act: DialogueAct) -> None:
+    """Accepts a detour that is the participant's own, and insists on the own one otherwise."""
+    own = first_new_street(view.raw, state.town, view.lane, state.route.progress)
     if own is None or own in act.values(Slot.STREET):
-        mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_Y))
+        state.say_first(remark(DialogueMove.REPLY_Y))
         return
     instead = remark(DialogueMove.INSTRUCT, own, wording=Wording(topic="detour"), joined=True)
-    mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_N), instead)
+    state.say_first(remark(DialogueMove.REPLY_N), instead)
 
 
-def _judge_proposal(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+def _answer_proposal(
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Says yes to the right way, and no with the right one to another."""
-    if not _fits(mind, view, act, words, rng):
-        _refuse_with_step(mind, view, rng)
+    """Accepts the right way, and names it otherwise."""
+    if not _fits(state, view, act, words, rng):
+        _refuse_with_step(state, view, rng)
         return
-    step = next_step(mind, view, DialogueMove.INSTRUCT, rng)
+    step = next_step(state, view, DialogueMove.INSTRUCT, rng)
     if step is not None:
-        note_told(mind, view, step[0])
-    first = (remark(DialogueMove.REPLY_U),) if rng.random() < UNSURE else ()
-    mind.voice = mind.voice.plan_first(*first, remark(DialogueMove.REPLY_Y), *_more(mind, rng))
+        note_step(state, view, step[0])
+    first = (remark(DialogueMove.REPLY_U),) if rng.random() < state.config.unsure else ()
+    state.say_first(*first, remark(DialogueMove.REPLY_Y), *_addition(state, rng))
+
+
+# --- open questions -------------------------------------------------------------------------------------------------
 
 
 def _open_question(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     landmarks, actions = act.values(Slot.LANDMARK), act.values(Slot.ACTION)
-    if mind.goal is None:
-        mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_U))
+    if state.errand.goal is None:
+        state.say_first(remark(DialogueMove.REPLY_U))
     elif words.order is not None and landmarks:
-        _say_order(mind, rng)
-    elif _put_right(mind, view, act, words):
+        _name_order(state, rng)
+    elif _correct(state, view, act, words):
         return
     elif GoalStatus.QUERIED in act.values(Slot.STATUS):
-        _say_target(mind, view, rng)
-    elif landmarks == (LandmarkName.QUERIED,) and (view.time - mind.told_at < JUST_TOLD or _just_named(mind, view)):
-        return
+        _name_target(state, view, rng)
     elif landmarks == (LandmarkName.QUERIED,):
-        _say_target(mind, view, rng, *_more(mind, rng))
-    elif actions and _just_named(mind, view):
-        return
+        told_lately = view.time - state.errand.told_at < state.config.just_said
+        if not told_lately and not _was_just_named(state, view):
+            _name_target(state, view, rng, *_addition(state, rng))
     elif actions:
-        mind.guiding = True
-        _say_way(mind, view, DialogueMove.REPLY_W, rng)
+        if not _was_just_named(state, view):
+            state.set_guiding(True)
+            _name_step(state, view, DialogueMove.REPLY_W, rng)
     else:
-        describe(mind, view, DialogueMove.REPLY_W, rng)
+        describe(state, view, DialogueMove.REPLY_W, rng)
 
 
-def _say_target(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator, *more: Remark) -> None:
-    """To "where to?": the place that comes next."""
-    mind.told, mind.told_at = True, view.time
-    named = [value for value in announcement(mind, view, rng).act.slots if value.slot in (Slot.LANDMARK, Slot.STREET)]
+def _name_target(state: ParticipantState, view: ParticipantView, rng: np.random.Generator, *more: Remark) -> None:
+    """Answers the question where to go."""
+    state.errand = state.errand.after_telling(view.time)
+    named = [value for value in announcement(state, view, rng).act.slots if value.slot in (Slot.LANDMARK, Slot.STREET)]
     answer = remark(DialogueMove.REPLY_W, *named, wording=Wording(topic="goal"))
-    mind.voice = mind.voice.cleared().plan(answer, *more)
+    state.say_only(answer, *more)
 
 
-def _say_order(mind: ParticipantState, rng: np.random.Generator) -> None:
-    """To "before or after?": what is under way is finished first."""
-    assert mind.goal is not None
-    mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_W, wording=Wording(topic="after")))
-    if rng.random() < SAYS_IT_ALL:
-        first = remark(DialogueMove.INSTRUCT, mind.goal.name, wording=Wording(topic="first"), joined=True)
-        mind.voice = replace(mind.voice, queue=(mind.voice.queue[0], first, *mind.voice.queue[1:]))
+def _name_order(state: ParticipantState, rng: np.random.Generator) -> None:
+    """Answers the question about the order of two tasks: the target is finished first."""
+    goal = state.errand.goal
+    assert goal is not None
+    state.say_first(remark(DialogueMove.REPLY_W, wording=Wording(topic="after")))
+    if rng.random() < state.config.explains_order:
+        first = remark(DialogueMove.INSTRUCT, goal.name, wording=Wording(topic="first"), joined=True)
+        state.speech = state.speech.with_second(first)
 
 
-def _just_named(mind: ParticipantState, view: ParticipantView) -> bool:
-    """Whether the car has been told of the place a moment ago and cannot have taken it up yet."""
-    if mind.goal is None or not mind.voice.has_just_spoken(view.time, JUST_TOLD):
+def _was_just_named(state: ParticipantState, view: ParticipantView) -> bool:
+    """Whether the place was named a moment ago, so that the car cannot have taken it up yet."""
+    goal = state.errand.goal
+    if goal is None or not state.speech.has_just_spoken(view.time, state.config.just_said):
         return False
-    return any(mind.goal.name in item.act.values(Slot.LANDMARK) for item in mind.voice.said[-LONGEST_BREATH:])
+    return any(goal.name in item.act.values(Slot.LANDMARK) for item in state.speech.said[-LONGEST_BREATH:])
 
 
-def _say_way(mind: ParticipantState, view: ParticipantView, move: DialogueMove, rng: np.random.Generator) -> None:
-    step = next_step(mind, view, move, rng)
+def _name_step(state: ParticipantState, view: ParticipantView, move: DialogueMove, rng: np.random.Generator) -> None:
+    """Tells the next step, unless a stop or an answer is being told anyway."""
+    step = next_step(state, view, move, rng)
     if step is None:
         return
     key, distance, words = step
-    if key[0] == "on" and distance < NEAR:
-        return  # the place is right ahead: that is what is to be said now
-    if move is DialogueMove.REPLY_W and mind.guided == key and view.time - mind.guided_at < JUST_TOLD:
-        return  # it was asked while the answer was being given
-    note_told(mind, view, key)
-    more = _more(mind, rng) if move is DialogueMove.REPLY_W else ()
-    mind.voice = mind.voice.cleared().plan(words, *more)
+    if key[0] == "on" and distance < state.config.stop_distance:
+        return  # the stop at the place is told next
+    answers = move is DialogueMove.REPLY_W
+    if answers and state.guidance.step == key and view.time - state.guidance.step_at < state.config.just_said:
+        return  # the question was asked during the answer
+    note_step(state, view, key)
+    state.say_only(words, *(_addition(state, rng) if answers else ()))
 
 
-def _elsewhere(mind: ParticipantState, view: ParticipantView) -> bool:
+# --- other moves ----------------------------------------------------------------------------------------------------
+
+
+def _is_elsewhere(state: ParticipantState, view: ParticipantView) -> bool:
     """Whether the car stands, and not at the target."""
-    return view.standing and mind.journey is not None and mind.journey.left(view.station) > ELSEWHERE
+    progress = state.route.progress
+    far = progress is not None and progress.left(view.station) > state.config.elsewhere_distance
+    return view.standing and far
 
 
-def _just_short(mind: ParticipantState, view: ParticipantView) -> bool:
-    """Whether the car stands just before the target, to which it is guided."""
-    near = mind.guiding and view.standing and mind.journey is not None and about_to_arrive(mind, view)
-    return near and mind.journey is not None and mind.journey.left(view.station) > 0.0
+def _is_just_short(state: ParticipantState, view: ParticipantView) -> bool:
+    """Whether the car stands just before the target that it is guided to."""
+    progress = state.route.progress
+    if not state.guidance.guiding or not view.standing or progress is None:
+        return False
+    return about_to_arrive(state, view) and progress.left(view.station) > 0.0
 
 
-def _not_here(mind: ParticipantState, view: ParticipantView) -> None:
-    """The car takes another place for the target."""
-    assert mind.goal is not None
-    mind.guiding = True
-    mind.voice = mind.voice.plan_first(remark(DialogueMove.REPLY_N, mind.goal.name))
+def _deny_arrival(state: ParticipantState) -> None:
+    """Tells the car that it has mistaken another place for the target."""
+    assert state.errand.goal is not None
+    state.set_guiding(True)
+    state.say_first(remark(DialogueMove.REPLY_N, state.errand.goal.name))
 
 
 def _explanation(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     landmarks, statuses = act.values(Slot.LANDMARK), act.values(Slot.STATUS)
-    if _put_right(mind, view, act, words):
+    if _correct(state, view, act, words):
         return
-    if GoalStatus.UNKNOWN in statuses and mind.goal is not None and mind.goal.name in landmarks:
-        describe(mind, view, DialogueMove.EXPLAIN, rng)
+    names_goal = state.errand.goal is not None and state.errand.goal.name in landmarks
+    if GoalStatus.UNKNOWN in statuses and names_goal:
+        describe(state, view, DialogueMove.EXPLAIN, rng)
         return
-    if mind.goal is not None and mind.goal.name in landmarks and not statuses and _elsewhere(mind, view):
-        _not_here(mind, view)
+    if names_goal and not statuses and _is_elsewhere(state, view):
+        _deny_arrival(state)
         return
     if act.values(Slot.OBJECT):
-        mind.excused_until = view.time + 30.0
+        state.motion = state.motion.excused(view.time + state.config.excuse_time)
         if ObjectClass.STATIC in act.values(Slot.OBJECT):
-            note_blocked(mind, view, near=True)
+            note_blocked(state, view, near=True)
 
 
-def _nod(mind: ParticipantState, view: ParticipantView, rng: np.random.Generator, *, alone: bool) -> None:
-    """Shows that it has heard: before what it says anyway, else now and then `alone`, in a word of its own."""
-    waiting = mind.voice.queue
+def _nod(state: ParticipantState, view: ParticipantView, rng: np.random.Generator, *, alone: bool) -> None:
+    """Acknowledges an explanation: before the next remark, or, where `alone` allows it, by itself."""
+    waiting = state.speech.queue
     if waiting and not waiting[0].urgent and not waiting[0].text:
         done = GoalStatus.COMPLETE in waiting[0].act.slots
-        if waiting[0].act.move in _AFTER_A_NOD and not done and rng.random() < NODS_FIRST:
-            first = replace(waiting[0], joined=True)
-            mind.voice = replace(mind.voice, queue=(remark(DialogueMove.ACKNOWLEDGE), first, *waiting[1:]))
-    elif not alone or not mind.voice.idle or (mind.guiding and about_to_arrive(mind, view)):
+        if waiting[0].act.move in _AFTER_A_NOD and not done and rng.random() < state.config.nods_first:
+            state.speech = state.speech.led_by(remark(DialogueMove.ACKNOWLEDGE))
+    elif not alone or not state.speech.idle or (state.guidance.guiding and about_to_arrive(state, view)):
         return
-    elif rng.random() < mind.style.nods:
-        mind.voice = mind.voice.plan(remark(DialogueMove.ACKNOWLEDGE), *_more(mind, rng))
+    elif rng.random() < state.style.nods:
+        state.say(remark(DialogueMove.ACKNOWLEDGE), *_addition(state, rng))
 
 
-def _put_right(mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText) -> bool:
-    """Says again what the car has taken for something else; tells whether it had to."""
-    again = misunderstood(mind, view, act, words)
+def _correct(state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText) -> bool:
+    """Corrects a misunderstanding of the car; returns whether there was one."""
+    again = correction(state, view, act, words)
     if again is None:
         return False
-    mind.told_at = view.time
+    state.errand = state.errand.after_reminding(view.time)
     refusal = (remark(DialogueMove.REPLY_N),) if act.move is DialogueMove.CONFIRM else ()
-    mind.voice = mind.voice.cleared().plan(*refusal, replace(again, joined=bool(refusal)))
+    state.say_only(*refusal, replace(again, joined=bool(refusal)))
     return True
 
 
 def _confusion(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    last = mind.voice.last
-    if mind.guiding and mind.guided is not None:
-        _say_way(mind, view, DialogueMove.CLARIFY, rng)
-    elif mind.goal is not None and mind.told:
-        mind.voice = mind.voice.plan_first(remark(DialogueMove.CLARIFY, mind.goal.name))
+    """Clarifies the last step, the target, or the last remark."""
+    last, goal = state.speech.last, state.errand.goal
+    if state.guidance.guiding and state.guidance.step is not None:
+        _name_step(state, view, DialogueMove.CLARIFY, rng)
+    elif goal is not None and state.errand.told:
+        state.say_first(remark(DialogueMove.CLARIFY, goal.name))
     elif last is not None:
-        mind.voice = mind.voice.plan_first(remark(DialogueMove.CLARIFY, *last.act.slots, wording=last.wording))
+        state.say_first(remark(DialogueMove.CLARIFY, *last.act.slots, wording=last.wording))
 
 
-def _uptake(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+def _acknowledgement(
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """A car that repeats the place knows it, and finds the way itself; one that names another has to be put right."""
-    if _put_right(mind, view, act, words):
+    """Ends the guidance of a car that repeats the place, because it knows the way; corrects one that names another."""
+    if _correct(state, view, act, words):
         return
-    if mind.goal is not None and mind.goal.name in act.values(Slot.LANDMARK):
-        mind.guiding = False
+    if state.errand.goal is not None and state.errand.goal.name in act.values(Slot.LANDMARK):
+        state.set_guiding(False)
 
 
 def _alignment(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    mind.voice = mind.voice.plan_first(remark(DialogueMove.ACKNOWLEDGE, wording=Wording(topic="align")))
+    state.say_first(remark(DialogueMove.ACKNOWLEDGE, wording=Wording(topic="align")))
 
 
 def _request(
-    mind: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """A car that wants to be guided is; one that names a place, or a turn, only repeats what it was told."""
+    """Guides a car that asks for help; a car that names a place or a turn only repeats an instruction."""
     if act.values(Slot.LANDMARK):
-        _uptake(mind, view, act, words, rng)
-    elif mind.goal is not None and not act.values(Slot.ACTION):
-        mind.guiding = True
-        _say_way(mind, view, DialogueMove.INSTRUCT, rng)
+        _acknowledgement(state, view, act, words, rng)
+    elif state.errand.goal is not None and not act.values(Slot.ACTION):
+        state.set_guiding(True)
+        _name_step(state, view, DialogueMove.INSTRUCT, rng)
 
 
 _ANSWERS: dict[
@@ -396,6 +401,6 @@ _ANSWERS: dict[
     DialogueMove.CONFUSE: _confusion,
     DialogueMove.ALIGN: _alignment,
     DialogueMove.INSTRUCT: _request,
-    DialogueMove.ACKNOWLEDGE: _uptake,
-    DialogueMove.CONFIRM: _uptake,
+    DialogueMove.ACKNOWLEDGE: _acknowledgement,
+    DialogueMove.CONFIRM: _acknowledgement,
 }

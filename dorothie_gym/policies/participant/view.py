@@ -10,6 +10,7 @@ from typing import Any
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import LandmarkName
+from dorothie_gym.policies.guidance_config import STANDING_SPEED
 from dorothie_gym.policies.observation_parser import (
     SeenLandmark,
     SeenObject,
@@ -20,16 +21,26 @@ from dorothie_gym.policies.observation_parser import (
     scalar,
 )
 
-STANDING = 0.3
-"""Below this speed the car stands [m/s]."""
-
 TURNED = 0.8
-"""Below this cosine of the angle between car and lane the car is in the middle of turning round."""
+"""Cosine of the angle between car and lane below which the car is in the middle of a U-turn."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ParticipantView:
-    """An observation of the participant, read; `turning` tells that the car stands across its lane."""
+    """Observation of the participant.
+
+    Attributes:
+        raw: the observation as received.
+        time: time of the session [s].
+        speed: speed of the car [m/s].
+        lane: lane of the car.
+        station: distance along the lane [m].
+        speaking: remaining duration of the own utterance [s].
+        landmarks: all landmarks.
+        subgoals: all subgoals.
+        objects: objects in sight.
+        turning: whether the car stands across its lane.
+    """
 
     raw: Mapping[str, Any]
     time: float
@@ -44,7 +55,7 @@ class ParticipantView:
 
     @classmethod
     def read(cls, observation: Mapping[str, Any], town: Town) -> ParticipantView:
-        """Reads what every decision needs."""
+        """Reads an observation."""
         lane, station = int(observation["lane"]), scalar(observation, "station")
         across = float(observation["pose"][2]) - town.lanes[lane].heading_at(station)
         return cls(
@@ -62,26 +73,26 @@ class ParticipantView:
 
     @property
     def position(self) -> tuple[float, float]:
-        """Where the car is [m]."""
+        """Position of the car [m]."""
         x, y = self.raw["pose"][:2]
         return float(x), float(y)
 
     @property
     def place(self) -> Place:
-        """Where the car is."""
+        """Lane and station of the car."""
         return self.lane, self.station
 
     @property
     def standing(self) -> bool:
         """Whether the car stands."""
-        return self.speed < STANDING
+        return self.speed < STANDING_SPEED
 
     def landmark(self, row: int) -> SeenLandmark | None:
-        """The landmark of a row."""
+        """Returns the landmark of a row."""
         return next((landmark for landmark in self.landmarks if landmark.row == row), None)
 
     def unique(self, landmark: SeenLandmark) -> bool:
-        """Whether no other landmark bears the same name."""
+        """Whether the name identifies the landmark."""
         return sum(other.name is landmark.name for other in self.landmarks) == 1 and landmark.name not in (
             LandmarkName.HOUSE,
             LandmarkName.PERSON,
