@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.policies.ad_wizard import MOST_TRICKS
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_vector import DECISION_FREQUENCY, MAX_SECONDS
 from dorothie_gym.sim.config import WorldConfig
@@ -15,9 +16,6 @@ TRAFFIC: Mapping[str, tuple[int, int]] = MappingProxyType(
     {"none": (0, 0), "light": (4, 2), "medium": (10, 4), "heavy": (30, 20)}
 )
 """Vehicles and pedestrians of each degree of traffic, as many as fit."""
-
-MOST_EXCEPTIONS = 4.0
-"""Exceptions of a session that the scripted Ad-Wizard can be asked for on average."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,8 +85,8 @@ class NavigationConfig:
         object.__setattr__(self, "guidance", Guidance(self.guidance))
         if self.traffic not in TRAFFIC:
             raise ValueError(f"traffic is {self.traffic!r}; it must be one of {', '.join(TRAFFIC)}")
-        if not 0.0 <= self.exceptions <= MOST_EXCEPTIONS:
-            raise ValueError(f"exceptions is {self.exceptions}; it must be in 0..{MOST_EXCEPTIONS:g} a session")
+        if not 0.0 <= self.exceptions <= MOST_TRICKS:
+            raise ValueError(f"exceptions is {self.exceptions}; it must be in 0..{MOST_TRICKS:g} a session")
         if not 10.0 <= self.patience <= 86400.0:
             raise ValueError(f"patience is {self.patience}; it must be in 10..86400 s")
         EnvConfig(decision_frequency=self.decision_frequency, max_seconds=self.max_seconds)  # which checks them

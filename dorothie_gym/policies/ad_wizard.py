@@ -5,9 +5,8 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable, Mapping, Sequence
-from copy import copy
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from dorothie_gym.spaces import ActionDict, AdWizardAction, LanePosition, PropCo
 
 
 class Trick(enum.StrEnum):
-    """What the Ad-Wizard may be up to."""
+    """Kind of interference of the scripted Ad-Wizard."""
 
     ROADBLOCK = "roadblock"
     WEATHER = "weather"
@@ -31,39 +30,66 @@ class Trick(enum.StrEnum):
 
 KINDS: tuple[Trick, ...] = tuple(Trick)
 
-ROADBLOCK_AHEAD = (55.0, 115.0)
-"""How far ahead of the car a roadblock is placed [m]."""
 
-CLEAR_OF_GOALS = 40.0
-"""No roadblock is placed closer to a landmark's waypoint on the same lane [m]."""
+@dataclass(frozen=True, kw_only=True)
+class AdWizardConfig:
+    """Tunable numbers of the scripted Ad-Wizard.
 
-MOST_ROADBLOCKS = 2
+    No publication gives these values. They were set by hand so that sessions in the built-in towns stay solvable.
 
-FIRST = 25.0
-"""Nothing happens before this time [s]."""
+    Attributes:
+        first_at: earliest time of a trick [s].
+        window: range of planned times from then on [s].
+        spacing: least time between two tricks [s].
+        expires_after: time after which a trick that finds no moment is given up [s].
+        weights: weight of each trick in the draw of those of a session.
+        roadblock_ahead: range of distances ahead of the car at which a roadblock is placed [m].
+        roadblock_margins: least distances of a roadblock from the beginning and the end of its lane [m].
+        roadblock_speed: least speed of the car when one is placed [m/s].
+        roadblock_clearance: least distance of a roadblock from a place where the car may have to stop [m].
+        roadblock_time: time after which a roadblock is removed [s].
+        most_roadblocks: largest number of roadblocks in a session.
+        bad_weather_time: range of durations of bad weather [s].
+        crowd_ahead: range of distances ahead at which people or vehicles are spawned [m].
+        crowd_extent: size of the area in which they are spawned [m].
+        crowd_of_people: probability that people are spawned instead of vehicles.
+    """
 
-SPACING = 35.0
-"""Least time between two tricks [s]."""
+    first_at: float = 25.0
+    window: float = 240.0
+    spacing: float = 35.0
+    expires_after: float = 60.0
+    weights: Mapping[Trick, float] = field(
+        default_factory=lambda: {
+            Trick.ROADBLOCK: 1.4,
+            Trick.WEATHER: 1.2,
+            Trick.TASK: 1.6,
+            Trick.SENSOR: 0.5,
+            Trick.CROWD: 0.5,
+        }  # fmt: skip
+    )
+    roadblock_ahead: tuple[float, float] = (55.0, 115.0)
+    roadblock_margins: tuple[float, float] = (12.0, 8.0)
+    roadblock_speed: float = 3.0
+    roadblock_clearance: float = 40.0
+    roadblock_time: float = 150.0
+    most_roadblocks: int = 2
+    bad_weather_time: tuple[float, float] = (80.0, 140.0)
+    crowd_ahead: tuple[float, float] = (60.0, 110.0)
+    crowd_extent: int = 25
+    crowd_of_people: float = 0.6
 
-WINDOW = 240.0
-"""Tricks are planned within this time from the first moment [s]."""
 
-EXPIRES = 60.0
-"""A trick that finds no moment for this long is given up [s]."""
+SAME_PROP = 3.0
+"""Distance within which a prop is recognized as the one placed [m]."""
 
-LIKELY = {Trick.ROADBLOCK: 1.4, Trick.WEATHER: 1.2, Trick.TASK: 1.6, Trick.SENSOR: 0.5, Trick.CROWD: 0.5}
-"""How likely each trick is to be among those of a session, beside the others."""
-
-BAD_WEATHER = (80.0, 140.0)
-"""How long bad weather lasts [s]."""
-
-ROADBLOCK_STAYS = 150.0
-"""How long a roadblock stands [s]."""
+MOST_TRICKS = 4
+"""Largest average number of tricks in a session that can be asked for."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlannedTrick:
-    """A trick and when it is due [s]."""
+    """Trick and the time at which it is due [s]."""
 
     trick: Trick
     at: float
@@ -71,166 +97,205 @@ class PlannedTrick:
 
 @dataclass(frozen=True, kw_only=True)
 class Restoration:
-    """Something to be put right again, and when [s]; `prop` is where a prop stands [m]."""
+    """Change that is to be undone, and the time [s]; `prop` is the position of a prop [m]."""
 
     at: float
     weather: WeatherParameter | None = None
     prop: tuple[float, float] | None = None
 
 
-@dataclass(kw_only=True)
-class AdWizardMind:
-    """Plans of the Ad-Wizard; a step works on a copy, and every field holds an immutable value.
+@dataclass(frozen=True, kw_only=True)
+class AdWizardState:
+    """Plans of the scripted Ad-Wizard.
 
     Attributes:
-        seed: of all chance.
+        seed: seed of all random draws.
         town: the map.
+        config: tunable numbers.
         planned: tricks to come.
-        count: decisions taken.
-        undo: what is to be put right again.
-        roadblocks: how many have been placed.
-        last: when the last trick was played [s].
+        count: number of decisions taken.
+        restorations: changes to be undone.
+        roadblocks: number of roadblocks placed.
+        last_at: time of the last trick [s].
     """
 
     seed: int
     town: Town
+    config: AdWizardConfig
     planned: tuple[PlannedTrick, ...]
     count: int = 0
-    undo: tuple[Restoration, ...] = ()
+    restorations: tuple[Restoration, ...] = ()
     roadblocks: int = 0
-    last: float = -math.inf
+    last_at: float = -math.inf
+
+    def advanced(self) -> AdWizardState:
+        """Counts a decision."""
+        return replace(self, count=self.count + 1)
+
+    def is_due(self, now: float) -> bool:
+        """Whether enough time has passed since the last trick."""
+        return now >= self.last_at + self.config.spacing
+
+    def without_expired(self, now: float) -> AdWizardState:
+        """Gives up the tricks that have found no moment for too long."""
+        config, earliest = self.config, self.last_at + self.config.spacing
+        kept = tuple(item for item in self.planned if now < max(item.at, earliest) + config.expires_after)
+        return replace(self, planned=kept)
+
+    def after_trick(self, done: PlannedTrick, now: float) -> AdWizardState:
+        """Removes a trick that was played."""
+        return replace(self, planned=tuple(item for item in self.planned if item is not done), last_at=now)
+
+    def with_restoration(self, item: Restoration) -> AdWizardState:
+        """Adds a change to be undone."""
+        return replace(self, restorations=(*self.restorations, item))
+
+    def after_restoration(self, done: Restoration) -> AdWizardState:
+        """Removes a change that was undone."""
+        return replace(self, restorations=tuple(item for item in self.restorations if item is not done))
+
+    def after_roadblock(self) -> AdWizardState:
+        """Counts a roadblock."""
+        return replace(self, roadblocks=self.roadblocks + 1)
 
 
-class ScriptedAdWizard(Policy[AdWizardMind]):
-    """Plays one to four tricks a session: roadblocks, weather, changed tasks, faulty sensors, crowds.
+Outcome: TypeAlias = tuple[AdWizardAction | None, AdWizardState]
+"""Action of a trick, or None where it finds no moment, and the new state."""
+
+
+class ScriptedAdWizard(Policy[AdWizardState]):
+    """Plays one to four tricks in a session: roadblocks, weather, changed tasks, faulty sensors, crowds.
 
     Every change of a task comes with a message that gives the participant a reason. Bad weather clears up, and
-    roadblocks are taken away again after a while.
+    roadblocks are removed after a while.
     """
 
     def __init__(
-        self, limits: SpaceLimits | None = None, *, rate: float = 2.5, kinds: Sequence[Trick | str] = KINDS
+        self,
+        limits: SpaceLimits | None = None,
+        *,
+        rate: float = 2.5,
+        kinds: Sequence[Trick | str] = KINDS,
+        config: AdWizardConfig | None = None,
     ) -> None:
         """Prepares the policy.
 
         Args:
             limits: sizes of the spaces.
-            rate: tricks a session on average, 0 to 4; at least one is played unless it is 0.
-            kinds: what it may do; `Trick`s or their names.
+            rate: average number of tricks in a session, 0 to 4; at least one is played unless it is 0.
+            kinds: permitted tricks or their names.
+            config: tunable numbers; None takes the defaults.
 
         Raises:
-            ValueError: if `rate` is out of its range or a kind is unknown.
+            ValueError: `rate` is out of its range or a kind is unknown.
         """
         super().__init__(Role.AD_WIZARD, limits)
-        if not 0.0 <= rate <= 4.0:
-            raise ValueError(f"rate is {rate}; it must be within 0 and 4")
+        if not 0.0 <= rate <= MOST_TRICKS:
+            raise ValueError(f"rate is {rate}; it must be within 0 and {MOST_TRICKS}")
         unknown = [str(kind) for kind in kinds if kind not in tuple(Trick)]
         if unknown:
             raise ValueError(f"kinds holds {unknown[0]!r}; the kinds are {', '.join(Trick)}")
-        self._rate = rate
-        self._kinds = tuple(Trick(kind) for kind in kinds)
+        self._rate, self._kinds = rate, tuple(Trick(kind) for kind in kinds)
+        self._config = AdWizardConfig() if config is None else config
 
-    def initial_state(self, seed: int, town: Town) -> AdWizardMind:
-        """Draws what is to happen in this session, and about when."""
-        rng = np.random.default_rng((seed, 0))
+    def initial_state(self, seed: int, town: Town) -> AdWizardState:
+        """Draws the tricks of the session and their times."""
+        rng, config = np.random.default_rng((seed, 0)), self._config
         planned: list[PlannedTrick] = []
         if self._rate > 0.0 and self._kinds:
-            count = 1 + int(rng.binomial(3, max(self._rate - 1.0, 0.0) / 3.0))
-            times = np.sort(rng.uniform(FIRST, FIRST + WINDOW, size=count))
-            weights = np.array([LIKELY[kind] for kind in self._kinds])
+            count = 1 + int(rng.binomial(MOST_TRICKS - 1, max(self._rate - 1.0, 0.0) / (MOST_TRICKS - 1.0)))
+            times = np.sort(rng.uniform(config.first_at, config.first_at + config.window, size=count))
+            weights = np.array([config.weights[kind] for kind in self._kinds])
             order = rng.choice(len(self._kinds), size=len(self._kinds), replace=False, p=weights / weights.sum())
             for k, at in enumerate(times):
                 planned.append(PlannedTrick(trick=self._kinds[int(order[k % len(order)])], at=float(at)))
-        return AdWizardMind(seed=seed, town=town, planned=tuple(planned))
+        return AdWizardState(seed=seed, town=town, config=config, planned=tuple(planned))
 
-    def step(self, observation: Mapping[str, Any], state: AdWizardMind) -> tuple[ActionDict, AdWizardMind]:
-        """Plays a trick, puts one right again, or does nothing."""
-        mind = copy(state)
-        mind.count += 1
-        rng = np.random.default_rng((mind.seed, mind.count))
+    def step(self, observation: Mapping[str, Any], state: AdWizardState) -> tuple[ActionDict, AdWizardState]:
+        """Plays a trick, undoes one, or does nothing."""
+        state = state.advanced()
+        rng = np.random.default_rng((state.seed, state.count))
         now = scalar(observation, "time")
-        action = _put_right(mind, observation, now) or self._next_trick(mind, observation, now, rng)
-        return (action or AdWizardAction()).encode(self.limits), mind
+        action, state = _restore(state, observation, now)
+        if action is None:
+            action, state = _play(state, observation, now, rng)
+        return (action or AdWizardAction()).encode(self.limits), state
 
-    def _next_trick(
-        self, mind: AdWizardMind, observation: Mapping[str, Any], now: float, rng: np.random.Generator
-    ) -> AdWizardAction | None:
-        if now < mind.last + SPACING:
-            return None
-        mind.planned = tuple(item for item in mind.planned if now < max(item.at, mind.last + SPACING) + EXPIRES)
-        for item in mind.planned:
-            action = _TRICKS[item.trick](mind, observation, now, rng) if now >= item.at else None
+
+def _play(state: AdWizardState, observation: Mapping[str, Any], now: float, rng: np.random.Generator) -> Outcome:
+    """Plays the first trick that is due and possible."""
+    if not state.is_due(now):
+        return None, state
+    state = state.without_expired(now)
+    for item in state.planned:
+        if now >= item.at:
+            action, state = _TRICKS[item.trick](state, observation, now, rng)
             if action is not None:
-                mind.planned = tuple(other for other in mind.planned if other is not item)
-                mind.last = now
-                return action
-        return None
+                return action, state.after_trick(item, now)
+    return None, state
 
 
-def _put_right(mind: AdWizardMind, observation: Mapping[str, Any], now: float) -> AdWizardAction | None:
-    due = next((item for item in mind.undo if item.at <= now), None)
+def _restore(state: AdWizardState, observation: Mapping[str, Any], now: float) -> Outcome:
+    """Undoes a change that is due."""
+    due = next((item for item in state.restorations if item.at <= now), None)
     if due is None:
-        return None
-    mind.undo = tuple(item for item in mind.undo if item is not due)
+        return None, state
+    state = state.after_restoration(due)
     if due.weather is not None:
         low, high, clear = due.weather.low, due.weather.high, due.weather.clear_noon
-        return AdWizardAction(exception=ExceptionKind.WEATHER, weather=due.weather, share=(clear - low) / (high - low))
+        share = (clear - low) / (high - low)
+        return AdWizardAction(exception=ExceptionKind.WEATHER, weather=due.weather, share=share), state
     assert due.prop is not None
     for row, prop in enumerate(observation["props"]):
         x, y = float(prop[PropColumn.X]), float(prop[PropColumn.Y])
-        if prop[PropColumn.KIND] > 0 and math.hypot(x - due.prop[0], y - due.prop[1]) < 3.0:
-            return AdWizardAction(exception=ExceptionKind.DELETE_PROP, item=row)
-    return None
+        if prop[PropColumn.KIND] > 0 and math.hypot(x - due.prop[0], y - due.prop[1]) < SAME_PROP:
+            return AdWizardAction(exception=ExceptionKind.DELETE_PROP, item=row), state
+    return None, state
 
 
-def _roadblock(
-    mind: AdWizardMind, observation: Mapping[str, Any], now: float, rng: np.random.Generator
-) -> AdWizardAction | None:
-    """A barrier across the lane that the car is about to take, not too near to a place it may have to stop at."""
-    if mind.roadblocks >= MOST_ROADBLOCKS:
-        return None
-    if scalar(observation, "speed") < 3.0:
-        return None
-    ahead = float(rng.uniform(*ROADBLOCK_AHEAD))
-    place = place_on_path(mind.town, observation, ahead)
+def _roadblock(state: AdWizardState, observation: Mapping[str, Any], now: float, rng: np.random.Generator) -> Outcome:
+    """Places a barrier across the lane ahead, not too near to a place where the car may have to stop."""
+    config = state.config
+    if state.roadblocks >= config.most_roadblocks or scalar(observation, "speed") < config.roadblock_speed:
+        return None, state
+    ahead = float(rng.uniform(*config.roadblock_ahead))
+    place = place_on_path(state.town, observation, ahead)
     if place is None:
-        return None
+        return None, state
     lane, station = place
-    town_lane = mind.town.lanes[lane]
-    goals = [mark.station for mark in read_landmarks(observation, mind.town) if mark.lane == lane]
-    if town_lane.in_junction or not 12.0 < station < town_lane.length - 8.0:
-        return None
-    if any(abs(goal - station) < CLEAR_OF_GOALS for goal in goals):
-        return None
-    mind.roadblocks += 1
+    town_lane = state.town.lanes[lane]
+    goals = [mark.station for mark in read_landmarks(observation, state.town) if mark.lane == lane]
+    begin, end = config.roadblock_margins
+    if town_lane.in_junction or not begin < station < town_lane.length - end:
+        return None, state
+    if any(abs(goal - station) < config.roadblock_clearance for goal in goals):
+        return None, state
     point = town_lane.position(round(station))
-    mind.undo = (*mind.undo, Restoration(at=now + ROADBLOCK_STAYS, prop=(float(point[0]), float(point[1]))))
-    return AdWizardAction(
+    removal = Restoration(at=now + config.roadblock_time, prop=(float(point[0]), float(point[1])))
+    action = AdWizardAction(
         exception=ExceptionKind.PLACE_PROP,
         prop=PropKind.STREET_BARRIER,
         place=LanePosition(lane=lane, metres=round(station)),
     )
+    return action, state.after_roadblock().with_restoration(removal)
 
 
-def _weather(
-    mind: AdWizardMind, observation: Mapping[str, Any], now: float, rng: np.random.Generator
-) -> AdWizardAction | None:
-    """Fog, heavy rain or night, for a while."""
+def _weather(state: AdWizardState, observation: Mapping[str, Any], now: float, rng: np.random.Generator) -> Outcome:
+    """Brings fog, heavy rain or night, for a while."""
     parameter, share = (
         (WeatherParameter.FOG_DENSITY, float(rng.uniform(0.5, 0.85))),
         (WeatherParameter.PRECIPITATION, float(rng.uniform(0.65, 0.95))),
         (WeatherParameter.SUN_ALTITUDE_ANGLE, float(rng.uniform(0.2, 0.42))),
     )[int(rng.integers(3))]
-    mind.undo = (*mind.undo, Restoration(at=now + float(rng.uniform(*BAD_WEATHER)), weather=parameter))
-    return AdWizardAction(exception=ExceptionKind.WEATHER, weather=parameter, share=round(share, 2))
+    clearing = Restoration(at=now + float(rng.uniform(*state.config.bad_weather_time)), weather=parameter)
+    action = AdWizardAction(exception=ExceptionKind.WEATHER, weather=parameter, share=round(share, 2))
+    return action, state.with_restoration(clearing)
 
 
-def _task(
-    mind: AdWizardMind, observation: Mapping[str, Any], now: float, rng: np.random.Generator
-) -> AdWizardAction | None:
-    """Adds, drops or changes a task, with a reason for the participant."""
+def _task(state: AdWizardState, observation: Mapping[str, Any], now: float, rng: np.random.Generator) -> Outcome:
+    """Adds, drops or changes a task, with a message for the participant."""
     subgoals = read_subgoals(observation)
-    marks = {mark.row: mark for mark in read_landmarks(observation, mind.town)}
+    marks = {mark.row: mark for mark in read_landmarks(observation, state.town)}
     options = [
         *((ExceptionKind.TASK_TRIGGER, subgoal) for subgoal in subgoals if subgoal.can_trigger),
         *((ExceptionKind.TASK_DELETE, subgoal) for subgoal in subgoals if subgoal.can_delete),
@@ -238,36 +303,35 @@ def _task(
     ]
     options = [(kind, subgoal) for kind, subgoal in options if subgoal.landmark in marks]
     if not options:
-        return None
+        return None, state
     kind, subgoal = options[int(rng.integers(len(options)))]
-    return AdWizardAction(exception=kind, item=subgoal.index, message=context(kind, marks[subgoal.landmark].name, rng))
+    message = task_message(kind, marks[subgoal.landmark].name, rng)
+    return AdWizardAction(exception=kind, item=subgoal.index, message=message), state
 
 
-def _sensor(
-    mind: AdWizardMind, observation: Mapping[str, Any], now: float, rng: np.random.Generator
-) -> AdWizardAction | None:
-    """A sensor fails; it comes back by itself."""
+def _sensor(state: AdWizardState, observation: Mapping[str, Any], now: float, rng: np.random.Generator) -> Outcome:
+    """Lets a sensor fail; it recovers by itself."""
     sensor = tuple(Sensor)[int(rng.integers(len(Sensor)))]
-    return AdWizardAction(exception=ExceptionKind.SENSOR_FAULT, sensor=sensor, on=True)
+    return AdWizardAction(exception=ExceptionKind.SENSOR_FAULT, sensor=sensor, on=True), state
 
 
-def _crowd(
-    mind: AdWizardMind, observation: Mapping[str, Any], now: float, rng: np.random.Generator
-) -> AdWizardAction | None:
-    """More people or cars about, further down the way."""
-    place = place_on_path(mind.town, observation, float(rng.uniform(60.0, 110.0)))
+def _crowd(state: AdWizardState, observation: Mapping[str, Any], now: float, rng: np.random.Generator) -> Outcome:
+    """Spawns people or vehicles on the road ahead."""
+    config = state.config
+    place = place_on_path(state.town, observation, float(rng.uniform(*config.crowd_ahead)))
     if place is None:
-        return None
-    kind = ExceptionKind.SPAWN_PEDESTRIANS if rng.random() < 0.6 else ExceptionKind.SPAWN_VEHICLES
-    return AdWizardAction(
-        exception=kind,
+        return None, state
+    people = rng.random() < config.crowd_of_people
+    action = AdWizardAction(
+        exception=ExceptionKind.SPAWN_PEDESTRIANS if people else ExceptionKind.SPAWN_VEHICLES,
         place=LanePosition(lane=place[0], metres=round(place[1])),
         count=int(rng.integers(1, 4)),
-        extent=25,
+        extent=config.crowd_extent,
     )
+    return action, state
 
 
-_TRICKS: dict[Trick, Callable[[AdWizardMind, Mapping[str, Any], float, np.random.Generator], AdWizardAction | None]] = {
+_TRICKS: dict[Trick, Callable[[AdWizardState, Mapping[str, Any], float, np.random.Generator], Outcome]] = {
     Trick.ROADBLOCK: _roadblock,
     Trick.WEATHER: _weather,
     Trick.TASK: _task,
@@ -298,13 +362,13 @@ _BODIES: Mapping[ExceptionKind, tuple[str, ...]] = {
 }
 
 
-def context(kind: ExceptionKind, landmark: LandmarkName, rng: np.random.Generator) -> str:
-    """A message that tells why a task is added, dropped or changed.
+def task_message(kind: ExceptionKind, landmark: LandmarkName, rng: np.random.Generator) -> str:
+    """Returns a message to the participant with the reason for a change of its tasks.
 
     Args:
         kind: one of the task exceptions.
-        landmark: the place of the task.
-        rng: chooses the words.
+        landmark: place of the task.
+        rng: random generator of the decision.
     """
     name = load_lexicon().forms(landmark, "say")[0]
     sender = _SENDERS[int(rng.integers(len(_SENDERS)))]

@@ -10,7 +10,8 @@ from typing import Final
 
 from dorothie_gym.maps import LinkType, Town
 from dorothie_gym.maps.lane_neighbours import oncoming_lanes
-from dorothie_gym.policies.route_progress import BRAKING, SWITCH_ROOM, U_TURN_SPEED_SQUARED
+from dorothie_gym.policies.route_progress import SWITCH_ROOM, U_TURN_SPEED_SQUARED
+from dorothie_gym.sim.ego.obstacles import BRAKING
 
 MOVING_SPEED: Final = 0.5
 """Speed above which the path of a manoeuvre begins some way ahead of the car [m/s]."""

@@ -20,25 +20,25 @@ from dorothie_gym.policies.trivial import LaneFollowPolicy, RandomPolicy, Silent
 from dorothie_gym.spaces import SpaceLimits
 
 POLICY_NAMES = ("scripted", "silent", "random")
-"""Names that `make_policy` knows for every role."""
+"""Names that `make_policy` accepts for every role."""
 
 LANE_FOLLOW = "lane-follow"
-"""Name of the policy that drives and never talks, which the Co-Wizard has."""
+"""Name of the Co-Wizard's policy that drives and never talks."""
 
 
 def policy_names(role: Role) -> tuple[str, ...]:
-    """Returns the names that `make_policy` knows for a role."""
+    """Returns the names that `make_policy` accepts for a role."""
     return (*POLICY_NAMES, LANE_FOLLOW) if role is Role.CO_WIZARD else POLICY_NAMES
 
 
 def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Policy[Any]:
-    """Makes a policy.
+    """Returns a policy by name.
 
     Args:
-        name: "scripted", "silent" (does nothing) or "random" (samples the action space); for the Co-Wizard
-            "lane-follow", too (drives on, never talks).
-        role: whom it acts for.
-        limits: sizes of the spaces it acts in.
+        name: "scripted", "silent" (does nothing) or "random" (samples the action space); for the Co-Wizard also
+            "lane-follow" (drives on, never talks).
+        role: role of the policy.
+        limits: sizes of the spaces.
 
     Raises:
         ValueError: if there is no policy of that name, or the role takes no actions.
@@ -59,10 +59,10 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Pol
 
 
 Loader: TypeAlias = Callable[[Path, Role, SpaceLimits], Policy[Any]]
-"""Reads a policy from a file or folder; a function of a module, so that other processes find it."""
+"""Function that reads a policy from a file or folder; defined in a module, so that it can be pickled."""
 
 DESCRIPTION: Final = "model.json"
-"""A folder is taken for a policy if it holds this file."""
+"""Name of the file that describes the policy of a folder."""
 
 _COSTS: Final = ("steps", "seconds")
 
@@ -70,11 +70,11 @@ _LOADERS: Final[dict[str, Loader]] = {}
 
 
 def register_loader(kind: str, loader: Loader) -> None:
-    """Makes files of a kind playable.
+    """Registers the loader of a kind of files.
 
     Args:
-        kind: ending of the files (".safetensors"), or what the field "kind" of their JSON says ("ppo").
-        loader: reads them; it raises `ValueError` where it cannot.
+        kind: suffix of the files (".safetensors"), or the field "kind" of their JSON ("ppo").
+        loader: function that reads them; it raises `ValueError` where it cannot.
 
     Raises:
         ValueError: another loader has the kind.
@@ -84,20 +84,20 @@ def register_loader(kind: str, loader: Loader) -> None:
 
 
 def loadable_kinds() -> tuple[str, ...]:
-    """Returns the kinds of files that can be played now, sorted."""
+    """Returns the kinds of files that have a loader, sorted."""
     return tuple(sorted(_LOADERS))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Player:
-    """Plays a role.
+    """Source of a role's policy, by name or from a file; can be sent to other processes.
 
     Attributes:
-        name: of the policy, or the path that was given.
-        path: of the file or folder that it was learned into; None for a policy by name.
-        loader: reads it.
-        sha256: of the file, or of the folder's files of the model ("model.*"); what a rollout was played with.
-        training: what the learning took, as far as the JSON of the file tells: `steps` and `seconds`.
+        name: name of the policy, or the path that was given.
+        path: file or folder of a trained policy; None for a policy by name.
+        loader: function that reads it.
+        sha256: hash of the file, or of the model files ("model.*") of the folder; identifies the policy of a rollout.
+        training: cost of the training in `steps` and `seconds`, where the JSON of the file has them.
     """
 
     name: str
@@ -107,10 +107,10 @@ class Player:
     training: Mapping[str, float] = field(default_factory=dict)
 
     def make(self, role: Role, limits: SpaceLimits) -> Policy[Any]:
-        """Makes the policy.
+        """Returns the policy.
 
         Raises:
-            ValueError: there is none of the name for the role, or the file cannot be read.
+            ValueError: the role has no policy of this name, or the file cannot be read.
         """
         if self.path is None or self.loader is None:
             return make_policy(self.name, role, limits)
@@ -121,15 +121,15 @@ SCRIPTED: Final = Player(name="scripted")
 ALL_SCRIPTED: Final[Mapping[Role, Player]] = MappingProxyType(
     {Role.PARTICIPANT: SCRIPTED, Role.CO_WIZARD: SCRIPTED, Role.AD_WIZARD: SCRIPTED}
 )
-"""The scripted three."""
+"""Scripted policies for all roles."""
 
 
 def find_player(given: str, role: Role) -> Player:
-    """Returns who is meant by a name or the path of a file.
+    """Returns the source of a policy by name or path.
 
     Args:
         given: name of a policy, or path of a file or folder; a name has precedence ("./scripted" is a path).
-        role: whom it is to play.
+        role: role of the policy.
 
     Raises:
         PolicyLoadError: there is no such policy for the role, no such file, or none that can be played.
@@ -155,7 +155,7 @@ def find_player(given: str, role: Role) -> Player:
 
 
 def _description(path: Path) -> Mapping[str, Any]:
-    """The JSON of a file, or of a folder's description; empty where there is none."""
+    """Returns the JSON of a file, or of a folder's description; empty where there is none."""
     file = path / DESCRIPTION if path.is_dir() else path
     if file.suffix != ".json" or not file.is_file():
         return {}
@@ -167,11 +167,11 @@ def _description(path: Path) -> Mapping[str, Any]:
 
 
 def _kinds_of(path: Path, description: Mapping[str, Any]) -> tuple[str, ...]:
-    """What a file may be called: the kind that its JSON tells, or its ending."""
-    told = (str(description["kind"]),) if "kind" in description else ()
+    """Returns the possible kinds of a file: the one named in its JSON, and its suffix."""
+    named = (str(description["kind"]),) if "kind" in description else ()
     if not path.is_dir():
-        return (*told, path.suffix or "file without an ending")
-    return (*told, ".json") if (path / DESCRIPTION).is_file() else ("folder without " + DESCRIPTION,)
+        return (*named, path.suffix or "file without an ending")
+    return (*named, ".json") if (path / DESCRIPTION).is_file() else ("folder without " + DESCRIPTION,)
 
 
 def _sha256(path: Path) -> str:

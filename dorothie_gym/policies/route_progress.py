@@ -1,4 +1,4 @@
-"""A way to a place while it is being driven: how far it is, what comes next, and when it has been left."""
+"""Route to a place and the progress on it: remaining distance, next junction or manoeuvre, and leaving the route."""
 
 from __future__ import annotations
 
@@ -15,39 +15,37 @@ from dorothie_gym.maps.routing import Entry, Leg, Place, Route, router
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import StreetName
 from dorothie_gym.policies.observation_parser import street_of
+from dorothie_gym.sim.ego.obstacles import BRAKING
 
 PASSED = 3.0
-"""A goal that lies further behind than this has been passed [m]."""
+"""Distance behind the car from which on a goal has been passed [m]."""
 
 ASTRAY = 3
-"""Who has been off the way for so many decisions has left it."""
+"""Number of decisions off the route after which it has been left."""
 
 SWITCH_ROOM = 16.0
-"""Least room for a lane switch [m]."""
+"""Least distance to the end of a lane for a lane switch [m]."""
 
 END_ROOM = 6.0
-"""Who is nearer to the end of a lane than this waits there and does not turn round any more [m]."""
+"""Distance to the end of a lane within which a car waits there and no longer turns round [m]."""
 
 SAME_WAY = 25.0
-"""An exit of the own lane this close in angle is taken instead of that of a lane beside [degrees]."""
+"""Difference in angle within which an exit of the own lane is taken instead of that of a neighbour [degrees]."""
 
 RIGHT_BEHIND = 70.0
-"""There may be no room to change lanes between a junction and a goal that is no further behind it [m]."""
+"""Distance from a junction to a goal within which there may be no room to change lanes [m]."""
 
 LATE = 18.0
-"""A lane change or U-turn that is this overdue will not come any more [m]."""
-
-BRAKING = 3.0
-"""Deceleration of the car's Stop [m/s^2]."""
+"""Distance behind its planned place from which on a lane change or U-turn is given up [m]."""
 
 U_TURN_SPEED_SQUARED = 12.0
-"""Square of the speed at which the car turns round [m^2/s^2]."""
+"""Square of the speed at which the scripted agents expect U-turns [m^2/s^2]; the local planner's is 3.5^2 = 12.25."""
 
 LIGHT_SIGHT = 60.0
-"""A traffic light no farther than this is what holds up a car that stands before it [m]."""
+"""Distance within which a traffic light explains a standstill [m]."""
 
 LAG = 0.56
-"""Time that the brakes seem to take until they bite, measured at 3 to 11 m/s [s]."""
+"""Delay of the brakes, measured at 3 to 11 m/s [s]."""
 
 NEAR_MISS = 150.0
 """A car that leaves the route within this distance of the goal may have missed it [m]."""
@@ -62,7 +60,7 @@ CELL_BEHIND = 8.0
 """Distance from a roadblock to a place in the following cell of the router [m]."""
 
 CANONICAL = {Direction.LEFT: 90.0, Direction.RIGHT: -90.0, Direction.STRAIGHT: 0.0, Direction.BACK: 180.0}
-"""The angle that a direction means at a junction like a cross [degrees, positive left]."""
+"""Angle of each direction at a crossroads [degrees, positive left]."""
 
 _DIRECTIONS = {
     LinkType.LEFT: Direction.LEFT,
@@ -74,7 +72,7 @@ _DIRECTIONS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """The next junction where one has to choose: the lane that leads there, how far its end is [m], and the exits."""
+    """Next junction with a choice: the lane before it, the distance to its end [m], and the exits."""
 
     lane: int
     distance: float
@@ -88,7 +86,7 @@ class Choice:
 
 @dataclass(frozen=True, kw_only=True)
 class RouteJunction:
-    """A junction of a journey: the lane it is entered from, the exit to take, and how far it is [m]."""
+    """Junction on a route: the lane before it, the exit to take, and the distance [m]."""
 
     lane: int
     exit: Exit
@@ -96,28 +94,28 @@ class RouteJunction:
 
     @property
     def direction(self) -> Direction:
-        """Which way the exit leads."""
+        """Direction of the exit."""
         return direction_of(self.exit)
 
 
 def stopping_distance(speed: float) -> float:
-    """How far the car goes on after Stop at a speed [m/s] [m]."""
+    """Returns the distance driven after a Stop command at a speed [m/s], in metres."""
     return LAG * speed + speed**2 / (2 * BRAKING)
 
 
 def direction_of(way: Exit) -> Direction:
-    """Which way an exit leads, as people say it."""
+    """Returns the direction of an exit as it is said."""
     return _DIRECTIONS[way.type]
 
 
 def is_choice(town: Town, lane: int) -> bool:
-    """Whether a lane ends at a junction with more than one way on."""
+    """Whether a lane ends at a junction with more than one exit."""
     exits = town.exits(lane)
     return len(exits) > 1 and any(way.junction_id >= 0 for way in exits)
 
 
 def default_successor(town: Town, lane: int) -> int | None:
-    """The lane that a car goes on in without being asked; None at a junction with a choice and where the map ends."""
+    """Returns the lane that follows by default; None at a junction with a choice and where the map ends."""
     exits = town.exits(lane)
     if not exits or is_choice(town, lane):
         return None
@@ -125,13 +123,13 @@ def default_successor(town: Town, lane: int) -> int | None:
 
 
 def default_lane_distance(town: Town, here: Place, place: Place, distance: float) -> float | None:
-    """Returns how far a place is along the lanes that a car takes by default [m]; None if it is not on them so near.
+    """Returns the distance to a place along the default lanes [m]; None if it is not on them within a distance.
 
     Args:
         town: the map.
-        here: where the car is.
-        place: that is looked for.
-        distance: so far it is looked for [m].
+        here: place of the car.
+        place: place to find.
+        distance: largest distance searched [m].
     """
     lane, station = here
     ahead = -station
@@ -143,7 +141,7 @@ def default_lane_distance(town: Town, here: Place, place: Place, distance: float
 
 
 def lanes_ahead(town: Town, lane: int, station: float, distance: float) -> tuple[int, ...]:
-    """The lane itself and those that follow by default, as far as `distance` [m]."""
+    """Returns a lane and those that follow by default within `distance` [m]."""
     found, ahead = [lane], town.lanes[lane].length - station
     following = default_successor(town, lane)
     while ahead < distance and following is not None and following not in found:
@@ -154,7 +152,7 @@ def lanes_ahead(town: Town, lane: int, station: float, distance: float) -> tuple
 
 
 def light_ahead(town: Town, lane: int, station: float, time: float) -> LightColour | None:
-    """What the next traffic light on the way that the car takes by default shows; None if none is in sight."""
+    """Returns the colour of the next traffic light on the default lanes; None if none is near."""
     ahead = -station
     for passed in lanes_ahead(town, lane, station, LIGHT_SIGHT):
         ahead += town.lanes[passed].length
@@ -167,7 +165,7 @@ def light_ahead(town: Town, lane: int, station: float, time: float) -> LightColo
 
 
 def next_choice(town: Town, lane: int, station: float) -> Choice | None:
-    """The next junction with a choice on the way that the car takes by default; None if there is none."""
+    """Returns the next junction with a choice on the default lanes; None if there is none."""
     seen, ahead = {lane}, town.lanes[lane].length - station
     while not is_choice(town, lane):
         following = default_successor(town, lane)
@@ -180,7 +178,7 @@ def next_choice(town: Town, lane: int, station: float) -> Choice | None:
 
 
 def lanes_beside(town: Town, lane: int) -> tuple[int, ...]:
-    """Lanes of the same direction beside a lane, the nearest first."""
+    """Returns the lanes of the same direction beside a lane, the nearest first."""
     found: list[int] = []
     for side in (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT):
         beside = town.neighbour(lane, side)
@@ -193,13 +191,13 @@ def lanes_beside(town: Town, lane: int) -> tuple[int, ...]:
 def find_exit(
     town: Town, choice: Choice, direction: Direction | None, streets: frozenset[int] = frozenset()
 ) -> Exit | None:
-    """The exit that is meant by a direction and perhaps a street; exits of lanes beside count where the own have none.
+    """Returns the exit meant by a direction and perhaps a street; lanes beside count where the own has no such exit.
 
     Args:
         town: the map.
         choice: the junction.
-        direction: which way; None if only a street was named.
-        streets: indices of the streets that bear the name; empty if none was named.
+        direction: the direction; None if only a street was named.
+        streets: indices of the streets of that name; empty if none was named.
     """
     for lane in (choice.lane, *lanes_beside(town, choice.lane)):
         exits = [way for way in town.exits(lane) if direction is None or direction_of(way) is direction]
@@ -214,14 +212,14 @@ def find_exit(
 
 @dataclass(frozen=True, kw_only=True)
 class RouteProgress:
-    """A route to a goal and how far it has been driven.
+    """Route to a goal and the progress on it.
 
     Attributes:
         goal: lane and station of the goal.
-        blocked: places that cannot be passed.
-        route: legs of the way; None if there is none.
-        leg: the leg that the car is on.
-        astray: for how many decisions the car has not been on the route.
+        blocked: places that the route was planned to avoid.
+        route: the route; None if there is none.
+        leg: index of the leg that the car is on.
+        astray: number of decisions for which the car has been off the route.
     """
 
     goal: Place
@@ -232,30 +230,30 @@ class RouteProgress:
 
     @classmethod
     def plan(cls, town: Town, start: Place, goal: Place, blocked: tuple[Place, ...] = ()) -> RouteProgress:
-        """Plans a way; where the blocked places leave none, one that ignores them."""
+        """Plans a route; where the blocked places leave none, one that ignores them."""
         route = router(town).route(start, goal, blocked)
         if route is None and blocked:
             route = router(town).route(start, goal)
         return cls(goal=goal, blocked=blocked, route=route)
 
     def replanned(self, town: Town, start: Place, blocked: tuple[Place, ...] | None = None) -> RouteProgress:
-        """A new way from `start` to the same goal."""
+        """Plans a route from `start` to the same goal."""
         return RouteProgress.plan(town, start, self.goal, self.blocked if blocked is None else blocked)
 
     @property
     def legs(self) -> tuple[Leg, ...]:
-        """What is left of the route, the present leg first."""
+        """Remaining legs of the route, the present one first."""
         return self.route.legs[self.leg :] if self.route is not None else ()
 
     def followed(self, town: Town, lane: int, station: float) -> RouteProgress:
-        """The same with the present leg brought up to where the car is; `astray` counts up if it is nowhere on it."""
+        """Advances the present leg to the place of the car; `astray` counts up if the car is off the route."""
         for ahead, leg in enumerate(self.legs):
             if leg.lane == lane and (ahead or not self._overdue(town, station)):
                 return replace(self, leg=self.leg + ahead, astray=0)
         return replace(self, astray=self.astray + 1)
 
     def lost(self, station: float) -> bool:
-        """Whether the way has been left, or its goal passed, so that a new one is wanted."""
+        """Whether the route has been left or the goal passed, so that a new route is needed."""
         return self.astray >= ASTRAY or self.left(station) < -PASSED
 
     def _overdue(self, town: Town, station: float) -> bool:
@@ -270,7 +268,7 @@ class RouteProgress:
         return room < SWITCH_ROOM or station > legs[0].end + LATE
 
     def left(self, station: float) -> float:
-        """How far the goal is along the route [m]; negative when it has just been passed."""
+        """Returns the distance to the goal along the route [m]; negative just behind the goal."""
         legs = self.legs
         if not legs:
             return math.inf
@@ -279,14 +277,14 @@ class RouteProgress:
         return max(legs[0].end - station, 0.0) + sum(leg.end - leg.start for leg in legs[1:])
 
     def way_in(self) -> Place | None:
-        """Where the last lane change before the goal begins; None if the goal's own lane is driven up to it."""
+        """Returns the place of the last lane change of the route; None if it has none."""
         for before, leg in reversed(list(itertools.pairwise(self.route.legs if self.route is not None else ()))):
             if leg.entry in (Entry.CHANGE_LEFT, Entry.CHANGE_RIGHT):
                 return before.lane, (before.start + before.end) / 2
         return None
 
     def next_crossing(self, town: Town, station: float) -> RouteJunction | None:
-        """The next junction with a choice on the route; None if the rest needs no choice."""
+        """Returns the next junction with a choice on the route; None if there is none."""
         return next(self.crossings(town, station), None)
 
     def crossings(self, town: Town, station: float) -> Iterator[RouteJunction]:
@@ -302,7 +300,7 @@ class RouteProgress:
                     yield RouteJunction(lane=leg.lane, exit=way, distance=distance)
 
     def next_manoeuvre(self, station: float) -> tuple[Entry, float] | None:
-        """The first lane change or U-turn on the route before the next junction, and how far it is [m]."""
+        """Returns the next lane change or U-turn on the route and its distance [m]; None without one."""
         distance = 0.0
         for k, leg in enumerate(self.legs):
             if k and leg.entry is not Entry.FOLLOW:
@@ -318,7 +316,7 @@ class RouteProgress:
         return False
 
     def run_up(self) -> tuple[float, int] | None:
-        """How far the goal is behind the next U-turn [m], and how many lane changes lie between; None without one."""
+        """Returns the distance from the next U-turn to the goal [m] and the number of lane changes; None without one."""
         for k, leg in enumerate(self.legs):
             if k and leg.entry is Entry.U_TURN:
                 after = self.legs[k:]
@@ -327,9 +325,9 @@ class RouteProgress:
         return None
 
     def needs_switch(self, town: Town, lane: int, station: float, crossing: RouteJunction) -> bool:
-        """Whether a lane change before a junction has to be made on its own, not on the way into the turn.
+        """Whether a lane change before a junction has to be commanded apart from the turn.
 
-        By default the car would go on to another junction, run into what blocks its lane, or cross the junction in its
+        Without it the car would reach another junction, run into what blocks its lane, or cross the junction in its
         own lane and come out beside a goal that is right behind it.
         """
         choice = next_choice(town, lane, station)
@@ -418,21 +416,21 @@ class RouteState:
 
 
 def first_new_street(
-    observation: Mapping[str, Any], town: Town, lane: int, journey: RouteProgress | None
+    observation: Mapping[str, Any], town: Town, lane: int, progress: RouteProgress | None
 ) -> StreetName | None:
-    """The first street with a name on a journey that is another than that of the present lane; None if there is none.
+    """Returns the first named street of a route other than that of the present lane; None if there is none.
 
     Args:
-        observation: with the names of the streets.
+        observation: observation with the names of the streets.
         town: the map.
         lane: the present lane.
-        journey: None for no way at all.
+        progress: the route, or None.
     """
     here = street_of(observation, town, lane)
-    names = (street_of(observation, town, leg.lane) for leg in (journey.legs[1:] if journey is not None else ()))
+    names = (street_of(observation, town, leg.lane) for leg in (progress.legs[1:] if progress is not None else ()))
     return next((name for name in names if name not in (here, StreetName.UNKNOWN)), None)
 
 
 def streets_named(street_names: Iterable[int], name: StreetName) -> frozenset[int]:
-    """Indices of the streets that bear a name."""
+    """Returns the indices of the streets of a name."""
     return frozenset(k for k, value in enumerate(street_names) if int(value) == name.value)

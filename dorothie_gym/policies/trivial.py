@@ -25,14 +25,14 @@ from dorothie_gym.spaces import (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Draws:
-    """A position in a stream of chance: the seed, and how many decisions have been taken."""
+class DrawCount:
+    """Position in a stream of random draws: its seed, and the number of decisions taken."""
 
     seed: int
     count: int = 0
 
-    def next(self) -> Draws:
-        """The position after one more decision."""
+    def next(self) -> DrawCount:
+        """Returns the position after one more decision."""
         return replace(self, count=self.count + 1)
 
 
@@ -40,27 +40,27 @@ class SilentPolicy(Policy[None]):
     """Says and does nothing."""
 
     def initial_state(self, seed: int, town: Town) -> None:
-        """There is nothing to remember."""
+        """Returns None: the policy has no state."""
 
     def step(self, observation: Mapping[str, Any], state: None) -> tuple[ActionDict, None]:
         """Returns the action that does nothing."""
         return noop(self.role, self.limits), None
 
 
-class RandomPolicy(Policy[Draws]):
-    """Samples the action space; utterances are left to the environment to word."""
+class RandomPolicy(Policy[DrawCount]):
+    """Samples the action space; the environment words the utterances."""
 
     def __init__(self, role: Role, limits: SpaceLimits | None = None) -> None:
-        """Takes a copy of the role's action space, to seed it."""
+        """Prepares a policy for `role`, with a copy of its action space."""
         super().__init__(role, limits)
         self._space = deepcopy(action_space(role, self.limits))
 
-    def initial_state(self, seed: int, town: Town) -> Draws:
-        """The beginning of the stream."""
-        return Draws(seed=seed)
+    def initial_state(self, seed: int, town: Town) -> DrawCount:
+        """Returns the beginning of the stream of draws."""
+        return DrawCount(seed=seed)
 
-    def step(self, observation: Mapping[str, Any], state: Draws) -> tuple[ActionDict, Draws]:
-        """Returns a sample that follows from the seed and the number of the decision."""
+    def step(self, observation: Mapping[str, Any], state: DrawCount) -> tuple[ActionDict, DrawCount]:
+        """Returns a sample that depends only on the seed and the number of the decision."""
         self._space.seed(state.seed * 1_000_003 + state.count & 0x7FFFFFFF)
         action: ActionDict = self._space.sample()
         for field in ("utterance", "message"):
@@ -70,9 +70,10 @@ class RandomPolicy(Policy[Draws]):
 
 
 class LaneFollowPolicy(Policy[None]):
-    """Follows its lane, goes as straight on as it can where it has to choose, and turns round at a dead end.
+    """Co-Wizard that drives and never talks; a baseline for what driving achieves without dialogue.
 
-    It does only what the car asks for: it acts where the car stands by Stop or waits at the end of its lane.
+    It follows its lane, takes the straightest exit where it has to choose, and turns round at a dead end. It acts only
+    where the car has been stopped or waits at the end of its lane.
     """
 
     def __init__(self, limits: SpaceLimits | None = None) -> None:
@@ -80,7 +81,7 @@ class LaneFollowPolicy(Policy[None]):
         super().__init__(Role.CO_WIZARD, limits)
 
     def initial_state(self, seed: int, town: Town) -> None:
-        """There is nothing to remember."""
+        """Returns None: the policy has no state."""
 
     def step(self, observation: Mapping[str, Any], state: None) -> tuple[ActionDict, None]:
         """Returns the action that keeps the car going."""

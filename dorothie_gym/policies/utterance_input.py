@@ -1,4 +1,4 @@
-"""What a listener has of an utterance: the words, what rules take from them, and the acts."""
+"""Utterances as a listener observes them: acts, words, and the interpretation of the words by rules."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dorothie_gym.spaces import heard_acts
 
 @dataclass(frozen=True, kw_only=True)
 class HeardUtterance:
-    """An utterance that is over: its acts in order, and its words with what they tell."""
+    """Completed utterance: its acts in order, and its parsed words."""
 
     acts: tuple[DialogueAct, ...]
     words: ParsedText
@@ -22,12 +22,12 @@ class HeardUtterance:
 def heard_utterance(
     observation: Mapping[str, Any], speaker: Role, after: DialogueMove | None = None
 ) -> HeardUtterance | None:
-    """What a speaker has said since the last decision, or None; acts that are not observed are guessed from the words.
+    """Returns the utterance completed since the last decision, or None; acts that are not observed are classified.
 
     Args:
-        observation: of the listener.
-        speaker: who may have spoken.
-        after: move of what the listener said last.
+        observation: observation of the listener.
+        speaker: role of the speaker.
+        after: last move of the listener, as context of the classification.
     """
     text = str(observation[f"{speaker}_text"])
     acts = heard_acts(observation, speaker)

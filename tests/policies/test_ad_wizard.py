@@ -4,7 +4,7 @@ import pytest
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import ExceptionKind, LandmarkName
 from dorothie_gym.policies import ScriptedAdWizard, Trick
-from dorothie_gym.policies.ad_wizard import context
+from dorothie_gym.policies.ad_wizard import task_message
 from dorothie_gym.spaces import AdWizardAction, SpaceLimits
 from tests.policies.walk import play
 
@@ -33,7 +33,7 @@ def test_wrong_arguments_are_told():
 @pytest.mark.parametrize("kind", [ExceptionKind.TASK_TRIGGER, ExceptionKind.TASK_DELETE, ExceptionKind.TASK_CHANGE])
 def test_messages_name_the_place_and_fit_their_field(kind):
     for seed in range(20):
-        text = context(kind, LandmarkName.SEVEN_ELEVEN, np.random.default_rng(seed))
+        text = task_message(kind, LandmarkName.SEVEN_ELEVEN, np.random.default_rng(seed))
         assert "SevenEleven" in text
         AdWizardAction.decode(AdWizardAction(exception=kind, message=text).encode(SpaceLimits()), SpaceLimits())
 

@@ -7,15 +7,12 @@ from typing import Final
 
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.maps import Exit, Town
-from dorothie_gym.maps.lane_neighbours import oncoming_lanes
 from dorothie_gym.maps.model import LinkType, wrap_degrees
 from dorothie_gym.ontology import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, PhysicalAction
 from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, u_turn_start
 from dorothie_gym.policies.route_progress import (
-    BRAKING,
     SAME_WAY,
-    SWITCH_ROOM,
-    U_TURN_SPEED_SQUARED,
     Choice,
     direction_of,
     lanes_beside,
@@ -107,8 +104,7 @@ def _turn_round(view: CoWizardView, town: Town) -> Deed | None:
         return Deed(physical=None, direction=Direction.BACK)
     if lane.in_junction or view.manoeuvring or town.neighbour(view.lane, LinkType.LANE_CHANGE_LEFT) is not None:
         return None
-    begin = view.station + max(0.0, view.speed**2 - U_TURN_SPEED_SQUARED) / (2 * BRAKING) + (view.speed > 0.5)
-    if oncoming_lanes(town).at(view.lane, min(begin, lane.length)) is None:
+    if not can_turn_round(town, view.lane, u_turn_start(view.station, view.speed)):
         return None
     return Deed(physical=Physical(action=PhysicalAction.U_TURN), direction=Direction.BACK)
 
@@ -116,8 +112,7 @@ def _turn_round(view: CoWizardView, town: Town) -> Deed | None:
 def _switch(left: bool, view: CoWizardView, town: Town) -> Deed | None:
     lane = town.lanes[view.lane]
     side = LinkType.LANE_CHANGE_LEFT if left else LinkType.LANE_CHANGE_RIGHT
-    room = lane.length - view.station > SWITCH_ROOM
-    if lane.in_junction or view.manoeuvring or not room or town.neighbour(view.lane, side) is None:
+    if lane.in_junction or view.manoeuvring or not can_switch_lane(town, view.lane, view.station, side):
         return None
     angle = int(LANE_SWITCH_LEFT if left else LANE_SWITCH_RIGHT)
     direction = Direction.LEFT if left else Direction.RIGHT

@@ -13,7 +13,7 @@ import numpy as np
 from dorothie_gym.baselines.selfplay.heard import Remark, listen
 from dorothie_gym.baselines.selfplay.seat import Mask, Seat
 from dorothie_gym.ontology import ExceptionKind, PropKind, Role, Sensor, WeatherParameter
-from dorothie_gym.policies.ad_wizard import FIRST, SPACING, context
+from dorothie_gym.policies.ad_wizard import AdWizardConfig, task_message
 from dorothie_gym.policies.observation_parser import SeenSubgoal, place_on_path, read_landmarks, read_subgoals, scalar
 from dorothie_gym.spaces import AdWizardAction, LanePosition, PropColumn
 
@@ -109,14 +109,14 @@ class AdWizardSeat(Seat[AdWizardMemory]):
 
     def own(self, observation: Mapping[str, Any], memory: AdWizardMemory) -> list[float]:
         """How long until the next trick, and whether one can be played ahead on the path."""
-        wait = max(memory.last + SPACING, FIRST) - scalar(observation, "time")
-        return [max(wait, 0.0) / SPACING, float(place_on_path(self.town, observation, NEAR) is not None)]
+        wait = max(memory.last + AdWizardConfig.spacing, AdWizardConfig.first_at) - scalar(observation, "time")
+        return [max(wait, 0.0) / AdWizardConfig.spacing, float(place_on_path(self.town, observation, NEAR) is not None)]
 
     def mask(self, observation: Mapping[str, Any], memory: AdWizardMemory) -> Mask:
         """What there is occasion for; nothing else while the last trick is still fresh."""
         mask = np.zeros(self.actions, dtype=np.bool_)
         mask[Caper.NOTHING] = True
-        if scalar(observation, "time") < max(memory.last + SPACING, FIRST):
+        if scalar(observation, "time") < max(memory.last + AdWizardConfig.spacing, AdWizardConfig.first_at):
             return mask
         mask[[*_WEATHER, *_FAULTS]] = True
         props = observation["props"][:, PropColumn.KIND] > 0
@@ -186,4 +186,6 @@ class AdWizardSeat(Seat[AdWizardMemory]):
             return _NOTHING
         names = {mark.row: mark.name for mark in read_landmarks(observation, self.town)}
         words = np.random.default_rng(round(scalar(observation, "time")))
-        return AdWizardAction(exception=kind, item=subgoal.index, message=context(kind, names[subgoal.landmark], words))
+        return AdWizardAction(
+            exception=kind, item=subgoal.index, message=task_message(kind, names[subgoal.landmark], words)
+        )
