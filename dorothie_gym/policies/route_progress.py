@@ -316,7 +316,7 @@ class RouteProgress:
         return False
 
     def run_up(self) -> tuple[float, int] | None:
-        """Returns the distance from the next U-turn to the goal [m] and the number of lane changes; None without one."""
+        """Returns distance and number of lane changes from the next U-turn to the goal [m]; None without a U-turn."""
         for k, leg in enumerate(self.legs):
             if k and leg.entry is Entry.U_TURN:
                 after = self.legs[k:]
