@@ -22,7 +22,7 @@ from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES
 from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, VECTOR_SLOTS, DialogueMove, PhysicalAction, Role
 from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS
 from dorothie_gym.recording import Session, Task
-from dorothie_gym.recording.points import DecisionPoint, InferencePoint, Point, View, history_angle
+from dorothie_gym.recording.points import DecisionPoint, InferencePoint, Point, PointView, history_angle
 
 WIDTH: Final = 770
 LANES, ROADS, JUNCTIONS = 486, 259, 34
@@ -92,7 +92,7 @@ class Features:
     frames: Tensor
 
 
-def rebuild(session: Session, view: View, graph: TownGraph, senses: Senses) -> Features:
+def rebuild(session: Session, view: PointView, graph: TownGraph, senses: Senses) -> Features:
     """Returns the features of a point, built from the recording with everything that came before it."""
     moves, actions = view.moves, view.actions
     landmarks = [

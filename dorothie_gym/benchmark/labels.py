@@ -35,7 +35,7 @@ from dorothie_gym.recording import (
     ufn_points,
     unpointed_events,
 )
-from dorothie_gym.recording.resampling import at_tenths
+from dorothie_gym.recording.points import at_tenths
 
 Split: TypeAlias = Literal["train", "val", "test", "all"]
 SPLITS: Final[tuple[Split, ...]] = ("train", "val", "test", "all")

@@ -31,7 +31,7 @@ from dorothie_gym.recording import (
     Task,
     task_points,
 )
-from dorothie_gym.recording.sdn.maps import find_town
+from dorothie_gym.recording.towns import find_town
 from dorothie_gym.spaces import SpaceLimits
 from dorothie_gym.wrappers.point_env import PointEnv
 

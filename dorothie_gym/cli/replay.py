@@ -195,7 +195,7 @@ def _is_unseen() -> bool:
 def _town(session: Session, town: str | None, maps: Path | None) -> Town:
     """The town of a session."""
     from dorothie_gym.maps import load_town
-    from dorothie_gym.recording.sdn.maps import find_town
+    from dorothie_gym.recording.towns import find_town
 
     if town is not None:
         return load_town(town)

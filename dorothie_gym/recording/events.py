@@ -199,6 +199,11 @@ class UtteranceRecord:
     end: float
     moves: tuple[MoveRecord, ...]
 
+    @property
+    def frame(self) -> int:
+        """Frame at which its last move was recorded."""
+        return max(move.frame for move in self.moves)
+
 
 def move_record(event: Event, index: int, where: str = "event") -> MoveRecord:
     """Returns the move that an event of type `DIALOGUE_MOVE` holds; raises `SessionError` naming the field."""

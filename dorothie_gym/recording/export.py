@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from dorothie_gym.ontology import VECTOR_SLOTS, Role
 from dorothie_gym.recording.file_names import PART
-from dorothie_gym.recording.points import View, history_angle, nfd_points
+from dorothie_gym.recording.points import PointView, history_angle, nfd_points
 from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.splits import Fold
 
@@ -149,5 +149,5 @@ def _start(fold: Fold | None, session: Session, event: int) -> dict[str, Any]:
     return {"fold": name, "session": session.name, "town": session.header.town, "event": event}
 
 
-def _last_said(view: View, speaker: Role) -> str | None:
+def _last_said(view: PointView, speaker: Role) -> str | None:
     return next((move.text for move in reversed(view.moves) if move.speaker is speaker), None)

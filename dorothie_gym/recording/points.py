@@ -1,51 +1,192 @@
-"""The points of the three tasks, each with exactly what may be seen there (teacher forcing).
+"""Prediction points of the three tasks, and the rule of what is visible at a point (teacher forcing).
 
-Visible is what was recorded on frames strictly before the point. At a UfN point, in addition, the words of the
-utterance and the acts of its earlier spans; at an NfD point the utterances that were over in its own frame and stand
-before it in the record: who obeys at once has heard them. At an RfN point no act of the point's own utterance, which
-would give its words away. Hidden landmarks, which the car does not know, are never visible.
+This module alone states the rule; environments read it as a `PointView`, batches as the row ranges of `visible_rows`:
+
+* Frames of the car and physical actions are visible if they were recorded strictly before the point.
+* An utterance, with its words and all of its moves, is visible if its last move was recorded strictly before the point.
+  At an NfD point, utterances of the point's own time that stand before it in the record are visible as well: an action
+  may obey an utterance at once.
+* At a UfN point, the words of the current utterance and the moves of its earlier spans are visible. At an RfN point
+  nothing of the current utterance is, since its words give its moves away.
+* Hidden landmarks, which the car does not know, are never visible.
 """
 
 from __future__ import annotations
 
-import bisect
 import enum
 import math
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Final, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
+from dorothie_gym.maps.model import wrap_degrees
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, U_TURN_ANGLE, ArgumentKind, DialogueAct, PhysicalAction, Role
-from dorothie_gym.recording.events import ActionRecord, Event, EventType, MoveRecord
+from dorothie_gym.recording.events import ActionRecord, Event, EventType, MoveRecord, UtteranceRecord
 from dorothie_gym.recording.header import LandmarkRow
 from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.sim.config import FRAME_RATE
 
 ANGLE_TOLERANCE: Final = 15.0
-"""The angle of a navigation action is right below this error [degrees] (paper, section 5, Evaluation)."""
-
+"""Largest error of a navigation action's angle that counts as right [degrees] (paper, section 5, Evaluation)."""
 
 WAY_LENGTH: Final = 25
+"""Most states of the car in a view: 100 frames of 10 Hz, every fourth (working memory, paper, section 6)."""
+
 WAY_STEP: Final = 12
-"""States of the car in a view, and frames (30 Hz) from one to the next: 100 frames of 10 Hz, every fourth."""
+"""Frames (30 Hz) between two states of the car in a view."""
+
+SPEAKERS: Final = (Role.PARTICIPANT, Role.CO_WIZARD)
+"""Roles whose utterances are visible."""
 
 
 class Task(enum.StrEnum):
-    """What is to be predicted (paper, section 5)."""
+    """Prediction task (paper, section 5)."""
 
     UFN = "ufn"
-    """Understanding from navigation: the act of what the participant says."""
+    """Understanding from navigation: the act of the participant's current span."""
     RFN = "rfn"
-    """Response from navigation: the act of what the Co-Wizard says next."""
+    """Response from navigation: the act of the Co-Wizard's next span."""
     NFD = "nfd"
     """Navigation from dialogue: the next navigation action and its angle."""
 
 
+# --- The rule ---------------------------------------------------------------------------------------------------------
+
+
+_TIME_BITS: Final = 32
+"""Times are below 2 to the power of this."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """Session and time of n rows, in rising order.
+
+    Attributes:
+        session: (n,) index of the session.
+        time: (n,) time since the session began, in frames or tenths of a second.
+    """
+
+    session: NDArray[np.integer]
+    time: NDArray[np.integer]
+
+    @classmethod
+    def of_one_session(cls, times: ArrayLike) -> Moments:
+        """Returns moments (n,) of a single session, whose index is 0."""
+        time = np.asarray(times, dtype=np.int64).reshape(-1)
+        return cls(np.zeros(len(time), dtype=np.int64), time)
+
+    def rows_before(self, points: Moments) -> RowRange:
+        """Returns the rows of each point's session with a time strictly before the point's."""
+        first = points.session.astype(np.int64) << _TIME_BITS
+        start, stop = np.searchsorted(self._keys, first), np.searchsorted(self._keys, first + points.time)
+        return RowRange(start.astype(np.int32), stop.astype(np.int32))
+
+    @cached_property
+    def _keys(self) -> NDArray[np.int64]:
+        """Numbers (n,) that rise with session and time."""
+        return (self.session.astype(np.int64) << _TIME_BITS) + self.time
+
+
+@dataclass(frozen=True, eq=False)
+class RowRange:
+    """Rows `start[i]:stop[i]` for each point i; both (n,) int32."""
+
+    start: NDArray[np.int32]
+    stop: NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RecordTimes:
+    """Times that decide what is visible in a record of one or several sessions, all in the same unit.
+
+    Attributes:
+        utterances: moments of the last move of u utterances of `SPEAKERS`; of one moment by their first event.
+        last_events: (u,) number of the event of each utterance's last move.
+        first_moves: (u + 1,) the moves of utterance i are rows `first_moves[i]:first_moves[i + 1]` of the moves.
+        actions: moments of the physical actions.
+        frames: moments of the frames of the car.
+    """
+
+    utterances: Moments
+    last_events: NDArray[np.integer]
+    first_moves: NDArray[np.integer]
+    actions: Moments
+    frames: Moments
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class VisibleRows:
+    """Rows of a record that are visible at n points."""
+
+    utterances: RowRange
+    moves: RowRange
+    actions: RowRange
+    frames: RowRange
+
+
+def visible_rows(times: RecordTimes, task: Task, points: Moments, events: ArrayLike) -> VisibleRows:
+    """Returns what is visible at points of a task; for UfN see also `earlier_spans`.
+
+    Args:
+        times: times of the record.
+        task: the task.
+        points: moments of n points, in any order.
+        events: (n,) number of each point's event in its session.
+    """
+    said = times.utterances.rows_before(points)
+    if task is Task.NFD:
+        said = _with_just_heard(times, said, points, np.asarray(events))
+    first = times.first_moves.astype(np.int32)
+    return VisibleRows(
+        utterances=said,
+        moves=RowRange(first[said.start], first[said.stop]),
+        actions=times.actions.rows_before(points),
+        frames=times.frames.rows_before(points),
+    )
+
+
+def _with_just_heard(times: RecordTimes, said: RowRange, points: Moments, events: NDArray[np.integer]) -> RowRange:
+    """Adds utterances of the points' own time up to the first that does not stand before its point in the record."""
+    through = times.utterances.rows_before(Moments(points.session, points.time + 1)).stop
+    stop = said.stop.copy()
+    for point in np.flatnonzero(through > stop).tolist():
+        while stop[point] < through[point] and times.last_events[stop[point]] < events[point]:
+            stop[point] += 1
+    return RowRange(said.start, stop)
+
+
+def earlier_spans(utterance_of_move: NDArray[np.integer], moves: ArrayLike) -> RowRange:
+    """Returns the rows of the moves that precede each given move within its own utterance.
+
+    Args:
+        utterance_of_move: utterance of each move of a record, rising.
+        moves: (n,) rows of moves.
+    """
+    rows = np.asarray(moves, dtype=np.int32).reshape(-1)
+    return RowRange(np.searchsorted(utterance_of_move, utterance_of_move[rows]).astype(np.int32), rows)
+
+
+def is_decision(record: ActionRecord) -> bool:
+    """Returns whether a physical action is a point of NfD."""
+    return record.flagged and record.source is Role.CO_WIZARD and record.action in NAVIGATION_ACTIONS
+
+
+def is_inference(move: MoveRecord, task: Task) -> bool:
+    """Returns whether a dialogue move is a point of UfN or RfN."""
+    return move.flagged and move.speaker is (Role.PARTICIPANT if task is Task.UFN else Role.CO_WIZARD)
+
+
+# --- Views ------------------------------------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True, kw_only=True)
 class CarState:
-    """The car in one frame: place [m], heading [rad, clockwise], speed [m/s]."""
+    """State of the car at a frame: position [m], heading [rad, clockwise], speed [m/s]."""
 
     frame: int
     x: float
@@ -55,19 +196,19 @@ class CarState:
 
 
 @dataclass(frozen=True, kw_only=True)
-class View:
-    """What may be seen at a point: all that a model is given.
+class PointView:
+    """Everything that is visible at a point: the whole input of a model.
 
     Attributes:
-        task: what is to be predicted.
+        task: the task.
         session: name of the session.
         frame: frame of the point.
         time: the same in seconds.
         moves: past dialogue moves of both speakers, oldest first.
         actions: past physical actions, oldest first.
         car: the last recorded state of the car; None before the first.
-        way: where it was before, every `WAY_STEP` frames of the recording back from `car`, which is the last; at most
-            `WAY_LENGTH` states (the working memory of the paper, section 6: 10 s).
+        way: past states of the car, oldest first, every `WAY_STEP` frames back from `car`, which is the last; at most
+            `WAY_LENGTH` states.
         utterance: words of the current utterance at a UfN point, else empty.
         street_names: label of each street's name.
         landmarks: those that are not hidden.
@@ -86,29 +227,138 @@ class View:
     landmarks: tuple[LandmarkRow, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
-class InferencePoint:
-    """A dialogue move to be predicted (UfN, RfN): `index` of its event, what may be seen, and the label."""
+class SessionHistory:
+    """Record of a session in the order in which it becomes visible.
 
+    Attributes:
+        session: the session.
+        utterances: utterances of `SPEAKERS`, by the frame of their last move, then by their first event.
+        moves: their moves, utterance by utterance.
+        actions: the physical actions.
+        landmarks: landmarks that are not hidden.
+        times: times of these rows in frames of the session.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        said: Sequence[UtteranceRecord] = [said for said in session.utterances() if said.speaker in SPEAKERS]
+        self.utterances = tuple(sorted(said, key=lambda said: (said.frame, said.moves[0].index)))
+        self.moves = tuple(move for said in self.utterances for move in said.moves)
+        self.actions = session.physical_actions
+        self.landmarks = tuple(row for row in session.header.landmarks if not row["hidden"])
+        self.times = RecordTimes(
+            utterances=Moments.of_one_session([said.frame for said in self.utterances]),
+            last_events=np.array([said.moves[-1].index for said in self.utterances], dtype=np.int64),
+            first_moves=np.cumsum([0, *(len(said.moves) for said in self.utterances)]),
+            actions=Moments.of_one_session([action.frame for action in self.actions]),
+            frames=Moments.of_one_session(session.trajectory["frame"]),
+        )
+
+    def view(self, task: Task, frame: int, event: int = -1) -> PointView:
+        """Returns what is visible at a point.
+
+        Args:
+            task: the task.
+            frame: frame of the point.
+            event: number of the point's event; -1 where nothing is predicted.
+        """
+        seen = visible_rows(self.times, task, Moments.of_one_session(frame), [event])
+        moves, utterance = self.moves[: int(seen.moves.stop[0])], ""
+        if task is Task.UFN and event in self._row_of_event:
+            row = self._row_of_event[event]
+            spans = earlier_spans(self._utterance_of_move, row)
+            moves += self.moves[int(spans.start[0]) : row]
+            utterance = self.moves[row].text
+        way = self._way(int(seen.frames.stop[0]))
+        return PointView(
+            task=task,
+            session=self.session.name,
+            frame=frame,
+            time=frame / FRAME_RATE,
+            moves=moves,
+            actions=self.actions[: int(seen.actions.stop[0])],
+            car=way[-1] if way else None,
+            way=way,
+            utterance=utterance,
+            street_names=tuple(self.session.header.street_names),
+            landmarks=self.landmarks,
+        )
+
+    @cached_property
+    def _row_of_event(self) -> dict[int, int]:
+        return {move.index: row for row, move in enumerate(self.moves)}
+
+    @cached_property
+    def _utterance_of_move(self) -> NDArray[np.int64]:
+        return np.repeat(np.arange(len(self.utterances)), np.diff(self.times.first_moves))
+
+    def _way(self, stop: int) -> tuple[CarState, ...]:
+        """Returns the states of the car up to row `stop` of the trajectory."""
+        if stop == 0:
+            return ()
+        trajectory = self.session.trajectory
+        wanted = int(trajectory["frame"][stop - 1]) - WAY_STEP * np.arange(WAY_LENGTH)[::-1]
+        rows = np.searchsorted(trajectory["frame"], wanted[wanted >= trajectory["frame"][0]])
+        states = trajectory[list(_STATE)][rows].tolist()
+        return tuple(CarState(**dict(zip(_STATE, state, strict=True))) for state in states)
+
+
+_STATE: Final = ("frame", "x", "y", "heading", "speed")
+
+
+def final_view(session: Session, task: Task) -> PointView:
+    """Returns what is visible after the end of a session: everything, and no current utterance."""
+    last_frame = round(session.duration * FRAME_RATE)
+    return SessionHistory(session).view(task, last_frame + 1)
+
+
+# --- Points -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class _TaskPoint:
+    """Place of a point; the view is made when it is first read."""
+
+    task: Task
     index: int
-    view: View
+    frame: int
+    history: SessionHistory = field(repr=False, compare=False)
+
+    @cached_property
+    def view(self) -> PointView:
+        """What is visible at the point."""
+        return self.history.view(self.task, self.frame, self.index)
+
+
+@dataclass(frozen=True, kw_only=True)
+class InferencePoint(_TaskPoint):
+    """Prediction point of a dialogue move (UfN, RfN).
+
+    Attributes:
+        task: the task.
+        index: number of the event in the session.
+        frame: frame of the event.
+        history: record of the session.
+        act: the label.
+    """
+
     act: DialogueAct
 
 
 @dataclass(frozen=True, kw_only=True)
-class DecisionPoint:
-    """A navigation action to be predicted (NfD).
+class DecisionPoint(_TaskPoint):
+    """Prediction point of a navigation action (NfD).
 
     Attributes:
-        index: number of its event.
-        view: what may be seen.
+        task: the task.
+        index: number of the event in the session.
+        frame: frame of the event.
+        history: record of the session.
         action: the label.
-        angle: its argument [degrees, positive left, in [-180, 180)]: 0 for actions that take none, NaN where the
-            recording does not know it.
+        angle: its argument [degrees, positive left, in [-180, 180)]: 0 for actions without one, NaN where the recording
+            does not hold it.
     """
 
-    index: int
-    view: View
     action: PhysicalAction
     angle: float
 
@@ -117,30 +367,39 @@ Point: TypeAlias = InferencePoint | DecisionPoint
 
 
 def ufn_points(session: Session, *, since: int = 0) -> Iterator[InferencePoint]:
-    """Yields a point for each flagged dialogue move of the participant; of events from number `since` on."""
-    yield from _inference_points(session, Task.UFN, Role.PARTICIPANT, since)
+    """Yields a point for each flagged dialogue move of the participant, from event number `since` on."""
+    yield from _inference_points(session, Task.UFN, since)
 
 
 def rfn_points(session: Session, *, since: int = 0) -> Iterator[InferencePoint]:
-    """Yields a point for each flagged dialogue move of the Co-Wizard; of events from number `since` on."""
-    yield from _inference_points(session, Task.RFN, Role.CO_WIZARD, since)
+    """Yields a point for each flagged dialogue move of the Co-Wizard, from event number `since` on."""
+    yield from _inference_points(session, Task.RFN, since)
 
 
 def nfd_points(session: Session, *, since: int = 0) -> Iterator[DecisionPoint]:
-    """Yields a point for each flagged navigation action of the Co-Wizard; of events from number `since` on."""
-    history = _History(session, Task.NFD)
-    for record in session.physical_actions:
+    """Yields a point for each flagged navigation action of the Co-Wizard, from event number `since` on."""
+    history = SessionHistory(session)
+    for record in history.actions:
         if record.index >= since and is_decision(record):
             yield DecisionPoint(
+                task=Task.NFD,
                 index=record.index,
-                view=history.view(record.frame, before=record.index),
+                frame=record.frame,
+                history=history,
                 action=record.action,
                 angle=label_angle(record),
             )
 
 
+def _inference_points(session: Session, task: Task, since: int) -> Iterator[InferencePoint]:
+    history = SessionHistory(session)
+    for move in session.all_moves:
+        if move.index >= since and is_inference(move, task):
+            yield InferencePoint(task=task, index=move.index, frame=move.frame, history=history, act=move.act)
+
+
 def task_points(session: Session, task: Task, *, since: int = 0) -> tuple[Point, ...]:
-    """Returns the points of a task in a session; of events from number `since` on."""
+    """Returns the points of a task in a session, from event number `since` on."""
     match task:
         case Task.UFN:
             return tuple(ufn_points(session, since=since))
@@ -151,7 +410,7 @@ def task_points(session: Session, task: Task, *, since: int = 0) -> tuple[Point,
 
 
 def corpus_points(sessions: Iterable[Session], task: Task) -> Iterator[Point]:
-    """Yields the points of a task in sessions, such as a `Corpus`; each session is read when it is its turn.
+    """Yields the points of a task in sessions, such as a `Corpus`; reads one session at a time.
 
     Raises:
         SessionError: a session cannot be read.
@@ -160,133 +419,63 @@ def corpus_points(sessions: Iterable[Session], task: Task) -> Iterator[Point]:
         yield from task_points(session, task)
 
 
-def is_decision(record: ActionRecord) -> bool:
-    """Whether a physical action is a point of NfD."""
-    return record.flagged and record.source is Role.CO_WIZARD and record.action in NAVIGATION_ACTIONS
-
-
 def unpointed_events(session: Session) -> tuple[tuple[int, str], ...]:
-    """Returns the number of each flagged event that is a point of no task, and why it is none.
+    """Returns number and reason of each flagged event that is a point of no task.
 
-    With the points of the three tasks they are all flagged events, each once.
+    Together with the points of the three tasks they are all flagged events, each once.
     """
-    acts = {act.index: act for act in session.physical_actions}
+    actions = {action.index: action for action in session.physical_actions}
     return tuple(
         (index, reason)
         for index, event in enumerate(session.events)
-        if event.flagged and (reason := _why_no_point(event, acts.get(index)))
+        if event.flagged and (reason := _why_no_point(event, actions.get(index)))
     )
 
 
-def _why_no_point(event: Event, act: ActionRecord | None) -> str:
-    """Why a flagged event is no point; empty if it is one."""
-    if act is not None:
-        if act.action not in NAVIGATION_ACTIONS:
-            return f"{act.action.label} is no navigation action"
-        return "" if is_decision(act) else f"{act.action.label} of {act.source.value}, not of the Co-Wizard"
+def _why_no_point(event: Event, action: ActionRecord | None) -> str:
+    """Returns why a flagged event is no point; empty if it is one."""
+    if action is not None:
+        if action.action not in NAVIGATION_ACTIONS:
+            return f"{action.action.label} is no navigation action"
+        return "" if is_decision(action) else f"{action.action.label} of {action.source.value}, not of the Co-Wizard"
     if event.type is not EventType.DIALOGUE_MOVE:
         return f"an event of type {event.type_name}: neither a dialogue move nor a physical action"
-    return (
-        ""
-        if event.source in (Role.PARTICIPANT, Role.CO_WIZARD)
-        else f"a move of {event.source.value}, neither the participant nor the Co-Wizard"
+    if event.source in SPEAKERS:
+        return ""
+    return f"a move of {event.source.value}, neither the participant nor the Co-Wizard"
+
+
+def at_tenths(session: Session) -> Session:
+    """Returns a session as recorded at 10 Hz: events move to the beginning of their tenth, frames between are dropped.
+
+    Points and views of the result do not depend on the layout that the session was read from.
+    """
+    trajectory = session.trajectory[session.trajectory["frame"] % FRAMES_PER_TENTH == 0]
+    return replace(
+        session,
+        events=tuple(replace(event, frame=event.frame - event.frame % FRAMES_PER_TENTH) for event in session.events),
+        trajectory=trajectory,
+        scene=session.scene.at_frames(trajectory["frame"]),
     )
 
 
-def final_view(session: Session, task: Task) -> View:
-    """Returns what may be seen when the session is over: everything, and no utterance."""
-    last_frame = round(session.duration * FRAME_RATE)
-    return _History(session, task).view(last_frame + 1)
+# --- Angles -----------------------------------------------------------------------------------------------------------
 
 
 def history_angle(record: ActionRecord) -> float:
-    """Returns the angle under which an action stands in a history [degrees]: a U-turn's is -180 (SDN), unknown is 0."""
+    """Returns the angle of a past action [degrees]: -180 for a U-turn (as in SDN), 0 where it is not known."""
     if record.action is PhysicalAction.U_TURN:
         return U_TURN_ANGLE
-    return _wrap(record.angle or 0.0)
+    return wrap_degrees(record.angle or 0.0)
 
 
 def label_angle(record: ActionRecord) -> float:
-    """Returns NfD's label of an action's argument [degrees]: 0 where it takes none, NaN where it is not known."""
+    """Returns the angle that NfD predicts [degrees]: 0 for actions without one, NaN where it is not known."""
     if record.action.argument not in (ArgumentKind.ANGLE, ArgumentKind.SIDE):
         return 0.0
-    return math.nan if record.angle is None else _wrap(record.angle)
+    return math.nan if record.angle is None else wrap_degrees(record.angle)
 
 
 def angle_error(predicted: float, label: float) -> float:
-    """Returns how far an angle is off, on the circle [degrees], in [0, 180]: 179 and -179 differ by 2."""
-    return abs(_wrap(predicted - label))
-
-
-class _History:
-    """What was recorded before each frame of a session."""
-
-    def __init__(self, session: Session, task: Task) -> None:
-        self._session = session
-        self._task = task
-        self._moves = session.moves()
-        self._actions = session.physical_actions
-        self._move_frames = [move.frame for move in self._moves]
-        self._action_frames = [action.frame for action in self._actions]
-        self._landmarks = tuple(row for row in session.header.landmarks if not row["hidden"])
-
-    def view(self, frame: int, move: MoveRecord | None = None, before: int = 0) -> View:
-        """The view at a frame.
-
-        Args:
-            frame: of the point.
-            move: the one to be predicted, if it is one.
-            before: utterances of the frame itself are visible whose last event has a number below this.
-        """
-        stop = bisect.bisect_left(self._move_frames, frame)
-        while stop < len(self._moves) and self._moves[stop].frame == frame and self._moves[stop].index < before:
-            stop += 1
-        moves = self._moves[:stop]
-        utterance = ""
-        if move is not None:
-            moves = tuple(past for past in moves if not _same_utterance(past, move))
-        if move is not None and self._task is Task.UFN:
-            utterance = move.text
-            moves += tuple(past for past in self._moves if _same_utterance(past, move) and past.index < move.index)
-        way = self._way(frame)
-        return View(
-            task=self._task,
-            session=self._session.name,
-            frame=frame,
-            time=frame / FRAME_RATE,
-            moves=moves,
-            actions=self._actions[: bisect.bisect_left(self._action_frames, frame)],
-            car=way[-1] if way else None,
-            way=way,
-            utterance=utterance,
-            street_names=tuple(self._session.header.street_names),
-            landmarks=self._landmarks,
-        )
-
-    def _way(self, frame: int) -> tuple[CarState, ...]:
-        trajectory = self._session.trajectory
-        last = int(np.searchsorted(trajectory["frame"], frame, side="left")) - 1
-        if last < 0:
-            return ()
-        wanted = int(trajectory["frame"][last]) - WAY_STEP * np.arange(WAY_LENGTH)[::-1]
-        rows = np.searchsorted(trajectory["frame"], wanted[wanted >= trajectory["frame"][0]])
-        states = trajectory[list(_STATE)][rows].tolist()
-        return tuple(CarState(**dict(zip(_STATE, state, strict=True))) for state in states)
-
-
-_STATE: Final = ("frame", "x", "y", "heading", "speed")
-
-
-def _inference_points(session: Session, task: Task, speaker: Role, since: int) -> Iterator[InferencePoint]:
-    history = _History(session, task)
-    for move in session.moves(speaker):
-        if move.flagged and move.index >= since:
-            yield InferencePoint(index=move.index, view=history.view(move.frame, move), act=move.act)
-
-
-def _same_utterance(one: MoveRecord, other: MoveRecord) -> bool:
-    return one.utterance == other.utterance and one.speaker is other.speaker
-
-
-def _wrap(degrees: float) -> float:
-    return (degrees + 180.0) % 360.0 - 180.0
+    """Returns the error of an angle on the circle [degrees], in [0, 180]: 179 and -179 differ by 2."""
+    return abs(wrap_degrees(predicted - label))

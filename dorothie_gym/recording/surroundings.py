@@ -82,6 +82,13 @@ class SceneTable:
         k = int(np.searchsorted(self.frames, frame, side="right")) - 1
         return None if k < 0 else self.rows[self.offsets[k] : self.offsets[k + 1]]
 
+    def at_frames(self, frames: NDArray[np.int64]) -> SceneTable:
+        """Returns the records at the given frames."""
+        kept = np.isin(self.frames, frames)
+        sizes = np.diff(self.offsets)
+        offsets = np.concatenate(([0], np.cumsum(sizes[kept]))).astype(np.int64)
+        return SceneTable(self.frames[kept], offsets, self.rows[np.repeat(kept, sizes)])
+
     def equals(self, other: SceneTable) -> bool:
         """Whether two tables hold the same."""
         return (
@@ -112,6 +119,14 @@ class Scene:
     lights: SceneTable = _nothing(LIGHT_DTYPE)
     weather: SceneTable = _nothing(WEATHER_DTYPE)
     columns: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+
+    def at_frames(self, frames: NDArray[np.int64]) -> Scene:
+        """Returns the records at the given frames, without further columns."""
+        return Scene(
+            actors=self.actors.at_frames(frames),
+            lights=self.lights.at_frames(frames),
+            weather=self.weather.at_frames(frames),
+        )
 
     def equals(self, other: Scene) -> bool:
         """Whether two scenes hold the same."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.sim.config import FRAME_COLUMNS
+from dorothie_gym.sim.config import FRAME_COLUMNS, FRAME_RATE
 
 Trajectory: TypeAlias = NDArray[np.void]
 """Structured array (n,) of `TRAJECTORY_DTYPE`, in order of frames."""
@@ -21,6 +21,12 @@ WHOLE_COLUMNS: Final = ("frame", "lane")
 
 OPEN_COLUMNS: Final = ("speed", "throttle", "steer", "brake")
 """Columns that may hold NaN: what the recording does not know."""
+
+TENTHS: Final = 10
+"""Frames a second of the benchmark and of SDN [Hz] (paper, section 4)."""
+
+FRAMES_PER_TENTH: Final = FRAME_RATE // TENTHS
+"""Frames of a native recording in one frame of the benchmark."""
 
 NO_LANE: Final = -1
 """Lane of a car whose lane the recording does not know."""

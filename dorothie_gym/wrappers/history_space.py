@@ -27,9 +27,9 @@ from dorothie_gym.recording import (
     WAY_LENGTH,
     MoveRecord,
     ObjectKind,
+    PointView,
     Session,
     Task,
-    View,
     history_angle,
     last_perceived,
 )
@@ -75,7 +75,7 @@ def history_space(task: Task, limits: SpaceLimits) -> spaces.Dict:
     )
 
 
-def encode_view(view: View, limits: SpaceLimits) -> Observation:
+def encode_view(view: PointView, limits: SpaceLimits) -> Observation:
     """Returns the observation of a view, in `history_space` of its task but for what `encode_objects` adds."""
     moves, actions = view.moves[: -HISTORY - 1 : -1], view.actions[: -HISTORY - 1 : -1]  # newest first
     car = view.car
@@ -150,7 +150,7 @@ def clean_text(text: str) -> str:
     return "".join(character if character in TEXT_CHARACTERS else "?" for character in text)[:MAX_UTTERANCE]
 
 
-def _way(view: View) -> NDArray[np.float64]:
+def _way(view: PointView) -> NDArray[np.float64]:
     table = np.zeros((WAY_LENGTH, 4))
     states = [(state.x, state.y, state.heading, state.speed) for state in reversed(view.way)]
     table[: len(states)] = np.nan_to_num(np.array(states).reshape(-1, 4))
@@ -179,14 +179,14 @@ def _last_text(moves: Sequence[MoveRecord], speaker: Role) -> str:
     return next((clean_text(move.text) for move in reversed(moves) if move.speaker is speaker), "")
 
 
-def _streets(view: View, limits: SpaceLimits) -> NDArray[np.int64]:
+def _streets(view: PointView, limits: SpaceLimits) -> NDArray[np.int64]:
     row = np.zeros(limits.streets, dtype=np.int64)
     names = view.street_names[: limits.streets]
     row[: len(names)] = [parse_street(name).value for name in names]
     return row
 
 
-def _landmarks(view: View, limits: SpaceLimits) -> NDArray[np.float64]:
+def _landmarks(view: PointView, limits: SpaceLimits) -> NDArray[np.float64]:
     table = np.zeros((limits.landmarks, len(LandmarkColumn)))
     for row, landmark in zip(table, view.landmarks, strict=False):
         row[LandmarkColumn.NAME] = parse_landmark(landmark["name"]).value

@@ -17,9 +17,9 @@ from dorothie_gym.recording import (
     DecisionPoint,
     InferencePoint,
     Point,
+    PointView,
     Session,
     Task,
-    View,
     angle_error,
     final_view,
 )
@@ -202,7 +202,7 @@ class PointEnv(gym.Env[Observation, dict[str, Any]]):
         """What the info of a step tells further of a prediction."""
         return {}
 
-    def _view(self) -> View:
+    def _view(self) -> PointView:
         return final_view(self._now()[0], self.task) if self._point is None else self._point.view
 
     def _observe(self) -> Observation:

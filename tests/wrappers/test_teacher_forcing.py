@@ -15,7 +15,7 @@ from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
-from dorothie_gym.recording import Session, Task, View, task_points
+from dorothie_gym.recording import PointView, Session, Task, task_points
 from dorothie_gym.rollout import play_session
 
 SEED = 3
@@ -25,7 +25,7 @@ def duo(seconds: float = 45.0) -> DuoWizardEnv:
     return DuoWizardEnv("brookside", config=EnvConfig(max_seconds=seconds))
 
 
-def play(env: TeacherForcing, *, right: bool = True) -> tuple[list[View], list[Any], list[float]]:
+def play(env: TeacherForcing, *, right: bool = True) -> tuple[list[PointView], list[Any], list[float]]:
     """Plays an episode with the truth, or with random answers."""
     observation, _ = env.reset(seed=SEED)
     env.action_space.seed(0)

@@ -27,8 +27,8 @@ from dorothie_gym.recording import (
     SessionHeader,
     Trajectory,
 )
-from dorothie_gym.recording.resampling import EACH
 from dorothie_gym.recording.surroundings import LIGHT_DTYPE, Rows, light_rows
+from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.spaces import LandmarkColumn, ObjectColumn
 
 _KINDS: Final = {
@@ -115,7 +115,9 @@ def way_of(glimpses: Sequence[Glimpse]) -> Trajectory:
     As in a recording, the first row is that of the first tenth: nothing has happened before.
     """
     frames = np.array([glimpse.frame for glimpse in glimpses])
-    rows = np.zeros(len(wanted := np.arange(_first_row(frames), frames[-1] + 1, EACH)), dtype=TRAJECTORY_DTYPE)
+    rows = np.zeros(
+        len(wanted := np.arange(_first_row(frames), frames[-1] + 1, FRAMES_PER_TENTH)), dtype=TRAJECTORY_DTYPE
+    )
     rows["frame"] = wanted
     x, y, heading = np.array([glimpse.pose for glimpse in glimpses]).T
     columns = {"x": x, "y": y, "heading": np.unwrap(heading), "speed": [glimpse.speed for glimpse in glimpses]}
@@ -129,7 +131,9 @@ def way_of(glimpses: Sequence[Glimpse]) -> Trajectory:
 
 def scene_of(glimpses: Sequence[Glimpse]) -> Scene:
     """Returns what was around the car at the glimpses of which the way has a row."""
-    seen = [glimpse for glimpse in glimpses if glimpse.frame >= EACH and glimpse.frame % EACH == 0]
+    seen = [
+        glimpse for glimpse in glimpses if glimpse.frame >= FRAMES_PER_TENTH and glimpse.frame % FRAMES_PER_TENTH == 0
+    ]
     frames = np.array([glimpse.frame for glimpse in seen], dtype=np.int64)
     return Scene(
         actors=_table(frames, [glimpse.actors for glimpse in seen], ACTOR_DTYPE),
@@ -170,7 +174,7 @@ def _lane_points(town: Town) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def _first_row(frames: NDArray[np.int64]) -> int:
-    return max(EACH, -(-int(frames[0]) // EACH) * EACH)
+    return max(FRAMES_PER_TENTH, -(-int(frames[0]) // FRAMES_PER_TENTH) * FRAMES_PER_TENTH)
 
 
 def _table(frames: NDArray[np.int64], rows: list[Rows], kind: np.dtype[Any]) -> SceneTable:

@@ -32,7 +32,7 @@ from dorothie_gym.policies.policy import Policy
 from dorothie_gym.policies.route_progress import default_lane_distance
 from dorothie_gym.policies.speech import SpeechState, remark
 from dorothie_gym.recording import Task
-from dorothie_gym.recording.resampling import EACH
+from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.spaces import ActionDict, CoWizardAction, Motion, Physical, SpaceLimits, heard_acts
 
 _TOLD_WAYS: Final = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)
@@ -134,7 +134,7 @@ def _understood(model: TownModel, history: History, heard: tuple[Span, ...]) -> 
 
 def _answer(model: TownModel, history: History, voice: SpeechState, deed: Deed) -> SpeechState:
     """What is said next: an act as the model tells, worded by the grammar."""
-    act = _act(model.answer(history.said(Role.CO_WIZARD, (_UNSAID,), history.frame + EACH), Task.RFN))
+    act = _act(model.answer(history.said(Role.CO_WIZARD, (_UNSAID,), history.frame + FRAMES_PER_TENTH), Task.RFN))
     told = deed.direction if any(value in _TOLD_WAYS for value in act.slots) else None
     return voice.plan(remark(act.move, *act.ordered, wording=Wording(direction=told)))
 
@@ -149,7 +149,7 @@ def _drive(model: TownModel, history: History, view: CoWizardView, town: Town, w
         town: the map.
         waits: whether the car waits for a turn: nothing would come of stopping.
     """
-    asked = history.done(_UNDONE, history.frame + EACH)
+    asked = history.done(_UNDONE, history.frame + FRAMES_PER_TENTH)
     allowed = [not waits or action is not PhysicalAction.STOP for action in NAVIGATION_ACTIONS]
     while any(allowed):
         predicted = model.answer(asked, Task.NFD, allowed=allowed)

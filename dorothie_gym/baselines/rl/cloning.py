@@ -19,7 +19,7 @@ from dorothie_gym.policies.navigation import NavigationAction
 from dorothie_gym.policies.navigation.demonstrations import Demonstration, DemonstrationRecorder
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS
 from dorothie_gym.recording import Corpus, Session
-from dorothie_gym.recording.sdn.maps import find_town
+from dorothie_gym.recording.towns import find_town
 from dorothie_gym.rollout import watch_session
 from dorothie_gym.spaces import CoWizardAction, SpaceLimits
 

@@ -6,7 +6,6 @@ from dorothie_gym.benchmark.features.columns import (
     CO_WIZARD,
     NO_TEXT,
     PARTICIPANT,
-    TENTHS,
     Actions,
     Columns,
     Frames,
@@ -22,6 +21,7 @@ from dorothie_gym.benchmark.features.columns import (
 )
 from dorothie_gym.benchmark.features.point_table import PointTable, points
 from dorothie_gym.recording.recorded_perception import OBJECT_VALUES, ObjectKind
+from dorothie_gym.recording.trajectory import TENTHS
 
 __all__ = [
     "Actions",

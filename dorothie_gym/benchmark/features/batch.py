@@ -8,9 +8,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dorothie_gym.benchmark.features.columns import NO_TEXT, TENTHS, Columns, Flags, Ints, Reals
+from dorothie_gym.benchmark.features.columns import NO_TEXT, Columns, Flags, Ints, Reals
 from dorothie_gym.benchmark.features.point_table import PointTable
 from dorothie_gym.recording import Task
+from dorothie_gym.recording.trajectory import TENTHS
 
 
 @dataclass(frozen=True, kw_only=True)

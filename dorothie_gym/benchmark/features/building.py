@@ -22,7 +22,7 @@ from dorothie_gym.maps import Town
 from dorothie_gym.maps.cache import compiler_digest
 from dorothie_gym.recording import FOLDS, Corpus, CorpusEntry, Fold, Session
 from dorothie_gym.recording.file_names import ACTIONS_FILE
-from dorothie_gym.recording.sdn.maps import find_town
+from dorothie_gym.recording.towns import find_town
 
 _STARTS = {"landmarks": "place", "streets": "text"}
 """Groups whose rows are found by session, with a column that tells their number."""

@@ -17,15 +17,14 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.recording.points import Moments, RecordTimes
+
 Ints: TypeAlias = NDArray[np.int32]
 Reals: TypeAlias = NDArray[np.float32]
 Flags: TypeAlias = NDArray[np.bool_]
 
 NO_TEXT: Final = -1
 """Index of a text that is not there."""
-
-TENTHS: Final = 10
-"""Tenths in a second: the rate of the benchmark [Hz] (paper, section 4)."""
 
 PARTICIPANT, CO_WIZARD = 0, 1
 """Values of columns `speaker`."""
@@ -278,6 +277,19 @@ class Columns:
     towns: tuple[TownGraph, ...]
     unreadable: tuple[tuple[str, str], ...] = ()
     unpointed: tuple[tuple[int, int, str], ...] = ()
+
+    @functools.cached_property
+    def times(self) -> RecordTimes:
+        """Times that decide what is visible at a point, in tenths."""
+        said, moves = self.utterances, self.moves
+        first = np.searchsorted(moves.utterance, np.arange(len(said.tenth) + 1))  # moves lie in the order of utterances
+        return RecordTimes(
+            utterances=Moments(said.session, said.tenth),
+            last_events=moves.event[first[1:] - 1],
+            first_moves=first,
+            actions=Moments(self.actions.session, self.actions.tenth),
+            frames=Moments(self.frames.session, self.frames.tenth),
+        )
 
     @functools.cached_property
     def content(self) -> str:

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from dorothie_gym.analysis.exception_attribution import Handled, handling_of_events
 from dorothie_gym.analysis.units import Units
-from dorothie_gym.benchmark.features.columns import CO_WIZARD, NO_TEXT, PARTICIPANT, TENTHS, TownGraph
+from dorothie_gym.benchmark.features.columns import NO_TEXT, TownGraph
 from dorothie_gym.maps import NO_JUNCTION, Town
 from dorothie_gym.maps.lane_graph import FEATURES
-from dorothie_gym.ontology import LABELS, GoalStatus, Role
+from dorothie_gym.ontology import LABELS, GoalStatus
 from dorothie_gym.recording import (
     NO_LANE,
     EventType,
@@ -25,13 +25,13 @@ from dorothie_gym.recording import (
     label_angle,
     unpointed_events,
 )
+from dorothie_gym.recording.points import SPEAKERS, SessionHistory, at_tenths
 from dorothie_gym.recording.recorded_perception import OBJECT_VALUES, light_switches, perceived
-from dorothie_gym.recording.resampling import EACH, at_tenths
+from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH, TENTHS
 
 HEADING_STEP: Final = 1e-3
 """Headings are rounded to this [degrees], so that the last digits do not tell in which unit a file had them."""
 
-SPEAKERS: Final = {Role.PARTICIPANT: PARTICIPANT, Role.CO_WIZARD: CO_WIZARD}
 HANDLINGS: Final = (Handled.NONE, Handled.TASK, Handled.ENVIRONMENTAL)
 """What the numbers in columns `handling` mean."""
 
@@ -64,7 +64,7 @@ def extract(session: Session, town: Town | None) -> SessionColumns:
     handled = {event: HANDLINGS.index(kind) for event, kind in handling_of_events(Units(session)).items()}
     arrays = {
         **_places(session, pool),  # first: numbers of texts then do not depend on what is said later
-        **_said(session, pool, handled),
+        **_said(SessionHistory(session), pool, handled),
         **_done(session, handled),
         **_frames(session, town),
         **_goals(session),
@@ -95,24 +95,23 @@ class _Pool:
         return NO_TEXT if text is None else self.texts.setdefault(text, len(self.texts))
 
 
-def _said(session: Session, pool: _Pool, handled: Mapping[int, int]) -> dict[str, NDArray[Any]]:
-    """Moves and utterances, by when the whole utterance was over."""
-    spoken = [utterance for utterance in session.utterances() if utterance.speaker in SPEAKERS]
-    spoken.sort(key=lambda utterance: (max(move.frame for move in utterance.moves), utterance.moves[0].index))
-    over = [max(move.frame for move in utterance.moves) // EACH for utterance in spoken]
+def _said(history: SessionHistory, pool: _Pool, handled: Mapping[int, int]) -> dict[str, NDArray[Any]]:
+    """Moves and utterances, in the order in which they become visible."""
+    spoken = history.utterances
+    over = [utterance.frame // FRAMES_PER_TENTH for utterance in spoken]
     for utterance in spoken:
         for text in (utterance.text, utterance.moves[0].recognised, *(move.span for move in utterance.moves)):
             pool.number(text)
     moves = [(row, move) for row, utterance in enumerate(spoken) for move in utterance.moves]
     return {
         "utterances.tenth": _ints(over),
-        "utterances.speaker": _ints([SPEAKERS[utterance.speaker] for utterance in spoken]),
+        "utterances.speaker": _ints([SPEAKERS.index(utterance.speaker) for utterance in spoken]),
         "utterances.text": _ints([pool.number(utterance.text) for utterance in spoken]),
         "utterances.recognised_text": _ints([pool.number(utterance.moves[0].recognised) for utterance in spoken]),
         "moves.tenth": _ints([over[row] for row, _ in moves]),
-        "moves.point_tenth": _ints([move.frame // EACH for _, move in moves]),
+        "moves.point_tenth": _ints([move.frame // FRAMES_PER_TENTH for _, move in moves]),
         "moves.event": _ints([move.index for _, move in moves]),
-        "moves.speaker": _ints([SPEAKERS[move.speaker] for _, move in moves]),
+        "moves.speaker": _ints([SPEAKERS.index(move.speaker) for _, move in moves]),
         "moves.utterance": _ints([row for row, _ in moves]),
         "moves.move": _ints([int(move.act.move) for _, move in moves]),
         "moves.slots": np.array([move.act.vector for _, move in moves], dtype=np.bool_).reshape(-1, len(LABELS)),
@@ -125,7 +124,7 @@ def _said(session: Session, pool: _Pool, handled: Mapping[int, int]) -> dict[str
 def _done(session: Session, handled: Mapping[int, int]) -> dict[str, NDArray[Any]]:
     done = session.physical_actions
     return {
-        "actions.tenth": _ints([act.frame // EACH for act in done]),
+        "actions.tenth": _ints([act.frame // FRAMES_PER_TENTH for act in done]),
         "actions.event": _ints([act.index for act in done]),
         "actions.action": _ints([act.action.value - 1 for act in done]),
         "actions.angle": np.array([history_angle(act) for act in done], dtype=np.float32),
@@ -141,13 +140,13 @@ def _frames(session: Session, town: Town | None) -> dict[str, NDArray[Any]]:
     rows = session.trajectory
     degrees = np.rint(np.degrees(rows["heading"]) / HEADING_STEP) * HEADING_STEP
     pose = np.stack([rows["x"], rows["y"], (degrees + 180.0) % 360.0 - 180.0], axis=1)
-    tenths = rows["frame"] // EACH
+    tenths = rows["frame"] // FRAMES_PER_TENTH
     speed = np.zeros(len(rows))
     if len(rows) > 1:
         way = np.hypot(np.diff(rows["x"]), np.diff(rows["y"]))
         speed[1:] = way / (np.diff(tenths) / TENTHS)
     looks = list(perceived(session.scene, pose, rows["frame"], light_switches(session), town))
-    look_tenths = np.array([frame // EACH for frame, _, _ in looks], dtype=np.int64)
+    look_tenths = np.array([frame // FRAMES_PER_TENTH for frame, _, _ in looks], dtype=np.int64)
     kinds = [kind for _, kind, _ in looks]
     values = [value for _, _, value in looks]
     return {
@@ -183,7 +182,7 @@ def _goals(session: Session) -> dict[str, NDArray[Any]]:
         if event.data.get("status") == GoalStatus.COMPLETE.label and isinstance(number, int):
             if 0 <= number < len(header.subgoals):
                 landmark = header.landmarks[header.subgoals[number]["landmark"]]
-                tenths.append(event.frame // EACH)
+                tenths.append(event.frame // FRAMES_PER_TENTH)
                 places.append((landmark["x"], landmark["y"]))
     return {"goals.tenth": _ints(tenths), "goals.place": _pairs(places)}
 

@@ -13,6 +13,7 @@ from dorothie_gym.benchmark.features.columns import CO_WIZARD, PARTICIPANT, Colu
 from dorothie_gym.benchmark.labels import NO_ANGLE, Unscored
 from dorothie_gym.ontology import LABELS
 from dorothie_gym.recording import Fold, Task
+from dorothie_gym.recording.points import Moments, RowRange, earlier_spans, visible_rows
 from dorothie_gym.recording.splits import check_fold
 
 
@@ -20,8 +21,7 @@ from dorothie_gym.recording.splits import check_fold
 class PointTable:
     """The points of a task (n,), by session and event.
 
-    What is visible at a point are rows `*_start:*_stop` of the columns: those of tenths strictly before the point's; at
-    a point of NfD also utterances that were over in its own tenth and stand before it in the record.
+    Rows `*_start:*_stop` of the columns are visible at a point, by the rule of `dorothie_gym.recording.points`.
 
     Attributes:
         task: the task.
@@ -100,11 +100,8 @@ def points(columns: Columns, task: Task, fold: Fold | str | None = None) -> Poin
         session, tenth, event, handling = (
             column[row] for column in (moves.session, moves.point_tenth, moves.event, moves.handling)
         )
-    seen: dict[str, Any] = {}
-    for name in ("moves", "utterances", "actions", "frames"):
-        seen[f"{name}_start"], seen[f"{name}_stop"] = _visible(getattr(columns, name), session, tenth)
-    if task is Task.NFD:
-        _add_just_heard(columns, seen, session, tenth, event)
+    moments = Moments(session, tenth)
+    seen = visible_rows(columns.times, task, moments, event)
     table = PointTable(
         task=task,
         session=session,
@@ -112,10 +109,17 @@ def points(columns: Columns, task: Task, fold: Fold | str | None = None) -> Poin
         event=event,
         row=row.astype(np.int32),
         handling=handling,
-        **seen,
+        moves_start=seen.moves.start,
+        moves_stop=seen.moves.stop,
+        utterances_start=seen.utterances.start,
+        utterances_stop=seen.utterances.stop,
+        actions_start=seen.actions.start,
+        actions_stop=seen.actions.stop,
+        frames_start=seen.frames.start,
+        frames_stop=seen.frames.stop,
         **_current(columns, task, row),
         **_labels(columns, task, row),
-        label_belief=_belief(columns, session, tenth, (seen["frames_start"], seen["frames_stop"])),
+        label_belief=_belief(columns, moments, seen.frames),
     )
     return replace(table, skipped=tuple(_skipped(columns, table, chosen)))
 
@@ -128,39 +132,13 @@ def _sessions_of(columns: Columns, fold: Fold | str | None) -> Flags:
     return np.array([bool(name) and Fold(name).matches(wanted) for name in columns.sessions.folds], dtype=np.bool_)
 
 
-def _visible(group: Any, session: Ints, tenth: Ints) -> tuple[Ints, Ints]:
-    """First row and end of the rows of a group that are of tenths strictly before each point's."""
-    # Rows rise by session and tenth: a number that rises with both finds both ends.
-    span = np.int64(1) << 32
-    rows = group.session.astype(np.int64) * span + group.tenth
-    first = session.astype(np.int64) * span
-    start = np.searchsorted(rows, first, side="left")
-    return start.astype(np.int32), np.searchsorted(rows, first + tenth, side="left").astype(np.int32)
-
-
-def _add_just_heard(columns: Columns, seen: dict[str, Any], session: Ints, tenth: Ints, event: Ints) -> None:
-    """Adds the utterances of the points' own tenths that stand before them in the record."""
-    moves = columns.moves
-    _, through = _visible(moves, session, tenth + 1)
-    stop, said_stop = seen["moves_stop"].copy(), seen["utterances_stop"].copy()
-    for point in np.flatnonzero(through > stop).tolist():
-        while stop[point] < through[point]:
-            utterance = moves.utterance[stop[point]]
-            end = int(np.searchsorted(moves.utterance, utterance, side="right"))  # moves lie in the order of utterances
-            if moves.event[end - 1] >= event[point]:
-                break
-            stop[point], said_stop[point] = end, utterance + 1
-    seen["moves_stop"], seen["utterances_stop"] = stop, said_stop
-
-
 def _current(columns: Columns, task: Task, row: NDArray[np.int64]) -> dict[str, Any]:
     """The utterance to be understood, and its earlier acts."""
     if task is not Task.UFN:
         nothing = np.zeros(len(row), dtype=np.int32)
         return {"spans_start": nothing, "spans_stop": nothing, "current": nothing - 1}
-    utterance = columns.moves.utterance[row]
-    first = np.searchsorted(columns.moves.utterance, utterance, side="left")  # moves lie in the order of utterances
-    return {"spans_start": first.astype(np.int32), "spans_stop": row.astype(np.int32), "current": utterance}
+    spans = earlier_spans(columns.moves.utterance, row)
+    return {"spans_start": spans.start, "spans_stop": spans.stop, "current": columns.moves.utterance[row]}
 
 
 def _labels(columns: Columns, task: Task, row: NDArray[np.int64]) -> dict[str, Any]:
@@ -180,11 +158,11 @@ def _labels(columns: Columns, task: Task, row: NDArray[np.int64]) -> dict[str, A
     }
 
 
-def _belief(columns: Columns, session: Ints, tenth: Ints, seen: tuple[Ints, Ints]) -> Reals:
-    """What the belief head is to predict (n, 5)."""
-    frames, goals = columns.frames, columns.goals
+def _belief(columns: Columns, points: Moments, seen: RowRange) -> Reals:
+    """Returns the labels of the belief head (n, 5)."""
+    frames, goals, session = columns.frames, columns.goals, points.session
     labels = np.full((len(session), 5), np.nan, dtype=np.float32)
-    start, stop = seen
+    start, stop = seen.start, seen.stop
     known = stop > start
     here = np.zeros((len(session), 2), dtype=np.float32)
     here[known] = frames.pose[stop[known] - 1, :2]
@@ -192,7 +170,7 @@ def _belief(columns: Columns, session: Ints, tenth: Ints, seen: tuple[Ints, Ints
     inside[inside] = frames.session[stop[inside]] == session[inside]
     labels[inside, :2] = frames.pose[stop[inside], :2] - here[inside]
     labels[inside, 2] = frames.pose[stop[inside], 2]
-    _, goal = _visible(goals, session, tenth)
+    goal = Moments(goals.session, goals.tenth).rows_before(points).stop
     ahead = known & (goal < len(goals.session))
     ahead[ahead] = goals.session[goal[ahead]] == session[ahead]
     labels[ahead, 3:] = goals.place[goal[ahead]] - here[ahead]

@@ -23,8 +23,9 @@ from dorothie_gym.ontology import (
     parse_role,
 )
 from dorothie_gym.recording.events import Event, EventType, check_event
-from dorothie_gym.recording.sdn.files import FRAMES_EACH, MORE, OURS, Row, frame_of, more_of, number_of, plain, whole_of
+from dorothie_gym.recording.sdn.files import MORE, OURS, Row, frame_of, more_of, number_of, plain, whole_of
 from dorothie_gym.recording.sdn.moves import MoveReader, read_speech
+from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.recording.validation import ReadReport
 
 RIGHT: Final = 2
@@ -304,7 +305,7 @@ class LogReader:
         )
 
     def _time(self, frame: int) -> int:
-        return FRAMES_EACH * max(frame - self._first, 0)
+        return FRAMES_PER_TENTH * max(frame - self._first, 0)
 
 
 def role_of(row: Row) -> Role | None:

@@ -16,12 +16,6 @@ from dorothie_gym.recording.file_names import MAX_EVENTS, MAX_FRAME
 from dorothie_gym.recording.json_io import MAX_DEPTH, decode_text, read_bytes
 from dorothie_gym.recording.validation import ReadReport
 
-FRAMES_EACH: Final = 3
-"""Our frames (30 Hz) in one of SDN's (10 Hz)."""
-
-SDN_RATE: Final = 10.0
-"""SDN's frames a second."""
-
 CONFIG_FILE: Final = "config.json"
 LOG_FILE: Final = "annotated_log.json"
 PLAN_FILE: Final = "plan.json"

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from collections import defaultdict
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from dorothie_gym.maps import NO_STREET, Town, load_town, town_names
+from dorothie_gym.maps import NO_STREET, Town
 from dorothie_gym.recording.trajectory import NO_LANE
-
-_NAME: Final = re.compile(r"\w{1,60}")
-_SUFFIXES: Final = (".xodr", ".yaml", ".yml")
 
 FAR: Final = 10.0
 """A place farther from every lane than this is on none [m]."""
@@ -27,20 +22,6 @@ class Place:
     lane: int = NO_LANE
     station: float = 0.0
     street: int = NO_STREET
-
-
-def find_town(name: str, maps: Path | None) -> Town | None:
-    """Returns the town of that name: one that is shipped, or the file `<name>.xodr` or `.yaml` in a folder of maps.
-
-    Raises:
-        TownError: the file is at fault.
-    """
-    if not _NAME.fullmatch(name):  # what a file says is no path
-        return None
-    if name in town_names():
-        return load_town(name)
-    candidates = [] if maps is None else [maps / f"{name}{suffix}" for suffix in _SUFFIXES]
-    return next((load_town(path) for path in candidates if path.is_file()), None)
 
 
 class SdnMap:

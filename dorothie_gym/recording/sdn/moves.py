@@ -13,7 +13,6 @@ from dorothie_gym.ontology import DialogueAct, Role, parse_act, parse_move, pars
 from dorothie_gym.ontology import parse_slot as slot_of
 from dorothie_gym.recording.sdn.files import (
     MORE,
-    SDN_RATE,
     Row,
     frame_of,
     more_of,
@@ -22,6 +21,7 @@ from dorothie_gym.recording.sdn.files import (
     transcript_of,
     whole_of,
 )
+from dorothie_gym.recording.trajectory import TENTHS
 from dorothie_gym.recording.validation import ReadReport
 
 WORDS_A_SECOND: Final = 2.5
@@ -169,9 +169,9 @@ class MoveReader:
         if start is not None and end is not None:
             return start, end
         if stretch is not None:
-            return (stretch.start - self._first) / SDN_RATE, (stretch.end - self._first) / SDN_RATE
+            return (stretch.start - self._first) / TENTHS, (stretch.end - self._first) / TENTHS
         self._report.repair("times of utterances without audio were guessed from their words")
-        over = (frame - self._first) / SDN_RATE
+        over = (frame - self._first) / TENTHS
         return round(over - max(len(text.split()), 1) / WORDS_A_SECOND, 3), over
 
 

@@ -25,7 +25,6 @@ from dorothie_gym.recording.sdn.event_log import goals_of, plan_of
 from dorothie_gym.recording.sdn.files import (
     AD_WIZARD_FILE,
     DETAILED_PLAN_FILE,
-    FRAMES_EACH,
     PLAN_FILE,
     frame_of,
     number_of,
@@ -34,6 +33,7 @@ from dorothie_gym.recording.sdn.files import (
     read_rows,
     whole_of,
 )
+from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.recording.validation import ReadReport
 
 _PROP: Final = ("id", "x", "y", "z", "pitch", "yaw", "roll")
@@ -159,7 +159,7 @@ class ViewReader:
     def _event(
         self, row: Any, kind: EventType, source: Role, data: dict[str, Any], extra: dict[str, Any] | None = None
     ) -> Event:
-        frame = FRAMES_EACH * max((frame_of(row) or 0) - self._first, 0)
+        frame = FRAMES_PER_TENTH * max((frame_of(row) or 0) - self._first, 0)
         return Event(frame=frame, type=kind, source=source, data=data, extra=extra or {})
 
 
@@ -188,7 +188,7 @@ def _key(event: Event) -> str:
 
 
 def _common(event: Event) -> tuple[Any, ...]:
-    data, tenth = event.data, event.frame // FRAMES_EACH
+    data, tenth = event.data, event.frame // FRAMES_PER_TENTH
     if event.type is EventType.EXCEPTION:
         return tenth, event.type, data.get("kind"), data.get("parameter"), data.get("prop")
     if event.type is EventType.SUBGOAL:

@@ -29,11 +29,12 @@ from dorothie_gym.recording.sdn.files import (
     read_json,
     whole_of,
 )
-from dorothie_gym.recording.sdn.maps import SdnMap, find_town
+from dorothie_gym.recording.sdn.maps import SdnMap
 from dorothie_gym.recording.sdn.plan_files import ViewReader
 from dorothie_gym.recording.sdn.trajectory import Places, read_places, read_scene, trajectory_of_places
 from dorothie_gym.recording.sdn.turn_angles import SignVote, vote, with_roads, with_sign
 from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.towns import find_town
 from dorothie_gym.recording.validation import ReadReport
 
 FROM_START: Final = 600

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from dorothie_gym.errors import SessionError
 from dorothie_gym.recording.file_names import MAX_FRAME, MAX_FRAMES
 from dorothie_gym.recording.frames import read_frames, write_frames
-from dorothie_gym.recording.sdn.files import FRAMES_EACH, SDN_RATE, number_of, read_csv
+from dorothie_gym.recording.sdn.files import number_of, read_csv
 from dorothie_gym.recording.sdn.maps import SdnMap
 from dorothie_gym.recording.session import Session
-from dorothie_gym.recording.surroundings import Scene, SceneTable
-from dorothie_gym.recording.trajectory import NO_LANE, TRAJECTORY_DTYPE, Trajectory
+from dorothie_gym.recording.surroundings import Scene
+from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH, NO_LANE, TENTHS, TRAJECTORY_DTYPE, Trajectory
 from dorothie_gym.recording.validation import ReadReport
 
 COLUMNS: Final = ("frame", "x", "y", "yaw", "junction_id", "road_id", "lane_id")
@@ -150,14 +150,14 @@ def trajectory_of_places(places: Places, first_frame: int, place: SdnMap) -> tup
     """
     count = len(places.frames)
     trajectory = np.zeros(count, dtype=TRAJECTORY_DTYPE)
-    trajectory["frame"] = FRAMES_EACH * (places.frames - first_frame)
+    trajectory["frame"] = FRAMES_PER_TENTH * (places.frames - first_frame)
     trajectory["x"], trajectory["y"], trajectory["heading"] = places.x, places.y, places.heading
     for name in ("throttle", "steer", "brake"):
         trajectory[name] = np.nan
     if count > 1:
         # Over the time before, never after: a state must not tell where the car goes next.
         way = np.hypot(np.diff(places.x), np.diff(places.y))
-        trajectory["speed"][1:] = way / (np.diff(places.frames) / SDN_RATE)
+        trajectory["speed"][1:] = way / (np.diff(places.frames) / TENTHS)
     roads, lanes = places.ids["road_id"].tolist(), places.ids["lane_id"].tolist()
     if place.town is None:
         trajectory["lane"] = NO_LANE
@@ -176,8 +176,8 @@ def write_scene(path: Path, session: Session) -> None:
     Raises:
         OSError: it cannot be written.
     """
-    trajectory = session.trajectory[session.trajectory["frame"] % FRAMES_EACH == 0]
-    scene = scene_at(session.scene, trajectory)
+    trajectory = session.trajectory[session.trajectory["frame"] % FRAMES_PER_TENTH == 0]
+    scene = session.scene.at_frames(trajectory["frame"])
     if any(map(len, (scene.actors, scene.lights, scene.weather))):
         write_frames(path, trajectory, scene)
 
@@ -197,20 +197,5 @@ def read_scene(path: Path, scene: Scene, trajectory: Trajectory, report: ReadRep
     if not path.is_file():
         return scene
     _, around = read_frames(path, report)
-    around = scene_at(around, trajectory)
+    around = around.at_frames(trajectory["frame"])
     return replace(scene, actors=around.actors, lights=around.lights, weather=around.weather)
-
-
-def scene_at(scene: Scene, trajectory: Trajectory) -> Scene:
-    """Returns what was recorded at the frames of a trajectory, without further columns."""
-    frames = trajectory["frame"]
-    return Scene(
-        actors=_kept(scene.actors, frames), lights=_kept(scene.lights, frames), weather=_kept(scene.weather, frames)
-    )
-
-
-def _kept(table: SceneTable, frames: np.ndarray[tuple[int], np.dtype[np.int64]]) -> SceneTable:
-    kept = np.isin(table.frames, frames)
-    sizes = np.diff(table.offsets)
-    offsets = np.concatenate(([0], np.cumsum(sizes[kept]))).astype(np.int64)
-    return SceneTable(table.frames[kept], offsets, table.rows[np.repeat(kept, sizes)])

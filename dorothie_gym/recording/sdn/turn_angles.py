@@ -13,9 +13,9 @@ from dorothie_gym.errors import SessionError
 from dorothie_gym.maps.model import wrap_degrees
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.recording.events import Event, EventType
-from dorothie_gym.recording.sdn.files import FRAMES_EACH
 from dorothie_gym.recording.sdn.maps import SdnMap
 from dorothie_gym.recording.sdn.trajectory import Places
+from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 
 SHARP: Final = 30.0
 """Angles and turns from here to `BLUNT` tell left from right [degrees]."""
@@ -63,7 +63,7 @@ def vote(events: Sequence[Event], places: Places, first_frame: int) -> SignVote:
     for event in events:
         if not _is_turn(event) or event.data["angle"] is None or not SHARP <= abs(event.data["angle"]) <= BLUNT:
             continue
-        turned = _turn_after(places, event.frame // FRAMES_EACH + first_frame)
+        turned = _turn_after(places, event.frame // FRAMES_PER_TENTH + first_frame)
         if turned is not None and SHARP <= abs(turned) <= BLUNT:
             agrees = (event.data["angle"] > 0) == (turned > 0)
             result += SignVote(left=1) if agrees else SignVote(right=1)
@@ -111,7 +111,7 @@ def with_roads(
     for event in events:
         number += _is_turn(event)
         if _is_turn(event) and number in roads:
-            lane = _lane_at(places, event.frame // FRAMES_EACH + first_frame, place)
+            lane = _lane_at(places, event.frame // FRAMES_PER_TENTH + first_frame, place)
             angle = place.turn_angle(lane, roads[number])
             unknown += angle is None
             event = _turned(event, angle, road=roads[number])

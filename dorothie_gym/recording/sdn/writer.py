@@ -32,18 +32,17 @@ from dorothie_gym.recording.sdn.files import (
     AD_WIZARD_FILE,
     CONFIG_FILE,
     DETAILED_PLAN_FILE,
-    FRAMES_EACH,
     LOG_FILE,
     MORE,
     OURS,
     PLACES_FILE,
     PLAN_FILE,
     SCENE_FILE,
-    SDN_RATE,
 )
-from dorothie_gym.recording.sdn.maps import find_town
 from dorothie_gym.recording.sdn.trajectory import COLUMNS, write_scene
 from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.towns import find_town
+from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH, TENTHS
 
 _ACT: Final = ("move", "slots", "exchange", "transaction", "span", "utterance", "start", "end")
 _SAID: Final = (*_ACT, "text", "recognised", "sdn", "sdn_act")
@@ -111,7 +110,7 @@ def ad_wizard_lines(session: Session, first: int) -> Iterator[str]:
             values = [name, data.get("count"), *(data.get(corner, 0.0) for corner in ("x0", "x1", "y0", "y1"))]
         if values is not None:
             frame = _frame(event, first)
-            yield ", ".join(str(value) for value in (f"{frame / SDN_RATE:.1f}", frame, *values))
+            yield ", ".join(str(value) for value in (f"{frame / TENTHS:.1f}", frame, *values))
 
 
 def _row(event: Event, first: int) -> dict[str, Any]:
@@ -199,7 +198,7 @@ def _more(data: Mapping[str, Any], known: Any) -> dict[str, Any]:
 def _speech(session: Session, first: int) -> Iterator[dict[str, Any]]:
     for utterance in session.utterances():
         data = session.events[utterance.moves[0].index].data
-        start, end = round(utterance.start * SDN_RATE), round(utterance.end * SDN_RATE)
+        start, end = round(utterance.start * TENTHS), round(utterance.end * TENTHS)
         for frame in range(max(start, 0), max(end, start, 0) + 1):
             yield {
                 "frame": frame + first,
@@ -219,7 +218,7 @@ def _blueprint(prop: Any) -> str:
 
 
 def _frame(event: Event, first: int) -> int:
-    return event.frame // FRAMES_EACH + first
+    return event.frame // FRAMES_PER_TENTH + first
 
 
 # --- Writing a session in SDN's release layout -----------------------------------------------------------------------
@@ -283,7 +282,7 @@ def _config(session: Session, town: Town | None, first: int) -> dict[str, Any]:
     header = session.header
     read = header.config.get("sdn")
     original = read.get("config") if isinstance(read, Mapping) else None
-    last = round(session.duration * SDN_RATE)
+    last = round(session.duration * TENTHS)
     config = dict(original) if isinstance(original, Mapping) else _own_config(session, town)
     outcome = canonical(session.summary, "outcome") if session.complete else None
     return {
@@ -340,7 +339,7 @@ def _waypoint(lane: int, station: float, x: float, y: float, town: Town | None) 
 
 def _place_lines(session: Session, town: Town | None, first: int) -> list[str]:
     trajectory = session.trajectory
-    kept = trajectory["frame"] % FRAMES_EACH == 0
+    kept = trajectory["frame"] % FRAMES_PER_TENTH == 0
     rows = trajectory[kept]
     ids = np.full((3, len(rows)), _NONE, dtype=np.int64)
     for k, name in enumerate(COLUMNS[4:]):
@@ -349,6 +348,6 @@ def _place_lines(session: Session, town: Town | None, first: int) -> list[str]:
         elif town is not None:
             table = [getattr(lane, name) for lane in town.lanes]
             ids[k] = [table[lane] if 0 <= lane < len(table) else _NONE for lane in rows["lane"].tolist()]
-    frames = (rows["frame"] // FRAMES_EACH + first).tolist()
+    frames = (rows["frame"] // FRAMES_PER_TENTH + first).tolist()
     columns = (frames, rows["x"].tolist(), rows["y"].tolist(), np.degrees(rows["heading"]).tolist(), *ids.tolist())
     return [", ".join(COLUMNS), *(", ".join(map(repr, row)) for row in zip(*columns, strict=True))]
