@@ -10,6 +10,7 @@ import typer
 
 from dorothie_gym._version import __version__
 from dorothie_gym.cli.bench import bench
+from dorothie_gym.cli.compare import compare
 from dorothie_gym.cli.convert import convert
 from dorothie_gym.cli.evaluate import evaluate
 from dorothie_gym.cli.generate import generate
@@ -42,6 +43,7 @@ app.command()(generate)
 app.command()(rollout)
 app.command()(leaderboard)
 app.command()(replay)
+app.command()(compare)
 app.command()(show)
 app.command("train-rl")(train_rl)
 app.command()(train)

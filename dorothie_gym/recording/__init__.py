@@ -2,7 +2,7 @@
 
 from dorothie_gym.errors import SessionError
 from dorothie_gym.recording.action_log import Decision
-from dorothie_gym.recording.comparison import Difference, first_difference
+from dorothie_gym.recording.comparison import Difference, compare_folders, first_difference
 from dorothie_gym.recording.corpus import (
     Corpus,
     CorpusEntry,
@@ -23,7 +23,7 @@ from dorothie_gym.recording.events import (
 )
 from dorothie_gym.recording.file_names import SessionState, safe_name
 from dorothie_gym.recording.folder import session_state
-from dorothie_gym.recording.header import LandmarkRow, SessionHeader, SubgoalRow
+from dorothie_gym.recording.header import FORMAT_VERSION, LandmarkRow, SessionHeader, SubgoalRow
 from dorothie_gym.recording.points import (
     ANGLE_TOLERANCE,
     WAY_LENGTH,
@@ -67,7 +67,6 @@ from dorothie_gym.recording.trajectory import (
     trajectory_of,
 )
 from dorothie_gym.recording.validation import ReadReport
-from dorothie_gym.recording.version import FORMAT_VERSION
 from dorothie_gym.recording.writer import SessionWriter
 from dorothie_gym.sim.config import FRAME_RATE
 
@@ -117,6 +116,7 @@ __all__ = [
     "WAY_LENGTH",
     "WEATHER_DTYPE",
     "angle_error",
+    "compare_folders",
     "corpus_points",
     "final_view",
     "first_difference",

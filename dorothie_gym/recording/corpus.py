@@ -15,12 +15,12 @@ from dorothie_gym.recording.events import Event, EventType, decode_event
 from dorothie_gym.recording.export import export_tables
 from dorothie_gym.recording.file_names import EVENTS_FILE
 from dorothie_gym.recording.folder import read_session_file
+from dorothie_gym.recording.header import parse_version
 from dorothie_gym.recording.json_io import Fields, decode_text, from_line, read_bytes, to_page, write_atomically
 from dorothie_gym.recording.reading import layout_of, read_session, session_folders, sign_of
 from dorothie_gym.recording.sdn import SignVote
 from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.splits import FOLDS, Fold, check_fold, fold_of_folder
-from dorothie_gym.recording.version import parse_version
 
 MANIFEST_FILE: Final = "manifest.json"
 MANIFEST_VERSION: Final = "1.0"
@@ -72,8 +72,7 @@ def read_manifest(root: Path) -> dict[str, str]:
     if not path.is_file():
         raise SessionError(f"{path}: is missing; write it with Corpus.write_manifest")
     fields = Fields(from_line(decode_text(read_bytes(path), str(path)), str(path)), str(path))
-    if parse_version(fields.text("version"), str(path))[0] != 1:
-        raise fields.error("version", "1.x")
+    parse_version(fields.text("version"), str(path), MANIFEST_VERSION)
     rows = [{"path": row.text("path"), "sha256": row.text("sha256")} for row in fields.objects("sessions")]
     if _digest(rows) != fields.text("sha256"):
         raise SessionError(f"{path}: its rows do not fit its own hash; it was changed or is damaged")

@@ -7,8 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from dorothie_gym.errors import OntologyError, SessionError
-from dorothie_gym.errors import short_repr as shown
+from dorothie_gym.errors import OntologyError, SessionError, short_repr
 from dorothie_gym.ontology import DialogueAct, ObjectClass, PhysicalAction, Role, parse_act, parse_physical_action
 from dorothie_gym.recording.file_names import MAX_FRAME
 from dorothie_gym.recording.json_io import Fields, canonical, from_line, to_line
@@ -298,7 +297,9 @@ def _act(data: Fields) -> DialogueAct:
     slots = data.mapping("slots")
     for slot, values in slots.items():
         if not isinstance(values, list | tuple) or not all(isinstance(value, str) for value in values):
-            raise SessionError(f"{data.where}: field 'slots.{slot}' is {shown(values)}; it must be a list of texts")
+            raise SessionError(
+                f"{data.where}: field 'slots.{slot}' is {short_repr(values)}; it must be a list of texts"
+            )
     return _parse(data.text("move"), slots, data.where)
 
 

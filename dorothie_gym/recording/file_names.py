@@ -24,18 +24,10 @@ JOURNAL_FILE: Final = "frames.journal"
 PICTURES_FOLDER: Final = "pictures"
 """Optional pictures, `<frame>.png`."""
 
-TRAJECTORY_FILE: Final = "trajectory.csv"
-"""Version 1 kept the frames here."""
-
-SUMMARY_FILE: Final = "summary.json"
-"""Version 1 kept the outcome and the counts here."""
-
 PART: Final = ".part"
 """Ending of a file that is being written; it is given its name when it is whole."""
 
-SESSION_FILES: Final = (
-    HEADER_FILE, EVENTS_FILE, ACTIONS_FILE, FRAMES_FILE, JOURNAL_FILE, TRAJECTORY_FILE, SUMMARY_FILE,
-)  # fmt: skip
+SESSION_FILES: Final = (HEADER_FILE, EVENTS_FILE, ACTIONS_FILE, FRAMES_FILE, JOURNAL_FILE)
 
 MAX_EVENTS: Final = 200_000
 """Events that a session may have; 15 minutes of three roles that act at 2 Hz give some 5,000."""

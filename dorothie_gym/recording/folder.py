@@ -28,8 +28,6 @@ from dorothie_gym.recording.file_names import (
     MAX_EVENTS,
     PART,
     PICTURES_FOLDER,
-    SUMMARY_FILE,
-    TRAJECTORY_FILE,
     SessionState,
 )
 from dorothie_gym.recording.frames import read_frames, read_journal, write_frames
@@ -48,7 +46,6 @@ from dorothie_gym.recording.json_io import (
 from dorothie_gym.recording.surroundings import Scene
 from dorothie_gym.recording.trajectory import TRAJECTORY_DTYPE, Trajectory, check_rising
 from dorothie_gym.recording.validation import ReadReport
-from dorothie_gym.recording.version1 import read_summary, read_trajectory
 
 if TYPE_CHECKING:
     from dorothie_gym.recording.session import Session
@@ -97,12 +94,6 @@ def read_session_file(folder: Path) -> SessionFile:
     )
 
 
-def is_version1(folder: Path) -> bool:
-    """Whether the folder has the files of version 1 and none of today's."""
-    ours = any((folder / name).exists() for name in (FRAMES_FILE, JOURNAL_FILE))
-    return not ours and any((folder / name).exists() for name in (TRAJECTORY_FILE, SUMMARY_FILE))
-
-
 def session_state(folder: Path | str) -> SessionState:
     """Returns how far a folder has come; a session that is finished was written whole.
 
@@ -112,8 +103,6 @@ def session_state(folder: Path | str) -> SessionState:
     folder = Path(folder)
     if not (folder / HEADER_FILE).is_file():
         return SessionState.ABSENT
-    if is_version1(folder):
-        return SessionState.FINISHED if (folder / SUMMARY_FILE).is_file() else SessionState.PARTIAL
     whole = all((folder / name).is_file() for name in (EVENTS_FILE, FRAMES_FILE))
     over = read_session_file(folder).outcome is not None
     return SessionState.FINISHED if whole and over else SessionState.PARTIAL
@@ -139,8 +128,6 @@ class FolderContent:
 
 def read_folder(folder: Path) -> FolderContent:
     """Reads a folder; raises `SessionError` naming file, line and field where there is no session or a damaged one."""
-    if is_version1(folder):
-        return _read_version1(folder)
     file = read_session_file(folder)
     report = ReadReport()
     events, events_torn = _read_events(folder / EVENTS_FILE)
@@ -158,26 +145,6 @@ def read_folder(folder: Path) -> FolderContent:
         report=report,
         pictures=_pictures(folder / PICTURES_FOLDER),
         decisions=decisions,
-    )
-
-
-def _read_version1(folder: Path) -> FolderContent:
-    header = read_session_file(folder).header
-    report = ReadReport(layout="native-1")
-    events, events_torn = _read_events(folder / EVENTS_FILE)
-    trajectory, whole = read_trajectory(folder)
-    ending = read_summary(folder)
-    counted = ending is not None and ending[1:] == (len(events), len(trajectory))
-    _note_unknown(header, events, report)
-    return FolderContent(
-        header=header,
-        events=events,
-        trajectory=trajectory,
-        scene=Scene(),
-        summary=ending[0] if ending else None,
-        complete=whole and counted and not events_torn,
-        report=report,
-        pictures=MappingProxyType({}),
     )
 
 

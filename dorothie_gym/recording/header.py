@@ -2,19 +2,56 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, NotRequired, TypedDict
 
-from dorothie_gym._version import __version__
-from dorothie_gym.errors import OntologyError, SessionError
-from dorothie_gym.ontology import parse_landmark, parse_street
+from dorothie_gym import __version__
+from dorothie_gym.errors import SessionError, short_repr
+from dorothie_gym.ontology import OntologyError, parse_landmark, parse_street
 from dorothie_gym.recording.json_io import Fields, canonical
 from dorothie_gym.recording.trajectory import NO_LANE
-from dorothie_gym.recording.version import FORMAT_VERSION, OLD_VERSION, parse_version
+
+FORMAT_VERSION: Final = "2.0"
+"""Version of the layout of a session folder, "major.minor".
+
+Another minor version only adds fields, columns and types of events; another major version changes existing ones.
+"""
 
 NATIVE: Final = "dorothie_gym"
-"""Source of the sessions that this package plays."""
+"""Source of the sessions that this package records."""
+
+_VERSION: Final = re.compile(r"(\d{1,4})\.(\d{1,4})")
+
+
+def parse_version(value: object, where: str, current: str = FORMAT_VERSION) -> tuple[int, int]:
+    """Returns major and minor number of the version of a file.
+
+    Args:
+        value: the file's version, "major.minor".
+        where: name of the file, for messages.
+        current: version that this package writes.
+
+    Raises:
+        SessionError: it is no version, or of another major number than the current one.
+    """
+    match = _VERSION.fullmatch(value) if isinstance(value, str) else None
+    if match is None:
+        raise SessionError(f"{where}: field 'format_version' is {short_repr(value)}; it must be like \"{current}\"")
+    major, minor = int(match[1]), int(match[2])
+    ours = int(current.partition(".")[0])
+    if major != ours:
+        hint = ": update it" if major > ours else ""
+        raise SessionError(
+            f"{where}: format version {major}.{minor} cannot be read; this dorothie_gym reads {ours}.x{hint}"
+        )
+    return major, minor
+
+
+def is_newer(version: str) -> bool:
+    """Returns whether a version of a session is a later minor one than this package's."""
+    return parse_version(version, "session") > parse_version(FORMAT_VERSION, "session")
 
 
 class LandmarkRow(TypedDict):
@@ -132,11 +169,9 @@ class SessionHeader:
         departure = Fields(fields.mapping("departure"), f"{where}, departure")
         place = (departure.integer("lane", NO_LANE), departure.number("station"))
         given = {name: fields.anything(name) for name in _NAMES}
-        # What is read of an old folder is written as a folder of today.
-        version = FORMAT_VERSION if f"{major}.{minor}" == OLD_VERSION else f"{major}.{minor}"
         extra = fields.others((*_NAMES, *RESERVED_NAMES))
         try:
-            return cls(**{**given, "format_version": version, "departure": place, "extra": extra})
+            return cls(**{**given, "format_version": f"{major}.{minor}", "departure": place, "extra": extra})
         except SessionError as error:
             raise SessionError(f"{where}: {error}") from None
 

@@ -12,8 +12,7 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from dorothie_gym.errors import SessionError
-from dorothie_gym.errors import short_repr as shown
+from dorothie_gym.errors import SessionError, short_repr
 from dorothie_gym.recording.file_names import MAX_TEXT_FILE, PART
 
 MAX_DEPTH: Final = 40
@@ -227,7 +226,7 @@ class Fields:
 
     def error(self, name: str, expected: str) -> SessionError:
         """The error for a field that is not what is expected."""
-        return SessionError(f"{self.where}: field {name!r} is {shown(self._values[name])}; it must be {expected}")
+        return SessionError(f"{self.where}: field {name!r} is {short_repr(self._values[name])}; it must be {expected}")
 
     def if_given(self, name: str, read: Callable[[str], _T]) -> _T | None:
         """None where the field is missing or null, else what `read` makes of it."""

@@ -11,8 +11,7 @@ import numpy as np
 
 from dorothie_gym.ontology import ArgumentKind
 from dorothie_gym.recording.events import EventType, MoveRecord
-from dorothie_gym.recording.header import NATIVE
-from dorothie_gym.recording.version import is_newer
+from dorothie_gym.recording.header import NATIVE, is_newer
 
 if TYPE_CHECKING:
     from dorothie_gym.recording.session import Session
@@ -107,7 +106,7 @@ class ReadReport:
     """Findings of one reading.
 
     Attributes:
-        layout: which layout was read: "native", "native-1", "release", "sample" or "hub".
+        layout: which layout was read: "native", "release", "sample" or "hub".
         unknown: names (file, field or type) that were kept though the reader does not know them, and how often.
         missing: files and fields that are expected and are not there, and how often.
         repaired: faults that were put right, or rows that were left out, and how often.

@@ -63,24 +63,12 @@ def test_a_type_that_this_very_version_lacks_is_a_fault(tmp_path: Path) -> None:
     assert fault == "events[0] (Yawn, frame 1): no type of event of version 2.0"
 
 
-def test_folder_of_version_1_is_read(tmp_path: Path) -> None:
+@pytest.mark.parametrize("version", ["1.0", "1.4", "3.0"])
+def test_another_major_version_is_rejected(tmp_path: Path, version: str) -> None:
     folder = write(tmp_path / "one", talk(), frames=3)
-    (folder / "frames.parquet").unlink()
-    page = json.loads((folder / "session.json").read_text())
-    old = {name: value for name, value in page.items() if name not in ("source", "outcome", "counts")}
-    (folder / "session.json").write_text(json.dumps({**old, "format_version": 1}) + "\n")
-    lines = ["frame,x,y,heading,speed,throttle,steer,brake,lane"]
-    lines += [",".join(repr(v) for v in row) for row in session(frames=3).trajectory.tolist()]
-    (folder / "trajectory.csv").write_text("\n".join(lines) + "\n")
-    assert not Session.load(folder).complete
-    ending = {"events": len(talk()), "frames": 3, "summary": {"success": True}}
-    (folder / "summary.json").write_text(json.dumps(ending) + "\n")
-    loaded = Session.load(folder)
-    assert (loaded.complete, loaded.summary, loaded.report.layout) == (True, {"success": True}, "native-1")
-    assert np.array_equal(loaded.trajectory, session(frames=3).trajectory)
-    assert loaded.header == header()
-    (folder / "trajectory.csv").write_text("\n".join(lines).replace("\n2,", "\n0,") + "\n")
-    with pytest.raises(SessionError, match=r"trajectory.csv, line 4: field 'frame' is 0; it must be above 1"):
+    edit(folder, format_version=version)
+    message = rf"session.json: format version {version} cannot be read; this dorothie_gym reads 2.x"
+    with pytest.raises(SessionError, match=message):
         Session.load(folder)
 
 

@@ -52,5 +52,5 @@ def test_checked_types_are_on_the_page(kind: EventType) -> None:
 
 
 def test_version_and_limits_are_those_of_the_code() -> None:
-    assert f"Version {FORMAT_VERSION}." in PAGE
+    assert f"version {FORMAT_VERSION}." in PAGE
     assert f"{MAX_EVENTS:,} events and {MAX_FRAMES:,} frames" in PAGE and f"{MAX_TEXT_FILE >> 20} MiB" in PAGE

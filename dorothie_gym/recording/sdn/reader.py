@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -139,6 +139,23 @@ def raw_session(folder: Path, maps: Path | None) -> RawSession:
         events = sorted([*events, *more], key=lambda event: event.frame)
     _note_files(folder, layout, report)
     return RawSession(layout, config, task, header, events, places, first, place, report)
+
+
+def settle_sign(folders: Iterable[Path | str]) -> SignVote:
+    """Returns the joint vote of the JTurns of SDN sessions on the sign of angles.
+
+    Sessions that cannot be read are skipped; reading them reports the error. Sessions that this package wrote do not
+    vote: their angles are positive to the left.
+    """
+    result = SignVote()
+    for folder in folders:
+        try:
+            raw = raw_session(Path(folder), None)
+        except SessionError:
+            continue
+        if not raw.is_ours:
+            result += vote(raw.events, raw.places, raw.first_frame)
+    return result
 
 
 def _object(folder: Path, name: str, report: ReadReport) -> Row:

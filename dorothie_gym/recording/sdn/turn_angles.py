@@ -1,15 +1,13 @@
-"""Which way a positive angle of a JTurn points, settled by where the car went; and angles of turns into a road."""
+"""Sign of JTurn angles, determined from the motion of the car, and angles of turns into a road."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from dorothie_gym.errors import SessionError
 from dorothie_gym.maps.model import wrap_degrees
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.recording.events import Event, EventType
@@ -117,25 +115,6 @@ def with_roads(
             event = _turned(event, angle, road=roads[number])
         result.append(event)
     return result, unknown
-
-
-def settle_sign(folders: Iterable[Path | str]) -> SignVote:
-    """Returns what the JTurns of the SDN sessions in these folders, together, say about the sign.
-
-    Sessions that cannot be read are passed over: whoever reads them is told. Those that this package wrote have no
-    voice: their angles are positive to the left anyway.
-    """
-    from dorothie_gym.recording.sdn.reader import raw_session
-
-    result = SignVote()
-    for folder in folders:
-        try:
-            raw = raw_session(Path(folder), None)
-        except SessionError:
-            continue
-        if not raw.is_ours:
-            result += vote(raw.events, raw.places, raw.first_frame)
-    return result
 
 
 def _lane_at(places: Places, frame: int, place: SdnMap) -> int:
