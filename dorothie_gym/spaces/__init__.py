@@ -1,9 +1,10 @@
-"""The contract between roles and environments: observation and action spaces, field by field."""
+"""Observation and action spaces: the contract between roles and environments, field by field."""
 
 from dorothie_gym.spaces.actions import (
     NO_MOVE,
     ActionDecoder,
     ActionDict,
+    ActionMapping,
     AdWizardAction,
     CoWizardAction,
     LanePosition,
@@ -12,10 +13,13 @@ from dorothie_gym.spaces.actions import (
     Physical,
     RoleAction,
     Speech,
+    StepInfo,
+    action_fields,
     action_space,
     decode_action,
     noop,
 )
+from dorothie_gym.spaces.fields import AnySpace, Column, FieldKind, FieldSpec, dict_space
 from dorothie_gym.spaces.limits import SpaceLimits, plain_text
 from dorothie_gym.spaces.observations import (
     ExitColumn,
@@ -27,6 +31,7 @@ from dorothie_gym.spaces.observations import (
     PropColumn,
     SubgoalColumn,
     heard_acts,
+    observation_fields,
     observation_space,
 )
 
@@ -34,27 +39,36 @@ __all__ = [
     "NO_MOVE",
     "ActionDecoder",
     "ActionDict",
+    "ActionMapping",
+    "AnySpace",
     "AdWizardAction",
     "CoWizardAction",
+    "Column",
     "ExitColumn",
+    "FieldKind",
+    "FieldSpec",
     "GuessColumn",
     "LandmarkColumn",
+    "LanePosition",
     "Mental",
     "Motion",
     "ObjectColumn",
     "Observation",
     "ParticipantAction",
     "Physical",
-    "LanePosition",
     "PropColumn",
     "RoleAction",
     "SpaceLimits",
+    "StepInfo",
     "Speech",
     "SubgoalColumn",
+    "action_fields",
     "action_space",
     "decode_action",
+    "dict_space",
     "heard_acts",
     "noop",
+    "observation_fields",
     "observation_space",
     "plain_text",
 ]

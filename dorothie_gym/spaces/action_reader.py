@@ -8,26 +8,26 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
 _ONE_BYTE = "bB?"
-"""Codes of the array types whose bytes are the numbers themselves."""
+"""Codes of the one-byte dtypes, whose raw bytes are the values."""
 
 _FLAGS = b"\0\1"
 
 
 class ActionFieldTable:
-    """What the fields of an action space may hold.
+    """Bounds of the fields of an action space.
 
     Attributes:
-        names: of all fields, in the order of the space.
-        ranges: least and greatest value of each whole number.
-        shapes: of each array of numbers.
-        tops: greatest value of each of its entries, in one row.
-        texts: most characters of each text, and those that it may have.
+        names: names of all fields, in the order of the space.
+        known: the same names as a set.
+        ranges: smallest and greatest value of each integer field.
+        shapes: shape of each array field.
+        tops: greatest value of each array entry, flattened.
+        texts: greatest length and permitted characters of each text field.
     """
 
     def __init__(self, space: spaces.Dict) -> None:
@@ -49,12 +49,12 @@ class ActionFieldTable:
 
 
 class ActionReader:
-    """Reads the fields of one action."""
+    """Reader of the fields of one action dict."""
 
     __slots__ = ("_action", "_table")
 
-    def __init__(self, action: Mapping[str, Any], table: ActionFieldTable) -> None:
-        """Takes an action; raises `ValueError` if a field is missing or unknown."""
+    def __init__(self, action: Mapping[str, object], table: ActionFieldTable) -> None:
+        """Wraps an action dict; raises `ValueError` if a field is missing or unknown."""
         self._action, self._table = action, table
         if action.keys() != table.known:
             fields = ", ".join(table.names)
@@ -65,7 +65,7 @@ class ActionReader:
             raise ValueError(f"field {unknown[0]!r} is unknown; the fields are {fields}")
 
     def integer(self, name: str) -> int:
-        """A whole number in its range."""
+        """Returns an integer field; raises `ValueError` if it is no integer or out of range."""
         low, high = self._table.ranges[name]
         value = self._action[name]
         if type(value) is int and low <= value <= high:
@@ -77,7 +77,7 @@ class ActionReader:
         return int(value)
 
     def integers(self, names: Sequence[str]) -> list[int]:
-        """Several whole numbers, each in its range."""
+        """Returns several integer fields; errors as in `integer`."""
         ranges, action = self._table.ranges, self._action
         found = []
         for name in names:
@@ -87,7 +87,7 @@ class ActionReader:
         return found
 
     def numbers(self, name: str) -> list[int]:
-        """Whole numbers of an array, each from 0 to its greatest."""
+        """Returns the flattened entries of an integer array; raises `ValueError` for a wrong shape, dtype or value."""
         shape, tops = self._table.shapes[name], self._table.tops[name]
         value = np.asarray(self._action[name])
         if value.shape != shape or value.dtype.kind not in "iub":
@@ -101,7 +101,7 @@ class ActionReader:
         return found
 
     def flags(self, name: str) -> bytes:
-        """The entries of an array of 0 and 1, a byte each."""
+        """Returns the flattened entries of an array of 0 and 1 as bytes; errors as in `numbers`."""
         value = self._action[name]
         if type(value) is np.ndarray and value.shape == self._table.shapes[name] and value.dtype.char in _ONE_BYTE:
             raw = value.tobytes()
@@ -110,7 +110,7 @@ class ActionReader:
         return bytes(self.numbers(name))
 
     def text(self, name: str) -> str:
-        """A text of the characters that the space has, not too long."""
+        """Returns a text field; raises `ValueError` for another type, excess length or characters outside the space."""
         length, characters = self._table.texts[name]
         value = self._action[name]
         if type(value) is str and not value:

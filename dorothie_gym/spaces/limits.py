@@ -1,4 +1,4 @@
-"""Sizes of the observation and action spaces, and text that fits them."""
+"""Sizes of the observation and action spaces, equal for all towns by default, and text normalisation."""
 
 from __future__ import annotations
 
@@ -9,27 +9,49 @@ from dataclasses import dataclass
 from dorothie_gym.maps import Town
 
 TEXT_CHARACTERS = string.ascii_letters + string.digits + string.punctuation + " \n"
-"""What utterances, messages and stories may be written with."""
+"""Permitted characters of utterances, messages and stories."""
 
 UTTERANCE_LENGTH = 160
+"""Greatest length of one span of an utterance [characters]."""
+
 MESSAGE_LENGTH = 240
+"""Greatest length of a message of the Ad-Wizard [characters]."""
+
 STORY_LENGTH = 2400
+"""Greatest length of a story [characters]."""
 
 METRES = 1024
-"""Places on a lane are given in whole metres; no lane of a known town is longer than this [m]."""
+"""Number of positions on a lane, in whole metres; no lane of a known town is longer [m]."""
 
 REACH = 1e6
-"""Bound of quantities that have no other: no coordinate [m], speed [m/s] or time [s] of a session comes near it."""
+"""Bound of quantities without a natural bound; far beyond all positions [m], speeds [m/s] and times [s]."""
 
 PERCENT = 101
-"""Steps of a quantity that the Ad-Wizard sets, as a share of its range."""
+"""Number of steps of a share in percent, 0 to 100."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpaceLimits:
-    """How many of each thing an observation or action can name.
+    """Numbers of rows and ids in observation and action spaces.
 
-    The defaults hold the paper's four towns (at most 486 lanes, 33 junctions, 14 streets; appendix C) and ours.
+    The defaults cover the four towns of the paper (at most 486 lanes, 33 junctions, 14 streets; appendix C) and ours:
+    a policy trained in one town can act in another.
+
+    Attributes:
+        lanes: number of lane ids.
+        junctions: number of junction indices.
+        streets: number of street indices.
+        landmarks: rows of `landmarks`.
+        subgoals: rows of `subgoals`.
+        objects: rows of `objects`.
+        exits: rows of `exits`.
+        waypoints: rows of `waypoints`.
+        spans: spans of an utterance.
+        plan: junctions of a plan, and lanes of a path.
+        props: rows of `props`.
+
+    Raises:
+        ValueError: if a size is below 1; names the field.
     """
 
     lanes: int = 640
@@ -51,7 +73,7 @@ class SpaceLimits:
 
     @classmethod
     def for_town(cls, town: Town) -> SpaceLimits:
-        """The defaults, larger where a town needs it."""
+        """Returns the default sizes, enlarged where the town needs it."""
         return cls(
             lanes=max(cls.lanes, len(town.lanes)),
             junctions=max(cls.junctions, len(town.junctions)),
@@ -64,7 +86,7 @@ _KNOWN = frozenset(TEXT_CHARACTERS)
 
 
 def plain_text(text: str, length: int) -> str:
-    """The text in the characters of the text spaces, cut to a length: accents go, typographic marks become plain."""
+    """Returns text in `TEXT_CHARACTERS`, truncated to `length`; accents are removed, typographic marks replaced."""
     if text.isascii() and text.isprintable():
         return text[:length]
     spelt = unicodedata.normalize("NFKD", text.translate(_PLAIN))

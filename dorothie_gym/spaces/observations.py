@@ -1,7 +1,7 @@
-"""What each role can observe: the spaces, and the columns of their tables.
+"""Observation spaces of the roles and the columns of their tables.
 
-Tables have a fixed number of rows; a row that is not used is all zeros (its first column tells). Lengths in metres,
-speeds in m/s unless a name says km/h, headings in radians clockwise, turn angles in degrees positive left.
+Tables have a fixed number of rows; unused rows are all zeros (column 0 is positive in used rows). Lengths are in
+metres, speeds in m/s, headings in radians clockwise, turn angles in degrees positive left, unless stated otherwise.
 """
 
 from __future__ import annotations
@@ -29,203 +29,258 @@ from dorothie_gym.ontology import (
     decode_slots,
 )
 from dorothie_gym.spaces.actions import NO_MOVE
-from dorothie_gym.spaces.limits import (
-    MESSAGE_LENGTH,
-    REACH,
-    STORY_LENGTH,
-    TEXT_CHARACTERS,
-    UTTERANCE_LENGTH,
-    SpaceLimits,
-)
+from dorothie_gym.spaces.fields import Column, FieldSpec, choice, choices, dict_space, flags, real, text
+from dorothie_gym.spaces.limits import MESSAGE_LENGTH, STORY_LENGTH, UTTERANCE_LENGTH, SpaceLimits
 
 Observation: TypeAlias = dict[str, Any]
+"""Observation dict of one role: values by field name, as specified by `observation_fields`."""
 
 MAX_UTTERANCE = 4 * (UTTERANCE_LENGTH + 1)
-"""Characters of an utterance of several spans."""
+"""Greatest length of an utterance of several spans [characters]."""
 
 
-class ObjectColumn(enum.IntEnum):
-    """Columns of `objects`: what is in sight, nearest first. `kind` is the id of an `ObjectClass`, never 0."""
+class ObjectColumn(Column):
+    """Columns of `objects`: objects in sight, nearest first."""
 
-    KIND = 0
-    X = 1
-    Y = 2
-    DISTANCE = 3
-    BEARING = 4
-    LENGTH = 5
-    WIDTH = 6
-    SPEED = 7
-
-
-class LandmarkColumn(enum.IntEnum):
-    """Columns of `landmarks`. `name` is the id of a `LandmarkName`, never 0; x and y of where it stands."""
-
-    NAME = 0
-    X = 1
-    Y = 2
-    LANE = 3
-    STATION = 4
-    STREET = 5
+    KIND = 0, "1", "id of an `ObjectClass`, never 0"
+    X = 1, "m", "x of the position"
+    Y = 2, "m", "y of the position"
+    DISTANCE = 3, "m", "distance from the car"
+    BEARING = 4, "rad", "bearing relative to the heading of the car"
+    LENGTH = 5, "m", "length of the object"
+    WIDTH = 6, "m", "width of the object"
+    SPEED = 7, "m/s", "speed of the object"
 
 
-class SubgoalColumn(enum.IntEnum):
-    """Columns of `subgoals`, the storyboard's tasks.
+class LandmarkColumn(Column):
+    """Columns of `landmarks`."""
 
-    `landmark` is a row of `landmarks`; `status` the id of a `GoalStatus`; `after` a bit mask of subgoals to be reached
-    before; `allowed` whether it counts now; the last three, what the Ad-Wizard may do with it, are 0 for others.
-    """
-
-    LIVE = 0
-    LANDMARK = 1
-    STATUS = 2
-    REACHED = 3
-    ALLOWED = 4
-    AFTER = 5
-    CAN_TRIGGER = 6
-    CAN_DELETE = 7
-    CAN_CHANGE = 8
+    NAME = 0, "1", "id of a `LandmarkName`, never 0"
+    X = 1, "m", "x of the landmark"
+    Y = 2, "m", "y of the landmark"
+    LANE = 3, "1", "id of the lane that gives access"
+    STATION = 4, "m", "distance of the waypoint along the lane"
+    STREET = 5, "1", "index of the street"
 
 
-class ExitColumn(enum.IntEnum):
-    """Columns of `exits`, the turn options at the next junction of the present path, from right to left.
+class SubgoalColumn(Column):
+    """Columns of `subgoals`, the subgoals of the storyboard; the last three are 0 except for the Ad-Wizard."""
 
-    `lane` is the lane after the junction, `street` its street (-1: none), `junction` an index in `Town.junctions`.
-    """
-
-    PRESENT = 0
-    ANGLE = 1
-    DISTANCE = 2
-    LANE = 3
-    STREET = 4
-    JUNCTION = 5
-
-
-class GuessColumn(enum.IntEnum):
-    """Columns of `guesses`, one row a `LandmarkName`: where a hidden landmark is believed to be, and how surely.
-
-    Mean and covariance of the estimate that what was said and what was marked add up to [m, m^2].
-    """
-
-    PRESENT = 0
-    X = 1
-    Y = 2
-    VARIANCE_X = 3
-    VARIANCE_Y = 4
-    COVARIANCE_XY = 5
+    LIVE = 0, "1", "1 if the subgoal is part of the task"
+    LANDMARK = 1, "1", "row in `landmarks`"
+    STATUS = 2, "1", "id of a `GoalStatus`"
+    REACHED = 3, "1", "1 if the subgoal is reached"
+    ALLOWED = 4, "1", "1 if a stop at the landmark would complete the subgoal now"
+    AFTER = 5, "1", "bit mask of the subgoals to be reached before"
+    CAN_TRIGGER = 6, "1", "1 if the Ad-Wizard may trigger the subgoal"
+    CAN_DELETE = 7, "1", "1 if the Ad-Wizard may delete the subgoal"
+    CAN_CHANGE = 8, "1", "1 if the Ad-Wizard may change the subgoal"
 
 
-class PropColumn(enum.IntEnum):
-    """Columns of `props` (Ad-Wizard). `kind` is 1 + the place of the `PropKind` in its enum."""
+class ExitColumn(Column):
+    """Columns of `exits`, the turn options at the next junction of the current path, from right to left."""
 
-    KIND = 0
-    X = 1
-    Y = 2
-    HEADING = 3
+    PRESENT = 0, "1", "1 in used rows"
+    ANGLE = 1, "deg", "turn angle, positive left"
+    DISTANCE = 2, "m", "distance to the junction along the path"
+    LANE = 3, "1", "id of the lane after the junction"
+    STREET = 4, "1", "index of the street of that lane; -1 for none"
+    JUNCTION = 5, "1", "index in `Town.junctions`"
+
+
+class GuessColumn(Column):
+    """Columns of `guesses`: estimated position of each hidden landmark, from the dialogue and marked positions."""
+
+    PRESENT = 0, "1", "1 in used rows"
+    X = 1, "m", "x of the mean"
+    Y = 2, "m", "y of the mean"
+    VARIANCE_X = 3, "m^2", "variance of x"
+    VARIANCE_Y = 4, "m^2", "variance of y"
+    COVARIANCE_XY = 5, "m^2", "covariance of x and y"
+
+
+class PropColumn(Column):
+    """Columns of `props` (Ad-Wizard)."""
+
+    KIND = 0, "1", "1 + index of the `PropKind`"
+    X = 1, "m", "x of the prop"
+    Y = 2, "m", "y of the prop"
+    HEADING = 3, "rad", "heading, clockwise"
 
 
 class Motion(enum.IntEnum):
-    """What the car is about."""
+    """State of motion of the car."""
 
     DRIVING = 0
     STOPPED = 1
-    """By the action Stop, until Start or another manoeuvre."""
+    """Stopped by the action Stop, until Start or another manoeuvre."""
     WAITING = 2
-    """At the end of its lane, for a turn."""
+    """Waiting at the end of the lane for a turn."""
     HAZARD = 3
-    """Braking or standing for what is ahead."""
+    """Braking or standing because of a hazard ahead."""
+
+
+@lru_cache(maxsize=64)
+def observation_fields(role: Role, limits: SpaceLimits, observe_acts: bool = True) -> tuple[FieldSpec, ...]:
+    """Returns the specifications of the observation fields of a role.
+
+    The Participant observes true positions and all landmarks, the Co-Wizard estimated positions and the landmarks that
+    are not hidden, the Ad-Wizard everything. For the Co-Wizard, exit distances, the first waypoint and object positions
+    follow from the estimated pose; distances and bearings of objects are as perceived.
+
+    Args:
+        role: one of the three agents.
+        limits: sizes of the tables.
+        observe_acts: whether dialogue acts of utterances are observed in addition to their text.
+
+    Raises:
+        ValueError: if the role has no observations.
+    """
+    landmarks = {
+        Role.PARTICIPANT: "all landmarks",
+        Role.CO_WIZARD: "landmarks that are not hidden",
+        Role.AD_WIZARD: "all landmarks",
+    }
+    if role not in landmarks:
+        raise ValueError(f"{role} has no observations")
+    estimated = role is Role.CO_WIZARD
+    common = (
+        real("time", 1, low=0.0, unit="s", meaning="time since the start of the session"),
+        real("speed", 1, unit="m/s", meaning="speed of the car"),
+        real("weather", len(WeatherParameter), unit="mixed", meaning="weather parameters in the order of the ontology"),
+        choices("street_names", len(StreetName), limits.streets, meaning="id of the `StreetName` of each street"),
+        real(
+            "pose",
+            3,
+            unit="m, m, rad",
+            meaning=f"{'estimated' if estimated else 'true'} x, y and heading (clockwise) of the car",
+        ),
+        choice(
+            "lane", limits.lanes, meaning=f"id of the lane of the car{', from the estimated pose' if estimated else ''}"
+        ),
+        real("station", 1, unit="m", meaning="distance of the car along its lane"),
+        real("landmarks", limits.landmarks, columns=LandmarkColumn, unit="mixed", meaning=landmarks[role]),
+    )
+    return (*common, *_OWN_FIELDS[role](limits, observe_acts))
+
+
+def _participant_fields(limits: SpaceLimits, observe_acts: bool) -> tuple[FieldSpec, ...]:
+    return (
+        _objects(limits),
+        _lights(),
+        _subgoals(limits),
+        _story(),
+        text("tasks", STORY_LENGTH, meaning="descriptions of the live subgoals"),
+        text("message", MESSAGE_LENGTH, meaning="message of the Ad-Wizard"),
+        _speaking(),
+        *_utterance(Role.CO_WIZARD, limits, observe_acts),
+    )
+
+
+def _co_wizard_fields(limits: SpaceLimits, observe_acts: bool) -> tuple[FieldSpec, ...]:
+    return (
+        real("pose_covariance", 3, 3, unit="m, m, rad", meaning="covariance of the estimated x, y and heading"),
+        real("cruise_speed", 1, unit="km/h", meaning="speed set by the Co-Wizard"),
+        _lights(),
+        _motion(),
+        choice("hazard", len(ObjectClass), meaning="id of the `ObjectClass` of the hazard ahead; 0 for none"),
+        real("hazard_distance", 1, unit="m", meaning="distance to the hazard"),
+        choice("manoeuvre", len(PhysicalAction) + 1, meaning="id of the `PhysicalAction` in preparation; 0 for none"),
+        real("manoeuvre_angle", 1, unit="deg", meaning="turn angle of the manoeuvre, positive left"),
+        _waypoints(limits),
+        real("exits", limits.exits, columns=ExitColumn, unit="mixed", meaning="turn options at the next junction"),
+        _objects(limits),
+        real(
+            "guesses",
+            len(LandmarkName),
+            columns=GuessColumn,
+            unit="mixed",
+            meaning="estimated positions of hidden landmarks, one row per `LandmarkName`",
+        ),
+        _speaking(),
+        *_utterance(Role.PARTICIPANT, limits, observe_acts),
+    )
+
+
+def _ad_wizard_fields(limits: SpaceLimits, observe_acts: bool) -> tuple[FieldSpec, ...]:
+    return (
+        _motion(),
+        flags("hidden", limits.landmarks, meaning="1 for landmarks hidden from the Co-Wizard"),
+        _subgoals(limits),
+        _story(),
+        _waypoints(limits),
+        choices("path_lanes", limits.lanes + 1, limits.plan, meaning="1 + id of the lanes of the path; 0 for none"),
+        real("props", limits.props, columns=PropColumn, unit="mixed", meaning="props on the road"),
+        flags("sensors", len(Sensor), meaning="1 for each faulty `Sensor`"),
+        *_utterance(Role.PARTICIPANT, limits, observe_acts),
+        *_utterance(Role.CO_WIZARD, limits, observe_acts),
+    )
+
+
+_OWN_FIELDS = {
+    Role.PARTICIPANT: _participant_fields,
+    Role.CO_WIZARD: _co_wizard_fields,
+    Role.AD_WIZARD: _ad_wizard_fields,
+}
 
 
 @lru_cache(maxsize=64)
 def observation_space(role: Role, limits: SpaceLimits, observe_acts: bool = True) -> spaces.Dict:
-    """The observation space of a role.
-
-    Every role sees `time` [s], `speed`, `weather` (the ten parameters in the ontology's order), `street_names` (id of
-    the `StreetName` of each street of the town) and what others say.
-
-    Participant: true `pose` (x, y, heading), `lane` and `station`, `objects` in sight, ALL `landmarks`, `subgoals`
-    with `story` and `tasks` in words, `message` of the Ad-Wizard.
-    Co-Wizard: `pose` as estimated and its `pose_covariance` (of x, y, heading), `lane` and `station` matched to the
-    estimate, `cruise_speed` [km/h], `lights`, `motion`, `hazard` (an `ObjectClass` id) and `hazard_distance`,
-    `manoeuvre` in preparation and its `manoeuvre_angle`, planned `waypoints`, `exits`, `objects` perceived, the
-    `landmarks` that are not hidden, `guesses` of hidden ones. Distances of exits, the first of the waypoints and the
-    places of objects follow from the estimated pose; distances and bearings of objects are as they are seen.
-    Ad-Wizard: everything: true pose, `landmarks` and which are `hidden`, `subgoals`, the car's `waypoints` and
-    `path_lanes` (lane id + 1), `props`, `sensors` that are faulty.
-    """
-    common: dict[str, spaces.Space[Any]] = {
-        "time": _box(1, low=0.0),
-        "speed": _box(1),
-        "weather": _box(len(WeatherParameter)),
-        "street_names": spaces.MultiDiscrete([len(StreetName)] * limits.streets),
-        "pose": _box(3),
-        "lane": spaces.Discrete(limits.lanes),
-        "station": _box(1),
-        "landmarks": _box(limits.landmarks, len(LandmarkColumn)),
-    }
-    if role is Role.PARTICIPANT:
-        own: dict[str, spaces.Space[Any]] = {
-            "objects": _box(limits.objects, len(ObjectColumn)),
-            "lights": spaces.Discrete(2),
-            "subgoals": _box(limits.subgoals, len(SubgoalColumn)),
-            "story": _text(STORY_LENGTH),
-            "tasks": _text(STORY_LENGTH),
-            "message": _text(MESSAGE_LENGTH),
-            "speaking": _box(1, low=0.0),
-            **_heard(Role.CO_WIZARD, limits, observe_acts),
-        }
-    elif role is Role.CO_WIZARD:
-        own = {
-            "pose_covariance": _box(3, 3),
-            "cruise_speed": _box(1),
-            "lights": spaces.Discrete(2),
-            "motion": spaces.Discrete(len(Motion)),
-            "hazard": spaces.Discrete(len(ObjectClass)),
-            "hazard_distance": _box(1),
-            "manoeuvre": spaces.Discrete(len(PhysicalAction) + 1),
-            "manoeuvre_angle": _box(1),
-            "waypoints": _box(limits.waypoints, 2),
-            "exits": _box(limits.exits, len(ExitColumn)),
-            "objects": _box(limits.objects, len(ObjectColumn)),
-            "guesses": _box(len(LandmarkName), len(GuessColumn)),
-            "speaking": _box(1, low=0.0),
-            **_heard(Role.PARTICIPANT, limits, observe_acts),
-        }
-    elif role is Role.AD_WIZARD:
-        own = {
-            "motion": spaces.Discrete(len(Motion)),
-            "hidden": spaces.MultiBinary(limits.landmarks),
-            "subgoals": _box(limits.subgoals, len(SubgoalColumn)),
-            "story": _text(STORY_LENGTH),
-            "waypoints": _box(limits.waypoints, 2),
-            "path_lanes": spaces.MultiDiscrete([limits.lanes + 1] * limits.plan),
-            "props": _box(limits.props, len(PropColumn)),
-            "sensors": spaces.MultiBinary(len(Sensor)),
-            **_heard(Role.PARTICIPANT, limits, observe_acts),
-            **_heard(Role.CO_WIZARD, limits, observe_acts),
-        }
-    else:
-        raise ValueError(f"{role} observes nothing")
-    return spaces.Dict({**common, **own})
+    """Returns the observation space of a role, built from `observation_fields`; arguments and errors as there."""
+    return dict_space(observation_fields(role, limits, observe_acts))
 
 
-def _box(*shape: int, low: float = -REACH) -> spaces.Box:
-    return spaces.Box(low, REACH, shape, dtype=np.float64)
+def _objects(limits: SpaceLimits) -> FieldSpec:
+    return real("objects", limits.objects, columns=ObjectColumn, unit="mixed", meaning="objects in sight")
 
 
-def _text(length: int) -> spaces.Text:
-    return spaces.Text(length, min_length=0, charset=TEXT_CHARACTERS)
+def _subgoals(limits: SpaceLimits) -> FieldSpec:
+    return real("subgoals", limits.subgoals, columns=SubgoalColumn, meaning="subgoals of the storyboard")
 
 
-def _heard(speaker: Role, limits: SpaceLimits, observe_acts: bool) -> dict[str, spaces.Space[Any]]:
-    fields: dict[str, spaces.Space[Any]] = {f"{speaker}_text": _text(MAX_UTTERANCE)}
-    if observe_acts:
-        fields[f"{speaker}_moves"] = spaces.MultiDiscrete([NO_MOVE + 1] * limits.spans)
-        fields[f"{speaker}_slots"] = spaces.MultiBinary([limits.spans, len(LABELS)])
-    return fields
+def _waypoints(limits: SpaceLimits) -> FieldSpec:
+    return real("waypoints", limits.waypoints, 2, unit="m", meaning="x and y of points of the planned path")
+
+
+def _motion() -> FieldSpec:
+    return choice("motion", len(Motion), meaning="id of the `Motion` of the car")
+
+
+def _lights() -> FieldSpec:
+    return choice("lights", 2, meaning="1 if the headlights are on")
+
+
+def _story() -> FieldSpec:
+    return text("story", STORY_LENGTH, meaning="story of the storyboard")
+
+
+def _speaking() -> FieldSpec:
+    return real("speaking", 1, low=0.0, unit="s", meaning="remaining duration of the own utterance")
+
+
+def _utterance(speaker: Role, limits: SpaceLimits, observe_acts: bool) -> tuple[FieldSpec, ...]:
+    name = {Role.PARTICIPANT: "Participant", Role.CO_WIZARD: "Co-Wizard"}[speaker]
+    words = text(
+        f"{speaker}_text", MAX_UTTERANCE, meaning=f"utterance of the {name} that ended since the last decision"
+    )
+    if not observe_acts:
+        return (words,)
+    return (
+        words,
+        choices(
+            f"{speaker}_moves",
+            NO_MOVE + 1,
+            limits.spans,
+            meaning=f"id of the `DialogueMove` of each span; {NO_MOVE} for none",
+        ),
+        flags(
+            f"{speaker}_slots", limits.spans, len(LABELS), meaning="label vector of each span, in the order of `LABELS`"
+        ),
+    )
 
 
 def heard_acts(observation: Mapping[str, Any], speaker: Role) -> tuple[DialogueAct, ...] | None:
-    """Acts of the utterance that ended since the last decision; None where acts are not observed."""
+    """Returns the acts of the utterance that ended since the last decision; None if acts are not observed."""
     moves: NDArray[np.int64] | None = observation.get(f"{speaker}_moves")
     if moves is None:
         return None

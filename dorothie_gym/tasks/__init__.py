@@ -1,4 +1,4 @@
-"""What the participant has to do: landmarks, storyboard templates, their binding to a town, and the task's state."""
+"""Tasks of the participant: landmarks, storyboard templates, their binding to a town, and the task state."""
 
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.tasks.binding import bind

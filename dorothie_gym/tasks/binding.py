@@ -1,4 +1,4 @@
-"""Binding of a storyboard template to a town: kinds of landmarks, sites, and values for all names."""
+"""Binding of a storyboard template to a town: landmark kinds, sites, and values for all names of the template."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from dorothie_gym.tasks.templates import StoryboardTemplate, SubgoalTemplate, Va
 
 
 def cast(template: StoryboardTemplate, rng: np.random.Generator | None = None) -> dict[str, LandmarkName]:
-    """Chooses a kind of landmark for each name of a template.
+    """Assigns a landmark kind to each name of a template.
 
-    Kinds that a town has once are given to one name only. House and Person may be given to several, but for a
-    wide category ("places") they are repeated only when every other kind that fits is taken.
+    Kinds that a town contains once are assigned once. House and Person may be assigned repeatedly; for a wide category
+    ("places") they are repeated only if all other matching kinds are in use.
 
     Args:
-        template: the template; its destinations must refer to something.
-        rng: draws among the kinds that fit; without it, the first ones are taken (to see whether there are any).
+        template: the template; all references of its destinations must be defined.
+        rng: source of randomness; without it, the first matching kinds are used (feasibility check).
 
     Returns:
-        A kind for each landmark named outright (key: its label) and each variable (key: "$NAME").
+        A kind for each landmark named directly (key: its label) and each variable (key: "$NAME").
 
     Raises:
-        StoryboardError: a category or attribute that no landmark has, or more names than landmarks.
+        StoryboardError: if no landmark has a category or attribute, or if there are more names than landmarks.
     """
     fixed = {
         ref: kind.name
@@ -62,7 +62,7 @@ def _candidates(template: StoryboardTemplate, variable: Variable) -> tuple[Landm
         if not kinds:
             most = max(len(kind.attributes[attribute]) for kind in having)
             reason = (
-                f"{number} different {variable.name}.{attribute} are asked for, but there are {most}; ask for fewer"
+                f"{number} different {variable.name}.{attribute} are requested, but only {most} exist; request fewer"
             )
             raise StoryboardError(template.name, field, reason)
     return kinds
@@ -73,7 +73,7 @@ def _assign(
     taken: tuple[LandmarkName, ...],
     rng: np.random.Generator | None,
 ) -> tuple[LandmarkName, ...] | None:
-    """One kind for each row of candidates, by depth-first search; None if there is no way."""
+    """Returns one kind per row of candidates by depth-first search; None if no assignment exists."""
     if not candidates:
         return ()
     row = candidates[0]
@@ -90,24 +90,24 @@ def _assign(
 def _shortage(template: StoryboardTemplate, fixed: Mapping[str, LandmarkName]) -> str:
     wanted = ", ".join(f"{variable.name} ({variable.category})" for variable in template.variables)
     named = f" besides {', '.join(fixed)}" if fixed else ""
-    return f"there are not enough different landmarks for {wanted}{named}; ask for fewer or for wider categories"
+    return f"there are not enough different landmarks for {wanted}{named}; request fewer or use wider categories"
 
 
-# A stop counts within 2 m of a waypoint (paper, appendix "Interface Components"); this leaves room for queues too.
+# A stop counts within 2 m of a waypoint (paper, appendix "Interface Components"); the spacing also allows queues.
 SPACING = 15.0
-"""Distance that two landmarks keep from one another where the town has the places for it [m]."""
+"""Preferred minimum distance between two landmarks [m]."""
 
 
 def spread_places(places: Sequence[LandmarkSite], count: int, rng: np.random.Generator) -> list[LandmarkSite]:
-    """Draws places, first those on lanes of their own that keep `SPACING`, then those that keep it, then the farthest.
+    """Samples sites: first on unused lanes at a distance of `SPACING`, then on any lane, then the farthest ones.
 
     Args:
-        places: places to draw from; at least `count`.
-        count: how many to draw.
-        rng: decides in which order the places are tried.
+        places: candidate sites; at least `count`.
+        count: number of sites.
+        rng: source of randomness for the order of the candidates.
 
     Returns:
-        Distinct places, best spread first.
+        Distinct sites, in descending order of spread.
     """
     shuffled = [places[k] for k in rng.permutation(len(places))]
     chosen: list[LandmarkSite] = []
@@ -124,7 +124,7 @@ def spread_places(places: Sequence[LandmarkSite], count: int, rng: np.random.Gen
 
 
 def _gap(place: LandmarkSite, others: Sequence[LandmarkSite]) -> float:
-    """Distance to the closest of the others, between the landmarks or between their waypoints [m]."""
+    """Returns the smallest distance to other sites, between landmarks or between waypoints [m]."""
     return min(
         (min(math.dist(place.position, other.position), math.dist(place.waypoint, other.waypoint)) for other in others),
         default=math.inf,
@@ -134,19 +134,19 @@ def _gap(place: LandmarkSite, others: Sequence[LandmarkSite]) -> float:
 def bind(
     template: StoryboardTemplate, places: Sequence[LandmarkSite], rng: np.random.Generator, *, name: str | None = None
 ) -> Storyboard:
-    """Draws landmarks, values and places for a template.
+    """Samples landmarks, values and sites for a template.
 
-    All ten kinds of landmark are placed, whether the story needs them or not, and as many more houses and people as
-    it needs; those of the story get the best spread places.
+    All ten landmark kinds are placed, together with the additional houses and people that the story needs; landmarks of
+    the story get the sites with the widest spread.
 
     Args:
         template: the template.
-        places: the town's places, in an order that does not depend on chance.
-        rng: the only source of chance.
-        name: name of the storyboard; by default that of the template.
+        places: candidate sites of the town, in a deterministic order.
+        rng: source of randomness.
+        name: name of the storyboard; the name of the template by default.
 
     Raises:
-        StoryboardError: the town has fewer places than there are landmarks.
+        StoryboardError: if the town has fewer sites than there are landmarks.
     """
     parts = cast(template, rng)
     values = _draw_values(template, parts, rng)
@@ -166,7 +166,7 @@ def bind(
 def _draw_values(
     template: StoryboardTemplate, parts: Mapping[str, LandmarkName], rng: np.random.Generator
 ) -> dict[str, str]:
-    """What each name of the template stands for in texts; dependents of one attribute draw without replacement."""
+    """Returns the text for each name of the template; dependents of one attribute draw without replacement."""
     values = {row.name: catalogue()[parts[f"${row.name}"]].noun for row in template.variables}
     left: dict[tuple[str, str], list[str]] = {}
     for row in template.dependents:
@@ -177,7 +177,7 @@ def _draw_values(
 
 
 def _line_up(parts: Mapping[str, LandmarkName]) -> tuple[list[LandmarkName], dict[str, int]]:
-    """Names of all landmarks (each kind once, then the repeated ones), and the index that each part gets."""
+    """Returns the names of all landmarks (each kind once, then repeated ones) and the index of each part."""
     names = list(catalogue())
     indices: dict[str, int] = {}
     seen: set[LandmarkName] = set()
@@ -198,7 +198,7 @@ def _place(
     places: Sequence[LandmarkSite],
     rng: np.random.Generator,
 ) -> tuple[Landmark, ...]:
-    """Puts landmarks at places, those whose indices are in `first` before the others."""
+    """Assigns landmarks to sites; those with an index in `first` come first."""
     order = [*first, *(index for index in range(len(names)) if index not in first)]
     sites = dict(zip(order, spread_places(places, len(names), rng), strict=True))
     numbers: Counter[LandmarkName] = Counter()

@@ -1,4 +1,4 @@
-"""The ten kinds of landmark: their categories, and the things that one gets or does there."""
+"""Catalogue of the ten landmark kinds: categories, and attributes such as items and actions."""
 
 from __future__ import annotations
 
@@ -18,15 +18,18 @@ _NOT_A_PLACE = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
 
 @dataclass(frozen=True, kw_only=True)
 class LandmarkKind:
-    """What stories may say about one landmark of the ontology.
+    """Properties of a landmark of the ontology that stories may refer to.
 
     Attributes:
-        name: the landmark.
+        name: landmark of the ontology.
         category: dotted category, such as "places.restaurants".
-        label: how a map names it.
-        noun: how a story names it ("Burger King", but "house").
-        repeatable: whether a town may have several of it.
-        attributes: values that dependents draw from, by attribute ("items", "menuitems", "actions").
+        label: name on maps.
+        noun: name in stories ("Burger King", but "house").
+        repeatable: whether a town may contain several instances.
+        attributes: values for dependents, by attribute ("items", "menuitems", "actions").
+
+    Raises:
+        ValueError: if an attribute contains a value twice.
     """
 
     name: LandmarkName
@@ -39,15 +42,15 @@ class LandmarkKind:
     def __post_init__(self) -> None:
         for attribute, values in self.attributes.items():
             if len(set(values)) != len(values):
-                raise ValueError(f"{DATA_FILE}: {self.name.label}.{attribute}: every value must be given once only")
+                raise ValueError(f"{DATA_FILE}: {self.name.label}.{attribute}: values must be distinct")
 
 
 @functools.cache
 def catalogue() -> Mapping[LandmarkName, LandmarkKind]:
-    """The ten kinds in the order of the ontology's ids.
+    """Returns the ten kinds in the order of the ids of the ontology.
 
     Raises:
-        ValueError: the data file does not describe every landmark of the ontology.
+        ValueError: if the data file does not describe every landmark of the ontology.
     """
     text = (resources.files("dorothie_gym.tasks") / DATA_FILE).read_text(encoding="utf-8")
     rows = yaml.safe_load(text)
@@ -70,17 +73,17 @@ def catalogue() -> Mapping[LandmarkName, LandmarkKind]:
 
 
 def categories() -> tuple[str, ...]:
-    """All categories of the catalogue, sorted."""
+    """Returns all categories of the catalogue, sorted."""
     return tuple(sorted({kind.category for kind in catalogue().values()}))
 
 
 def kinds_in(category: str) -> tuple[LandmarkKind, ...]:
-    """Kinds whose category starts with the given one, in the order of the ontology's ids."""
+    """Returns the kinds whose category starts with `category`, in the order of the ids of the ontology."""
     return tuple(kind for kind in catalogue().values() if kind.category.startswith(category))
 
 
 def find_kind(text: str) -> LandmarkKind | None:
-    """The kind that a landmark's name stands for, in any spelling that the ontology reads; None if there is none."""
+    """Returns the kind for a landmark name, in any spelling of the ontology, or None."""
     try:
         name = parse_slot_value(Slot.LANDMARK, text)
     except OntologyError:

@@ -1,4 +1,4 @@
-"""Parser of storyboard templates."""
+"""Parser of storyboard templates: lenient JSON, typed fields, and error messages with file, field and reason."""
 
 from __future__ import annotations
 
@@ -8,45 +8,49 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn, TypeAlias
 
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.tasks.catalogue import find_kind
 from dorothie_gym.tasks.templates import Dependent, StoryboardTemplate, SubgoalTemplate, Variable
 from dorothie_gym.tasks.validation import check
 
-# A string is matched as a whole, so that a comma inside it is left alone.
+JsonValue: TypeAlias = "bool | int | float | str | list[JsonValue] | dict[str, JsonValue] | None"
+"""Value of a parsed JSON text."""
+
+# Strings are matched as a whole, so that commas inside them are kept.
 _STRING_OR_LAST_COMMA = re.compile(r'"(?:\\.|[^"\\])*"|(?<=[^\s\[{,:])(\s*),(?=\s*[\]}])', re.DOTALL)
 
 
-def read_json(text: str, source: str) -> Any:
-    """Parses a text.
+def read_json(text: str, source: str) -> JsonValue:
+    """Parses lenient JSON: trailing commas and raw line breaks in strings are accepted.
 
     Args:
-        text: JSON, but for trailing commas and raw line breaks in strings.
-        source: what the text is called in errors.
+        text: the text.
+        source: name of the text in error messages.
 
     Raises:
-        StoryboardError: not JSON even so (with line and column), or an object gives one field twice.
+        StoryboardError: if the text is malformed (with line and column), or if an object contains a field twice.
     """
 
-    def one_of_each(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        fields: dict[str, Any] = {}
+    def unique_fields(pairs: list[tuple[str, JsonValue]]) -> dict[str, JsonValue]:
+        fields: dict[str, JsonValue] = {}
         for key, value in pairs:
             if key in fields:
-                raise StoryboardError(source, key, "this field is given twice in one object; keep one of them")
+                raise StoryboardError(source, key, "this field is given twice in one object; remove one")
             fields[key] = value
         return fields
 
-    # The comma becomes a space, so that positions in errors stay those of the file.
+    # Commas are replaced by spaces, so that error positions refer to the file.
     strict = _STRING_OR_LAST_COMMA.sub(lambda match: match[0] if match[1] is None else f"{match[1]} ", text)
     try:
-        return json.loads(strict, strict=False, object_pairs_hook=one_of_each)
+        value: JsonValue = json.loads(strict, strict=False, object_pairs_hook=unique_fields)
     except json.JSONDecodeError as error:
         place = f"line {error.lineno}, column {error.colno}"
         raise StoryboardError(source, place, f"not JSON: {error.msg}; correct the file there") from error
     except RecursionError as error:
         raise StoryboardError(source, "text", "not a template: brackets are nested too deeply") from error
+    return value
 
 
 _NAME = re.compile(r"[A-Za-z_]\w*")
@@ -54,89 +58,93 @@ _NAME = re.compile(r"[A-Za-z_]\w*")
 
 @dataclass(frozen=True)
 class TemplateFields:
-    """One object of a template.
+    """Typed access to the fields of one JSON object of a template; all errors are `StoryboardError`.
 
     Attributes:
-        template: what the template is called in errors.
-        path: where the object stands, such as "subgoals[1]"; empty at the top.
-        values: the object.
+        template: name of the template in error messages.
+        path: path of the object, e.g. "subgoals[1]"; empty at the top level.
+        values: fields of the object.
     """
 
     template: str
     path: str
-    values: dict[str, Any]
+    values: dict[str, JsonValue]
 
     def fail(self, field: str, reason: str) -> NoReturn:
-        """Raises a `StoryboardError` about a field of this object."""
+        """Raises a `StoryboardError` for a field of this object."""
         raise StoryboardError(self.template, f"{self.path}.{field}" if self.path else field, reason)
 
     def check_known(self, known: Collection[str]) -> None:
-        """Raises if the object has a field that is not in `known`."""
+        """Raises an error if the object has a field that is not in `known`."""
         for field in self.values:
             if field not in known:
                 self.fail(field, f"unknown field; the fields are {', '.join(known)}")
 
     def text(self, field: str) -> str:
-        """A text that must be there; line breaks and runs of blanks become one blank."""
+        """Returns a required text with normalised white space."""
         text = self.optional_text(field)
         if text is None:
             self.fail(field, "is missing or empty; give a text")
         return text
 
     def optional_text(self, field: str) -> str | None:
-        """A text, or None where the field is absent or empty."""
+        """Returns a text with normalised white space, or None if the field is absent or empty."""
         value = self.values.get(field, "")
         if not isinstance(value, str):
             self.fail(field, f"must be a text, not {_describe(value)}")
         return " ".join(value.split()) or None
 
     def flag(self, field: str) -> bool:
-        """True or false; false where the field is absent."""
+        """Returns a boolean; False if the field is absent."""
         value = self.values.get(field, False)
         if not isinstance(value, bool):
             self.fail(field, f"must be true or false, not {_describe(value)}")
         return value
 
-    def items(self, field: str) -> list[Any]:
-        """A list; empty where the field is absent."""
+    def items(self, field: str) -> list[JsonValue]:
+        """Returns a list; empty if the field is absent."""
         value = self.values.get(field, [])
         if not isinstance(value, list):
             self.fail(field, f"must be a list, not {_describe(value)}")
         return value
 
     def indices(self, field: str) -> tuple[int, ...]:
-        """A list of indices, each once, in ascending order."""
-        items = self.items(field)
-        for item in items:
+        """Returns a list of distinct indices in ascending order."""
+        found: set[int] = set()
+        for item in self.items(field):
             if isinstance(item, bool) or not isinstance(item, int):
                 self.fail(field, f"must be a list of subgoal numbers (the first is 0), not of {_describe(item)}")
-        return tuple(sorted(set(items)))
+            found.add(item)
+        return tuple(sorted(found))
 
     def names(self, field: str) -> tuple[str, ...]:
-        """A list of variables' names, with or without the dollar sign."""
-        items = self.items(field)
-        for item in items:
+        """Returns a list of variable names, without dollar signs."""
+        found: list[str] = []
+        for item in self.items(field):
             if not isinstance(item, str):
                 self.fail(field, f"must be a list of variables' names, not of {_describe(item)}")
-        return tuple(item.removeprefix("$") for item in items)
+            found.append(item.removeprefix("$"))
+        return tuple(found)
 
     def pairs(self, field: str, second: str) -> tuple[tuple[str, str], ...]:
-        """A list of [NAME, text]; `second` says in errors what the text is."""
+        """Returns a list of [NAME, text] pairs; `second` describes the text in error messages."""
         found: list[tuple[str, str]] = []
         for index, item in enumerate(self.items(field)):
             where = f"{field}[{index}]"
-            if not (isinstance(item, list) and len(item) == 2 and all(isinstance(part, str) for part in item)):
-                self.fail(where, f'must be ["NAME", "{second}"], not {_describe(item)}')
-            name, text = item[0].removeprefix("$"), item[1].strip()
+            match item:
+                case [str(written), str(value)]:
+                    name, text = written.removeprefix("$"), value.strip()
+                case _:
+                    self.fail(where, f'must be ["NAME", "{second}"], not {_describe(item)}')
             if not _NAME.fullmatch(name):
-                self.fail(where, f"{item[0]!r} is no name; use letters, digits and underscores")
+                self.fail(where, f"{written!r} is no name; use letters, digits and underscores")
             if not text:
                 self.fail(where, f"{name} has an empty {second}; give one")
             found.append((name, text))
         return tuple(found)
 
 
-def _describe(value: Any) -> str:
+def _describe(value: JsonValue) -> str:
     if value is None:
         return "null"
     kinds = {
@@ -167,18 +175,18 @@ _SUBGOAL_FIELDS = (
 
 
 def template_names() -> tuple[str, ...]:
-    """Names of the templates that come with the package, sorted."""
+    """Returns the names of the templates of the package, sorted."""
     return tuple(sorted(entry.name.removesuffix(".json") for entry in _SHIPPED.iterdir()))
 
 
 def load_template(name_or_path: str | Path) -> StoryboardTemplate:
-    """Reads a template.
+    """Loads a template.
 
     Args:
-        name_or_path: the name of one that comes with the package, or the path of a JSON file.
+        name_or_path: name of a template of the package, or path of a JSON file.
 
     Raises:
-        StoryboardError: there is no such template, or it is no valid one.
+        StoryboardError: if the template does not exist or is invalid.
     """
     if isinstance(name_or_path, str) and name_or_path in template_names():
         text = (_SHIPPED / f"{name_or_path}.json").read_text(encoding="utf-8")
@@ -199,15 +207,15 @@ def load_template(name_or_path: str | Path) -> StoryboardTemplate:
 
 
 def parse_template(text: str, name: str, *, source: str | None = None) -> StoryboardTemplate:
-    """Reads a template from its text.
+    """Parses and validates a template.
 
     Args:
-        text: JSON; trailing commas and raw line breaks inside strings are accepted.
+        text: JSON; trailing commas and raw line breaks in strings are accepted.
         name: name of the template.
-        source: what errors call it; by default its name.
+        source: name in error messages; `name` by default.
 
     Raises:
-        StoryboardError: not JSON, or no valid template: names the field and the reason.
+        StoryboardError: if the text is not JSON or not a valid template; names the field and the reason.
     """
     source = source or name
     top = TemplateFields(source, "", _object(source, "template", read_json(text, source)))
@@ -230,7 +238,7 @@ def parse_template(text: str, name: str, *, source: str | None = None) -> Storyb
     return replace(template, name=name)
 
 
-def _object(source: str, field: str, value: Any) -> dict[str, Any]:
+def _object(source: str, field: str, value: JsonValue) -> dict[str, JsonValue]:
     if not isinstance(value, dict):
         raise StoryboardError(source, field, f"must be an object in braces, not {type(value).__name__}")
     return value
@@ -266,7 +274,7 @@ def _subgoal(fields: TemplateFields) -> SubgoalTemplate:
 
 
 def _destination(fields: TemplateFields, field: str) -> str | None:
-    """A destination as templates keep it: "$VARIABLE", or the ontology's label of the landmark that is named."""
+    """Returns a destination: "$VARIABLE", or the ontology label of a landmark."""
     text = fields.optional_text(field)
     if text is None or text.startswith("$"):
         return text
@@ -277,10 +285,9 @@ def _destination(fields: TemplateFields, field: str) -> str | None:
 
 
 def _delete_after(fields: TemplateFields) -> tuple[int | None, bool]:
-    """The two readings of `delete_after_subgoal`: a subgoal's number, or (in published templates) a flag.
+    """Returns the two meanings of `delete_after_subgoal`: a subgoal index, or (in published templates) a flag.
 
-    The flag means that whoever stands at the destination is gone once the subgoal is reached, as a person who has
-    been picked up.
+    The flag marks a person at the destination who disappears once the subgoal is reached, e.g. by being picked up.
     """
     value = fields.values.get("delete_after_subgoal")
     if value is None or isinstance(value, bool):

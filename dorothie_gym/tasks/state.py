@@ -1,4 +1,4 @@
-"""How far a storyboard has been played: what is live, reached, deleted and changed."""
+"""State of the task: live, reached, deleted and changed subgoals."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from dorothie_gym.tasks.storyboard import Storyboard
 
 
 class TaskState:
-    """The task as it stands.
+    """State of a storyboard during a session.
 
-    A subgoal is live unless it waits for its trigger or has been deleted. The last live subgoal of the storyboard's
-    list is the destination: it is reached after all others, and ends the task. A subgoal that is triggered and stands
-    behind it in the list becomes the destination in its place. `after` binds by live subgoals only.
+    A subgoal is live unless it awaits its trigger or has been deleted. The last live subgoal of the storyboard is the
+    final destination: it is reached after all others and ends the task. A triggered subgoal that follows it in the
+    storyboard becomes the new final destination. Only live subgoals count for `after`.
 
     Attributes:
-        storyboard: what is played.
-        live: subgoals that are part of the task now, reached ones included, in the storyboard's order.
-        version: counts the changes: while it is the same, all else is.
+        storyboard: the storyboard of the session.
+        live: indices of the live subgoals, including reached ones, in the order of the storyboard.
+        version: number of changes so far; an equal version means an equal state.
     """
 
     def __init__(self, storyboard: Storyboard) -> None:
@@ -34,12 +34,12 @@ class TaskState:
 
     @property
     def destination(self) -> int:
-        """The last live subgoal."""
+        """Index of the last live subgoal."""
         return self.live[-1]
 
     @property
     def done(self) -> bool:
-        """Whether the destination has been reached, which ends the task."""
+        """Whether the final destination has been reached, which ends the task."""
         return self._reached[self.destination]
 
     @property
@@ -48,15 +48,15 @@ class TaskState:
         return all(self._reached[i] for i in self.live)
 
     def reached(self, i: int) -> bool:
-        """Whether a subgoal has been reached."""
+        """Returns whether a subgoal has been reached."""
         return self._reached[i]
 
     def changed(self, i: int) -> bool:
-        """Whether a subgoal has been changed by the Ad-Wizard."""
+        """Returns whether the Ad-Wizard has changed a subgoal."""
         return self._changed[i]
 
     def allowed(self, i: int) -> bool:
-        """Whether stopping at its landmark would complete a subgoal now."""
+        """Returns whether a stop at the landmark would complete the subgoal now."""
         live = self.live
         if i not in live or self._reached[i]:
             return False
@@ -64,7 +64,7 @@ class TaskState:
         return all(self._reached[k] for k in before if k in live)
 
     def status(self, i: int) -> GoalStatus:
-        """Complete (reached), Abandoned (deleted), Ongoing (may be completed now) or Pending (waits for something)."""
+        """Returns Complete (reached), Abandoned (deleted), Ongoing (can be completed now) or Pending (not yet)."""
         if self._reached[i]:
             return GoalStatus.COMPLETE
         if self._deleted[i]:
@@ -72,25 +72,25 @@ class TaskState:
         return GoalStatus.ONGOING if self.allowed(i) else GoalStatus.PENDING
 
     def landmark_of(self, i: int) -> int:
-        """Where a subgoal is now, as an index in `Storyboard.landmarks`."""
+        """Returns the current landmark of a subgoal, as an index in `Storyboard.landmarks`."""
         subgoal = self.storyboard.subgoals[i]
         if self._changed[i] and subgoal.change_landmark is not None:
             return subgoal.change_landmark
         return subgoal.landmark
 
     def description(self, i: int) -> str:
-        """What a subgoal says now."""
+        """Returns the current description of a subgoal."""
         subgoal = self.storyboard.subgoals[i]
         return subgoal.change if self._changed[i] and subgoal.change is not None else subgoal.description
 
     def arrive(self, landmark: int) -> list[int]:
-        """The car has stopped at a landmark: completes every subgoal there that is allowed.
+        """Completes all permitted subgoals at a landmark where the car has stopped.
 
         Args:
             landmark: index in `Storyboard.landmarks`.
 
         Returns:
-            The subgoals completed, in the order in which they were. One may allow the next at the same place.
+            The completed subgoals, in order; one completion may permit the next at the same landmark.
         """
         completed: list[int] = []
         while here := [i for i in self.live if self.landmark_of(i) == landmark and self.allowed(i)]:
@@ -106,27 +106,27 @@ class TaskState:
         self._note_change()
 
     def delete(self, i: int) -> None:
-        """Deletes a live subgoal; raises `StoryboardError` with the reason if it must not."""
+        """Deletes a live subgoal; raises `StoryboardError` with the reason if this is not permitted."""
         self._require(i, self._refuse_delete)
         self._deleted[i] = True
         self._note_change()
 
     def change(self, i: int) -> None:
-        """Gives a live subgoal its other description and place; raises `StoryboardError` if it must not."""
+        """Changes description and place of a live subgoal; raises `StoryboardError` if this is not permitted."""
         self._require(i, self._refuse_change)
         self._changed[i] = True
         self._note_change()
 
     def possible_triggers(self) -> tuple[int, ...]:
-        """Subgoals that `trigger` would accept now."""
+        """Returns the subgoals that `trigger` would accept now."""
         return self._accepted(self._refuse_trigger)
 
     def possible_deletions(self) -> tuple[int, ...]:
-        """Subgoals that `delete` would accept now."""
+        """Returns the subgoals that `delete` would accept now."""
         return self._accepted(self._refuse_delete)
 
     def possible_changes(self) -> tuple[int, ...]:
-        """Subgoals that `change` would accept now."""
+        """Returns the subgoals that `change` would accept now."""
         return self._accepted(self._refuse_change)
 
     def _note_change(self) -> None:
@@ -173,7 +173,7 @@ class TaskState:
         return "has been changed already" if self._changed[i] else None
 
     def _not_open(self, i: int) -> str | None:
-        """Why a subgoal is no longer, or not yet, to be reached."""
+        """Returns the reason why a subgoal cannot be reached now or any more; None if it can."""
         if self._waiting[i]:
             return "it is not part of the task yet"
         if self._deleted[i]:

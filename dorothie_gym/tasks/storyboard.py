@@ -1,4 +1,4 @@
-"""Storyboards bound to a town."""
+"""Storyboard bound to a town."""
 
 from __future__ import annotations
 
@@ -9,49 +9,49 @@ from dorothie_gym.ontology import LandmarkName
 
 
 class LandmarkSite(Protocol):
-    """A place in a town where a landmark may stand (the world's `Site` is one)."""
+    """Candidate site of a landmark in a town (the `Site` of a town implements it)."""
 
     @property
     def id(self) -> int:
-        """Number of the place in its town."""
+        """Id of the site in its town."""
 
     @property
     def lane(self) -> int:
-        """Lane that it is reached from."""
+        """Id of the lane that gives access."""
 
     @property
     def station(self) -> float:
-        """Distance of its waypoint along the lane [m]."""
+        """Distance of the waypoint along the lane [m]."""
 
     @property
     def position(self) -> tuple[float, float]:
-        """Where the landmark stands (x, y) [m]."""
+        """Position of the landmark (x, y) [m]."""
 
     @property
     def waypoint(self) -> tuple[float, float]:
-        """The closest place on the lane (x, y) [m]."""
+        """Closest point on the lane (x, y) [m]."""
 
     @property
     def street(self) -> int:
-        """Number of its street."""
+        """Index of the street."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Landmark:
-    """A landmark at its place.
+    """Landmark at its site.
 
     Attributes:
-        index: position in `Storyboard.landmarks`.
-        name: the ontology's landmark.
-        label: how a map names it; houses and people are numbered where there are several.
+        index: index in `Storyboard.landmarks`.
+        name: landmark of the ontology.
+        label: name on maps; several houses and people are numbered.
         category: dotted category.
-        site: id of the place.
-        lane: lane that it is reached from.
-        station: distance of its waypoint along the lane [m].
-        position: where it stands (x, y) [m].
-        waypoint: the closest place on the lane (x, y) [m].
-        street: number of its street.
-        hidden: whether the Co-Wizard does not know where it is.
+        site: id of the site.
+        lane: id of the lane that gives access.
+        station: distance of the waypoint along the lane [m].
+        position: position of the landmark (x, y) [m].
+        waypoint: closest point on the lane (x, y) [m].
+        street: index of the street.
+        hidden: whether the position is hidden from the Co-Wizard.
     """
 
     index: int
@@ -69,7 +69,7 @@ class Landmark:
 
 @dataclass(frozen=True, kw_only=True)
 class Subgoal:
-    """One thing to do; see `SubgoalTemplate`, with names filled in and landmarks given by index."""
+    """Subgoal with texts filled in and landmarks given by index; fields as in `SubgoalTemplate`."""
 
     landmark: int
     description: str
@@ -84,14 +84,14 @@ class Subgoal:
 
 @dataclass(frozen=True, kw_only=True)
 class Storyboard:
-    """A bound storyboard.
+    """Storyboard bound to a town.
 
     Attributes:
         name: name of the template.
-        story: what the participant reads.
-        subgoals: in the template's order, those to be triggered included.
-        landmarks: everything that stands in the town. The first ten are the ontology's, in the order of its ids;
-            further houses and people follow.
+        story: text for the participant.
+        subgoals: subgoals in the order of the template, including those that await their trigger.
+        landmarks: all landmarks of the town. The first ten are those of the ontology, in the order of its ids; further
+            houses and people follow.
     """
 
     name: str

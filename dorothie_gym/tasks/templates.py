@@ -1,4 +1,4 @@
-"""The parsed form of a storyboard template, and its `$NAME` references."""
+"""Parsed storyboard templates and their `$NAME` references."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _REFERENCE = re.compile(r"\$([A-Za-z_]\w*)")
 
 @dataclass(frozen=True, kw_only=True)
 class Variable:
-    """A name that is bound to a landmark whose category starts with `category`."""
+    """Name that is bound to a landmark whose category starts with `category`."""
 
     name: str
     category: str
@@ -19,7 +19,7 @@ class Variable:
 
 @dataclass(frozen=True, kw_only=True)
 class Dependent:
-    """A name that is bound to one value of an attribute of a variable's landmark."""
+    """Name that is bound to one attribute value of the landmark of a variable."""
 
     name: str
     variable: str
@@ -28,18 +28,18 @@ class Dependent:
 
 @dataclass(frozen=True, kw_only=True)
 class SubgoalTemplate:
-    """One thing to do, as the template words it.
+    """Subgoal of a template.
 
     Attributes:
-        destination: "$VARIABLE", or the ontology's label of a landmark.
+        destination: "$VARIABLE", or the ontology label of a landmark.
         description: text with `$NAME` references.
-        after: subgoals that must be reached before, as indices in the template.
-        trigger: not part of the task until the Ad-Wizard adds it.
-        delete: the Ad-Wizard may delete it.
-        change: what the description becomes when the Ad-Wizard changes it; None where it may not.
-        change_destination: where it then is; None where it stays.
-        delete_after_subgoal: it may be deleted only when this subgoal has been reached.
-        leaves: whoever stands at the destination is gone once the subgoal is reached.
+        after: indices of the subgoals that must be reached before.
+        trigger: whether the subgoal is inactive until the Ad-Wizard triggers it.
+        delete: whether the Ad-Wizard may delete the subgoal.
+        change: description after a change by the Ad-Wizard; None if the subgoal cannot change.
+        change_destination: destination after the change; None if it stays the same.
+        delete_after_subgoal: index of the subgoal that must be reached before a deletion; None for no condition.
+        leaves: whether the person at the destination disappears once the subgoal is reached.
     """
 
     destination: str
@@ -55,15 +55,15 @@ class SubgoalTemplate:
 
 @dataclass(frozen=True, kw_only=True)
 class StoryboardTemplate:
-    """A story with open places (paper, appendix "Task Configuration"); made by `parse_template`, which checks it.
+    """Storyboard template (paper, appendix "Task Configuration"); `parse_template` creates and validates it.
 
     Attributes:
-        name: what it is called in errors and listings.
+        name: name in error messages and listings.
         story: text with `$NAME` references.
-        subgoals: in the template's order; the last live one is the destination.
-        variables: names for landmarks.
-        dependents: names for values.
-        hidden: variables whose place the Co-Wizard does not know, in the order of `variables`.
+        subgoals: subgoals in order; the last live one is the final destination.
+        variables: names bound to landmarks.
+        dependents: names bound to attribute values.
+        hidden: variables whose positions are hidden from the Co-Wizard, in the order of the file.
     """
 
     name: str
@@ -74,12 +74,12 @@ class StoryboardTemplate:
     hidden: tuple[str, ...] = ()
 
     def destinations(self) -> tuple[str, ...]:
-        """All destinations that the subgoals name, those of changes too, each once."""
+        """Returns the distinct destinations of all subgoals, including those after changes."""
         both = ((subgoal.destination, subgoal.change_destination) for subgoal in self.subgoals)
         return tuple(dict.fromkeys(ref for pair in both for ref in pair if ref is not None))
 
     def texts(self) -> Iterator[tuple[str, str]]:
-        """Every (field, text) with references in it."""
+        """Yields (field, text) for all texts that may contain references."""
         yield "story", self.story
         for index, subgoal in enumerate(self.subgoals):
             yield f"subgoals[{index}].description", subgoal.description
@@ -88,15 +88,15 @@ class StoryboardTemplate:
 
 
 def variable_of(destination: str) -> str | None:
-    """The variable that a destination refers to; None if it names a landmark."""
+    """Returns the variable of a destination; None if the destination names a landmark."""
     return destination[1:] if destination.startswith("$") else None
 
 
 def references(text: str) -> tuple[str, ...]:
-    """Names that a text refers to as `$NAME`, in order."""
+    """Returns the names of the `$NAME` references in a text, in order."""
     return tuple(_REFERENCE.findall(text))
 
 
 def fill(text: str, values: Mapping[str, str]) -> str:
-    """The text with each `$NAME` replaced by its value."""
+    """Returns the text with each `$NAME` replaced by its value."""
     return _REFERENCE.sub(lambda match: values[match[1]], text)

@@ -1,4 +1,4 @@
-"""What must hold between the fields of a template: every reference meets something, and the order can be kept."""
+"""Validation of storyboard templates across fields: references are defined, and the order of subgoals is feasible."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dorothie_gym.errors import StoryboardError
 from dorothie_gym.tasks.binding import cast
 from dorothie_gym.tasks.templates import StoryboardTemplate, references, variable_of
 
-# Paper, appendix "Task Configuration": two to six landmarks to visit. Those to be triggered come on top.
-MOST_LIVE_SUBGOALS = 6
+MAX_LIVE_SUBGOALS = 6
+"""Largest number of subgoals without a trigger: two to six landmarks to visit (paper, "Task Configuration")."""
 
 
 def check(template: StoryboardTemplate) -> None:
-    """Checks a template as a whole.
+    """Validates a template.
 
     Raises:
-        StoryboardError: names the first field that is wrong, and the reason.
+        StoryboardError: for the first invalid field, with the reason.
     """
     _check_names(template)
     _check_references(template)
@@ -68,8 +68,8 @@ def _check_number(template: StoryboardTemplate) -> None:
     if len(template.subgoals) < 2:
         reason = f"a template has at least 2 subgoals, the last one being the destination, not {len(template.subgoals)}"
         raise StoryboardError(template.name, "subgoals", reason)
-    if not 1 <= live <= MOST_LIVE_SUBGOALS:
-        reason = f"1 to {MOST_LIVE_SUBGOALS} subgoals must be without `trigger`, not {live}"
+    if not 1 <= live <= MAX_LIVE_SUBGOALS:
+        reason = f"1 to {MAX_LIVE_SUBGOALS} subgoals must be without `trigger`, not {live}"
         raise StoryboardError(template.name, "subgoals", reason)
 
 
@@ -84,15 +84,15 @@ def _check_indices(template: StoryboardTemplate) -> None:
             if not 0 <= other <= last:
                 raise StoryboardError(template.name, where, f"there is no subgoal {other}; use 0 to {last}")
             if other == index:
-                raise StoryboardError(template.name, where, f"subgoal {index} refers to itself; leave it out")
+                raise StoryboardError(template.name, where, f"subgoal {index} refers to itself; remove it")
 
 
 def _check_order(template: StoryboardTemplate) -> None:
-    """Whichever subgoals are live, none must wait for itself or for the destination, which waits for all."""
+    """Checks that no subgoal waits for itself or for the final destination, whichever subgoals are live."""
     number = len(template.subgoals)
     for index, subgoal in enumerate(template.subgoals):
         for other in subgoal.after:
-            # `other` is the destination for as long as all that follow it are to be triggered.
+            # `other` is the final destination as long as all later subgoals await their trigger.
             if other > index and all(template.subgoals[k].trigger for k in range(other + 1, number)):
                 reason = f"subgoal {index} cannot come after subgoal {other}: that is the destination, which comes last"
                 raise StoryboardError(template.name, f"subgoals[{index}].after", reason)
@@ -100,6 +100,6 @@ def _check_order(template: StoryboardTemplate) -> None:
     while free := {k for k in waiting if not waiting.intersection(template.subgoals[k].after)}:
         waiting -= free
     if waiting:
-        circle = ", ".join(str(k) for k in sorted(waiting))
-        reason = f"the subgoals {circle} wait for one another in a circle; leave out one `after`"
+        cycle = ", ".join(str(k) for k in sorted(waiting))
+        reason = f"the subgoals {cycle} wait for one another in a cycle; remove one `after`"
         raise StoryboardError(template.name, f"subgoals[{min(waiting)}].after", reason)

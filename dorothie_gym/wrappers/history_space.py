@@ -1,9 +1,9 @@
-"""What may be seen at a point as a dict of fixed-shape arrays, and predictions as actions."""
+"""Observation and action spaces of the three tasks: the history at a point, and predictions."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from gymnasium import spaces
@@ -23,7 +23,6 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.recording import (
     FRAME_RATE,
-    OBJECT_VALUES,
     WAY_LENGTH,
     MoveRecord,
     ObjectKind,
@@ -33,50 +32,99 @@ from dorothie_gym.recording import (
     history_angle,
     last_perceived,
 )
-from dorothie_gym.spaces import NO_MOVE, LandmarkColumn, Observation, SpaceLimits
+from dorothie_gym.spaces import NO_MOVE, ActionMapping, LandmarkColumn, Observation, SpaceLimits
+from dorothie_gym.spaces.fields import Column, FieldSpec, choice, choices, dict_space, flags, real, text
 from dorothie_gym.spaces.limits import TEXT_CHARACTERS
 from dorothie_gym.spaces.observations import MAX_UTTERANCE
 
 HISTORY: Final = 16
-"""Moves and physical actions of the history that are in an observation; the oldest are left out."""
+"""Number of latest moves and physical actions in an observation."""
 
 SPEAKERS: Final = (Role.PARTICIPANT, Role.CO_WIZARD)
-"""Who may have spoken; `move_speakers` holds 1 + the place in here, 0 where there is no move."""
-
-REACH: Final = 1e6
-"""No time [s], place [m] or speed [m/s] of a session is beyond this; the checker wants finite bounds."""
+"""Possible speakers; `move_speakers` holds 1 + the index in this tuple, 0 for no move."""
 
 
-def history_space(task: Task, limits: SpaceLimits) -> spaces.Dict:
-    """Returns the observation space of a task; see `TeacherForcedEnv` for its fields."""
-    utterance: dict[str, spaces.Space[Any]] = {"utterance": _text()} if task is Task.UFN else {}
-    return spaces.Dict(
-        {
-            **utterance,
-            "time": _box(1, low=0.0),
-            "moves": spaces.MultiDiscrete([NO_MOVE + 1] * HISTORY),
-            "move_speakers": spaces.MultiDiscrete([len(SPEAKERS) + 1] * HISTORY),
-            "move_slots": spaces.MultiBinary([HISTORY, len(LABELS)]),
-            "move_times": _box(HISTORY, low=0.0),
-            "participant_text": _text(),
-            "co_wizard_text": _text(),
-            "actions": spaces.MultiDiscrete([len(PhysicalAction) + 1] * HISTORY),
-            "action_angles": spaces.Box(U_TURN_ANGLE, 180.0, (HISTORY,), dtype=np.float64),
-            "action_times": _box(HISTORY, low=0.0),
-            "pose": _box(3),
-            "speed": _box(1),
-            "way": _box(WAY_LENGTH, 4),
-            "way_length": spaces.Discrete(WAY_LENGTH + 1),
-            "object_kinds": spaces.MultiDiscrete([len(ObjectKind) + 1] * limits.objects),
-            "objects": _box(limits.objects, len(OBJECT_VALUES)),
-            "street_names": spaces.MultiDiscrete([len(StreetName)] * limits.streets),
-            "landmarks": _box(limits.landmarks, len(LandmarkColumn)),
-        }
+class HistoryObjectColumn(Column):
+    """Columns of `objects` in the history space, in the order of `dorothie_gym.recording.OBJECT_VALUES`."""
+
+    DISTANCE = 0, "m", "distance from the car; for a traffic light, from its stop line"
+    BEARING = 1, "deg", "bearing relative to the heading of the car, positive left"
+    AHEAD = 2, "m", "longitudinal offset from the car"
+    ASIDE = 3, "m", "lateral offset from the car, positive left"
+    HEADING = 4, "deg", "heading relative to the car, positive left; 0 for a traffic light"
+    SPEED = 5, "m/s", "speed; 0 for a traffic light"
+    LENGTH = 6, "m", "length; 0 for a traffic light"
+    WIDTH = 7, "m", "width; 0 for a traffic light"
+
+
+class TrackColumn(Column):
+    """Columns of `way`, the recent trajectory of the car."""
+
+    X = 0, "m", "x of the position"
+    Y = 1, "m", "y of the position"
+    HEADING = 2, "rad", "heading, clockwise"
+    SPEED = 3, "m/s", "speed"
+
+
+def history_fields(task: Task, limits: SpaceLimits) -> tuple[FieldSpec, ...]:
+    """Returns the specifications of the observation fields of a task; histories are sorted newest first."""
+    utterance = (text("utterance", MAX_UTTERANCE, meaning="words whose dialogue act is to be inferred"),)
+    return (
+        *(utterance if task is Task.UFN else ()),
+        real("time", 1, low=0.0, unit="s", meaning="time of the point since the start of the session"),
+        choices("moves", NO_MOVE + 1, HISTORY, meaning=f"ids of the last dialogue moves; {NO_MOVE} for none"),
+        choices(
+            "move_speakers", len(SPEAKERS) + 1, HISTORY, meaning="1 + index of each speaker in `SPEAKERS`; 0 for none"
+        ),
+        flags("move_slots", HISTORY, len(LABELS), meaning="label vector of each move, in the order of `LABELS`"),
+        real("move_times", HISTORY, low=0.0, unit="s", meaning="end of the utterance of each move"),
+        text("participant_text", MAX_UTTERANCE, meaning="last utterance of the participant"),
+        text("co_wizard_text", MAX_UTTERANCE, meaning="last utterance of the Co-Wizard"),
+        choices("actions", len(PhysicalAction) + 1, HISTORY, meaning="ids of the last physical actions; 0 for none"),
+        real(
+            "action_angles",
+            HISTORY,
+            low=U_TURN_ANGLE,
+            high=180.0,
+            unit="deg",
+            meaning="angle of each action, positive left",
+        ),
+        real("action_times", HISTORY, low=0.0, unit="s", meaning="time of each action"),
+        real("pose", 3, unit="m, m, rad", meaning="x, y and heading (clockwise) of the car"),
+        real("speed", 1, unit="m/s", meaning="speed of the car"),
+        real("way", WAY_LENGTH, columns=TrackColumn, unit="mixed", meaning="recent trajectory of the car, every 0.4 s"),
+        choice("way_length", WAY_LENGTH + 1, meaning="number of used rows of `way`"),
+        choices(
+            "object_kinds",
+            len(ObjectKind) + 1,
+            limits.objects,
+            meaning="1 + `ObjectKind` of each perceived object, nearest first; 0 for none",
+        ),
+        real(
+            "objects",
+            limits.objects,
+            columns=HistoryObjectColumn,
+            unit="mixed",
+            meaning="perceived objects, in the order of `object_kinds`",
+        ),
+        choices("street_names", len(StreetName), limits.streets, meaning="id of the `StreetName` of each street"),
+        real(
+            "landmarks",
+            limits.landmarks,
+            columns=LandmarkColumn,
+            unit="mixed",
+            meaning="landmarks that are not hidden",
+        ),
     )
 
 
+def history_space(task: Task, limits: SpaceLimits) -> spaces.Dict:
+    """Returns the observation space of a task, built from `history_fields`."""
+    return dict_space(history_fields(task, limits))
+
+
 def encode_view(view: PointView, limits: SpaceLimits) -> Observation:
-    """Returns the observation of a view, in `history_space` of its task but for what `encode_objects` adds."""
+    """Returns the observation of a view in `history_space` of its task, without the fields of `encode_objects`."""
     moves, actions = view.moves[: -HISTORY - 1 : -1], view.actions[: -HISTORY - 1 : -1]  # newest first
     car = view.car
     observation: Observation = {
@@ -91,7 +139,7 @@ def encode_view(view: PointView, limits: SpaceLimits) -> Observation:
         "action_angles": _padded([history_angle(action) for action in actions], 0.0),
         "action_times": _padded([action.frame / FRAME_RATE for action in actions], 0.0),
         "pose": np.array([car.x, car.y, car.heading] if car else [0.0, 0.0, 0.0]),
-        "speed": np.nan_to_num([car.speed if car else 0.0]),  # NaN: the recording does not know it
+        "speed": np.nan_to_num([car.speed if car else 0.0]),  # NaN: not in the recording
         "way": _way(view),
         "way_length": np.int64(len(view.way)),
         "street_names": _streets(view, limits),
@@ -103,33 +151,49 @@ def encode_view(view: PointView, limits: SpaceLimits) -> Observation:
 
 
 def encode_objects(session: Session, frame: int, town: Town | None, limits: SpaceLimits) -> Observation:
-    """Returns the part of an observation that tells what was perceived around the car at the last look before a frame.
+    """Returns the fields `object_kinds` and `objects`: objects perceived at the last snapshot before a frame.
 
     Args:
-        session: the session, as far as it has come.
-        frame: of the point.
-        town: the session's, where it is known: it tells where traffic lights are.
-        limits: how many objects there are room for, the nearest.
+        session: the session so far.
+        frame: frame of the point.
+        town: town of the session, if known; provides the positions of traffic lights.
+        limits: sizes of the tables; the nearest objects are kept.
     """
     kinds, values = last_perceived(session, frame, town)
-    numbers, table = np.zeros(limits.objects, dtype=np.int64), np.zeros((limits.objects, len(OBJECT_VALUES)))
+    numbers, table = np.zeros(limits.objects, dtype=np.int64), np.zeros((limits.objects, len(HistoryObjectColumn)))
     count = min(len(kinds), limits.objects)
     numbers[:count], table[:count] = 1 + kinds[:count], values[:count]
     return {"object_kinds": numbers, "objects": table}
 
 
+def act_fields() -> tuple[FieldSpec, ...]:
+    """Returns the specifications of the action fields of UfN and RfN."""
+    return (
+        choice("move", len(DialogueMove), meaning="id of the `DialogueMove`"),
+        flags("slots", len(LABELS), meaning="label vector of the slot values, in the order of `LABELS`"),
+    )
+
+
+def decision_fields() -> tuple[FieldSpec, ...]:
+    """Returns the specifications of the action fields of NfD."""
+    return (
+        choice("action", len(NAVIGATION_ACTIONS), meaning="class of `PhysicalAction.nfd_class`"),
+        choice("angle", 360, start=-180, unit="deg", meaning="angle of the action, positive left"),
+    )
+
+
 def act_space() -> spaces.Dict:
-    """Returns the action space of UfN and RfN: a move, and the slot values in the order of `LABELS`."""
-    return spaces.Dict({"move": spaces.Discrete(len(DialogueMove)), "slots": spaces.MultiBinary(len(LABELS))})
+    """Returns the action space of UfN and RfN, built from `act_fields`."""
+    return dict_space(act_fields())
 
 
 def decision_space() -> spaces.Dict:
-    """Returns the action space of NfD: a class of `PhysicalAction.nfd_class`, an angle [degrees, positive left]."""
-    return spaces.Dict({"action": spaces.Discrete(len(NAVIGATION_ACTIONS)), "angle": spaces.Discrete(360, start=-180)})
+    """Returns the action space of NfD, built from `decision_fields`."""
+    return dict_space(decision_fields())
 
 
-def check_action(action: object, space: spaces.Dict) -> Mapping[str, Any]:
-    """Returns the action if it is in the space; raises `ValueError` naming the field otherwise."""
+def check_action(action: object, space: spaces.Dict) -> ActionMapping:
+    """Returns the action if it is in the space; raises `ValueError` with the name of an invalid field otherwise."""
     if not isinstance(action, Mapping):
         raise ValueError(f"action: a dict with the fields {', '.join(space)} is expected, not {type(action).__name__}")
     if extra := [name for name in action if name not in space.spaces]:
@@ -145,19 +209,19 @@ def check_action(action: object, space: spaces.Dict) -> Mapping[str, Any]:
     return action
 
 
-def clean_text(text: str) -> str:
-    """Returns the text as a `Text` space takes it: unknown characters become "?", and its end is cut off if long."""
-    return "".join(character if character in TEXT_CHARACTERS else "?" for character in text)[:MAX_UTTERANCE]
+def clean_text(words: str) -> str:
+    """Returns words that fit a `Text` space: other characters become "?", and long text is truncated."""
+    return "".join(character if character in TEXT_CHARACTERS else "?" for character in words)[:MAX_UTTERANCE]
 
 
 def _way(view: PointView) -> NDArray[np.float64]:
-    table = np.zeros((WAY_LENGTH, 4))
+    table = np.zeros((WAY_LENGTH, len(TrackColumn)))
     states = [(state.x, state.y, state.heading, state.speed) for state in reversed(view.way)]
-    table[: len(states)] = np.nan_to_num(np.array(states).reshape(-1, 4))
+    table[: len(states)] = np.nan_to_num(np.array(states).reshape(-1, len(TrackColumn)))
     return table
 
 
-def _padded(values: Sequence[float], filler: float) -> NDArray[Any]:
+def _padded(values: Sequence[float], filler: float) -> NDArray[np.float64] | NDArray[np.int64]:
     dtype = np.float64 if isinstance(filler, float) else np.int64
     row = np.full(HISTORY, filler, dtype=dtype)
     row[: len(values)] = values
@@ -194,11 +258,3 @@ def _landmarks(view: PointView, limits: SpaceLimits) -> NDArray[np.float64]:
         row[LandmarkColumn.LANE], row[LandmarkColumn.STATION] = landmark["lane"], landmark["station"]
         row[LandmarkColumn.STREET] = landmark["street"]
     return table
-
-
-def _box(*shape: int, low: float = -REACH) -> spaces.Box:
-    return spaces.Box(low, REACH, shape, dtype=np.float64)
-
-
-def _text() -> spaces.Text:
-    return spaces.Text(MAX_UTTERANCE, min_length=0, charset=TEXT_CHARACTERS)

@@ -1,4 +1,4 @@
-"""All roles with the same two spaces, for libraries that ask for it: SuperSuit, and learners that share parameters."""
+"""Wrapper with identical spaces for all roles, as required by SuperSuit and by parameter sharing."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pettingzoo import ParallelEnv
 
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import Role
-from dorothie_gym.spaces import noop
+from dorothie_gym.spaces import ActionDict, Observation, StepInfo, noop
 from dorothie_gym.wrappers.flatten import Flat, FlatActions, FlatObservations
 
 FlatVector: TypeAlias = NDArray[np.float32]
@@ -21,19 +21,19 @@ FlatVector: TypeAlias = NDArray[np.float32]
 class IdenticalSpaces(ParallelEnv[str, FlatVector, Flat]):
     """`DuoWizardEnv` with one observation space and one action space for all three roles.
 
-    Observations are flat vectors (`FlatObservations`), filled up with zeros to the longest. The last three numbers tell
-    the role, one-hot: what shares parameters has to know who it is. Actions are entries in a row (`FlatActions`); each
-    has as many values as the role with most has there. A value that a role does not have counts as 0, and entries
-    beyond its own are ignored. `info["action_mask"]` is flat and has a place for each value of each entry.
+    Observations are flat vectors (`FlatObservations`), zero-padded to the longest. The last three entries encode the
+    role (one-hot), for policies with shared parameters. Actions are flat vectors (`FlatActions`); the number of values
+    of an entry is the maximum over the roles. Values that a role does not have count as 0, and surplus entries are
+    ignored. `info["action_mask"]` is flat, with one entry per value.
 
     Args:
         env: the environment.
-        fields: which fields of its action a role keeps, by role; the others do nothing. None, or a role that is left
-            out, keeps all but texts.
-        only_masks: whether infos hold the mask and nothing else: TorchRL takes arrays only.
+        fields: action fields to keep, by role; the other fields do nothing. All fields except texts are kept for None
+            and for roles without an entry.
+        only_masks: whether infos contain only the mask; TorchRL accepts arrays only.
 
     Raises:
-        ValueError: `fields` names a role or a field that does not exist.
+        ValueError: if `fields` contains an unknown role or field.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class IdenticalSpaces(ParallelEnv[str, FlatVector, Flat]):
         self.action_spaces = {agent: spaces.MultiDiscrete(self.nvec) for agent in self.possible_agents}
 
     def _bounds(self) -> tuple[FlatVector, FlatVector]:
-        """Bounds that hold for all roles."""
+        """Returns bounds that cover all roles."""
         roles = len(self.possible_agents)
         low, high = (np.zeros(self._length + roles, dtype=np.float32) for _ in range(2))
         high[-roles:] = 1.0
@@ -76,49 +76,49 @@ class IdenticalSpaces(ParallelEnv[str, FlatVector, Flat]):
 
     @property
     def agents(self) -> list[str]:
-        """Roles that still play."""
+        """Roles that are active."""
         return list(self.env.agents)
 
     @property
     def unwrapped(self) -> DuoWizardEnv:
-        """The environment inside."""
+        """The wrapped environment."""
         return self.env
 
     def observation_space(self, agent: str) -> spaces.Box:
-        """The observation space, equal for all agents."""
+        """Returns the observation space, equal for all agents."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.MultiDiscrete:
-        """The action space, equal for all agents."""
+        """Returns the action space, equal for all agents."""
         return self.action_spaces[agent]
 
     def reset(
-        self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, FlatVector], dict[str, dict[str, Any]]]:
-        """Begins a session, see `DuoWizardEnv.reset`."""
+        self, seed: int | None = None, options: Mapping[str, object] | None = None
+    ) -> tuple[dict[str, FlatVector], dict[str, StepInfo]]:
+        """Starts a session, see `DuoWizardEnv.reset`."""
         observations, infos = self.env.reset(seed=seed, options=options)
         return self._flatten(observations), self._pad(infos)
 
     def step(
         self, actions: Mapping[str, Flat]
-    ) -> tuple[dict[str, FlatVector], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
-        """Plays one decision, see `DuoWizardEnv.step`.
+    ) -> tuple[dict[str, FlatVector], dict[str, float], dict[str, bool], dict[str, bool], dict[str, StepInfo]]:
+        """Steps one decision, see `DuoWizardEnv.step`.
 
         Raises:
-            ValueError: an action is missing, or of another shape.
+            ValueError: if an action is missing or has a wrong shape.
         """
         taken = {agent: self.unflatten(agent, action) for agent, action in actions.items()}
         observations, rewards, terminations, truncations, infos = self.env.step(taken)
         return self._flatten(observations), rewards, terminations, truncations, self._pad(infos)
 
-    def unflatten(self, agent: str, action: Flat) -> dict[str, Any]:
-        """The role's own action for a flat one."""
+    def unflatten(self, agent: str, action: Flat) -> ActionDict:
+        """Returns the action of the role for a flat one; raises `ValueError` for a wrong shape."""
         values = np.asarray(action, dtype=np.int64)
         if values.shape != self.nvec.shape:
             raise ValueError(f"action of {agent}: the shape is {values.shape}; it must be {self.nvec.shape}")
         own = self._actions[agent].nvec
         mine = values[: len(own)]
-        taken: dict[str, Any] = self._actions[agent].action(np.where((mine >= 0) & (mine < own), mine, 0))
+        taken: ActionDict = self._actions[agent].action(np.where((mine >= 0) & (mine < own), mine, 0))
         return taken
 
     def render(self) -> Any:
@@ -126,14 +126,14 @@ class IdenticalSpaces(ParallelEnv[str, FlatVector, Flat]):
         return self.env.render()
 
     def close(self) -> None:
-        """Closes the window, if there is one."""
+        """Closes the window, if open."""
         self.env.close()
 
     def state(self) -> NDArray[np.float64]:
-        """The true state in numbers, see `DuoWizardEnv.state`."""
+        """Returns the true state as a vector, see `DuoWizardEnv.state`."""
         return self.env.state()
 
-    def _flatten(self, observations: Mapping[str, Any]) -> dict[str, FlatVector]:
+    def _flatten(self, observations: Mapping[str, Observation]) -> dict[str, FlatVector]:
         flat = {}
         for agent, observation in observations.items():
             row = np.zeros(self._length + len(self.possible_agents), dtype=np.float32)
@@ -143,12 +143,12 @@ class IdenticalSpaces(ParallelEnv[str, FlatVector, Flat]):
             flat[agent] = row
         return flat
 
-    def _pad(self, infos: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    def _pad(self, infos: dict[str, StepInfo]) -> dict[str, StepInfo]:
         starts = np.concatenate(([0], np.cumsum(self.nvec)))
         for agent, info in infos.items():
             own, flat = self._actions[agent].mask(info["action_mask"]), self._actions[agent].nvec
             mask = np.zeros(starts[-1], dtype=np.int8)
-            mask[starts[len(flat) : -1]] = 1  # entries that the role does not have: 0 only
+            mask[starts[len(flat) : -1]] = 1  # surplus entries: only 0 is permitted
             begin = 0
             for start, size in zip(starts, flat, strict=False):
                 mask[start : start + size] = own[begin : begin + size]

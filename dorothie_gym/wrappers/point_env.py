@@ -1,4 +1,4 @@
-"""Environment base class whose steps are the prediction points of a session, and the scoring rules."""
+"""Base class of environments whose steps are the prediction points of a session, and the scoring rules."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
+from numpy.typing import NDArray
 
 from dorothie_gym.maps import Town
 from dorothie_gym.recording import (
@@ -23,7 +24,7 @@ from dorothie_gym.recording import (
     angle_error,
     final_view,
 )
-from dorothie_gym.spaces import Observation, SpaceLimits
+from dorothie_gym.spaces import ActionDict, ActionMapping, Observation, SpaceLimits, StepInfo
 from dorothie_gym.wrappers.history_space import (
     act_space,
     check_action,
@@ -33,16 +34,18 @@ from dorothie_gym.wrappers.history_space import (
     history_space,
 )
 
-Action: TypeAlias = Mapping[str, Any]
+Label: TypeAlias = dict[str, int | NDArray[np.int8]]
+"""Correct prediction of a point, in the action space of the task."""
+
 PointT = TypeVar("PointT", InferencePoint, DecisionPoint)
 
 
 class PointRules(ABC, Generic[PointT]):
-    """The rules of a task.
+    """Scoring rules of a task.
 
     Attributes:
-        terms: names of what a prediction earns, each in [0, 1]: the per-point form of the task's two metrics in the
-            paper's table. The reward is their mean.
+        terms: names of the reward terms, each in [0, 1]: the two metrics of the task in the paper, per point.
+            The reward is their mean.
     """
 
     terms: ClassVar[tuple[str, ...]]
@@ -50,35 +53,35 @@ class PointRules(ABC, Generic[PointT]):
     @property
     @abstractmethod
     def action_space(self) -> spaces.Dict:
-        """The space of predictions."""
+        """Action space of the predictions."""
 
     @abstractmethod
-    def label(self, point: PointT) -> dict[str, Any]:
-        """Returns the prediction that would be right."""
+    def label(self, point: PointT) -> Label:
+        """Returns the correct prediction."""
 
     @abstractmethod
-    def score(self, action: Action, point: PointT) -> dict[str, float]:
-        """Returns what a prediction earns, by the names of `terms`; an undefined term is left out."""
+    def score(self, action: ActionMapping, point: PointT) -> dict[str, float]:
+        """Returns the reward terms of a prediction, by name; undefined terms are omitted."""
 
 
 class ActRules(PointRules[InferencePoint]):
-    """UfN and RfN: `move` is 1 if the move is right, `slots` is F1 over the (slot, value) pairs of the point.
+    """UfN and RfN: `move` is 1 for the correct move, `slots` is F1 over the (slot, value) pairs of the point.
 
-    Where there is no slot and none is predicted, `slots` is 1: nothing to say, and nothing said.
+    `slots` is 1 if neither the point nor the prediction has slot values.
     """
 
     terms = ("move", "slots")
 
     @property
     def action_space(self) -> spaces.Dict:
-        """`move` and `slots`."""
+        """Action space with `move` and `slots`."""
         return act_space()
 
-    def label(self, point: InferencePoint) -> dict[str, Any]:
+    def label(self, point: InferencePoint) -> Label:
         """Returns the act of the point."""
         return {"move": int(point.act.move), "slots": np.array(point.act.vector, dtype=np.int8)}
 
-    def score(self, action: Action, point: InferencePoint) -> dict[str, float]:
+    def score(self, action: ActionMapping, point: InferencePoint) -> dict[str, float]:
         """Returns `move` and `slots`."""
         truth, guess = np.array(point.act.vector, dtype=np.bool_), np.asarray(action["slots"], dtype=np.bool_)
         hits, named = int((truth & guess).sum()), int(truth.sum() + guess.sum())
@@ -87,26 +90,26 @@ class ActRules(PointRules[InferencePoint]):
 
 
 class DecisionRules(PointRules[DecisionPoint]):
-    """NfD: `action` is 1 if the action is right, `joint` if the angle is as well, within 15 degrees on the circle.
+    """NfD: `action` is 1 for the correct action, `joint` if the angle is also correct within 15 degrees on the circle.
 
-    Where the recording does not know the angle, `joint` is undefined.
+    `joint` is undefined if the recording lacks the angle.
     """
 
     terms = ("action", "joint")
 
     @property
     def action_space(self) -> spaces.Dict:
-        """`action` and `angle`."""
+        """Action space with `action` and `angle`."""
         return decision_space()
 
-    def label(self, point: DecisionPoint) -> dict[str, Any]:
-        """Returns the action of the point, its angle in whole degrees; 0 where the recording does not know it."""
+    def label(self, point: DecisionPoint) -> Label:
+        """Returns the action of the point and its angle in whole degrees, 0 if the recording lacks the angle."""
         angle = 0.0 if np.isnan(point.angle) else point.angle
-        # 179.6 degrees is nearest to 180, which the space holds as -180.
+        # 179.6 degrees rounds to 180, which the space represents as -180.
         return {"action": point.action.nfd_class, "angle": (round(angle) + 180) % 360 - 180}
 
-    def score(self, action: Action, point: DecisionPoint) -> dict[str, float]:
-        """Returns `action` and, where the angle is known, `joint`."""
+    def score(self, action: ActionMapping, point: DecisionPoint) -> dict[str, float]:
+        """Returns `action` and, if the angle is known, `joint`."""
         right = int(action["action"]) == point.action.nfd_class
         if np.isnan(point.angle):
             return {"action": float(right)}
@@ -121,17 +124,18 @@ RULES: Final[Mapping[Task, PointRules[Any]]] = {
 }
 
 
-class PointEnv(gym.Env[Observation, dict[str, Any]]):
-    """What recorded and live sessions have in common when a task is played on them point by point.
+class PointEnv(gym.Env[Observation, ActionDict]):
+    """Base class of the task environments on recorded and live sessions.
 
-    An episode is one session. What is predicted never changes what is observed next.
+    An episode is one session, a step one prediction point. Predictions do not affect later observations.
 
     Attributes:
-        task: what is to be predicted.
-        limits: sizes of the observation's tables.
+        task: the task.
+        limits: sizes of the observation tables.
+        rules: scoring rules of the task.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["ansi"], "render_fps": 2}  # type: ignore[misc]
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["ansi"], "render_fps": 2}  # type: ignore[misc]  # gymnasium declares an instance attribute
 
     def __init__(self, task: Task, limits: SpaceLimits | None, render_mode: str | None) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
@@ -145,21 +149,19 @@ class PointEnv(gym.Env[Observation, dict[str, Any]]):
         self._points: Iterator[Point] = iter(())
         self._point: Point | None = None
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Begins a session and shows its first point."""
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, StepInfo]:
+        """Starts a session and returns the observation of its first point."""
         super().reset(seed=seed)
         self._points = self._begin(seed, options or {})
         self._point = next(self._points)
         return self._observe(), self._info()
 
-    def step(self, action: dict[str, Any]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Scores the prediction at the point that is shown, and shows the next.
+    def step(self, action: ActionDict) -> tuple[Observation, float, bool, bool, StepInfo]:
+        """Scores the prediction at the current point and moves to the next.
 
         Raises:
-            ValueError: the action is malformed; the message names the field.
-            gymnasium.error.ResetNeeded: there is no point to predict.
+            ValueError: if the action is malformed; the message names the field.
+            gymnasium.error.ResetNeeded: if there is no current point.
         """
         point = self._point
         if point is None:
@@ -177,7 +179,7 @@ class PointEnv(gym.Env[Observation, dict[str, Any]]):
         return self._observe(), sum(terms.values()) / len(terms), self._point is None, False, info
 
     def render(self) -> str | None:
-        """Returns the talk so far and the words to be inferred, one utterance a line."""
+        """Returns the dialogue so far and the words to be inferred, one utterance per line."""
         if self.render_mode is None:
             return None
         view = self._view()
@@ -187,19 +189,19 @@ class PointEnv(gym.Env[Observation, dict[str, Any]]):
         return "\n".join([*lines, f"{view.frame:6d} {self.task.value:>11}? {view.utterance}"])
 
     @abstractmethod
-    def _begin(self, seed: int | None, options: Mapping[str, Any]) -> Iterator[Point]:
-        """Begins a session that has a point, and yields its points as they come."""
+    def _begin(self, seed: int | None, options: Mapping[str, object]) -> Iterator[Point]:
+        """Starts a session with at least one point and yields its points in order."""
 
     @abstractmethod
     def _now(self) -> tuple[Session, Town | None]:
-        """The session that is played, as far as it is known, and its town, where that is known."""
+        """Returns the session so far and its town, if known."""
 
     @abstractmethod
-    def _info(self) -> dict[str, Any]:
-        """What the infos tell besides the score."""
+    def _info(self) -> StepInfo:
+        """Returns the entries of the infos besides the score."""
 
-    def _judge(self, action: Mapping[str, Any], point: Point) -> dict[str, Any]:
-        """What the info of a step tells further of a prediction."""
+    def _judge(self, action: ActionMapping, point: Point) -> StepInfo:
+        """Returns additional info entries for a prediction."""
         return {}
 
     def _view(self) -> PointView:

@@ -1,10 +1,10 @@
-"""Recording what happens in an environment, which does not know that it is recorded."""
+"""Wrapper that records the sessions of an environment; the environment is unaware of the recording."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias, cast
+from typing import Protocol, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,29 +14,30 @@ from pettingzoo.utils import BaseParallelWrapper
 from dorothie_gym.engine.recorder import SessionRecorder
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.recording import Event, SessionHeader, SessionWriter
+from dorothie_gym.spaces import ActionDict, Observation, StepInfo
 
-ResetResult: TypeAlias = tuple[dict[Any, Any], dict[Any, dict[str, Any]]]
+ResetResult: TypeAlias = tuple[dict[str, Observation], dict[str, StepInfo]]
 StepResult: TypeAlias = tuple[
-    dict[Any, Any], dict[Any, float], dict[Any, bool], dict[Any, bool], dict[Any, dict[str, Any]]
+    dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, StepInfo]
 ]
 
 
 class Recordable(Protocol):
-    """What an environment shows to a recorder (`DuoWizardEnv` does)."""
+    """Interface of recordable environments, implemented by `DuoWizardEnv`."""
 
     @property
     def last_events(self) -> tuple[Event, ...]:
-        """What happened in the last step, or in the reset."""
+        """Events of the last step, or of the reset."""
 
     @property
     def last_frames(self) -> NDArray[np.float64]:
-        """Rows (n, 9) of the trajectory in the last step, or in the reset; columns as in `TRAJECTORY_COLUMNS`."""
+        """Trajectory rows (n, 9) of the last step, or of the reset; columns as in `TRAJECTORY_COLUMNS`."""
 
     def session_header(self) -> SessionHeader:
-        """What is known of the session before it begins; asked after each reset."""
+        """Returns the header of the session; called after each reset."""
 
-    def summary(self) -> Mapping[str, Any]:
-        """How the session ended, in JSON types; asked when all agents are done."""
+    def summary(self) -> Mapping[str, object]:
+        """Returns the outcome of the session in JSON types; called when all agents are done."""
 
 
 def name_by_seed(header: SessionHeader) -> str:
@@ -45,27 +46,25 @@ def name_by_seed(header: SessionHeader) -> str:
 
 
 class RecordSession(BaseParallelWrapper):
-    """Writes a session folder for each reset of the environment inside; observations and actions pass unchanged.
+    """Wrapper that writes one session folder per reset; observations and actions pass unchanged.
 
-    Of a `DuoWizardEnv` also the decisions of the roles and what is around the car are written, of others events and
-    frames.
-
-    A session that is not played to its end (another reset, `close`, the death of the process) is left as it is, to be
-    read up to the last decision.
+    Sessions of a `DuoWizardEnv` include the decisions of the roles and the surroundings of the car; sessions of other
+    environments consist of events and frames. An incomplete session (another reset, `close`, end of the process) can be
+    read up to its last decision.
 
     Args:
-        env: a parallel environment whose `unwrapped` is `Recordable`.
-        folder: folder for the sessions' folders.
-        name: name of a session's folder from its header; `"."` records into `folder` itself.
-        overwrite: whether a session of the same name is deleted.
+        env: parallel environment whose `unwrapped` is `Recordable`.
+        folder: parent folder of the session folders.
+        name: function from the header to the name of the session folder; `"."` records into `folder` itself.
+        overwrite: whether an existing session of the same name is deleted.
 
     Raises:
-        SessionError: on reset, where the folder holds a session and `overwrite` is False.
+        SessionError: on reset, if the folder contains a session and `overwrite` is False.
     """
 
     def __init__(
         self,
-        env: ParallelEnv[Any, Any, Any],
+        env: ParallelEnv[str, Observation, ActionDict],
         folder: Path | str,
         *,
         name: Callable[[SessionHeader], str] = name_by_seed,
@@ -81,11 +80,11 @@ class RecordSession(BaseParallelWrapper):
 
     @property
     def session_folder(self) -> Path | None:
-        """Folder of the session that is played, or was last; None before the first reset."""
+        """Folder of the current or last session; None before the first reset."""
         return self._session_folder
 
-    def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> ResetResult:
-        """Resets the environment and opens the folder of the next session."""
+    def reset(self, seed: int | None = None, options: dict[str, object] | None = None) -> ResetResult:
+        """Resets the environment and creates the folder of the next session."""
         self._close_writer()
         result: ResetResult = super().reset(seed=seed, options=options)
         header = self._recorded.session_header()
@@ -97,8 +96,8 @@ class RecordSession(BaseParallelWrapper):
             self._append()
         return result
 
-    def step(self, actions: dict[Any, Any]) -> StepResult:
-        """Steps the environment, appends what happened, and finishes the session when all agents are done."""
+    def step(self, actions: dict[str, ActionDict]) -> StepResult:
+        """Steps the environment, records the step, and finishes the session when all agents are done."""
         result: StepResult = super().step(actions)
         if self._recorder is not None:
             self._recorder.record(actions)

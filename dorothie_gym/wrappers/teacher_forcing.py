@@ -1,11 +1,11 @@
-"""A task on a live session: policies play, a learner is asked at each point, the policies' truth goes on."""
+"""Task environment on live sessions: policies play, and a learner predicts their actions at each point."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,27 +19,29 @@ from dorothie_gym.policies import Policy, make_policy
 from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.recording import Event, Point, Scene, SceneTable, Session, Task, task_points, trajectory_of
 from dorothie_gym.recording.surroundings import Rows, light_rows, weather_rows
-from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.spaces import SpaceLimits, StepInfo
 from dorothie_gym.wrappers.point_env import PointEnv
 
-MOST_SILENT = 20
-"""After so many sessions in a row without a point of the task, it is clear that the policies make none."""
+AnyPolicy: TypeAlias = Policy[Any]
+"""Policy whose state type is not known statically."""
+
+MAX_SILENT_SESSIONS = 20
+"""Largest number of consecutive sessions without a point of the task before an error is raised."""
 
 
-LOOKS: Final = 4
-"""Looks around that are kept: a point of a decision sees the one before, or the one before that."""
+SNAPSHOTS: Final = 4
+"""Number of latest snapshots of the surroundings that are kept; points refer to one of the last two."""
 
 
 class TeacherForcing(PointEnv):
-    """The three tasks over a live `DuoWizardEnv`.
+    """Environment of the three tasks on a live `DuoWizardEnv`.
 
     ## Description
-    Policies play a session for all three roles. At each point of the task the learner is asked what the role does; it
-    earns what its answer is worth beside what the policy did, which is what happens. So there are as many sessions to
-    learn from as there are seeds.
+    Policies play all three roles of a session. At each point of the task the learner predicts the action of the role
+    and is rewarded for the agreement with the policy, whose action is executed. Every seed yields another session.
 
     ## Observation Space
-    As of `dorothie_gym.benchmark.TeacherForcedEnv`: what was there before the point, in `history_space` of the task.
+    `history_space` of the task, as in `dorothie_gym.benchmark.TeacherForcedEnv`: the history before the point.
 
     ## Action Space
     UfN, RfN: `move` Discrete(15), `slots` MultiBinary(69). NfD: `action` Discrete(6), `angle` Discrete(360,
@@ -49,21 +51,21 @@ class TeacherForcing(PointEnv):
     The mean of `info["reward_terms"]`, see `dorothie_gym.wrappers.point_env`.
 
     ## Episode End
-    Terminated when the session is over; one episode is one session. A session without a point is passed over.
+    Terminates at the end of the session; one episode is one session. Sessions without a point are skipped.
 
     ## Arguments
-    - `env`: where the session is played.
+    - `env`: environment of the session.
     - `task`: `Task` or its value: "ufn", "rfn", "nfd".
-    - `policies`: who plays, by role: "scripted" (default), "silent", "random", or a `Policy`.
-    - `limits`: sizes of the observation's tables; those of the town's where None.
+    - `policies`: policy of each role: "scripted" (default), "silent", "random", or a `Policy`.
+    - `limits`: sizes of the observation tables; None for the sizes of the town.
     - `render_mode`: None or "ansi".
 
-    `reset(seed=...)` plays the session that `DuoWizardEnv` and `play_session` have for this seed. The infos hold
+    `reset(seed=...)` plays the same session as `DuoWizardEnv` and `play_session` with this seed. The infos hold
     `session` (its name) and `seed`; after a step `index` (number of the event), `label` and `reward_terms`.
 
     Raises:
-        ValueError: `task`, `policies`, `render_mode` or an action is none of those above; the message names the field.
-        SessionError: the policies make no point of the task.
+        ValueError: if `task`, `policies`, `render_mode` or an action is invalid; the message names the field.
+        SessionError: if the policies produce no point of the task.
 
     ## Version History
     v0.
@@ -74,7 +76,7 @@ class TeacherForcing(PointEnv):
         env: DuoWizardEnv,
         task: Task | str,
         *,
-        policies: Mapping[Role | str, str | Policy[Any]] | None = None,
+        policies: Mapping[Role | str, str | AnyPolicy] | None = None,
         limits: SpaceLimits | None = None,
         render_mode: str | None = None,
     ) -> None:
@@ -86,21 +88,23 @@ class TeacherForcing(PointEnv):
         self._record: _Record
 
     def close(self) -> None:
-        """Closes the environment inside."""
+        """Closes the wrapped environment."""
         self.duo.close()
 
-    def _begin(self, seed: int | None, options: Mapping[str, Any]) -> Iterator[Point]:
-        for _ in range(MOST_SILENT):
+    def _begin(self, seed: int | None, options: Mapping[str, object]) -> Iterator[Point]:
+        for _ in range(MAX_SILENT_SESSIONS):
             chosen = seed if seed is not None else int(self.np_random.integers(2**31))
             points = self._play(chosen, options)
             first = next(points, None)
             if first is not None:
                 return _before(first, points)
             seed = None  # the next is drawn
-        raise SessionError(f"task {self.task}: {MOST_SILENT} sessions had no point; give policies that talk and drive")
+        raise SessionError(
+            f"task {self.task}: {MAX_SILENT_SESSIONS} sessions had no point; give policies that talk and drive"
+        )
 
-    def _play(self, seed: int, options: Mapping[str, Any]) -> Iterator[Point]:
-        """Plays a session, and yields each point as it happens."""
+    def _play(self, seed: int, options: Mapping[str, object]) -> Iterator[Point]:
+        """Plays a session and yields each point at its time."""
         observations, _ = self.duo.reset(seed=seed, options=dict(options))
         session_seed = self.duo.scenario.seed
         states = {
@@ -124,13 +128,13 @@ class TeacherForcing(PointEnv):
     def _now(self) -> tuple[Session, Town | None]:
         return self._record.session(), self.duo.town
 
-    def _info(self) -> dict[str, Any]:
+    def _info(self) -> StepInfo:
         header = self._record.header
         return {"session": self._record.session().name, "seed": header.seed}
 
 
 class _Record:
-    """What has happened so far in a session that is being played, as `SessionRecorder` would write it down."""
+    """Record of the current session so far, with the content that `SessionRecorder` writes."""
 
     def __init__(self, env: DuoWizardEnv) -> None:
         self.header = env.session_header()
@@ -138,22 +142,24 @@ class _Record:
         self._lights = LightStates(env.town)
         self._events: list[Event] = []
         self._rows: list[NDArray[np.float64]] = []
-        self._looks: deque[_Look] = deque(maxlen=LOOKS)
+        self._snapshots: deque[_Snapshot] = deque(maxlen=SNAPSHOTS)
         self._session: Session | None = None
 
     def append(self) -> bool:
-        """Adds what the last decision brought; returns whether there may be a point in it."""
+        """Adds the last decision; returns whether it may contain a point."""
         events, rows, world = self._env.last_events, self._env.last_frames, self._env.stage.world
         self._events += events
         self._rows.append(rows.copy())
         if len(rows) and rows[-1, 0] == world.frame:
             lights = light_rows(self._lights.at(world.time))
-            self._looks.append(_Look(world.frame, actors_around(world), lights, weather_rows(world.weather.values)))
+            self._snapshots.append(
+                _Snapshot(world.frame, actors_around(world), lights, weather_rows(world.weather.values))
+            )
         self._session = None
         return any(event.flagged for event in events)
 
     def session(self) -> Session:
-        """Returns the session so far, of its surroundings the last looks only."""
+        """Returns the session so far, with the latest snapshots of the surroundings only."""
         if self._session is None:
             self._session = Session(
                 header=self.header,
@@ -165,13 +171,13 @@ class _Record:
         return self._session
 
     def _scene(self) -> Scene:
-        if not self._looks:
+        if not self._snapshots:
             return Scene()
-        frames = np.array([look.frame for look in self._looks], dtype=np.int64)
+        frames = np.array([snapshot.frame for snapshot in self._snapshots], dtype=np.int64)
         return Scene(
-            actors=_table(frames, [look.actors for look in self._looks]),
-            lights=_table(frames, [look.lights for look in self._looks]),
-            weather=_table(frames, [look.weather for look in self._looks]),
+            actors=_table(frames, [snapshot.actors for snapshot in self._snapshots]),
+            lights=_table(frames, [snapshot.lights for snapshot in self._snapshots]),
+            weather=_table(frames, [snapshot.weather for snapshot in self._snapshots]),
         )
 
 
@@ -181,8 +187,8 @@ def _table(frames: NDArray[np.int64], rows: list[Rows]) -> SceneTable:
 
 
 @dataclass(frozen=True)
-class _Look:
-    """What was around the car at a frame."""
+class _Snapshot:
+    """Snapshot of the surroundings of the car at a frame."""
 
     frame: int
     actors: Rows
@@ -195,11 +201,11 @@ def _before(first: Point, others: Iterator[Point]) -> Iterator[Point]:
     yield from others
 
 
-def _cast(wanted: Mapping[Role | str, str | Policy[Any]], env: DuoWizardEnv) -> dict[Role, Policy[Any]]:
+def _cast(wanted: Mapping[Role | str, str | AnyPolicy], env: DuoWizardEnv) -> dict[Role, AnyPolicy]:
     for name in wanted:
         if name not in AGENT_ROLES:
             raise ValueError(f"policies has {str(name)!r}; the roles are {', '.join(AGENT_ROLES)}")
-    cast: dict[Role, Policy[Any]] = {}
+    cast: dict[Role, AnyPolicy] = {}
     for role in AGENT_ROLES:
         policy = wanted.get(role, "scripted")
         cast[role] = make_policy(policy, role, env.limits) if isinstance(policy, str) else policy

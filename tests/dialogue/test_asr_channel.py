@@ -22,7 +22,7 @@ def test_the_error_rate_is_the_one_that_is_set(rate):
     assert word_error_rate(SAID, heard) == pytest.approx(rate, rel=0.1)
 
 
-def test_a_perfect_recogniser_hears_what_was_said():
+def test_error_free_channel_returns_the_spoken_text():
     rng = np.random.default_rng(0)
     assert [AsrChannel(rate=0).transcribe(text, rng) for text in SAID] == SAID
 
@@ -32,7 +32,7 @@ def test_a_transcript_is_a_function_of_text_and_seed():
     assert hear[0] == hear[1]
 
 
-def test_names_are_misheard_for_what_sounds_alike():
+def test_names_are_confused_with_similar_sounding_words():
     heard = {misheard("Baits", draw) for draw in (itertools.repeat(x / 20).__next__ for x in range(20))}
     assert "Baits" not in heard
     assert heard & {"Beats", "Bits", "Bats", "Bets", "Bates"}
@@ -70,7 +70,7 @@ TALK = [
 ]
 
 
-def test_a_perfect_recogniser_hands_on_what_was_said() -> None:
+def test_error_free_recogniser_returns_the_utterance() -> None:
     perfect = recogniser(0.0)
     assert all(perfect.hear(utterance) is utterance for utterance in TALK)
 
@@ -91,7 +91,7 @@ def test_words_that_are_heard_right_keep_their_act_and_others_never_do() -> None
     assert kept > 30 and lost > 30
 
 
-def test_what_is_heard_does_not_depend_on_the_act_that_was_meant() -> None:
+def test_transcript_does_not_depend_on_the_intended_act() -> None:
     to_kfc = DialogueAct.of(DialogueMove.INSTRUCT, LandmarkName.KFC)
     misheard = 0
     ears, others = recogniser(0.3), recogniser(0.3)

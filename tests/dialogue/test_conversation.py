@@ -46,7 +46,7 @@ def span(text: str, move: DialogueMove = DialogueMove.INSTRUCT) -> Span:
     return Span(text, DialogueAct.of(move))
 
 
-def test_one_act_is_heard_when_its_words_are_over():
+def test_an_utterance_is_delivered_when_its_words_are_over():
     talk = Conversation(words_per_second=2.5)
     assert talk.say(PARTICIPANT, span("turn left at the next"), 10.0) is None  # 5 words: 2 s
     assert talk.speaking(PARTICIPANT, 10.5) == pytest.approx(1.5)
@@ -76,7 +76,7 @@ def test_a_pause_begins_a_new_utterance():
     assert talk.in_air(PARTICIPANT).start == 1.0
 
 
-def test_words_that_ended_but_were_not_delivered_are_gone_on_with_from_now():
+def test_an_undelivered_utterance_is_continued_from_now():
     talk = Conversation()
     talk.say(PARTICIPANT, span("yes"), 0.0)
     talk.say(PARTICIPANT, span("stop"), 2.0)
@@ -102,7 +102,7 @@ def test_late_delivery_keeps_the_order_of_starts():
     assert [heard.speaker for heard in talk.deliver(5.0)] == [CO_WIZARD, PARTICIPANT]
 
 
-def test_too_many_acts_in_a_breath_are_refused_with_a_reason():
+def test_too_many_acts_in_an_utterance_are_refused_with_a_reason():
     talk = Conversation(max_spans=2)
     assert talk.say(PARTICIPANT, span("left"), 0.0) is None
     assert talk.say(PARTICIPANT, span("left"), 0.5) is None

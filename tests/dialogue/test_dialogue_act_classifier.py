@@ -101,7 +101,7 @@ def test_free_english_is_understood(text, move, slots):
         ("okay", DialogueMove.INSTRUCT, DialogueMove.ACKNOWLEDGE),
     ],
 )
-def test_the_move_before_tells_what_an_answer_is(text, after, move):
+def test_previous_move_determines_the_move_of_an_answer(text, after, move):
     assert guess_act(text, after).move is move
 
 

@@ -47,7 +47,7 @@ def test_an_answer_and_a_command_in_one_utterance_close_and_open():
     assert [exchange.state for exchange in tracker.exchanges] == [ExchangeState.FULFILLED, ExchangeState.OPEN]
 
 
-def test_a_reason_and_the_question_it_leads_to_share_an_exchange():
+def test_a_reason_and_the_following_question_share_an_exchange():
     tracker = ExchangeTracker()
     assert tracker.update(said(C, 0.0, M.EXPLAIN, M.QUERY_YN)) == (0, 0)
     assert tracker.update(said(P, 2.0, M.REPLY_N)) == (0,)
@@ -69,14 +69,14 @@ def test_two_overlapping_exchanges_both_get_closed():
     assert tracker.open() == []
 
 
-def test_nobody_answers_themselves():
+def test_a_speaker_cannot_answer_its_own_question():
     tracker = ExchangeTracker()
     tracker.update(said(C, 0.0, M.QUERY_YN))
     tracker.update(said(C, 2.0, M.REPLY_Y))
     assert tracker.exchanges[0].state is ExchangeState.OPEN
 
 
-def test_a_misunderstanding_keeps_the_exchange_open_until_it_is_repaired():
+def test_an_exchange_with_a_misunderstanding_stays_open_until_the_repair():
     tracker = ExchangeTracker()
     tracker.update(said(P, 0.0, M.INSTRUCT))
     assert tracker.update(said(C, 2.0, M.CONFUSE)) == (0,)
@@ -95,14 +95,14 @@ def test_ten_seconds_of_silence_abandon_a_question():
     assert tracker.exchanges[0].state is ExchangeState.ABANDONED
 
 
-def test_a_statement_that_nobody_takes_up_owed_no_answer():
+def test_an_unanswered_statement_is_fulfilled():
     tracker = ExchangeTracker()
     tracker.update(said(C, 0.0, M.EXPLAIN))
     tracker.tick(20.0)
     assert tracker.exchanges[0].state is ExchangeState.FULFILLED
 
 
-def test_an_answer_that_began_in_time_counts_although_it_ended_late():
+def test_an_answer_that_started_in_time_counts():
     tracker = ExchangeTracker()
     tracker.update(said(C, 0.0, M.QUERY_W))
     tracker.tick(12.0)
@@ -139,7 +139,7 @@ def test_patience_must_be_positive():
         ExchangeTracker(0.0)
 
 
-def test_who_asks_back_about_a_command_stays_in_its_exchange_until_it_is_answered():
+def test_a_question_about_a_command_stays_in_the_exchange_of_the_command():
     tracker = ExchangeTracker()
     tracker.update(said(P, 0.0, M.INSTRUCT))
     assert tracker.update(said(C, 2.0, M.CHECK)) == (0,)
@@ -148,7 +148,7 @@ def test_who_asks_back_about_a_command_stays_in_its_exchange_until_it_is_answere
     assert tracker.exchanges[0].state is ExchangeState.FULFILLED
 
 
-def test_what_the_other_does_not_know_is_explained_within_the_exchange():
+def test_an_explanation_of_missing_knowledge_stays_in_the_exchange():
     tracker = ExchangeTracker()
     tracker.update(said(P, 0.0, M.INSTRUCT))
     assert tracker.update(said(C, 2.0, M.EXPLAIN)) == (0,)
@@ -174,7 +174,7 @@ def naming(speaker: Role, start: float, move: DialogueMove, *values: SlotValue) 
     return Utterance(speaker, (Span("words", DialogueAct.of(move, *values)),), start, start + 1.0)
 
 
-def test_who_takes_something_up_by_its_name_speaks_of_what_named_it():
+def test_a_grounding_act_with_a_name_refers_to_the_exchange_of_that_name():
     tracker = ExchangeTracker()
     tracker.update(naming(C, 0.0, M.EXPLAIN, LandmarkName.PANERA))  # 0: nobody has taken it up yet
     assert tracker.update(naming(P, 1.5, M.INSTRUCT, LandmarkName.HOUSE)) == (1,)
@@ -184,7 +184,7 @@ def test_who_takes_something_up_by_its_name_speaks_of_what_named_it():
 
 
 @pytest.mark.parametrize("value", [LandmarkName.QUERIED, LandmarkName.UNKNOWN])
-def test_what_is_asked_for_is_not_named(value):
+def test_queried_and_unknown_values_are_not_names(value):
     tracker = ExchangeTracker()
     tracker.update(naming(P, 0.0, M.QUERY_W, value))
     tracker.update(said(C, 1.5, M.REPLY_W))
@@ -192,7 +192,7 @@ def test_what_is_asked_for_is_not_named(value):
     assert tracker.update(naming(C, 4.5, M.ACKNOWLEDGE, value)) == (1,)
 
 
-def test_who_says_the_same_again_before_there_is_an_answer_begins_nothing_new():
+def test_a_repetition_before_an_answer_continues_the_exchange():
     tracker = ExchangeTracker()
     tracker.update(naming(P, 0.0, M.INSTRUCT, ActionValue.STOP))
     assert tracker.update(naming(P, 4.0, M.INSTRUCT, ActionValue.STOP)) == (0,)
@@ -202,7 +202,7 @@ def test_who_says_the_same_again_before_there_is_an_answer_begins_nothing_new():
 
 
 @pytest.mark.parametrize("puzzled", [M.CONFUSE, M.CHECK, M.EXPLAIN])
-def test_who_was_not_understood_and_names_the_same_once_more_goes_on(puzzled):
+def test_a_repetition_after_a_misunderstanding_continues_the_exchange(puzzled):
     tracker = ExchangeTracker()
     tracker.update(naming(P, 0.0, M.INSTRUCT, LandmarkName.COCO, ActionValue.U_TURN))
     tracker.update(said(C, 2.0, puzzled))
@@ -219,14 +219,14 @@ def test_something_else_is_no_answer_to_a_check():
     assert tracker.update(naming(P, 4.0, M.INSTRUCT, ActionValue.STOP)) == (1,)
 
 
-def test_who_says_the_same_again_after_ten_seconds_begins_anew():
+def test_a_repetition_after_ten_seconds_starts_a_new_exchange():
     tracker = ExchangeTracker()
     tracker.update(naming(P, 0.0, M.INSTRUCT, ActionValue.STOP))
     tracker.tick(12.0)
     assert tracker.update(naming(P, 12.0, M.INSTRUCT, ActionValue.STOP)) == (1,)
 
 
-def test_who_explains_what_the_other_does_not_know_answers():
+def test_an_explanation_answers_a_statement_of_missing_knowledge():
     tracker = ExchangeTracker()
     tracker.update(naming(C, 0.0, M.EXPLAIN, LandmarkName.HOUSE, GoalStatus.UNKNOWN))
     assert tracker.update(naming(P, 2.0, M.EXPLAIN, StreetName.FULLER)) == (0,)

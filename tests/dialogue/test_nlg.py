@@ -210,7 +210,7 @@ def test_as_many_contexts_as_acts_are_wanted():
         word_acts([DialogueAct.of(DialogueMove.CONFIRM)], Role.PARTICIPANT, np.random.default_rng(0), [None, None])
 
 
-def test_what_was_mentioned_is_referred_to():
+def test_mentioned_values_are_replaced_by_references():
     act = DialogueAct.of(DialogueMove.INSTRUCT, StreetName.BEAL)
     style = SpeakerStyle(anaphora=1.0)
     scene = WordingContext(mentioned=frozenset({StreetName.BEAL}))

@@ -65,7 +65,7 @@ def test_a_generated_refusal_denies_the_direction():
         ("Go around over Hubbard.", None),
     ],
 )
-def test_directions_are_told_from_other_lefts_and_rights(text, direction):
+def test_directions_are_distinguished_from_other_senses_of_left_and_right(text, direction):
     assert understand(text).direction == direction
 
 

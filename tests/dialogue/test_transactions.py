@@ -32,21 +32,21 @@ def test_an_interrupted_goal_is_resumed_in_its_own_transaction() -> None:
     assert [drive.say(k, M.INSTRUCT, goal) for k, goal in enumerate((KFC, IKEA, KFC))] == [0, 1, 0]
 
 
-def test_what_is_to_be_done_later_leaves_open_what_is_going_on() -> None:
+def test_a_pending_goal_keeps_the_current_transaction_open() -> None:
     drive = Drive(KFC, IKEA)
     drive.say(0, M.INSTRUCT, KFC)
     assert drive.say(1, M.INSTRUCT, IKEA, S.PENDING) == 1
     assert drive.say(2, M.INSTRUCT, ActionValue.LANE_FOLLOW) == 0
 
 
-def test_an_answer_belongs_where_its_question_does() -> None:
+def test_an_answer_belongs_to_the_transaction_of_its_question() -> None:
     drive = Drive(KFC, IKEA)
     drive.say(0, M.INSTRUCT, KFC)
     drive.say(1, M.EXPLAIN, IKEA, S.PENDING)
     assert drive.say(1, M.ACKNOWLEDGE, speaker=Role.CO_WIZARD) == 1
 
 
-def test_the_question_where_to_go_opens_the_transaction_of_the_answer() -> None:
+def test_a_question_for_the_next_goal_starts_the_transaction_of_the_answer() -> None:
     drive = Drive(KFC, SHELL)
     drive.say(0, M.INSTRUCT, KFC)
     drive.tracker.note(KFC, S.COMPLETE)
@@ -61,7 +61,7 @@ def test_a_place_that_one_only_passes_is_no_goal() -> None:
     assert drive.say(1, M.INSTRUCT, ActionValue.J_TURN, SHELL) == 0
 
 
-def test_a_goal_that_is_added_becomes_one_when_it_is_added() -> None:
+def test_a_landmark_becomes_a_goal_when_it_is_added() -> None:
     drive = Drive(KFC)
     drive.say(0, M.INSTRUCT, KFC)
     drive.tracker.note(SHELL, S.ONGOING)
@@ -75,14 +75,14 @@ def test_not_this_but_that_begins_the_transaction_of_that() -> None:
     assert drive.say(2, M.INSTRUCT, ActionValue.J_TURN) == 1
 
 
-def test_a_hidden_place_that_is_never_named_is_found_when_it_is_reached() -> None:
+def test_an_arrival_names_the_landmark_of_an_anonymous_transaction() -> None:
     drive = Drive(KFC)
     assert drive.say(0, M.INSTRUCT, ActionValue.LANE_FOLLOW) == 0
     drive.tracker.note(KFC, S.COMPLETE)
     assert drive.say(1, M.EXPLAIN, KFC, S.COMPLETE) == 0
 
 
-def test_where_to_go_now_counts_before_what_is_left_for_later_in_one_breath() -> None:
+def test_a_current_goal_takes_precedence_over_a_pending_goal_in_one_utterance() -> None:
     tracker = TransactionTracker((KFC, IKEA))
     now, later = DialogueAct.of(M.INSTRUCT, KFC), DialogueAct.of(M.EXPLAIN, IKEA, S.PENDING)
     for k, acts in enumerate(((now, later), (later, now))):

@@ -88,7 +88,7 @@ def test_an_entry_that_is_no_bit_is_refused_by_place_and_name() -> None:
         decode_slots(vector)
 
 
-def test_encoding_what_is_no_slot_value_is_refused() -> None:
+def test_encoding_of_other_objects_is_refused() -> None:
     with pytest.raises(OntologyError, match="EXPLAIN"):
         encode_slots([LandmarkName.KFC, DialogueMove.EXPLAIN])  # type: ignore[list-item]
 

@@ -122,7 +122,7 @@ def test_unknown_text_is_refused_by_name(parser: Parser, text: str) -> None:
 
 @pytest.mark.parametrize("parser", PARSERS)
 @pytest.mark.parametrize("text", [None, 3])
-def test_what_is_no_text_is_refused(parser: Parser, text: object) -> None:
+def test_parsers_refuse_non_text(parser: Parser, text: object) -> None:
     with pytest.raises(OntologyError, match="expected a text"):
         parser(text)  # type: ignore[arg-type]
 

@@ -33,7 +33,7 @@ def test_error_shows_a_spelling_even_when_none_is_near() -> None:
     assert "'Explain'" in str(unknown_spelling("%%%", "dialogue move", ["Explain"]))
 
 
-def test_error_for_what_is_no_text_names_its_type() -> None:
+def test_error_for_non_text_names_the_type() -> None:
     assert "int" in str(unknown_spelling(3, "dialogue move", ["Explain"]))
 
 

@@ -61,7 +61,7 @@ SPEECH = Speech(act=DialogueAct.of(DialogueMove.INSTRUCT, StreetName.BAITS, Land
     ],
     ids=lambda action: type(action).__name__,
 )
-def test_what_is_encoded_is_read_back(action: RoleAction) -> None:
+def test_decoding_inverts_encoding(action: RoleAction) -> None:
     assert decode_action(action.role, action.encode(LIMITS), LIMITS) == action
 
 

@@ -25,7 +25,7 @@ def cast_of(*categories, seed=0, dependents=(), subgoals=({}, {})):
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_a_wide_category_leaves_what_a_narrow_one_needs(seed):
+def test_a_wide_category_does_not_use_up_the_kinds_of_a_narrow_one(seed):
     parts = cast_of("places", "places.cafe", "places.stores", seed=seed, subgoals=({"destination": "House"}, {}))
     assert parts["$V1"] is LandmarkName.COCO
     assert len(set(parts.values())) == len(parts)
@@ -51,7 +51,7 @@ def test_a_landmark_named_outright_is_not_given_to_a_variable():
         assert parts["$V0"] is LandmarkName.SEVEN_ELEVEN
 
 
-def test_a_dependent_narrows_a_wide_category_to_what_has_the_attribute():
+def test_a_dependent_restricts_a_wide_category_to_kinds_with_the_attribute():
     for seed in range(20):
         parts = cast_of("places", seed=seed, dependents=[["A", "V0.actions"]], subgoals=({"destination": "KFC"}, {}))
         assert parts["$V0"].label in ("Ikea", "SevenEleven")  # Shell is named outright
@@ -73,13 +73,13 @@ REFUSED = {
     ),
     "too few values": (
         {"variables": variables("places.cafe"), "dependents": [[f"I{k}", "V0.menuitems"] for k in range(6)]},
-        r"dependents\.I0: 6 different V0.menuitems are asked for, but there are 5; ask for fewer",
+        r"dependents\.I0: 6 different V0.menuitems are requested, but only 5 exist; request fewer",
     ),
 }
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_the_catalogue_cannot_serve_is_refused(case):
+def test_infeasible_templates_are_refused(case):
     fields, message = REFUSED[case]
     with pytest.raises(StoryboardError, match="^storyboard test: " + message):
         parse(plain({}, {}, **fields))

@@ -46,7 +46,7 @@ def test_landmarks_are_found_in_any_spelling(spelling):
 
 
 @pytest.mark.parametrize("text", ["Unknown", "Queried", "hospital"])
-def test_what_is_no_place_is_not_found(text):
+def test_unknown_landmarks_are_not_found(text):
     assert find_kind(text) is None
 
 

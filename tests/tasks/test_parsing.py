@@ -32,18 +32,18 @@ def test_commas_inside_strings_are_left_alone():
 
 
 @given(VALUES)
-def test_json_proper_reads_as_ever(value):
+def test_strict_json_is_parsed_unchanged(value):
     assert read_json(json.dumps(value), "t") == value
     assert read_json(json.dumps(value, indent=1, ensure_ascii=False), "t") == value
 
 
 @pytest.mark.parametrize("text", ["[,]", "{,}", "[1,,]", '{"a":,}', "", "{", '{"a": "'])
-def test_what_is_no_json_even_so_is_refused(text):
+def test_malformed_json_is_refused(text):
     with pytest.raises(StoryboardError, match="line 1, column"):
         read_json(text, "t")
 
 
-def test_the_error_tells_line_and_column_of_the_file():
+def test_json_error_contains_line_and_column_of_the_file():
     with pytest.raises(StoryboardError, match=r"storyboard picnic: line 3, column 8: not JSON"):
         read_json('{\n "a": [1,],\n "b" : : 2\n}', "picnic")
 
@@ -53,7 +53,7 @@ def test_a_field_given_twice_is_refused():
         read_json('{"story": "a", "story": "b"}', "t")
 
 
-def test_endless_nesting_is_refused():
+def test_deep_nesting_is_refused():
     with pytest.raises(StoryboardError, match="nested too deeply"):
         read_json("[" * 200_000, "t")
 

@@ -32,7 +32,7 @@ def test_stops_in_between_come_in_any_order_and_the_destination_last():
     assert state.success and state.done
 
 
-def test_a_subgoal_waits_for_those_it_comes_after():
+def test_a_subgoal_waits_for_its_predecessors():
     state = state_of({"after": [1]}, {}, {})
     assert reach(state, 0) == []
     assert reach(state, 1, 0) == [1, 0]
@@ -66,7 +66,7 @@ def test_a_subgoal_to_be_triggered_is_no_part_of_the_task_before():
     assert reach(state, 1, 2) == [1, 2]
 
 
-def test_without_its_trigger_nobody_waits_for_it():
+def test_no_subgoal_waits_for_an_untriggered_subgoal():
     state = state_of({"trigger": True}, {"after": [0]}, {})
     assert state.allowed(1)
     state.trigger(0)
@@ -107,7 +107,7 @@ def test_a_deletion_may_have_to_wait_for_another_subgoal():
     state.delete(1)
 
 
-def test_a_change_moves_a_subgoal_and_words_it_anew():
+def test_a_change_replaces_place_and_description_of_a_subgoal():
     state = state_of({"change": "Drink something", "change_destination": "Coco"}, {})
     before = state.landmark_of(0)
     assert state.description(0) == "Stop at KFC" and state.possible_changes() == (0,)
@@ -124,7 +124,7 @@ def test_the_destination_may_change_its_place():
     assert reach(state, 0, 1) == [0, 1] and state.success
 
 
-def test_a_change_without_a_destination_stays_where_it_is():
+def test_a_change_without_a_destination_keeps_the_place():
     state = state_of({"change": "Ask for the bill"}, {})
     before = state.landmark_of(0)
     state.change(0)
@@ -156,7 +156,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_the_template_does_not_allow_is_refused_and_changes_nothing(case):
+def test_changes_that_the_template_forbids_are_refused_without_effect(case):
     subgoals, steps, action, i, reason = REFUSED[case]
     state = state_of(*subgoals)
     for step, k in steps:

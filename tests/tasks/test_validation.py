@@ -42,9 +42,9 @@ REFUSED = {
         plain({"delete_after_subgoal": 9}, {}),
         r"subgoals\[0\]\.delete_after_subgoal: there is no subgoal 9",
     ),
-    "after in a circle": (
+    "after in a cycle": (
         plain({"after": [2]}, {"after": [0]}, {"after": [1]}, {}),
-        r"subgoals\[0\]\.after: the subgoals 0, 1, 2 wait for one another in a circle",
+        r"subgoals\[0\]\.after: the subgoals 0, 1, 2 wait for one another in a cycle",
     ),
     "after the destination": (
         plain({"after": [1]}, {}),
@@ -58,13 +58,13 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_a_template_that_does_not_hold_together_is_refused(case):
+def test_an_inconsistent_template_is_refused(case):
     fields, message = REFUSED[case]
     with pytest.raises(StoryboardError, match="^storyboard test: " + message):
         parse(fields)
 
 
-def test_after_may_look_ahead_to_what_is_never_the_destination():
+def test_after_may_refer_to_a_later_subgoal_that_is_never_final():
     assert parse(plain({"after": [1]}, {}, {})).subgoals[0].after == (1,)
 
 

@@ -173,7 +173,7 @@ def test_plain_spaces_are_flattened_too() -> None:
         (spaces.Dict(throttle=spaces.Box(0.0, 1.0)), None, "field 'throttle'"),
     ],
 )
-def test_what_cannot_be_flattened_is_named(space: Any, fields: Any, message: str) -> None:
+def test_error_names_the_field_that_cannot_be_flattened(space: Any, fields: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         FlattenAction(Echo(space, NUMBERS), fields)
 

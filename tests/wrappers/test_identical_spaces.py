@@ -35,7 +35,7 @@ def test_all_roles_have_the_same_spaces() -> None:
         assert observations[agent][-3:].tolist() == [float(k == i) for i in range(3)]
 
 
-def test_actions_mean_what_they_mean_to_the_role() -> None:
+def test_flat_actions_decode_to_the_actions_of_the_role() -> None:
     env = IdenticalSpaces(make(), FEW)
     assert env.nvec.shape == (2,) and env.nvec[0] >= 360  # the angle comes first, by the alphabet
     env.reset(seed=0)
@@ -80,7 +80,7 @@ def test_masked_actions_of_all_roles_are_carried_out() -> None:
     assert all(truncations.values())
 
 
-def test_what_does_not_fit_is_told() -> None:
+def test_invalid_arguments_are_refused() -> None:
     with pytest.raises(ValueError, match="fields: 'driver'"):
         IdenticalSpaces(make(), {"driver": ["move"]})
     env = IdenticalSpaces(make(), FEW)

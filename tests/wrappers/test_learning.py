@@ -39,7 +39,7 @@ def test_a_learner_learns(package: str, name: str) -> None:
     assert model.predict(model.env.reset())[0].shape == (1, 2)
 
 
-def test_a_masked_learner_does_only_what_is_possible() -> None:
+def test_a_masked_learner_takes_feasible_actions_only() -> None:
     contrib = pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
     env = dorothie_gym.flatten(
         gym.make("dorothie_gym/CoWizard-v0", partners=QUIET, max_cycles=20), fields=("physical",)

@@ -90,7 +90,7 @@ def test_whole_session_is_recorded(tmp_path: Path) -> None:
     assert (session.complete, session.summary, session.header.seed) == (True, {"success": True}, 3)
 
 
-def test_environment_behaves_as_if_it_were_not_recorded(tmp_path: Path) -> None:
+def test_recording_does_not_change_the_environment(tmp_path: Path) -> None:
     assert play(RecordSession(TalkingEnv(), tmp_path)) == play(TalkingEnv())
 
 

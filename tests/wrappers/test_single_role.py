@@ -48,7 +48,7 @@ def test_a_role_plays_in_its_own_spaces(role: Role) -> None:
         env.step(noop(role, env.duo.limits))
 
 
-def test_the_same_session_as_where_three_policies_play() -> None:
+def test_session_equals_one_played_by_three_policies() -> None:
     env = SingleRole("co_wizard", max_cycles=40)
     duo = dorothie_gym.DuoWizardEnv(max_cycles=40)
     policies = {role: make_policy("scripted", role) for role in AGENT_ROLES}

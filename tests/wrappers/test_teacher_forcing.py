@@ -74,7 +74,7 @@ def test_live_observations_are_those_of_the_recorded_session(
 
 
 @pytest.mark.parametrize("task", list(Task))
-def test_answers_do_not_change_what_happens(task: Task) -> None:
+def test_predictions_do_not_change_the_session(task: Task) -> None:
     _, one, _ = play(TeacherForcing(duo(), task))
     _, other, rewards = play(TeacherForcing(duo(), task), right=False)
     np.testing.assert_equal(one, other)

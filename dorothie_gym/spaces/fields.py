@@ -1,0 +1,144 @@
+"""Field specifications: one machine-readable table per space, from which spaces and documentation are built."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Self, TypeAlias
+
+import numpy as np
+from gymnasium import spaces
+
+from dorothie_gym.spaces.limits import REACH, TEXT_CHARACTERS
+
+AnySpace: TypeAlias = spaces.Space[Any]
+"""Space whose kind of values is not known statically."""
+
+
+class FieldKind(enum.StrEnum):
+    """Kind of the values of a field, by the Gymnasium space that holds them."""
+
+    REAL = "Box"
+    CHOICE = "Discrete"
+    CHOICES = "MultiDiscrete"
+    FLAGS = "MultiBinary"
+    TEXT = "Text"
+
+
+class Column(enum.IntEnum):
+    """Column of a table field; members are written `NAME = index, unit, meaning`.
+
+    Attributes:
+        unit: unit of the values; "1" for dimensionless values and ids.
+        meaning: content of the column.
+    """
+
+    unit: str
+    meaning: str
+
+    # No member uses the defaults: they let type checkers accept the look-up by number, `Enum(3)`.
+    def __new__(cls, value: int, unit: str = "", meaning: str = "") -> Self:
+        """Creates a member from its index, unit and meaning."""
+        member = int.__new__(cls, value)
+        member._value_ = value
+        member.unit = unit
+        member.meaning = meaning
+        return member
+
+
+@dataclass(frozen=True, kw_only=True)
+class FieldSpec:
+    """Specification of one field of a `Dict` space.
+
+    Create specifications with `real`, `choice`, `choices`, `flags` and `text`.
+
+    Attributes:
+        name: key of the field.
+        kind: kind of the values.
+        meaning: content of the field, for documentation.
+        shape: shape of the values; () for a choice and for text.
+        low: lower bound of the values; shortest length of a text [characters].
+        high: upper bound of the values, inclusive; greatest length of a text [characters].
+        unit: unit of the values; "1" for dimensionless values and ids.
+        columns: enum of the columns of a table (the last axis), or None.
+    """
+
+    name: str
+    kind: FieldKind
+    meaning: str
+    shape: tuple[int, ...] = ()
+    low: float
+    high: float
+    unit: str = "1"
+    columns: type[Column] | None = None
+
+    @property
+    def dtype(self) -> str:
+        """Name of the numpy dtype of the values; "str" for text."""
+        if self.kind is FieldKind.TEXT:
+            return "str"
+        return {FieldKind.REAL: "float64", FieldKind.FLAGS: "int8"}.get(self.kind, "int64")
+
+    @property
+    def range(self) -> str:
+        """Permitted values for documentation, e.g. "[0, 15]"."""
+        if self.kind is FieldKind.TEXT:
+            return f"up to {self.high:g} characters"
+        return f"[{self.low:g}, {self.high:g}]"
+
+    def space(self) -> AnySpace:
+        """Builds the Gymnasium space of the field."""
+        low, high = int(self.low), int(self.high)
+        match self.kind:
+            case FieldKind.REAL:
+                return spaces.Box(self.low, self.high, self.shape, dtype=np.float64)
+            case FieldKind.CHOICE:
+                return spaces.Discrete(high - low + 1, start=low)
+            case FieldKind.CHOICES:
+                return spaces.MultiDiscrete([high + 1] * self.shape[0])
+            case FieldKind.FLAGS:
+                return spaces.MultiBinary(self.shape[0] if len(self.shape) == 1 else self.shape)
+            case FieldKind.TEXT:
+                return spaces.Text(high, min_length=low, charset=TEXT_CHARACTERS)
+
+
+def real(
+    name: str,
+    *shape: int,
+    meaning: str,
+    unit: str = "1",
+    low: float = -REACH,
+    high: float = REACH,
+    columns: type[Column] | None = None,
+) -> FieldSpec:
+    """Returns the specification of a float64 array; the number of columns is appended to the shape of a table."""
+    full = (*shape, len(columns)) if columns is not None else shape
+    return FieldSpec(
+        name=name, kind=FieldKind.REAL, shape=full, low=low, high=high, unit=unit, meaning=meaning, columns=columns
+    )
+
+
+def choice(name: str, count: int, *, meaning: str, unit: str = "1", start: int = 0) -> FieldSpec:
+    """Returns the specification of an integer in [start, start + count)."""
+    return FieldSpec(name=name, kind=FieldKind.CHOICE, low=start, high=start + count - 1, unit=unit, meaning=meaning)
+
+
+def choices(name: str, count: int, length: int, *, meaning: str) -> FieldSpec:
+    """Returns the specification of an array of `length` integers in [0, count)."""
+    return FieldSpec(name=name, kind=FieldKind.CHOICES, shape=(length,), low=0, high=count - 1, meaning=meaning)
+
+
+def flags(name: str, *shape: int, meaning: str) -> FieldSpec:
+    """Returns the specification of an array of 0 and 1."""
+    return FieldSpec(name=name, kind=FieldKind.FLAGS, shape=shape, low=0, high=1, meaning=meaning)
+
+
+def text(name: str, length: int, *, meaning: str) -> FieldSpec:
+    """Returns the specification of a text of 0 to `length` characters from `TEXT_CHARACTERS`."""
+    return FieldSpec(name=name, kind=FieldKind.TEXT, low=0, high=length, meaning=meaning)
+
+
+def dict_space(fields: Iterable[FieldSpec]) -> spaces.Dict:
+    """Builds the `Dict` space of several fields."""
+    return spaces.Dict({field.name: field.space() for field in fields})
