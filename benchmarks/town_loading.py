@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from dorothie_gym.maps import load_town, town_names
-from dorothie_gym.maps.cache import CACHE_VARIABLE
+from dorothie_gym.user_cache import CACHE_VARIABLE
 
 # The clock starts when the package is there: importing numpy and the town package is the same for both.
 LOAD = """

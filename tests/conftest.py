@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from dorothie_gym.maps.cache import CACHE_VARIABLE
+from dorothie_gym.user_cache import CACHE_VARIABLE
 
 _FOLDER = pytest.StashKey[tempfile.TemporaryDirectory[str]]()
 

@@ -16,7 +16,7 @@ from dorothie_gym.baselines.inputs import TASKS, Examples
 from dorothie_gym.benchmark.features import BatchSpec, Columns, PointTable, build, points
 from dorothie_gym.errors import SessionError
 from dorothie_gym.recording import Fold
-from dorothie_gym.rollout.default_corpus import cache_folder
+from dorothie_gym.user_cache import cache_folder
 
 _TABLES: Final = "texts"
 
@@ -52,7 +52,8 @@ class Material:
             SessionError: it cannot be read, or lacks a fold.
             EncoderError: the encoder is unknown, or what it needs is not here.
         """
-        return cls(build(corpus), text_encoder(encoder), cache_folder() / _TABLES)
+        cache = cache_folder()
+        return cls(build(corpus), text_encoder(encoder), None if cache is None else cache / _TABLES)
 
     def about(self) -> dict[str, Any]:
         """Returns what decided the features, in JSON types: part of every checkpoint and of every result."""

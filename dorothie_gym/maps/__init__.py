@@ -16,8 +16,8 @@ from dorothie_gym.maps.model import (
     SignalKind,
     Site,
     Street,
-    Town,
 )
+from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_lights import LightColour, LightPhase, LightProgramme
 
 __all__ = [

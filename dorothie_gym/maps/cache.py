@@ -1,4 +1,4 @@
-"""Cache of compiled towns: an `.npz` archive for each source file, kept in the user's cache folder."""
+"""Cache of compiled towns: one `.npz` archive for each source file, in the folder `towns` of the user's cache."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import io
 import json
 import logging
 import os
-import sys
 import tempfile
 import zipfile
 import zlib
@@ -18,10 +17,11 @@ from collections.abc import Callable, Iterator
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
+from dorothie_gym import angles
 from dorothie_gym.errors import TownArchiveError
 from dorothie_gym.maps.model import (
     Array,
@@ -35,14 +35,14 @@ from dorothie_gym.maps.model import (
     SignalKind,
     Site,
     Street,
-    Town,
 )
+from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_lights import LightPhase, LightProgramme
+from dorothie_gym.user_cache import cache_folder
 
 FORMAT = 1
-"""To be raised when the same town would be written differently."""
+"""Version of the archive format; raise it when the same town would be written differently."""
 
-# What a town consists of, named as the arguments of `Town`.
 PARTS: dict[str, type] = {
     "lanes": Lane,
     "links": LaneLink,
@@ -54,43 +54,47 @@ PARTS: dict[str, type] = {
     "sidewalks": Sidewalk,
     "programmes": LightProgramme,
 }
+"""Element types of a town, named as the arguments of `Town`."""
 
-_DIGEST_LENGTH = 64  # hexadecimal digits of SHA-256
+_DIGEST_LENGTH = 64
+"""Hexadecimal digits of SHA-256."""
 
-_Column = list[Any] | dict[str, list[list[int]]]
+_Column: TypeAlias = "list[object] | dict[str, list[list[int]]]"
+"""One field of all elements: the values or, for arrays, `{"shapes": ...}` with the numbers in the array `floats`."""
 
 
 def pack(town: Town, key: str) -> bytes:
-    """A town as the bytes of an `.npz` file.
+    """Returns a town as the bytes of an `.npz` file.
 
-    All arrays lie one after another in its member `floats`; everything else is JSON in its member `document`, where
-    floats are written so that they are read back exactly. The zip comment at the end is the SHA-256 of all before it.
+    All arrays lie one after another in the member `floats`. Everything else is JSON in the member `document`; its
+    floats are written with all digits. The zip comment at the end is the SHA-256 of all preceding bytes.
 
     Args:
-        town: the town.
-        key: what the archive is filed under; `unpack` wants the same one.
+        town: town to archive.
+        key: key of the archive, checked by `unpack`.
     """
     arrays: list[Array] = []
-    document: dict[str, Any] = {"format": FORMAT, "key": key, "name": town.name}
+    document: dict[str, object] = {"format": FORMAT, "key": key, "name": town.name}
     for part, kind in PARTS.items():
-        records = getattr(town, part)
+        elements = getattr(town, part)
         document[part] = {
-            f.name: _column([getattr(r, f.name) for r in records], arrays) for f in dataclasses.fields(kind)
+            f.name: _column([getattr(element, f.name) for element in elements], arrays)
+            for f in dataclasses.fields(kind)
         }
     text = json.dumps(document, default=_plain, separators=(",", ":")).encode()
     buffer = io.BytesIO()
     np.savez(buffer, document=np.frombuffer(text, np.uint8), floats=np.concatenate([np.empty(0), *arrays]))
     with zipfile.ZipFile(buffer, "a") as archive:
-        archive.comment = bytes(_DIGEST_LENGTH)  # to be replaced below; the comment is the last thing in a zip file
+        archive.comment = bytes(_DIGEST_LENGTH)  # placeholder; the comment is the last part of a zip file
     body = buffer.getvalue()[:-_DIGEST_LENGTH]
     return body + hashlib.sha256(body).hexdigest().encode()
 
 
 def unpack(data: bytes, key: str) -> Town:
-    """The town that `pack` wrote under a key; nothing is parsed before the checksum is found to be right.
+    """Returns the town of an archive; the checksum is verified before anything is parsed.
 
     Raises:
-        TownArchiveError: the bytes are damaged, or another format, or filed under another key.
+        TownArchiveError: the bytes are damaged, or have another format or key.
     """
     body = memoryview(data)[:-_DIGEST_LENGTH]
     if hashlib.sha256(body).hexdigest().encode() != data[-_DIGEST_LENGTH:]:
@@ -118,7 +122,7 @@ def unpack(data: bytes, key: str) -> Town:
 
 
 def _column(values: list[Any], arrays: list[Array]) -> _Column:
-    """One field of all records: the values, or of arrays the shapes, while their numbers go to `arrays`."""
+    """Returns one field of all elements as JSON; the numbers of arrays are appended to `arrays`."""
     if not values or not isinstance(values[0], np.ndarray):
         return values
     arrays.extend(np.ascontiguousarray(value, dtype=np.float64).ravel() for value in values)
@@ -126,7 +130,7 @@ def _column(values: list[Any], arrays: list[Array]) -> _Column:
 
 
 def _plain(value: object) -> object:
-    """What JSON does not know by itself: numpy's numbers and records within records."""
+    """Converts what JSON does not support: numpy scalars and nested dataclasses."""
     if isinstance(value, np.generic):
         return value.item()
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
@@ -135,7 +139,7 @@ def _plain(value: object) -> object:
 
 
 def _town(document: dict[str, Any], floats: Array) -> Town:
-    numbers = _Reader(floats)
+    numbers = _ArrayReader(floats)
     parts = {}
     for part, kind in PARTS.items():
         columns = {name: list(numbers.values(name, column)) for name, column in document[part].items()}
@@ -146,59 +150,60 @@ def _town(document: dict[str, Any], floats: Array) -> Town:
     return Town(name=document["name"], **parts)
 
 
-# Fields that are more than numbers, texts and tuples of them.
-_KINDS: dict[str, Callable[[Any], Any]] = {
-    "type": LinkType,
-    "kind": SignalKind,
-    "phases": lambda rows: tuple(LightPhase(**{name: _frozen(value) for name, value in row.items()}) for row in rows),
-}
+def _phases(rows: Any) -> tuple[LightPhase, ...]:
+    columns = ({name: _frozen(value) for name, value in row.items()} for row in rows)
+    return tuple(LightPhase(**column) for column in columns)
 
 
-class _Reader:
-    """Hands out the arrays of an archive in the order in which they were written."""
+_CONVERTERS: dict[str, Callable[[Any], object]] = {"type": LinkType, "kind": SignalKind, "phases": _phases}
+"""Constructors of the fields that are not plain numbers, strings or tuples of these."""
+
+
+class _ArrayReader:
+    """Splits the numbers of an archive into arrays, in the order of writing."""
 
     def __init__(self, floats: Array) -> None:
         self._floats, self._at = floats, 0
 
     @property
     def at_end(self) -> bool:
+        """Whether all numbers were read."""
         return self._at == len(self._floats)
 
-    def values(self, name: str, column: _Column) -> Iterator[Any]:
-        """One field of all records, as the records hold it."""
+    def values(self, name: str, column: _Column) -> Iterator[object]:
+        """Yields one field of all elements."""
         if isinstance(column, dict):
             for shape in column["shapes"]:
                 count = int(np.prod(shape))
                 yield self._floats[self._at : self._at + count].reshape(shape)
                 self._at += count
         else:
-            yield from map(_KINDS.get(name, _frozen), column)
+            yield from map(_CONVERTERS.get(name, _frozen), column)
 
 
 def _frozen(value: Any) -> Any:
-    """Lists as tuples, all the way down."""
+    """Converts lists to tuples, nested ones included."""
     return tuple(_frozen(item) for item in value) if isinstance(value, list) else value
 
 
-# --- Towns that were read before, kept between runs in the user's cache folder ---------------------------------------
-
-CACHE_VARIABLE = "DOROTHIE_GYM_CACHE"
-"""Environment variable that names the cache folder; if it is set to nothing, no town is kept."""
+# --- Entries in the cache folder -------------------------------------------------------------------------------------
 
 MOST_TOWNS = 64
-"""When there are more, those that were written first are removed: a town takes up to some megabytes."""
+"""Largest number of entries; the oldest are removed beyond it. A town takes up to some megabytes."""
 
 _log = logging.getLogger(__name__)
 
 
 def through_cache(path: Path, read: Callable[[Path], Town]) -> Town:
-    """The town in a file: as it was kept when it was read before, else read and kept for the next time.
+    """Returns the town of a file from the cache, or reads the file and adds the town to the cache.
+
+    A cache that cannot be read or written is logged at level DEBUG and otherwise ignored.
 
     Args:
-        path: the file.
-        read: reads it where there is no entry; its errors are passed on, and nothing is kept then.
+        path: source file.
+        read: compiles the file if the cache has no entry; its exceptions are passed on and nothing is cached.
     """
-    folder = cache_folder()
+    folder = towns_folder()
     compiler = compiler_digest() if folder is not None else None
     content = _content(path)
     if folder is None or compiler is None or content is None:
@@ -207,44 +212,29 @@ def through_cache(path: Path, read: Callable[[Path], Town]) -> Town:
     town = _recall(folder, key)
     if town is None:
         town = read(path)
-        if _content(path) == content:  # else it changed meanwhile, and nobody knows which version this is
+        if _content(path) == content:  # else the file changed meanwhile and the version of the town is unknown
             _keep(folder, key, town)
     return town
 
 
-def cache_folder() -> Path | None:
-    """Folder that towns are kept in, whether it exists or not; None if none are to be kept.
-
-    `$DOROTHIE_GYM_CACHE/towns` if that is set; else within the user's cache folder: `$XDG_CACHE_HOME` or `~/.cache`,
-    on macOS `~/Library/Caches`, on Windows `%LOCALAPPDATA%`.
-    """
-    wish = os.environ.get(CACHE_VARIABLE)
-    if wish is not None:
-        return Path(wish) / "towns" if wish else None
-    try:
-        if sys.platform == "win32":
-            named = os.environ.get("LOCALAPPDATA")
-            base = Path(named) if named else Path.home() / "AppData" / "Local"
-        elif sys.platform == "darwin":
-            base = Path.home() / "Library" / "Caches"
-        else:
-            named = os.environ.get("XDG_CACHE_HOME", "")
-            base = Path(named) if Path(named).is_absolute() else Path.home() / ".cache"
-    except RuntimeError:  # a user without a home
-        return None
-    return base / "dorothie_gym" / "towns"
+def towns_folder() -> Path | None:
+    """Returns the folder of the cached towns, which need not exist; None if caching is turned off."""
+    cache = cache_folder()
+    return None if cache is None else cache / "towns"
 
 
 @functools.cache
 def compiler_digest() -> str | None:
-    """Digest of all that decides which town a file becomes besides the file; None where our sources are not at hand.
+    """Returns a digest of everything besides the source file that determines the compiled town.
 
-    These are the sources of this package and the releases of the libraries that compute for it: another release of
-    them may round differently.
+    It covers the sources of this package, `dorothie_gym.angles`, and the versions of numpy and scipy, which may round
+    differently. None if the sources cannot be read.
     """
     digest = hashlib.sha256(f"format {FORMAT}, numpy {np.__version__}".encode())
     digest.update(f"scipy {importlib.metadata.version('scipy')}".encode())
     sources = sorted(_sources(files("dorothie_gym.maps"), ""))
+    if sources:
+        sources.append(("angles.py", Path(angles.__file__).read_bytes()))
     for name, text in sources:
         digest.update(f"{name} {len(text)}\n".encode() + text)
     return digest.hexdigest() if sources else None
@@ -260,7 +250,7 @@ def _sources(folder: Traversable, prefix: str) -> Iterator[tuple[str, bytes]]:
 
 
 def _content(path: Path) -> bytes | None:
-    """What a file holds; None if it cannot be read, which whoever compiles it will say in better words."""
+    """Returns the bytes of a file, or None if it cannot be read; the compiler reports the reason."""
     try:
         return path.read_bytes()
     except OSError:
@@ -268,7 +258,7 @@ def _content(path: Path) -> bytes | None:
 
 
 def _key(compiler: str, path: Path, content: bytes) -> str:
-    """What an entry is filed under. A town is named like its file, and the suffix says which language it is in."""
+    """Returns the key of an entry; it includes the name of the file, which names the town, and its suffix."""
     digest = hashlib.sha256(f"{compiler} {path.suffix.lower()} {path.stem!r}\n".encode())
     digest.update(content)
     return digest.hexdigest()
@@ -281,12 +271,12 @@ def _recall(folder: Path, key: str) -> Town | None:
     except FileNotFoundError:
         return None
     except (OSError, TownArchiveError) as error:
-        _log.debug("the cached town %s is of no use and is read anew: %s", entry, error)
+        _log.debug("the cached town %s cannot be used and is compiled again: %s", entry, error)
         return None
 
 
 def _keep(folder: Path, key: str, town: Town) -> None:
-    """Writes an entry in one step, so that other processes see all of it or nothing of it."""
+    """Writes an entry atomically: other processes see the whole entry or none."""
     data = pack(town, key)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -305,7 +295,7 @@ def _keep(folder: Path, key: str, town: Town) -> None:
 
 
 def _prune(folder: Path) -> None:
-    """Removes the oldest entries where there are too many, and drafts of processes that were killed with them."""
+    """Removes the oldest entries beyond `MOST_TOWNS`, with the temporary files of processes that were killed."""
     entries = [entry for entry in folder.iterdir() if entry.suffix in (".npz", ".tmp")]
     if len(entries) > MOST_TOWNS:
         entries.sort(key=lambda entry: (entry.stat().st_mtime_ns, entry.name))

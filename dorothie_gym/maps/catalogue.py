@@ -14,7 +14,8 @@ from scipy.sparse.csgraph import connected_components
 
 from dorothie_gym.errors import TownError
 from dorothie_gym.maps.cache import through_cache
-from dorothie_gym.maps.model import LaneLink, SignalKind, Town
+from dorothie_gym.maps.model import LaneLink, SignalKind
+from dorothie_gym.maps.town import Town
 
 SEEN_TOWNS: tuple[str, ...] = ("midtown", "millbrook", "northgate")
 """Towns that sessions to train on are driven in (the paper's folds: CARLA's Town01, Town03 and Town05)."""

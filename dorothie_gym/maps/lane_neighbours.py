@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from dorothie_gym.compilation import allocating
-from dorothie_gym.maps.model import Array, LinkType, Town
+from dorothie_gym.maps.model import Array, LinkType
 from dorothie_gym.maps.polyline import (
     HEADING,
     HEIGHT,
@@ -25,6 +25,7 @@ from dorothie_gym.maps.polyline import (
     position,
     value_at,
 )
+from dorothie_gym.maps.town import Town
 
 MAX_GAP = 13.0
 """Largest distance between the lanes' centre lines [m]: a median is crossed, a park is not."""

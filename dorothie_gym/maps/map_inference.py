@@ -14,7 +14,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from dorothie_gym.maps.model import NO_STREET, Array, Lane, LaneLink, Site, Street, wrap_degrees
+from dorothie_gym.angles import wrap_degrees
+from dorothie_gym.maps.model import NO_STREET, Array, Lane, LaneLink, Site, Street
 
 # A street goes on across a junction where it turns by less than this [degrees].
 STREET_BEND = 35.0

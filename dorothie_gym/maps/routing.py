@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import breadth_first_order, connected_components, dijkstra
 
-from dorothie_gym.maps.model import NO_JUNCTION, LinkType, Town
+from dorothie_gym.maps.model import NO_JUNCTION, LinkType
 from dorothie_gym.maps.routing_graph import (
     CELL,
     CHANGE_COST,
@@ -27,6 +27,7 @@ from dorothie_gym.maps.routing_graph import (
     Moves,
     Place,
 )
+from dorothie_gym.maps.town import Town
 
 __all__ = [
     "CELL",

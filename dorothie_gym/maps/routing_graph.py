@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.lane_neighbours import OncomingLanes, oncoming_lanes
-from dorothie_gym.maps.model import Array, Lane, LinkType, Town
+from dorothie_gym.maps.model import Array, Lane, LinkType
+from dorothie_gym.maps.town import Town
 
 IntArray: TypeAlias = NDArray[np.int64]
 

@@ -8,9 +8,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.maps import Town
-from dorothie_gym.maps.model import Exit, LinkType, wrap_degrees
+from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.routing import Entry, Leg, Place, Route, router
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import StreetName

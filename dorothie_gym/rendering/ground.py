@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
-from dorothie_gym.maps.model import Array, Town
+from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.palette import Colour
 from dorothie_gym.rendering.shapes import Shape, disc, ribbon, simplified, strokes

@@ -8,7 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from dorothie_gym.maps.model import Signal, SignalKind, Town
+from dorothie_gym.maps.model import Signal, SignalKind
+from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import markings
 from dorothie_gym.rendering.borders import Border, Borders, find_borders
 from dorothie_gym.rendering.ground import landscape

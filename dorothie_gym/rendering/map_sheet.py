@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from dorothie_gym.maps.model import Array, LinkType, SignalKind, Town
+from dorothie_gym.maps.model import Array, LinkType, SignalKind
+from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.borders import BorderKind
 from dorothie_gym.rendering.ground import town_bounds

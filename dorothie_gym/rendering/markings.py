@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dorothie_gym.maps.model import Array, Lane, LinkType, SignalKind, Town
+from dorothie_gym.maps.model import Array, Lane, LinkType, SignalKind
+from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.borders import Border, BorderKind, Borders
 from dorothie_gym.rendering.palette import Colour

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array, Lane, Town
+from dorothie_gym.maps.model import Array, Lane
+from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.borders import Border, BorderKind, Borders
 from dorothie_gym.rendering.levels import Places

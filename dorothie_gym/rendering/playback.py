@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import DialogueAct, PhysicalAction, Role, parse_landmark
 from dorothie_gym.recording import FRAME_RATE, ActorKind, EventType, Session
@@ -174,7 +175,7 @@ class Playback:
 
 
 def _actor(row: np.void, after: np.void, share: float) -> Actor:
-    turn = (float(after["heading"] - row["heading"]) + math.pi) % (2 * math.pi) - math.pi
+    turn = wrap_radians(float(after["heading"] - row["heading"]))
     return Actor(
         kind=_KINDS[int(row["kind"])],  # type: ignore[arg-type]
         x=float(row["x"] + share * (after["x"] - row["x"])),

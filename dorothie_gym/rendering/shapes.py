@@ -10,7 +10,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array, Lane, Town
+from dorothie_gym.maps.model import Array, Lane
+from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering.palette import Colour
 
 

@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from dorothie_gym.maps.model import Array, Lane, Site, Town
+from dorothie_gym.maps.model import Array, Lane, Site
+from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.borders import Border, BorderKind
 from dorothie_gym.rendering.ground import junction_areas

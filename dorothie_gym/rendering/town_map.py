@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from dorothie_gym.maps.model import Array, Lane, SignalKind, Town
+from dorothie_gym.maps.model import Array, Lane, SignalKind
+from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.ground import town_bounds
 from dorothie_gym.rendering.icons import lamp_colour, pin_icon, sign_icon, stamp

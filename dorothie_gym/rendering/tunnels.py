@@ -7,7 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array, Town
+from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.borders import Border, BorderKind
 from dorothie_gym.rendering.levels import Places, Stretch

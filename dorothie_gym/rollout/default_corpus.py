@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-import os
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -21,9 +20,7 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import CacheError
 from dorothie_gym.recording import FORMAT_VERSION
 from dorothie_gym.rollout.corpus_generation import generate_corpus
-
-CACHE_VARIABLE = "DOROTHIE_GYM_CACHE"
-"""The environment variable that names the folder in which sessions are kept."""
+from dorothie_gym.user_cache import CACHE_VARIABLE, cache_folder
 
 SESSIONS = 20
 """Sessions of the corpus: the fewest of which each fold has one, as many as a leak test wants, some minutes to play."""
@@ -33,17 +30,6 @@ SEED = 0
 CONFIG = EnvConfig()
 
 _LOG = logging.getLogger(__name__)
-
-
-def cache_folder() -> Path:
-    """Returns the folder in which sessions are kept, which need not exist.
-
-    `DOROTHIE_GYM_CACHE`, else `dorothie_gym` in `XDG_CACHE_HOME`, else `~/.cache/dorothie_gym`.
-    """
-    if chosen := os.environ.get(CACHE_VARIABLE):
-        return Path(chosen).expanduser()
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path("~/.cache").expanduser()) / "dorothie_gym"
 
 
 def default_corpus(*, sessions: int | None = None, seed: int = SEED, config: EnvConfig | None = None) -> Path:
@@ -66,7 +52,10 @@ def default_corpus(*, sessions: int | None = None, seed: int = SEED, config: Env
     sessions = SESSIONS if sessions is None else sessions
     key = {"format": FORMAT_VERSION, "sessions": sessions, "seed": seed, "config": asdict(config)}
     digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:12]
-    folder = cache_folder() / f"corpus-{__version__}-{digest}"
+    cache = cache_folder()
+    if cache is None:
+        raise CacheError(f"sessions cannot be kept: {CACHE_VARIABLE} is empty; set it to a folder that can be written")
+    folder = cache / f"corpus-{__version__}-{digest}"
     if folder.is_dir():
         return folder
     with _told_what_to_set(folder.parent):

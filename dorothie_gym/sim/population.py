@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from dorothie_gym.maps.lane_neighbours import rightmost
-from dorothie_gym.maps.model import Town
+from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology import PropKind
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.footways import closest_walk, place_beside

@@ -11,8 +11,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from dorothie_gym.maps.model import LinkType, Town
+from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.routing import CELL, Place, router
+from dorothie_gym.maps.town import Town
 
 STANDS_BEFORE = 17.0
 """The middle of a car that stops for a prop stands about this far before the prop's [m]."""

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dorothie_gym.maps.model import Array, Town
+from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology import ObjectClass, Sensor, WeatherParameter
 from dorothie_gym.sim.actors import Actors
 from dorothie_gym.sim.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig

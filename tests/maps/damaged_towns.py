@@ -11,7 +11,8 @@ import numpy as np
 
 from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.maps.lint import Fault, FaultKind
-from dorothie_gym.maps.model import Array, Junction, Lane, LaneLink, LinkType, Sidewalk, Signal, Town
+from dorothie_gym.maps.model import Array, Junction, Lane, LaneLink, LinkType, Sidewalk, Signal
+from dorothie_gym.maps.town import Town
 
 LEFT, RIGHT, STRAIGHT, U_TURN = LinkType.LEFT, LinkType.RIGHT, LinkType.STRAIGHT, LinkType.U_TURN
 

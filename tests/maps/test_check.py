@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from dorothie_gym.maps.catalogue import load_town, town_names
 from dorothie_gym.maps.lint import FaultKind, check_town
 from dorothie_gym.maps.lint.fault import CAR_WIDTH, SMALLEST_RADIUS
-from dorothie_gym.maps.model import Array, LaneLink, LinkType, Signal, SignalKind, Town
+from dorothie_gym.maps.model import Array, LaneLink, LinkType, Signal, SignalKind
+from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.ego.limits import MAX_STEERING
 from tests.maps.damaged_towns import (
     LEFT,

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from dorothie_gym.maps.catalogue import describe, load_town
-from dorothie_gym.maps.model import Lane, LaneLink, LinkType, Signal, SignalKind, Street, Town
+from dorothie_gym.maps.model import Lane, LaneLink, LinkType, Signal, SignalKind, Street
+from dorothie_gym.maps.town import Town
 
 
 def lane(k: int, length: float) -> Lane:

@@ -11,7 +11,8 @@ import pytest
 import yaml
 
 from dorothie_gym.errors import TownError
-from dorothie_gym.maps.model import SignalKind, Town
+from dorothie_gym.maps.model import SignalKind
+from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.yaml import arms as ramps
 from dorothie_gym.maps.yaml import clearance, layout, read_yaml_town, schema, streets
 from dorothie_gym.maps.yaml import courses as heights

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from dorothie_gym.maps import NO_STREET, Lane, LaneLink, LinkType, Town, load_town
-from dorothie_gym.maps.lane_graph import END, FEATURES, LANE_ID, LENGTH, START, EdgeType, LaneGraph, lane_graph
+from dorothie_gym.maps.lane_graph import END, FEATURES, LANE_ID, LENGTH, START, EdgeType, LaneGraph
+from dorothie_gym.maps.sdn_graph import graph_to_json
 from tests.maps.opendrive_text import shared_map
 
 NAMES = ["brookside", "Town01", "Town02", "Town05"]
@@ -20,7 +21,7 @@ def town_of(name: str) -> Town:
 
 @lru_cache(maxsize=4)
 def graph_of(name: str) -> LaneGraph:
-    return lane_graph(town_of(name))
+    return town_of(name).to_graph()
 
 
 def straight(number: int, lane_id: int, xs: tuple[float, float], y: float, road: int = 1) -> Lane:
@@ -110,7 +111,7 @@ def test_u_turn_leads_to_the_lane_beside_where_a_turn_lane_cuts_the_others() -> 
         straight(4, -1, (35, 100), 2),
     ]
     links = [LaneLink(0, 1, LinkType.STRAIGHT), LaneLink(3, 4, LinkType.STRAIGHT)]
-    graph = lane_graph(Town(name="cut", lanes=lanes, links=links, junctions=()))
+    graph = Town(name="cut", lanes=lanes, links=links, junctions=()).to_graph()
     turns = {int(a): int(b) for a, b in graph.edges_of(EdgeType.UTURN)}
     assert turns == {0: 4, 1: 3, 2: 3, 3: 2, 4: 0}
 
@@ -118,7 +119,7 @@ def test_u_turn_leads_to_the_lane_beside_where_a_turn_lane_cuts_the_others() -> 
 def test_edge_is_written_once_where_a_lane_goes_on_in_the_one_it_could_turn_round_to() -> None:
     lanes = [straight(0, -1, (0, 100), 2), straight(1, 1, (100, 0), -2)]
     town = Town(name="end", lanes=lanes, links=[LaneLink(0, 1, LinkType.U_TURN)], junctions=())
-    graph = lane_graph(town)
+    graph = town.to_graph()
     assert graph.edges.tolist() == [[0, 1], [1, 0]]
     assert graph.edges_of(EdgeType.CONCAT).tolist() == [[0, 1]]
 
@@ -140,12 +141,14 @@ def test_lanes_belong_to_the_streets_of_the_town(name: str) -> None:
 
 def test_connecting_road_that_several_streets_share_belongs_to_none() -> None:
     lanes = [straight(0, -1, (0, 50), 2, road=1), straight(1, -1, (50, 90), 2, road=2)]
-    graph = lane_graph(Town(name="none", lanes=lanes, links=[], junctions=()))
+    graph = Town(name="none", lanes=lanes, links=[], junctions=()).to_graph()
     assert graph.num_streets == 0
     assert graph.street.tolist() == [NO_STREET, NO_STREET]
 
 
 @pytest.mark.parametrize("name", ["brookside", "Town05"])
 def test_the_same_town_gives_the_same_graph(name: str) -> None:
-    one, two = lane_graph(town_of(name)), lane_graph(town_of(name))
-    assert one.to_json() == two.to_json()
+    town = town_of(name)
+    again = Town(name=town.name, lanes=town.lanes, links=town.links, junctions=town.junctions, streets=town.streets)
+    assert again.to_graph() is not town.to_graph()
+    assert graph_to_json(again.to_graph()) == graph_to_json(town.to_graph())

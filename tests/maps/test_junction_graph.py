@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.maps import Junction, Lane, LaneLink, LinkType, Town, load_town
-from dorothie_gym.maps.lane_graph import JunctionGraph, lane_graph
+from dorothie_gym.maps.lane_graph import JunctionGraph
 from tests.maps.opendrive_text import shared_map
 
 NAMES = ["brookside", "Town01", "Town02", "Town05"]
@@ -19,7 +19,7 @@ def town_of(name: str) -> Town:
 
 
 def graph_of(name: str) -> JunctionGraph:
-    return lane_graph(town_of(name)).meta_map
+    return town_of(name).to_graph().meta_map
 
 
 def lane(number: int, points: list[tuple[float, float]], *, road: int, junction: int = -1, lane_id: int = -1) -> Lane:
@@ -94,7 +94,7 @@ def test_of_two_ways_between_junctions_the_shorter_counts() -> None:
     ]
     links = [LaneLink(a, b, LinkType.STRAIGHT) for a, b in ((0, 1), (0, 2), (1, 3), (2, 3))]
     junctions = [Junction(id=k, position=(0, 0), connectors=()) for k in (5, 6)]
-    graph = lane_graph(Town(name="two", lanes=lanes, links=links, junctions=junctions)).meta_map
+    graph = Town(name="two", lanes=lanes, links=links, junctions=junctions).to_graph().meta_map
     assert (graph.edges.tolist(), graph.lengths.tolist(), graph.roads) == ([[0, 1]], [pytest.approx(100.0)], ((2,),))
 
 
@@ -112,7 +112,7 @@ def test_turn_lane_without_a_lane_before_it_is_part_of_the_way() -> None:
         LaneLink(2, 1, LinkType.LANE_CHANGE_RIGHT),
     ]
     junctions = [Junction(id=k, position=(0, 0), connectors=()) for k in (5, 6)]
-    graph = lane_graph(Town(name="turn", lanes=lanes, links=links, junctions=junctions)).meta_map
+    graph = Town(name="turn", lanes=lanes, links=links, junctions=junctions).to_graph().meta_map
     assert (graph.edges.tolist(), graph.lengths.tolist(), graph.roads) == ([[0, 1]], [pytest.approx(100.0)], ((1,),))
 
 

@@ -8,8 +8,9 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from dorothie_gym.maps.model import Lane, LinkType, SignalKind, Town
+from dorothie_gym.maps.model import Lane, LinkType, SignalKind
 from dorothie_gym.maps.opendrive import read_opendrive
+from dorothie_gym.maps.town import Town
 
 from .opendrive_text import shared_map
 

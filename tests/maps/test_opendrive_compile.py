@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from dorothie_gym.maps.lint import FaultKind, check_town
-from dorothie_gym.maps.model import LaneLink, LinkType, SignalKind, Town
+from dorothie_gym.maps.model import LaneLink, LinkType, SignalKind
 from dorothie_gym.maps.opendrive import read_opendrive
+from dorothie_gym.maps.town import Town
 
 from .opendrive_text import geometry, lane, linked, opendrive, road, section
 

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dorothie_gym.maps.model import Signal, SignalKind, Town
+from dorothie_gym.maps.model import Signal, SignalKind
 from dorothie_gym.maps.opendrive import read_opendrive
+from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_lights import LightColour
 
 from .opendrive_text import geometry, lane, linked, opendrive, road, section, shared_map

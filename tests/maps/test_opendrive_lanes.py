@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dorothie_gym.maps.model import Lane, LinkType, Town
+from dorothie_gym.maps.model import Lane, LinkType
 from dorothie_gym.maps.opendrive import read_opendrive
 from dorothie_gym.maps.opendrive.geometry import Spiral
+from dorothie_gym.maps.town import Town
 
 from .opendrive_text import geometry, lane, linked, opendrive, road, section
 

@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
+from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.maps import Lane, LinkType, Town, load_town
-from dorothie_gym.maps.model import Signal, SignalKind, wrap_degrees
+from dorothie_gym.maps.model import Signal, SignalKind
 from dorothie_gym.maps.right_of_way import right_of_way
 from dorothie_gym.maps.traffic_light_programs import (
     ALL_RED,

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.yaml.courses import STEEPEST, height_profile
 from dorothie_gym.maps.yaml.geometry import (
     CHORD_ERROR,
@@ -15,7 +16,6 @@ from dorothie_gym.maps.yaml.geometry import (
     connect,
     line,
     rounded,
-    wrap,
 )
 
 RIGHT_ARC = Piece(0.0, 0.0, 0.0, 10.0 * math.pi / 2.0, 0.1)
@@ -71,11 +71,11 @@ def test_a_connection_is_smooth_from_end_to_end(x: float, y: float, turn: float)
     path = connect((0.0, 0.0, 0.0), (x, y, turn))
     assert path.start == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
     assert path.end[:2] == pytest.approx((x, y), abs=1e-5)
-    assert wrap(path.end[2] - turn) == pytest.approx(0.0, abs=1e-6)
+    assert wrap_radians(path.end[2] - turn) == pytest.approx(0.0, abs=1e-6)
     for before, after in zip(path.pieces, path.pieces[1:], strict=False):
         there = before.at(before.length)
         assert after.at(0.0)[:2] == pytest.approx(there[:2], abs=1e-5)
-        assert wrap(after.heading - there[2]) == pytest.approx(0.0, abs=1e-6)
+        assert wrap_radians(after.heading - there[2]) == pytest.approx(0.0, abs=1e-6)
 
 
 @given(before=st.floats(0.5, 60.0), after=st.floats(0.5, 60.0), turn=st.floats(-2.2, 2.2))

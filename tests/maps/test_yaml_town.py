@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dorothie_gym.maps.model import LinkType, SignalKind, Town, wrap_degrees
+from dorothie_gym.angles import wrap_degrees
+from dorothie_gym.maps.model import LinkType, SignalKind
+from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.yaml import read_yaml_town, schema
 
 VILLAGE = """\

@@ -4,7 +4,8 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 
-from dorothie_gym.maps.model import LinkType, Town
+from dorothie_gym.maps.model import LinkType
+from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.yaml import read_yaml_town
 from dorothie_gym.maps.yaml.layout import Layout, lay_out
 from dorothie_gym.maps.yaml.schema import read_plan

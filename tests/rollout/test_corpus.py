@@ -65,10 +65,7 @@ def test_a_cache_that_cannot_be_written_is_told_with_what_to_set(
         default_corpus(sessions=1, seed=3, config=SHORT)
 
 
-def test_the_cache_follows_the_desktop_standard(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("DOROTHIE_GYM_CACHE", raising=False)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert corpus.cache_folder() == tmp_path / "dorothie_gym"
-    monkeypatch.delenv("XDG_CACHE_HOME")
-    monkeypatch.setenv("HOME", str(tmp_path))
-    assert corpus.cache_folder() == tmp_path / ".cache" / "dorothie_gym"
+def test_a_cache_that_is_turned_off_is_reported_with_the_variable_to_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DOROTHIE_GYM_CACHE", "")
+    with pytest.raises(CacheError, match="sessions cannot be kept: DOROTHIE_GYM_CACHE is empty; set it to a folder"):
+        default_corpus(sessions=1, seed=3, config=SHORT)

@@ -10,11 +10,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.baselines.selfplay.heard import Remark, listen
 from dorothie_gym.baselines.selfplay.seat import Mask, Seat
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.maps import Town
-from dorothie_gym.maps.model import wrap_degrees
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import (
     ActionValue,

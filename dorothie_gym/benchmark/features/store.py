@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.benchmark.features.columns import GROUPS, Columns, TownGraph
 from dorothie_gym.errors import FeatureStoreError
-from dorothie_gym.maps.cache import cache_folder
+from dorothie_gym.user_cache import cache_folder
 
 INDEX_FILE: Final = "columns.json"
 PART: Final = ".part"
@@ -40,8 +40,8 @@ _log = logging.getLogger(__name__)
 
 def features_folder() -> Path | None:
     """Folder that columns are kept in, beside that of towns; None if nothing is to be kept."""
-    towns = cache_folder()
-    return None if towns is None else towns.parent / "features"
+    cache = cache_folder()
+    return None if cache is None else cache / "features"
 
 
 def recall(key: str) -> Columns | None:

@@ -14,7 +14,7 @@ from dorothie_gym.maps.lint.fault import Fault, FaultKind
 from dorothie_gym.maps.lint.kerbs import kerb_faults
 from dorothie_gym.maps.lint.samples import sample_lanes
 from dorothie_gym.maps.lint.turn_types import promise_faults
-from dorothie_gym.maps.model import Town
+from dorothie_gym.maps.town import Town
 
 __all__ = ["Fault", "FaultKind", "check_town"]
 

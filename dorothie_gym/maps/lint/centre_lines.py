@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.lint.fault import CAR_WIDTH, SMALLEST_RADIUS, Fault, FaultKind
-from dorothie_gym.maps.model import Array, Lane, Town
+from dorothie_gym.maps.model import Array, Lane
+from dorothie_gym.maps.town import Town
 
 MAX_GAP = 0.05
 """Largest distance in the plane between the ends of linked lanes [m]; demanded of the towns."""

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from dorothie_gym.maps.lint.fault import HALF_WIDTH, Fault, FaultKind
 from dorothie_gym.maps.lint.samples import SAME_LEVEL, SPACING, LaneSamples
-from dorothie_gym.maps.model import Array, Town
+from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.town import Town
 
 MAX_OVERLAP = 0.5
 """Lanes may overlap sideways by this [m]: roads that meet in a mouth do, and markings are not that exact."""

@@ -10,7 +10,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from dorothie_gym.maps.lint.fault import Fault, FaultKind
-from dorothie_gym.maps.model import Town
+from dorothie_gym.maps.town import Town
 
 _LANES_NAMED = 8  # in a message
 

@@ -10,7 +10,8 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from dorothie_gym.maps.lint.fault import HALF_WIDTH, Fault, FaultKind
 from dorothie_gym.maps.lint.samples import SAME_LEVEL, SPACING, LaneSamples
-from dorothie_gym.maps.model import Array, Junction, Lane, Sidewalk, Town
+from dorothie_gym.maps.model import Array, Junction, Lane, Sidewalk
+from dorothie_gym.maps.town import Town
 
 CORNER_TURNS = np.radians([20.0, 160.0])
 """Turns between these have a corner on their inner side [rad]."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from dorothie_gym.maps.lint.fault import Fault, FaultKind
 from dorothie_gym.maps.lint.samples import SAME_LEVEL
-from dorothie_gym.maps.model import Lane, LaneLink, LinkType, SignalKind, Town
+from dorothie_gym.maps.model import Lane, LaneLink, LinkType, SignalKind
+from dorothie_gym.maps.town import Town
 
 WRONG_WAY = 10.0
 """A left turn may lead this far to the right, and a right turn to the left [degrees]: where a road forks into two that

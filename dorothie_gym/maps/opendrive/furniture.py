@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import NO_STREET, Array, Crosswalk, Lane, Sidewalk, Signal, SignalKind
 from dorothie_gym.maps.opendrive.centrelines import RoadSamples, thin
 from dorothie_gym.maps.opendrive.records import SIDEWALK, CrosswalkRecord, OpenDriveRecords, RoadRecord, SignalRecord
@@ -145,7 +146,7 @@ def _signal(
         id=number,
         kind=_kind(record),
         position=(float(position[0]), float(position[1]), z),
-        heading=float((facing + np.pi) % (2.0 * np.pi) - np.pi),
+        heading=float(wrap_radians(facing)),
         lanes=ruled,
         value=record.value,
     )

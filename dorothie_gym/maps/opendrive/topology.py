@@ -14,8 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.errors import TownError
-from dorothie_gym.maps.model import Lane, LaneLink, LinkType, wrap_degrees
+from dorothie_gym.maps.model import Lane, LaneLink, LinkType
 from dorothie_gym.maps.opendrive.records import ConnectionRecord, OpenDriveRecords, RoadRecord
 
 # Sections shorter than this are joints, not road: they are left out and what they link is linked directly [m].

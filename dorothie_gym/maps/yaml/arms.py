@@ -6,8 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import Lane
-from dorothie_gym.maps.yaml.geometry import Piece, Pose, wrap
+from dorothie_gym.maps.yaml.geometry import Piece, Pose
 from dorothie_gym.maps.yaml.plan import StreetPlan
 from dorothie_gym.maps.yaml.stretches import Crossing, Stretch
 
@@ -52,7 +53,7 @@ class Arm:
     @property
     def heading(self) -> float:
         """Direction away from the centre of the crossing [rad]."""
-        return wrap(self.leg.heading)
+        return wrap_radians(self.leg.heading)
 
     @property
     def through(self) -> tuple[LaneEnd, ...]:
@@ -67,17 +68,17 @@ class Arm:
     def ending(self, lane: LaneEnd, trim: float) -> Pose:
         """Where and in which direction an incoming lane ends, `trim` metres from the centre."""
         x, y, heading = self.beginning(lane, trim)
-        return x, y, wrap(heading + math.pi)
+        return x, y, wrap_radians(heading + math.pi)
 
     def beginning(self, lane: LaneEnd, trim: float) -> Pose:
         """Where and in which direction an outgoing lane begins, `trim` metres from the centre."""
         x, y, heading = self.leg.at(trim)
-        return x - lane.offset * math.sin(heading), y + lane.offset * math.cos(heading), wrap(heading)
+        return x - lane.offset * math.sin(heading), y + lane.offset * math.cos(heading), wrap_radians(heading)
 
 
 def turn_between(source: Arm, target: Arm) -> float:
     """Change of heading on the way from one arm into another [rad], positive to the right."""
-    return wrap(target.leg.heading - source.leg.heading - math.pi)
+    return wrap_radians(target.leg.heading - source.leg.heading - math.pi)
 
 
 def arms_at(crossing: Crossing, stretches: Sequence[Stretch], ends: Sequence[tuple[int, bool]]) -> tuple[Arm, ...]:
@@ -98,7 +99,7 @@ def arms_at(crossing: Crossing, stretches: Sequence[Stretch], ends: Sequence[tup
             f"street {stretches[ends[0][0]].street.name!r} ends here and nothing goes on: dead ends are not supported;"
             " lead another street here"
         )
-    order = sorted(ends, key=lambda end: (wrap(stretches[end[0]].leg(end[1]).heading), end))
+    order = sorted(ends, key=lambda end: (wrap_radians(stretches[end[0]].leg(end[1]).heading), end))
     return tuple(_arm(place, *end, stretches[end[0]]) for place, end in enumerate(order))
 
 

@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import Array, Crosswalk, Junction, Lane, LaneLink, Sidewalk, Signal, SignalKind, Site
 from dorothie_gym.maps.traffic_light_programs import derive_programmes, yellow_time
 from dorothie_gym.maps.traffic_lights import LightPhase, LightProgramme
 from dorothie_gym.maps.yaml.arms import Approach, find_slips
-from dorothie_gym.maps.yaml.geometry import Point, wrap
+from dorothie_gym.maps.yaml.geometry import Point
 from dorothie_gym.maps.yaml.layout import Layout
 from dorothie_gym.maps.yaml.nodes import Entry
 from dorothie_gym.maps.yaml.plan import GreenPlan, LightsPlan, StreetPlan
@@ -162,7 +163,7 @@ def _signal(number: int, kind: SignalKind, rules: Sequence[Lane], beside: Lane, 
         id=number,
         kind=kind,
         position=(float(x), float(y), float(beside.points[-1, 2]) + SIGNAL_HEIGHT),
-        heading=wrap(beside.heading_at(beside.length) + math.pi),
+        heading=wrap_radians(beside.heading_at(beside.length) + math.pi),
         lanes=tuple(lane.id for lane in rules),
     )
 

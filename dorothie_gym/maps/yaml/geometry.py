@@ -12,6 +12,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import Array
 
 Point: TypeAlias = tuple[float, float]
@@ -28,11 +29,6 @@ CLOSEST = 0.1
 """Samples are not closer than this [m]: where ends are joined, a rounding error must not turn the last step."""
 _STRAIGHT = 1e-9  # [1/m] curvatures below this are lines; at 1 km they are 0.5 mm off
 _TINY = 1e-6  # [m] pieces shorter than this are left out
-
-
-def wrap(angle: float) -> float:
-    """The same angle in [-pi, pi) [rad]."""
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +171,7 @@ def line(a: Point, b: Point) -> Piece:
 
 def turn_at(a: Point, b: Point, c: Point) -> float:
     """Change of heading at the middle one of three points [rad], positive to the right."""
-    return wrap(line(b, c).heading - line(a, b).heading)
+    return wrap_radians(line(b, c).heading - line(a, b).heading)
 
 
 def rounded(points: Sequence[Point], radii: Sequence[float]) -> Path:
@@ -223,7 +219,7 @@ def connect(entry: Pose, exit_: Pose) -> Path:
 
 def _fillet(entry: Pose, exit_: Pose) -> Path | None:
     """One arc between the lines through the two poses, if they meet ahead of the first and behind the second."""
-    turn = wrap(exit_[2] - entry[2])
+    turn = wrap_radians(exit_[2] - entry[2])
     if abs(math.sin(turn)) < 1e-3:  # as good as parallel
         return None
     dx, dy = exit_[0] - entry[0], exit_[1] - entry[1]
@@ -257,7 +253,7 @@ def _biarc(entry: Pose, exit_: Pose) -> Path:
 def _arc_to(start: Pose, end: Point) -> Piece:
     """The arc that leaves a pose and ends in a point."""
     chord = line(start[:2], end)
-    half = wrap(chord.heading - start[2])
+    half = wrap_radians(chord.heading - start[2])
     if abs(half) < 1e-9:
         return Piece(*start, chord.length)
     return Piece(*start, chord.length * half / math.sin(half), 2.0 * math.sin(half) / chord.length)

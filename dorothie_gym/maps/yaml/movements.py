@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.yaml.arms import (
     LARGEST_ANGLE,
@@ -17,7 +18,7 @@ from dorothie_gym.maps.yaml.arms import (
     neighbours,
     turn_between,
 )
-from dorothie_gym.maps.yaml.geometry import Path, connect, wrap
+from dorothie_gym.maps.yaml.geometry import Path, connect
 from dorothie_gym.maps.yaml.stretches import Crossing, Stretch
 
 STRAIGHT_BELOW = math.radians(35.0)
@@ -203,7 +204,7 @@ class Way:
     @property
     def turn(self) -> float:
         """Change of heading from its start to its end [rad], positive to the right."""
-        return wrap(self.path.end[2] - self.path.start[2])
+        return wrap_radians(self.path.end[2] - self.path.start[2])
 
 
 @dataclass(frozen=True, kw_only=True)

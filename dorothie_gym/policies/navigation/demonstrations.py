@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.maps import Town
-from dorothie_gym.maps.model import wrap_degrees
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.policies.co_wizard import ScriptedCoWizard, attend, respond
 from dorothie_gym.policies.co_wizard.driving import distance_ahead

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.maps import Exit, Town
-from dorothie_gym.maps.model import wrap_degrees
 from dorothie_gym.policies.route_progress import is_choice, lanes_beside, next_choice
 from dorothie_gym.spaces import ExitColumn
 

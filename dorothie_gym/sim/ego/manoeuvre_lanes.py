@@ -6,7 +6,9 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dorothie_gym.maps.model import Exit, LinkType, Town, wrap_degrees
+from dorothie_gym.angles import wrap_degrees
+from dorothie_gym.maps.model import Exit, LinkType
+from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.ego.path import Piece, follow, switch
 
 HORIZON = 120.0

@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from dorothie_gym.maps.lane_neighbours import Oncoming, oncoming_lanes
-from dorothie_gym.maps.model import Exit, LinkType, Town
+from dorothie_gym.maps.model import Exit, LinkType
+from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.sim.ego.manoeuvre_lanes import HORIZON, LEAD, MIN_SWITCH, Lanes, Step
 from dorothie_gym.sim.ego.obstacles import BRAKING, HALF_LENGTH, LANDING, landing_is_blocked, switch_is_blocked

@@ -12,8 +12,9 @@ import numpy as np
 from highway_env.road.lane import LineType
 from highway_env.road.road import RoadNetwork
 
-from dorothie_gym.maps.model import Array, Lane, LinkType, Town
+from dorothie_gym.maps.model import Array, Lane, LinkType
 from dorothie_gym.maps.polyline import HEIGHT, LaneTable
+from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.network.grid import GridIndex
 from dorothie_gym.sim.network.lane import PolylineLane
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.lane_neighbours import LaneEdges, leftmost, oncoming_lanes, rightmost
-from dorothie_gym.maps.model import Array, Town
+from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.pedestrians.pacing import FROM_ENDS, FROM_JUNCTION, KERB, SHORTEST_WALK, WALK_STEP
 from dorothie_gym.sim.state.records import Records
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.lane_neighbours import LaneEdges
-from dorothie_gym.maps.model import Array, Crosswalk, Lane, Sidewalk, Town
+from dorothie_gym.maps.model import Array, Crosswalk, Lane, Sidewalk
+from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.footways import street_walks
 from dorothie_gym.sim.state.records import CROSSING, MOUTH, NOBODY, PASSAGE, WALKWAY, Footway, Records

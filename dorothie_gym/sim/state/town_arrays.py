@@ -10,9 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array, Lane, LinkType, SignalKind, Town
+from dorothie_gym.maps.model import Array, Lane, LinkType, SignalKind
 from dorothie_gym.maps.polyline import LaneTable
 from dorothie_gym.maps.right_of_way import RightOfWay, right_of_way
+from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.network.lane_lookup import build_cells
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.walkways import build_walkways

@@ -1,0 +1,184 @@
+"""Town: lanes, links and everything beside the roads, with the queries that the simulation asks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from dorothie_gym.angles import wrap_degrees
+from dorothie_gym.maps.lane_graph import LaneGraph, build_lane_graph
+from dorothie_gym.maps.model import (
+    Crosswalk,
+    Exit,
+    Junction,
+    Lane,
+    LaneLink,
+    LinkType,
+    Sidewalk,
+    Signal,
+    Site,
+    Street,
+)
+from dorothie_gym.maps.traffic_lights import LightColour, LightProgramme
+
+
+class Town:
+    """Road map of a town. Immutable: do not modify its parts, they are cached and shared.
+
+    Args:
+        name: short name.
+        lanes: all driving lanes, connectors through junctions included; `lanes[i].id` must be `i`.
+        links: lane links, each once; successors come before lane changes.
+        junctions: junctions in any order, with unique ids.
+        streets: named streets; `streets[i].id` must be `i`.
+        sites: places beside the lanes for landmarks.
+        signals: traffic lights and signs.
+        crosswalks: marked pedestrian crossings.
+        sidewalks: pavements.
+        programmes: traffic light programmes, one for each junction with lights.
+
+    Attributes:
+        name, lanes, links, junctions, streets, sites, signals, crosswalks, sidewalks, programmes: the arguments;
+            sequences as tuples.
+    """
+
+    def __init__(
+        self,
+        *,
+        name: str,
+        lanes: Sequence[Lane],
+        links: Sequence[LaneLink],
+        junctions: Sequence[Junction],
+        streets: Sequence[Street] = (),
+        sites: Sequence[Site] = (),
+        signals: Sequence[Signal] = (),
+        crosswalks: Sequence[Crosswalk] = (),
+        sidewalks: Sequence[Sidewalk] = (),
+        programmes: Sequence[LightProgramme] = (),
+    ) -> None:
+        self.name = name
+        self.lanes = tuple(lanes)
+        self.links = tuple(links)
+        self.junctions = tuple(junctions)
+        self.streets = tuple(streets)
+        self.sites = tuple(sites)
+        self.signals = tuple(signals)
+        self.crosswalks = tuple(crosswalks)
+        self.sidewalks = tuple(sidewalks)
+        self.programmes = tuple(programmes)
+
+    @property
+    def kilometres(self) -> float:
+        """Length of all driving lanes, connectors included [km]."""
+        return sum(lane.length for lane in self.lanes) / 1000.0
+
+    @cached_property
+    def _links_from(self) -> tuple[tuple[LaneLink, ...], ...]:
+        table: list[list[LaneLink]] = [[] for _ in self.lanes]
+        for link in self.links:
+            table[link.source].append(link)
+        return tuple(tuple(row) for row in table)
+
+    @cached_property
+    def _predecessors(self) -> tuple[tuple[int, ...], ...]:
+        table: list[list[int]] = [[] for _ in self.lanes]
+        for link in self.links:
+            if not link.type.is_lane_change:
+                table[link.target].append(link.source)
+        return tuple(tuple(row) for row in table)
+
+    def successors(self, lane: int) -> tuple[LaneLink, ...]:
+        """Returns the links from the end of a lane to the lanes that follow it, lane changes excluded.
+
+        Raises:
+            IndexError: no lane has this id.
+        """
+        return tuple(link for link in self._links_from[lane] if not link.type.is_lane_change)
+
+    def predecessors(self, lane: int) -> tuple[int, ...]:
+        """Returns the ids of the lanes that lead into the start of a lane, lane changes excluded.
+
+        Raises:
+            IndexError: no lane has this id.
+        """
+        return self._predecessors[lane]
+
+    def neighbour(self, lane: int, side: LinkType) -> int | None:
+        """Returns the parallel lane that a lane change leads to, or None.
+
+        Args:
+            lane: id of the lane.
+            side: `LinkType.LANE_CHANGE_LEFT` or `LinkType.LANE_CHANGE_RIGHT`.
+
+        Raises:
+            IndexError: no lane has this id.
+        """
+        return next((link.target for link in self._links_from[lane] if link.type is side), None)
+
+    @cached_property
+    def _lights(self) -> dict[int, tuple[LightProgramme, int]]:
+        """Programme and signal id of the light at the end of each lane, by lane id."""
+        programme_of = {signal: programme for programme in self.programmes for signal in programme.signals}
+        return {
+            lane: (programme_of[signal.id], signal.id)
+            for signal in self.signals
+            if signal.id in programme_of
+            for lane in signal.lanes
+        }
+
+    def light(self, lane: int, time: float) -> LightColour | None:
+        """Returns the colour of the traffic light at the end of a lane, or None if the lane has no light.
+
+        Args:
+            lane: id of the lane.
+            time: simulated time [s].
+        """
+        found = self._lights.get(lane)
+        return None if found is None else found[0].colour(found[1], time)
+
+    def to_graph(self) -> LaneGraph:
+        """Returns the town as a lane graph with its junction graph (the map input of TOTO); built once."""
+        return self._graph
+
+    @cached_property
+    def _graph(self) -> LaneGraph:
+        return build_lane_graph(
+            name=self.name, lanes=self.lanes, links=self.links, junctions=self.junctions, streets=self.streets
+        )
+
+    @cached_property
+    def _exits(self) -> tuple[tuple[Exit, ...], ...]:
+        return tuple(self._find_exits(lane) for lane in self.lanes)
+
+    def exits(self, lane: int) -> tuple[Exit, ...]:
+        """Returns the exits from the end of a lane, sorted by angle from right to left.
+
+        Raises:
+            IndexError: no lane has this id.
+        """
+        return self._exits[lane]
+
+    def _find_exits(self, lane: Lane) -> tuple[Exit, ...]:
+        found = []
+        for link in self.successors(lane.id):
+            target, junction = self.lanes[link.target], self.lanes[link.target].junction_id
+            seen = {target.id}
+            while (
+                target.in_junction and len(onward := self.successors(target.id)) == 1 and onward[0].target not in seen
+            ):
+                target = self.lanes[onward[0].target]
+                seen.add(target.id)
+            turn = wrap_degrees(float(np.degrees(lane.headings[-1] - target.headings[0])))
+            found.append((turn, link, target, junction))
+        found.sort(key=lambda row: (row[0], row[2].id))
+        used: set[int] = set()
+        exits = []
+        for turn, link, target, junction in found:
+            angle = int(wrap_degrees(round(turn)))
+            while angle in used:
+                angle = int(wrap_degrees(angle + 1))
+            used.add(angle)
+            exits.append(Exit(connector=link.target, lane=target.id, type=link.type, angle=angle, junction_id=junction))
+        return tuple(exits)
