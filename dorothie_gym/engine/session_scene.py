@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from dorothie_gym.engine.session_engine import Stage
 from dorothie_gym.ontology import GoalStatus, Role
 from dorothie_gym.rendering.frames import HumanWindow, SceneRenderer
-from dorothie_gym.rendering.scene import Actor, CarView, Line, Pin, Scene, State
+from dorothie_gym.rendering.scene import Actor, CarView, Pin, Scene, SpokenLine, SubgoalState
 
-_STATES: dict[GoalStatus, State] = {
+_STATES: dict[GoalStatus, SubgoalState] = {
     GoalStatus.COMPLETE: "complete",
     GoalStatus.ONGOING: "ongoing",
     GoalStatus.PENDING: "pending",
@@ -22,7 +22,7 @@ def scene_of(stage: Stage, caption: str = "") -> Scene:
     """The present moment of a session."""
     world, task = stage.world, stage.task
     car, planner = world.car, world.planner
-    states: dict[int, State] = {}
+    states: dict[int, SubgoalState] = {}
     for i in range(len(task.storyboard.subgoals)):
         if i in task.live:
             states[task.landmark_of(i)] = _STATES[task.status(i)]
@@ -35,10 +35,12 @@ def scene_of(stage: Stage, caption: str = "") -> Scene:
         x, y = prop.position
         others.append(Actor(kind="prop", x=x, y=y, heading=prop.heading, length=prop.LENGTH, width=prop.WIDTH))
     lines = [
-        Line(time=u.start, speaker=u.speaker, text=u.text, acts=" ".join(str(act).removesuffix("()") for act in u.acts))
+        SpokenLine(
+            time=u.start, speaker=u.speaker, text=u.text, acts=" ".join(str(act).removesuffix("()") for act in u.acts)
+        )
         for u in stage.said
     ]
-    lines += [Line(time=time, speaker=Role.AD_WIZARD, text=text) for time, text in stage.messages]
+    lines += [SpokenLine(time=time, speaker=Role.AD_WIZARD, text=text) for time, text in stage.messages]
     lines.sort(key=lambda line: line.time)
     notes = []
     if world.hazard is not None:

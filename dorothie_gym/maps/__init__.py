@@ -1,4 +1,4 @@
-"""Towns to drive in: the model, towns that are shipped or read from files, and a town in figures."""
+"""Town maps: the data model, the catalogue of shipped towns, and readers for OpenDRIVE and YAML files."""
 
 from dorothie_gym.errors import TownError
 from dorothie_gym.maps.catalogue import SEEN_TOWNS, UNSEEN_TOWNS, describe, fold_of, load_town, town_names

@@ -1,4 +1,4 @@
-"""The towns that are shipped, and files of one's own."""
+"""Catalogue of towns: shipped ones by name, others by file, and summary figures of a town."""
 
 from __future__ import annotations
 
@@ -18,37 +18,37 @@ from dorothie_gym.maps.model import LaneLink, SignalKind
 from dorothie_gym.maps.town import Town
 
 SEEN_TOWNS: tuple[str, ...] = ("midtown", "millbrook", "northgate")
-"""Towns that sessions to train on are driven in (the paper's folds: CARLA's Town01, Town03 and Town05)."""
+"""Training towns (in the paper: CARLA's Town01, Town03 and Town05)."""
 
 UNSEEN_TOWNS: tuple[str, ...] = ("brookside",)
-"""Towns that sessions of the unseen fold are driven in (the paper's: CARLA's Town02)."""
+"""Towns of the unseen fold (in the paper: CARLA's Town02)."""
 
 _SUFFIXES = (".xodr", ".yaml", ".yml")
 _FOLDER = files("dorothie_gym.maps") / "data"
 
 
 def town_names() -> tuple[str, ...]:
-    """Names of the towns that are shipped, in alphabetical order."""
+    """Returns the names of the shipped towns in alphabetical order."""
     return tuple(
         sorted(entry.name.removesuffix(".yaml") for entry in _FOLDER.iterdir() if entry.name.endswith(".yaml"))
     )
 
 
 def fold_of(name: str) -> str | None:
-    """The fold that a town belongs to: "seen", "unseen", or None for a town of one's own."""
+    """Returns the fold of a town, "seen" or "unseen", or None for a town that is not shipped."""
     if name in SEEN_TOWNS:
         return "seen"
     return "unseen" if name in UNSEEN_TOWNS else None
 
 
 def load_town(name_or_path: str | Path) -> Town:
-    """The town of that name, or the one in that file (`.xodr` for OpenDRIVE, `.yaml` for the town language).
+    """Loads a town by name, or from a file (`.xodr` for OpenDRIVE, `.yaml` or `.yml` for the town language).
 
-    A town that was read before is given again as long as its file has not changed, also in later runs: it is kept in
-    the user's cache folder (see `dorothie_gym.maps.cache`). Towns are not to be modified.
+    Towns are cached: within a process as objects, between processes as archives in the user's cache folder
+    (`dorothie_gym.maps.cache`). An entry is valid until its file changes. Do not modify a town.
 
     Raises:
-        TownError: there is no such town or file, or the file is at fault.
+        TownError: no town or file has this name, or the file is invalid.
     """
     if str(name_or_path) in town_names():
         with as_file(_FOLDER / f"{name_or_path}.yaml") as path:
@@ -74,12 +74,12 @@ def _load(path: Path) -> Town:
 
 @lru_cache(maxsize=16)
 def _read(path: Path, modified: int, size: int) -> Town:
-    """Reads a file once a run; when it was modified and its size are there to tell versions apart."""
+    """Reads each version of a file once per process; modification time and size distinguish versions."""
     return through_cache(path, _compile)
 
 
 def _compile(path: Path) -> Town:
-    # Each reader is imported when it is needed: lxml and scipy are slow to start.
+    # imported on demand: lxml and scipy are slow to import
     if path.suffix.lower() == ".xodr":
         from dorothie_gym.maps.opendrive import read_opendrive
 
@@ -89,21 +89,21 @@ def _compile(path: Path) -> Town:
     return read_yaml_town(path)
 
 
-# --- A town in figures -----------------------------------------------------------------------------------------------
+# --- Summary figures -------------------------------------------------------------------------------------------------
 
 
 def describe(town: Town) -> dict[str, Any]:
-    """What a town has, in numbers and names that go into JSON.
+    """Returns summary figures of a town as JSON-compatible values.
 
     Returns:
-        name: of the town;
-        lanes, links: counts, connectors included, lane changes excluded from the links;
-        components: sizes of the strongly connected components of lanes by links alone, largest first;
-        components_with_lane_changes: the same when lane changes count;
-        kilometres: of all lanes, to 10 m;
+        name: name of the town;
+        lanes, links: counts; connectors are included, lane changes are not;
+        components: sizes of the strongly connected components of the lanes without lane changes, largest first;
+        components_with_lane_changes: the same with lane changes;
+        kilometres: length of all lanes, rounded to 10 m;
         junctions: count;
-        streets: their names;
-        signals: count of traffic lights;
+        streets: names;
+        signals: number of traffic lights;
         crosswalks, sites: counts.
     """
     onward = [link for link in town.links if not link.type.is_lane_change]
@@ -123,7 +123,7 @@ def describe(town: Town) -> dict[str, Any]:
 
 
 def _component_sizes(lanes: int, links: Iterable[LaneLink]) -> list[int]:
-    """Sizes of the strongly connected components, largest first."""
+    """Returns the sizes of the strongly connected components, largest first."""
     if lanes == 0:
         return []
     pairs = np.array([(link.source, link.target) for link in links], dtype=np.intp).reshape(-1, 2)

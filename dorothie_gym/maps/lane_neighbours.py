@@ -28,7 +28,7 @@ from dorothie_gym.maps.polyline import (
 from dorothie_gym.maps.town import Town
 
 MAX_GAP = 13.0
-"""Largest distance between the lanes' centre lines [m]: a median is crossed, a park is not."""
+"""Largest distance between the centre lines [m]: across a median, but not across a park."""
 
 MAX_HEIGHT = 1.0
 """Largest difference of height [m]."""
@@ -40,14 +40,14 @@ MIN_GAP = 1.0
 """Smallest distance between the centre lines [m]."""
 
 MAX_OFFSET = 3.0
-"""Farthest along the lane that the closest place of the other may be [m]: beyond, that one has ended."""
+"""Largest distance along the lane to the closest point of the other lane [m]; beyond it the other lane has ended."""
 
 SAMPLING = 4.0
-"""Lanes near a lane are found by points about this far apart [m], on short ones up to twice as far."""
+"""Spacing of the points by which candidate lanes are found [m]; up to twice as much on short lanes."""
 
 
 class Oncoming(NamedTuple):
-    """The place on the oncoming lane that lies across from a place on a lane: station and distance in metres."""
+    """Point on the oncoming lane opposite a point on a lane: lane id, station [m] and distance [m]."""
 
     lane: int
     station: float
@@ -55,7 +55,7 @@ class Oncoming(NamedTuple):
 
 
 class OncomingLanes:
-    """Answers, for places on the lanes of a town, which lane runs the other way to their left."""
+    """Lookup of the oncoming lane to the left of a point on a lane."""
 
     def __init__(self, town: Town) -> None:
         self._town = town
@@ -72,7 +72,10 @@ class OncomingLanes:
         self._near: dict[int, IntArray] = {}
 
     def at(self, lane_id: int, station: float) -> Oncoming | None:
-        """The oncoming place, or None: in a junction, from a lane that is not the leftmost, or with nothing there."""
+        """Returns the opposite point on the oncoming lane.
+
+        None in a junction, on a lane that is not the leftmost, and without an oncoming lane nearby.
+        """
         candidates = self._near.get(lane_id)
         if candidates is None:
             candidates = self._near[lane_id] = self._lanes_near(lane_id)
@@ -83,7 +86,7 @@ class OncomingLanes:
         return found if found.lane >= 0 else None
 
     def _lanes_near(self, lane_id: int) -> IntArray:
-        """Lanes outside junctions that come near enough to a lane to be oncoming somewhere along it, by their ids."""
+        """Returns the lanes outside junctions that are close enough to be oncoming somewhere along a lane."""
         lane = self._town.lanes[lane_id]
         if lane.in_junction or self._town.neighbour(lane_id, LinkType.LANE_CHANGE_LEFT) is not None:
             return np.empty(0, dtype=np.int64)
@@ -99,7 +102,7 @@ class OncomingLanes:
 def _across(
     points: Array, offsets: IntArray, ends: Array, lane: int, station: float, candidates: IntArray
 ) -> tuple[int, float, float]:
-    """The closest of some lanes that is oncoming at a place of a lane (-1: none), the station on it, and the gap."""
+    """Returns the closest oncoming lane among candidates (-1: none), the station on it [m], and the distance [m]."""
     x, y = position(points, offsets, ends, lane, station, 0.0)
     heading = value_at(points, offsets, lane, HEADING, station)
     height = value_at(points, offsets, lane, HEIGHT, station)
@@ -125,38 +128,38 @@ def _across(
 
 @lru_cache(maxsize=16)
 def oncoming_lanes(town: Town) -> OncomingLanes:
-    """The table of a town, made once."""
+    """Returns the oncoming lanes of a town; built once for each town."""
     return OncomingLanes(town)
 
 
-# --- Lanes beside one another ----------------------------------------------------------------------------------------
+# --- Lanes side by side ----------------------------------------------------------------------------------------------
 
 
 def rightmost(town: Town, lane_id: int) -> int:
-    """The last of the lanes beside one another to the right: who walks beside it does not walk on another lane."""
+    """Returns the rightmost lane that can be reached by lane changes."""
     while (beside := town.neighbour(lane_id, LinkType.LANE_CHANGE_RIGHT)) is not None:
         lane_id = beside
     return lane_id
 
 
 def leftmost(town: Town, lane_id: int) -> int:
-    """The lane of the same direction that is farthest to the left."""
+    """Returns the leftmost lane that can be reached by lane changes."""
     while (beside := town.neighbour(lane_id, LinkType.LANE_CHANGE_LEFT)) is not None:
         lane_id = beside
     return lane_id
 
 
-# --- Where the lanes of a town are, to keep people off them ----------------------------------------------------------
+# --- Ground covered by lanes -----------------------------------------------------------------------------------------
 
 LEVEL = 2.0
-"""Lanes that are farther above or below than this are no matter [m]."""
+"""Lanes with a larger difference of height are ignored [m]."""
 
 SAMPLE = 0.5
-"""Step in which lanes, and lines between places, are sampled [m]."""
+"""Sampling distance of lanes and of tested lines [m]."""
 
 
 class LaneEdges:
-    """Lanes as discs on their centre lines, as wide as they are."""
+    """Ground covered by the lanes of a town, as discs of the lane width along the centre lines."""
 
     def __init__(self, town: Town) -> None:
         rows = []
@@ -172,11 +175,11 @@ class LaneEdges:
         self._widest = float(self._discs[:, 3].max())
 
     def height(self, place: Array) -> float:
-        """Height of the road that is nearest to a place (2,) [m]."""
+        """Returns the height of the lane nearest to a position (2,) [m]."""
         return float(self._discs[int(self._tree.query(place)[1]), 2])
 
     def is_clear(self, ends: Sequence[Array] | Array, height: float, margin: float) -> bool:
-        """Whether a straight line between two places keeps off all lanes by a margin [m]."""
+        """Returns whether a straight line between two positions keeps a margin [m] to all lanes at its height."""
         first, last = ends[0][:2], ends[1][:2]
         count = max(2, math.ceil(float(np.hypot(*(last - first))) / SAMPLE) + 1)
         share = np.linspace(0.0, 1.0, count)[:, None]
@@ -184,7 +187,7 @@ class LaneEdges:
         return bool(self.free(np.column_stack((places, np.full(len(places), height))), margin).all())
 
     def free(self, places: Array, margin: float) -> NDArray[np.bool_]:
-        """Which places (n, 3) keep off all lanes of their height by a margin [m]."""
+        """Returns which positions (n, 3) keep a margin [m] to all lanes at their height (n,)."""
         near: Any = self._tree.query_ball_point(places[:, :2], self._widest + margin, return_sorted=False)
         counts = np.fromiter((len(discs) for discs in near), dtype=np.int64, count=len(places))
         free = np.ones(len(places), dtype=bool)

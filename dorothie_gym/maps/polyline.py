@@ -1,7 +1,6 @@
-"""Centre lines in flat arrays, and the compiled functions that measure along them.
+"""Lane centre lines as flat arrays, with compiled functions that measure along them.
 
-There is one function for each question, whoever asks (a lane, the grid index, the search for neighbours), so that all
-answers agree to the last bit.
+Lanes, the grid index and the neighbour search share these functions, so that their results agree to the last bit.
 """
 
 from __future__ import annotations
@@ -22,13 +21,13 @@ X, Y, STATION, HEADING, HEIGHT, WIDTH = range(6)
 
 
 class LaneTable(NamedTuple):
-    """Centre lines of several lanes; the lane in row i has the points `offsets[i] : offsets[i + 1]`.
+    """Centre lines of several lanes; lane i has the points `offsets[i] : offsets[i + 1]`.
 
     Attributes:
-        points: (p, 6) x, y, station [m], heading [rad], height, width [m] of all points.
-        offsets: (n + 1,) first point of each lane.
+        points: (p, 6) x, y, station [m], heading [rad], height [m], width [m] of all points.
+        offsets: (n + 1,) index of the first point of each lane, and p.
         ends: (n, 4) cosine and sine of the first heading, cosine and sine of the last.
-        boxes: (n, 4) least x, least y, greatest x, greatest y [m].
+        boxes: (n, 4) bounding boxes: smallest x, smallest y, largest x, largest y [m].
     """
 
     points: Array
@@ -38,7 +37,7 @@ class LaneTable(NamedTuple):
 
     @classmethod
     def of(cls, lanes: Sequence[Lane]) -> LaneTable:
-        """The table of some lanes, row by row."""
+        """Builds the table of the given lanes, in their order."""
         columns = [
             np.column_stack((lane.points[:, :2], lane.stations, lane.headings, lane.points[:, 2], lane.widths))
             for lane in lanes
@@ -58,7 +57,7 @@ class LaneTable(NamedTuple):
 
 @allocating
 def closest_on_segment(points: Array, k: int, x: float, y: float) -> tuple[float, float]:
-    """Closest place of the segment from point k to k + 1: its share of the segment, and its squared distance [m^2]."""
+    """Returns the closest point on segment k: its fraction of the segment, and the squared distance to it [m^2]."""
     ax, ay = points[k, 0], points[k, 1]
     dx, dy = points[k + 1, 0] - ax, points[k + 1, 1] - ay
     t = ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)
@@ -71,11 +70,10 @@ def closest_on_segment(points: Array, k: int, x: float, y: float) -> tuple[float
 def local_coordinates(
     points: Array, offsets: IntArray, ends: Array, row: int, x: float, y: float
 ) -> tuple[float, float]:
-    """Station [m] and signed distance to the right [m] of a world position with respect to a lane.
+    """Returns the lane coordinates of a world position: station [m] and distance to the right [m].
 
-    The closest place counts, the first one of several. Before the start and after the end of the lane it goes on
-    straight in the direction of its ends. |lateral| + overshoot is never less than the distance to the centre line:
-    the grid index rests on this.
+    Refers to the closest point, of several to the first. Beyond both ends the lane continues straight. |lateral| plus
+    overshoot is never less than the distance to the centre line, which the grid index relies on.
     """
     first, last = offsets[row], offsets[row + 1] - 1
     best, at, share = np.inf, first, 0.0
@@ -102,7 +100,7 @@ def local_coordinates(
 
 @allocating
 def value_at(points: Array, offsets: IntArray, row: int, column: int, station: float) -> float:
-    """A column of the table at a station, linear between the points and constant beyond the ends."""
+    """Interpolates a column of the table at a station, linearly between points and constant beyond the ends."""
     low, high = offsets[row], offsets[row + 1] - 1
     if station <= 0.0:
         return float(points[low, column])
@@ -122,7 +120,7 @@ def value_at(points: Array, offsets: IntArray, row: int, column: int, station: f
 def position(
     points: Array, offsets: IntArray, ends: Array, row: int, station: float, lateral: float
 ) -> tuple[float, float]:
-    """World position [m] at a station and a distance to the right of a lane, straight on beyond its ends."""
+    """Returns the world position [m] at a station and a distance to the right, straight beyond the ends of the lane."""
     first, last = offsets[row], offsets[row + 1] - 1
     if station < 0.0:
         c, n = ends[row, 0], ends[row, 1]
@@ -140,7 +138,7 @@ def position(
 def distance(
     points: Array, offsets: IntArray, ends: Array, row: int, x: float, y: float, heading: float, weight: float
 ) -> tuple[float, float]:
-    """highway-env's distance to a lane, and the station it is measured at.
+    """Returns highway-env's distance to a lane, and the station of the closest point.
 
     The distance is |lateral| + overshoot [m] + `weight` x difference of heading [rad].
     """
@@ -155,7 +153,7 @@ def distance(
 
 @allocating
 def positions(points: Array, offsets: IntArray, ends: Array, row: int, stations: Array, lateral: float) -> Array:
-    """`position` at many stations (n,): (n, 2) [m]."""
+    """Returns `position` for many stations (n,): (n, 2) [m]."""
     found = np.empty((len(stations), 2))
     for i in range(len(stations)):
         found[i, 0], found[i, 1] = position(points, offsets, ends, row, stations[i], lateral)
@@ -164,7 +162,7 @@ def positions(points: Array, offsets: IntArray, ends: Array, row: int, stations:
 
 @allocating
 def local_coordinates_many(points: Array, offsets: IntArray, ends: Array, row: int, places: Array) -> Array:
-    """`local_coordinates` of many world positions (n, 2): (n, 2) [m]."""
+    """Returns `local_coordinates` for many world positions (n, 2): (n, 2) [m]."""
     found = np.empty((len(places), 2))
     for i in range(len(places)):
         found[i, 0], found[i, 1] = local_coordinates(points, offsets, ends, row, places[i, 0], places[i, 1])

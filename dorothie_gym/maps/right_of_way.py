@@ -1,8 +1,8 @@
-"""Who crosses whom at the junctions of a town, and who waits for whom: read off its lanes and signs, once.
+"""Right of way at junctions: conflicts between connectors and priority, derived once from lanes and signs.
 
-The model is that of SUMO's networks, where each `request` of a junction lists for one connection its `foes`, which it
-conflicts with, and its `response`, those foes that it gives way to (https://sumo.dlr.de/docs/Networks/SUMO_Road_Networks.html).
-Whether a light lets somebody go at all is another matter: `Town.light`.
+The model is that of SUMO: each `request` of a junction lists the `foes` of one connection, which conflict with
+it, and its `response`, the foes with priority (https://sumo.dlr.de/docs/Networks/SUMO_Road_Networks.html).
+Traffic lights are not considered here; see `Town.light`.
 """
 
 from __future__ import annotations
@@ -20,36 +20,36 @@ CIRCLE_OFFSET = 1.7
 """Three circles of radius 1.3 m, one in the middle and one this far to either side, cover a car of 5 m x 2 m [m]."""
 
 CLEARANCE = 3.1
-"""Circles of two vehicles that go straight, closer than this, touch or nearly so [m]."""
+"""Distance below which the circles of two vehicles driving straight (almost) touch [m]."""
 
 TURNING_CLEARANCE = 3.9
-"""The same where one of them turns: stock steering cuts corners by up to 0.8 m [m]."""
+"""The same if one of them turns: highway-env's steering cuts corners by up to 0.8 m [m]."""
 
 TURN = np.radians(20.0)
-"""A connector that changes direction by more than this is a turn [rad]."""
+"""Smallest change of direction of a turn [rad]."""
 
 HEIGHT = 2.5
-"""Connectors further apart in height do not meet [m]."""
+"""Largest difference of height of conflicting connectors [m]."""
 
 FACING = np.radians(45.0)
-"""Lanes that are off from running against each other by less than this face each other [rad]."""
+"""Largest deviation from opposite directions of lanes that face each other [rad]."""
 
 LEFTWARD = (LinkType.LEFT, LinkType.U_TURN)
-"""Turns that cross the way of who comes towards one."""
+"""Turn types that cross oncoming traffic."""
 
-_CONTROLS = (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP, SignalKind.YIELD)  # a light overrules a sign
+_CONTROLS = (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP, SignalKind.YIELD)  # a light overrides a sign
 
 
 class RightOfWay:
-    """For every connector of a town: which others it meets, and for which of them it waits; see `right_of_way`.
+    """Conflicts and priorities of all connectors of a town; see `right_of_way`.
 
-    Priority is by sign first: who comes from a stop or yield sign waits for who does not (a roundabout's entries have
-    yield signs, so they wait for its ring). Among equals it is by turn: a left or U-turn waits for those who come
-    towards it and go straight on or right. Everybody else is equal, and so are those who only pass one another too near
-    for comfort, as a turn does that ends beside the lane of the oncoming: the first to come is the first to go.
+    Signs count first: traffic from a stop or yield sign waits for traffic without one (roundabout entries have yield
+    signs, so they wait for the ring). Among equals, left turns and U-turns wait for oncoming traffic that goes straight
+    or right. All others are equal and go in order of arrival, as do movements that only pass each other too closely,
+    such as a turn that ends beside the lane of oncoming traffic.
 
-    Whoever waits is signed while the other is not, or turns left while the other does not and is signed alike. Both
-    only ever lead downwards, so nobody waits for one another, nor do any number of connectors in a circle.
+    A connector waits only if it has a sign and the other has none, or if it turns left, the other does not, and both
+    have equal signs. This order has no cycles, so no set of connectors waits for each other.
     """
 
     def __init__(self, town: Town) -> None:
@@ -59,7 +59,7 @@ class RightOfWay:
         for lane in town.lanes:
             if lane.in_junction:
                 connectors[lane.junction_id].append(lane)
-        foes: defaultdict[int, dict[int, bool]] = defaultdict(dict)  # and whether they touch if both drive exactly
+        foes: defaultdict[int, dict[int, bool]] = defaultdict(dict)  # with whether exact driving would touch
         for group in connectors.values():
             for one, other, touch in _meetings(group):
                 follows = one in sources[other] or other in sources[one] or sources[one] & sources[other]
@@ -78,23 +78,22 @@ class RightOfWay:
         }
 
     def foes(self, connector: int) -> tuple[int, ...]:
-        """Connectors of the same junction that cannot be driven at the same time as this one by vehicles of 5 m x 2 m.
+        """Returns the connectors of the junction that conflict with a connector for vehicles of 5 m x 2 m.
 
-        They cross it, join it or begin beside it on a neighbouring lane too near. Those that begin on the same lane, or
-        go on from one another, are none: there vehicles follow each other.
+        Conflicting connectors cross it, merge with it, or begin too close beside it. Connectors from the same lane and
+        successive connectors do not conflict: vehicles follow each other there.
 
         Returns:
-            Their ids in ascending order; none for a lane that is no connector. If a is among the foes of b, b is
-            among those of a.
+            Ids in ascending order; none for a lane that is no connector. The relation is symmetric.
         """
         return self._foes.get(connector, ())
 
     def waits_for(self, connector: int) -> tuple[int, ...]:
-        """Those of the foes that have priority over this connector, in ascending order of their ids."""
+        """Returns the foes with priority over a connector, in ascending order of ids."""
         return self._waits.get(connector, ())
 
     def control(self, lane: int) -> SignalKind | None:
-        """What a driver has to heed at the end of a lane: light, stop or yield sign (a light overrules a sign)."""
+        """Returns the control at the end of a lane: light, stop or yield sign (a light overrides a sign), or None."""
         return self._control.get(lane)
 
     def _is_signed(self, sources: Iterable[int]) -> bool:
@@ -103,19 +102,19 @@ class RightOfWay:
 
 @lru_cache(maxsize=16)
 def right_of_way(town: Town) -> RightOfWay:
-    """The right of way in a town, found once (0.1 s for a town of 500 lanes)."""
+    """Returns the right of way of a town; computed once for each town (0.1 s for 500 lanes)."""
     return RightOfWay(town)
 
 
 def opposition(one: Lane, other: Lane) -> float:
-    """How far two lanes are, where they begin, from running against each other: 0 where they face, pi abreast [rad]."""
+    """Returns the deviation of two lanes from opposite directions at their starts: 0 facing, pi parallel [rad]."""
     return abs(float(other.headings[0] - one.headings[0]) % (2.0 * np.pi) - np.pi)
 
 
 def turn_into(link: LaneLink, lanes: Sequence[Lane]) -> LinkType:
-    """The turn that a connector makes for who enters it by a link: the link's type, after another connector its shape.
+    """Returns the turn type of a connector: that of the link, or by shape if the link comes from another connector.
 
-    Links are typed where a road enters a junction; junctions that abut are entered from one another's connectors.
+    Links carry the turn type where a road enters a junction; adjacent junctions are entered from connectors.
     """
     if not lanes[link.source].in_junction:
         return link.type
@@ -134,7 +133,7 @@ def _controls(town: Town) -> dict[int, SignalKind]:
 
 
 def _turns(town: Town) -> dict[int, LinkType]:
-    """Turn that each connector makes; one that is entered from roads and connectors alike has it from a road."""
+    """Returns the turn type of each connector; links from roads take precedence over links from connectors."""
     entering = [k for k in town.links if not k.type.is_lane_change and town.lanes[k.target].in_junction]
     entering.sort(key=lambda link: not town.lanes[link.source].in_junction)
     return {link.target: turn_into(link, town.lanes) for link in entering}
@@ -148,9 +147,9 @@ def _waits(one: Lane, other: Lane, turns: Mapping[int, LinkType], signed: Mappin
 
 
 def _meetings(lanes: Sequence[Lane]) -> Iterator[tuple[int, int, bool]]:
-    """Pairs of ids of lanes of one junction that two vehicles cannot drive at the same time, each pair once.
+    """Yields the conflicting pairs of lanes of one junction, each pair once.
 
-    The third entry tells those that touch from those that pass, but come too near where turning vehicles cut corners.
+    The third entry is True if vehicles touch, and False if they only pass too closely where turns cut corners.
     """
     swept = [_swept(lane) for lane in lanes]
     first = np.cumsum([0, *(len(circles) for circles in swept)])  # row at which each lane's circles begin
@@ -168,7 +167,7 @@ def _meetings(lanes: Sequence[Lane]) -> Iterator[tuple[int, int, bool]]:
 
 
 def _gaps(points: Array, others: Array) -> Array:
-    """For each point (n, 2) the distance to the nearest of some others (m, 2) [m]: (n,)."""
+    """Returns the distance of each point (n, 2) to the nearest of `others` (m, 2): (n,) [m]."""
     east = points[:, None, 0] - others[:, 0]
     south = points[:, None, 1] - others[:, 1]
     gaps: Array = np.sqrt((east * east + south * south).min(axis=1))
@@ -176,7 +175,7 @@ def _gaps(points: Array, others: Array) -> Array:
 
 
 def _swept(lane: Lane) -> Array:
-    """Centres of the circles that cover a vehicle, at every metre of its way along a lane (n, 2) [m]."""
+    """Returns the centres of the circles that cover a vehicle at each metre of a lane (n, 2) [m]."""
     stations = np.linspace(0.0, lane.length, int(lane.length) + 2)
     headings = np.interp(stations, lane.stations, lane.headings)
     middles = np.column_stack([np.interp(stations, lane.stations, lane.points[:, k]) for k in (0, 1)])

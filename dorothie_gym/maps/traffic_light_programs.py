@@ -1,4 +1,4 @@
-"""Programmes for the traffic lights of a map that says where lights stand, but not how they change."""
+"""Generated programmes for the traffic lights of maps that only give their positions."""
 
 from __future__ import annotations
 
@@ -13,42 +13,42 @@ from dorothie_gym.maps.right_of_way import FACING, LEFTWARD, opposition, turn_in
 from dorothie_gym.maps.traffic_lights import LightPhase, LightProgramme
 
 THROUGH_GREEN = 20.0
-"""Green of facing approaches [s]: ten cars a lane, 2 s from car to car (Highway Capacity Manual)."""
+"""Green of facing approaches [s]: ten cars per lane at a headway of 2 s (Highway Capacity Manual)."""
 
 SHARED_GREEN = 45.0
-"""Where more than two phases take turns they share about this much green [s], so that nobody waits for minutes."""
+"""Total green that more than two phases share approximately [s], to limit waiting times."""
 
 SHORTEST_GREEN = 12.0
-"""Green of facing approaches where very many phases take turns [s]."""
+"""Shortest green of facing approaches with many phases [s]."""
 
 LEFT_GREEN = 8.0
-"""Green of lanes that only turn left [s]: four cars."""
+"""Green of left-turn lanes [s]: four cars."""
 
 YELLOW, LONGEST_YELLOW = 3.0, 6.0
-"""Yellow after a green [s], at least and at most (MUTCD 2009, section 4D.26)."""
+"""Shortest and longest yellow [s] (MUTCD 2009, section 4D.26)."""
 
 YELLOW_REACTION, YELLOW_BRAKING = 1.0, 3.0
-"""Who drives on at yellow has this long to react [s] and would have to brake this hard [m/s^2]."""
+"""Reaction time [s] and braking [m/s^2] assumed for the yellow time."""
 
 ALL_RED = 2.0
-"""Red for everybody before the next green [s], so that the junction clears: at most 6 s (MUTCD 2009, section 4D.26)."""
+"""Clearance interval with red for all directions [s], at most 6 s (MUTCD 2009, section 4D.26)."""
 
 LONE_RED = 15.0
-"""Red of lights that have none to take turns with [s]: that is when the approaches without lights get through."""
+"""Red phase of a junction with a single phase [s], for the approaches without lights."""
 
 STAGGER = 7.0
-"""A junction's lights begin this much later than those of the one before it [s], lest all change at once."""
+"""Offset between the programmes of successive junctions [s]."""
 
 
 @dataclass(frozen=True)
 class _Movement:
-    """A way across a junction.
+    """Movement across a junction.
 
     Attributes:
-        source: the lane it comes from.
-        speed: limit there [m/s].
-        connector: the lane across.
-        targets: where that leads.
+        source: id of the incoming lane.
+        speed: speed limit of the incoming lane [m/s].
+        connector: lane across the junction.
+        targets: ids of the lanes behind it.
         left: whether it turns left.
     """
 
@@ -61,9 +61,9 @@ class _Movement:
 
 @dataclass(frozen=True)
 class _Head:
-    """Lights that always show the same: their ids, the movements that they rule, and the approaches of those.
+    """Lights that always show the same colour: ids, controlled movements, and the approaches of these.
 
-    An approach is a road and its direction.
+    An approach is a road id and a direction.
     """
 
     signals: tuple[int, ...]
@@ -75,19 +75,19 @@ class _Head:
         return all(movement.left for movement in self.movements)
 
     def opposition(self, other: _Head) -> float:
-        """How far the two are from facing each other [rad], to a thousandth, so that equals are equal."""
+        """Returns the deviation of two groups from facing each other [rad], rounded to 0.001 for stable ties."""
         return round(min(opposition(a.connector, b.connector) for a in self.movements for b in other.movements), 3)
 
     def may_go_with(self, other: _Head) -> bool:
-        """Whether the two may be green together."""
+        """Returns whether the two may be green together."""
         return all(_compatible(a, b) for a in self.movements for b in other.movements)
 
 
 def yellow_time(speed: float) -> float:
-    """Yellow for an approach with a speed limit [m/s], to half a second [s].
+    """Returns the yellow time for a speed limit [m/s], rounded up to half a second [s].
 
-    So long that who can no longer stop is past the line: time to react and half of that to brake to a stand (Institute
-    of Transportation Engineers, Traffic Signal Timing Manual).
+    Reaction time plus half the braking time to a stop: a car that can no longer stop passes the line (Institute of
+    Transportation Engineers, Traffic Signal Timing Manual).
     """
     needed = YELLOW_REACTION + speed / (2.0 * YELLOW_BRAKING)
     return float(np.clip(np.ceil(2.0 * needed) / 2.0, YELLOW, LONGEST_YELLOW))
@@ -96,18 +96,18 @@ def yellow_time(speed: float) -> float:
 def derive_programmes(
     lanes: Sequence[Lane], links: Sequence[LaneLink], junctions: Sequence[Junction], signals: Sequence[Signal]
 ) -> tuple[LightProgramme, ...]:
-    """A programme for every junction that has traffic lights at its approaches.
+    """Generates a programme for each junction with traffic lights.
 
-    Approaches that face each other are green together, all others one after the other. Who turns left there has to wait
-    for who comes towards them (`RightOfWay.waits_for`); other movements never meet on green. Lights of lanes that only
-    turn left, where there are others beside and facing them, have a phase of their own just before those beside them,
-    shared with such lanes that face them. Lights that share a lane show the same. Every light is green once in a cycle.
+    Approaches that face each other are green together, all others in turn. Left turns yield to oncoming traffic
+    (`RightOfWay.waits_for`); other movements never conflict. Lights of left-turn lanes, where there are others
+    beside and facing them, have a protected phase just before the lights beside them, shared with facing left-turn
+    lanes. Lights that share a lane show the same colour. Every light is green once in a cycle.
 
     Args:
         lanes: lanes of the town, `lanes[i].id == i`.
         links: links between them.
-        junctions: their order staggers the programmes.
-        signals: those of other kinds, and lights whose lanes do not lead into a junction, are left out.
+        junctions: junctions in the order of the offsets of their programmes.
+        signals: signals; other kinds, and lights whose lanes do not lead into a junction, are ignored.
 
     Returns:
         Programmes in the order of the junctions.
@@ -126,9 +126,9 @@ def derive_programmes(
 
 
 def _junction(signal: Signal, lanes: Sequence[Lane], followers: dict[int, list[LaneLink]]) -> int | None:
-    """Id of the junction that a light belongs to: the one that begins nearest to it of those its lanes lead into.
+    """Returns the junction of a light, or None: of those that its lanes lead into, the one nearest to the light.
 
-    A light that a map gives to both directions of a road would rule the junction at the road's other end, too.
+    Some maps assign a light to both directions of a road, and thus to the junctions at both ends.
     """
     found = [
         (float(np.hypot(*(lanes[lane].points[-1, :2] - signal.position[:2]))), lanes[link.target].junction_id)
@@ -142,7 +142,7 @@ def _junction(signal: Signal, lanes: Sequence[Lane], followers: dict[int, list[L
 def _heads(
     junction: int, signals: Sequence[Signal], lanes: Sequence[Lane], followers: dict[int, list[LaneLink]]
 ) -> list[_Head]:
-    """Lights of a junction, those that share a lane joined, in order of their ids."""
+    """Returns the lights of a junction in order of their ids, grouped if they share a lane."""
     sharing: list[tuple[list[int], set[int]]] = []  # ids of lights and their lanes
     for signal in signals:
         ids, ruled = [signal.id], set(signal.lanes)
@@ -196,9 +196,9 @@ def _programme(order: int, junction: int, heads: Sequence[_Head]) -> LightProgra
 
 
 def _is_turn_lane(head: _Head, heads: Sequence[_Head]) -> bool:
-    """Whether lights that let lanes turn left need a green of their own: there are others beside them and facing them.
+    """Returns whether left-turn lights need a protected phase: there are others beside them and facing them.
 
-    The stem of a T, or a road that ends at a one-way street, has nobody to be protected from.
+    The stem of a T, or a road that ends at a one-way street, has no oncoming traffic.
     """
     others = [other for other in heads if not other.only_left]
     beside = any(head.approaches & other.approaches for other in others)
@@ -206,7 +206,7 @@ def _is_turn_lane(head: _Head, heads: Sequence[_Head]) -> bool:
 
 
 def _turn_of(heads: Iterable[_Head], green: float) -> tuple[LightPhase, LightPhase, LightPhase]:
-    """What happens when it is the turn of some lights: green, yellow, and red for all."""
+    """Returns the phases of a group of lights: green, yellow, and red for all."""
     heads = tuple(heads)
     signals = tuple(sorted(signal for head in heads for signal in head.signals))
     fastest = max(movement.speed for head in heads for movement in head.movements)
@@ -218,7 +218,7 @@ def _turn_of(heads: Iterable[_Head], green: float) -> tuple[LightPhase, LightPha
 
 
 def _together(heads: Sequence[_Head]) -> list[list[_Head]]:
-    """Divides lights into groups that may be green together, those that face each other best first."""
+    """Divides lights into groups that may be green together, best facing pairs first."""
 
     def best(head: _Head) -> float:
         return min((head.opposition(other) for other in heads if other is not head), default=np.pi)
@@ -235,9 +235,9 @@ def _together(heads: Sequence[_Head]) -> list[list[_Head]]:
 
 
 def _compatible(one: _Movement, other: _Movement) -> bool:
-    """Whether two movements may have green together: those side by side, or face to face, unless they meet.
+    """Returns whether two movements may be green together: parallel or opposite ones that do not meet.
 
-    Only a left turn may meet who comes towards it, for it waits. Who comes from aside never goes at the same time.
+    Left turns may meet oncoming traffic because they yield. Crossing approaches are never green together.
     """
     if one.source == other.source:
         return True
@@ -251,10 +251,10 @@ def _compatible(one: _Movement, other: _Movement) -> bool:
 
 
 def _cross(one: Array, other: Array) -> bool:
-    """Whether two lines (n, 2), (m, 2) cross or touch: some segment of each has the other's ends on both its sides."""
+    """Returns whether two lines (n, 2), (m, 2) cross or touch: some segments have each other's ends on both sides."""
 
     def sides(line: Array, points: Array) -> Array:
-        """On which side of each segment of a line each point lies: the sign of the result (segments, points)."""
+        """Returns the side of each segment on which each point lies, as a sign (segments, points)."""
         along = np.diff(line, axis=0)[:, None]
         to = points[None] - line[:-1, None]
         return np.sign(along[..., 0] * to[..., 1] - along[..., 1] * to[..., 0])

@@ -1,4 +1,4 @@
-"""Programmes of traffic lights: which of a junction's lights shows which colour, as a function of time alone."""
+"""Traffic light programmes: the colour of each light of a junction as a function of time alone."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from itertools import accumulate
 
 
 class LightColour(enum.StrEnum):
-    """What a traffic light shows."""
+    """Colour of a traffic light."""
 
     GREEN = "green"
     YELLOW = "yellow"
@@ -18,12 +18,12 @@ class LightColour(enum.StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class LightPhase:
-    """A time during which no light of the junction changes.
+    """Interval in which no light of the junction changes.
 
     Attributes:
         duration: [s], more than 0.
-        green: ids of the signals that are green; what is neither green nor yellow is red.
-        yellow: ids of the signals that are yellow.
+        green: ids of the green signals; signals in neither list are red.
+        yellow: ids of the yellow signals.
     """
 
     duration: float
@@ -31,7 +31,7 @@ class LightPhase:
     yellow: tuple[int, ...] = ()
 
     def colour(self, signal: int) -> LightColour:
-        """What a signal shows while the phase lasts."""
+        """Returns the colour of a signal during the phase."""
         if signal in self.green:
             return LightColour.GREEN
         return LightColour.YELLOW if signal in self.yellow else LightColour.RED
@@ -39,13 +39,13 @@ class LightPhase:
 
 @dataclass(frozen=True, kw_only=True)
 class LightProgramme:
-    """What the lights of one junction do, over and over again.
+    """Cyclic programme of the lights of one junction.
 
     Attributes:
-        junction_id: the junction.
-        signals: ids of the signals that it switches.
-        phases: one after the other, at least one.
-        offset: time at which the first phase begins for the first time [s].
+        junction_id: id of the junction.
+        signals: ids of the signals that it controls.
+        phases: phases in order, at least one.
+        offset: start of the first phase in the first cycle [s].
     """
 
     junction_id: int
@@ -63,14 +63,14 @@ class LightProgramme:
 
     @property
     def cycle(self) -> float:
-        """Time after which it begins again [s]."""
+        """Length of a cycle [s]."""
         return self._ends[-1]
 
     def phase_at(self, time: float) -> LightPhase:
-        """The phase at a simulated time [s]."""
+        """Returns the phase at a simulated time [s]."""
         now = (time - self.offset) % self.cycle
         return next((phase for phase, end in zip(self.phases, self._ends, strict=True) if now < end), self.phases[0])
 
     def colour(self, signal: int, time: float) -> LightColour:
-        """What a signal shows at a simulated time [s]."""
+        """Returns the colour of a signal at a simulated time [s]."""
         return self.phase_at(time).colour(signal)

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
-from dorothie_gym.rendering.shapes import Samples, right_of
+from dorothie_gym.rendering.shapes import TownSamples, right_of
 
 NARROWEST_MEDIAN = 1.2
 """Less than this between the two directions is paint, not a median [m]."""
@@ -112,7 +112,7 @@ class Borders:
         return lane
 
 
-def find_borders(town: Town, samples: Samples) -> Borders:
+def find_borders(town: Town, samples: TownSamples) -> Borders:
     """Looks beside every lane outside junctions."""
     outside = samples.of_lanes(np.array([not lane.in_junction for lane in town.lanes], dtype=bool))
     if not len(outside):
@@ -143,7 +143,7 @@ def find_borders(town: Town, samples: Samples) -> Borders:
     return Borders(tuple(lines), _majority(samples, on_right), frozenset(divided))
 
 
-def _beside(samples: Samples, outside: NDArray[np.int64], sign: int) -> NDArray[np.int64]:
+def _beside(samples: TownSamples, outside: NDArray[np.int64], sign: int) -> NDArray[np.int64]:
     """Sample (n,) of the lane in the same direction on that side, or -1."""
     own, other = samples.edge(sign)[outside], samples.edge(-sign)[outside]
     near, where = cKDTree(other).query(own, k=6, distance_upper_bound=np.hypot(_TOUCH, 1.5))
@@ -159,7 +159,7 @@ def _beside(samples: Samples, outside: NDArray[np.int64], sign: int) -> NDArray[
     return found
 
 
-def _facing(samples: Samples, leftmost: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
+def _facing(samples: TownSamples, leftmost: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
     """Sample (n,) of the oncoming lane on the left, or -1, and what lies between the two left edges (n,) [m]."""
     found, gap = np.full(len(samples.lane), -1, dtype=np.int64), np.zeros(len(samples.lane))
     if not len(leftmost):
@@ -179,14 +179,14 @@ def _facing(samples: Samples, leftmost: NDArray[np.int64]) -> tuple[NDArray[np.i
     return found, gap
 
 
-def _frame(samples: Samples, index: NDArray[np.int64], offset: Array) -> tuple[Array, Array]:
+def _frame(samples: TownSamples, index: NDArray[np.int64], offset: Array) -> tuple[Array, Array]:
     """Offsets (m, k, 2) [m] from samples, as seen from them: forward and to the right (m, k) each."""
     heading = samples.heading[index][:, None]
     c, s = np.cos(heading), np.sin(heading)
     return offset[..., 0] * c + offset[..., 1] * s, offset[..., 1] * c - offset[..., 0] * s
 
 
-def _inside_others(samples: Samples, outside: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _inside_others(samples: TownSamples, outside: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Whether the left and right edges (2, n) lie inside another lane at the same height."""
     hidden = np.zeros((2, len(samples.lane)), dtype=bool)
     tree = cKDTree(samples.centre[outside, :2])
@@ -200,7 +200,7 @@ def _inside_others(samples: Samples, outside: NDArray[np.int64]) -> NDArray[np.b
     return hidden
 
 
-def _owns(town: Town, samples: Samples, facing: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _owns(town: Town, samples: TownSamples, facing: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Whether the line between a lane and the oncoming one is drawn from this lane (n,)."""
     number = np.array([lane.lane_id for lane in town.lanes])[samples.lane]
     other = number[np.maximum(facing, 0)]
@@ -208,7 +208,7 @@ def _owns(town: Town, samples: Samples, facing: NDArray[np.int64]) -> NDArray[np
     return np.where(different, number < 0, samples.lane < samples.lane[np.maximum(facing, 0)])
 
 
-def _majority(samples: Samples, beside: NDArray[np.int64]) -> dict[int, int]:
+def _majority(samples: TownSamples, beside: NDArray[np.int64]) -> dict[int, int]:
     """By lane, the lane that most of its samples have beside them."""
     index = np.flatnonzero(beside >= 0)
     pairs, counts = np.unique(
@@ -221,7 +221,7 @@ def _majority(samples: Samples, beside: NDArray[np.int64]) -> dict[int, int]:
     return {lane: other for lane, (_, other) in best.items()}
 
 
-def _lines(town: Town, samples: Samples, kinds: NDArray[np.int64], gap: Array, sign: int) -> Iterator[Border]:
+def _lines(town: Town, samples: TownSamples, kinds: NDArray[np.int64], gap: Array, sign: int) -> Iterator[Border]:
     """Lines along one side, joined across the ends of lanes."""
     runs = [run for lane in range(len(town.lanes)) for run in _runs(kinds, *samples.bounds[lane].tolist())]
     edge = np.column_stack((samples.edge(sign), samples.centre[:, 2]))
@@ -240,7 +240,7 @@ def _lines(town: Town, samples: Samples, kinds: NDArray[np.int64], gap: Array, s
             yield from _border(town, samples, edge, gap, sign, chain)
 
 
-def _followers(town: Town, samples: Samples, runs: Sequence[_Run], edge: Array) -> dict[int, int]:
+def _followers(town: Town, samples: TownSamples, runs: Sequence[_Run], edge: Array) -> dict[int, int]:
     """By run that reaches the end of its lane, the run of the same kind and street that goes on where it ends."""
     begins = {(int(samples.lane[a]), kind): k for k, (a, _, kind) in enumerate(runs) if samples.station[a] == 0.0}
     after: dict[int, int] = {}
@@ -259,7 +259,7 @@ def _followers(town: Town, samples: Samples, runs: Sequence[_Run], edge: Array) 
 
 
 def _border(
-    town: Town, samples: Samples, edge: Array, gap: Array, sign: int, chain: Sequence[_Run]
+    town: Town, samples: TownSamples, edge: Array, gap: Array, sign: int, chain: Sequence[_Run]
 ) -> Iterator[Border]:
     # Where one lane follows another their common place is kept once.
     index = np.concatenate([np.arange(a + (k > 0), b) for k, (a, b, _) in enumerate(chain)])

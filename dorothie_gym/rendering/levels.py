@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
-from dorothie_gym.rendering.shapes import Samples, right_of
+from dorothie_gym.rendering.shapes import TownSamples, right_of
 
 CLEARANCE = 3.0
 """A lane this much higher than another passes over it [m]."""
@@ -28,7 +28,7 @@ _ON_GROUND = 3.0  # [m] a street below this is on the ground
 
 
 @dataclass(frozen=True)
-class Stretch:
+class LevelStretch:
     """A part of a lane that is not on the level of the ground.
 
     Attributes:
@@ -44,27 +44,27 @@ class Stretch:
     end: float
 
 
-def stretches(town: Town, samples: Samples) -> list[Stretch]:
+def stretches(town: Town, samples: TownSamples) -> list[LevelStretch]:
     """Stretches of lanes that are bridges or tunnels, lower levels first."""
     lower, upper = _crossings(samples)
     z = samples.centre[:, 2]
     deep = (z[lower] < _TUNNEL_DEPTH) & (z[upper] < _ON_GROUND)
     found = _raised(town, samples, lower[~deep], upper[~deep])
     for lane, start, end in _merged(_covered(town, samples, lower[deep], upper[deep])):
-        found.append(Stretch(-1, lane, start, end))
+        found.append(LevelStretch(-1, lane, start, end))
     return sorted(found, key=lambda row: (row.level, row.lane, row.start))
 
 
-def cuttings(town: Town, tunnels: Iterable[Stretch]) -> list[Stretch]:
+def cuttings(town: Town, tunnels: Iterable[LevelStretch]) -> list[LevelStretch]:
     """Stretches of lanes in open cuttings: where a road comes down to a tunnel and where it goes up again."""
     pieces: list[tuple[int, float, float]] = []
     for part in tunnels:
         for station, direction in ((part.start, -1.0), (part.end, 1.0)):
             pieces += _walk(town, part.lane, station, direction, _CUTTING, -1.0)
-    return [Stretch(0, *piece) for piece in _merged(pieces)]
+    return [LevelStretch(0, *piece) for piece in _merged(pieces)]
 
 
-def _crossings(samples: Samples) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _crossings(samples: TownSamples) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Pairs of samples of which the second lies above the first: two index arrays (m,)."""
     pairs = cKDTree(samples.centre[:, :2]).query_pairs(_NEAR, output_type="ndarray")
     z = samples.centre[:, 2]
@@ -74,7 +74,7 @@ def _crossings(samples: Samples) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return pairs[over, 0], pairs[over, 1]
 
 
-def _raised(town: Town, samples: Samples, lower: NDArray[np.int64], upper: NDArray[np.int64]) -> list[Stretch]:
+def _raised(town: Town, samples: TownSamples, lower: NDArray[np.int64], upper: NDArray[np.int64]) -> list[LevelStretch]:
     z = samples.centre[:, 2]
     level = np.zeros(len(z), dtype=np.int64)
     order = np.argsort(z[upper], kind="stable")
@@ -84,12 +84,12 @@ def _raised(town: Town, samples: Samples, lower: NDArray[np.int64], upper: NDArr
     for height in np.unique(level[level > 0]).tolist():
         own = level[upper] == height
         for lane, start, end in _merged(_grown(town, samples, upper[own], z[lower[own]] + CLEARANCE)):
-            found.append(Stretch(height, lane, start, end))
+            found.append(LevelStretch(height, lane, start, end))
     return found
 
 
 def _covered(
-    town: Town, samples: Samples, lower: NDArray[np.int64], upper: NDArray[np.int64]
+    town: Town, samples: TownSamples, lower: NDArray[np.int64], upper: NDArray[np.int64]
 ) -> Iterator[tuple[int, float, float]]:
     """What lies under streets as (lane, start, end): exact for straight roads, whatever the places of the samples."""
     offset = samples.centre[lower, :2] - samples.centre[upper, :2]
@@ -109,7 +109,7 @@ def _covered(
                 yield link.target, 0.0, min(town.lanes[link.target].length, float(end) - length)
 
 
-def _grown(town: Town, samples: Samples, at: NDArray[np.int64], limit: Array) -> Iterator[tuple[int, float, float]]:
+def _grown(town: Town, samples: TownSamples, at: NDArray[np.int64], limit: Array) -> Iterator[tuple[int, float, float]]:
     """The samples of crossings as (lane, start, end), grown along the road while it stays above a limit."""
     for lane in np.unique(samples.lane[at]).tolist():
         own = samples.lane[at] == lane
@@ -160,10 +160,10 @@ def _merged(pieces: Iterable[tuple[int, float, float]]) -> Iterator[tuple[int, f
         yield last
 
 
-class Places:
+class LevelLookup:
     """Tells which world positions lie on some stretches of lanes, heights considered."""
 
-    def __init__(self, samples: Samples, parts: Iterable[Stretch], further: float = 0.0) -> None:
+    def __init__(self, samples: TownSamples, parts: Iterable[LevelStretch], further: float = 0.0) -> None:
         """Takes the stretches, each longer by `further` [m] on either side."""
         keep = np.zeros(len(samples.lane), dtype=bool)
         for part in parts:

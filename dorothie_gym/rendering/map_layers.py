@@ -13,10 +13,10 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import markings
 from dorothie_gym.rendering.borders import Border, Borders, find_borders
 from dorothie_gym.rendering.ground import landscape
-from dorothie_gym.rendering.levels import Places, stretches
+from dorothie_gym.rendering.levels import LevelLookup, stretches
 from dorothie_gym.rendering.markings import lane_arrows
 from dorothie_gym.rendering.medians import find_pockets, held, pocket_paint
-from dorothie_gym.rendering.shapes import Samples, Shape
+from dorothie_gym.rendering.shapes import Shape, TownSamples
 from dorothie_gym.rendering.surfaces import deck, streets
 
 _ASIDE = 1.5  # [m] from the edge of the lane
@@ -86,7 +86,7 @@ def _leftmost(borders: Borders, lanes: frozenset[int], lane: int) -> int:
 _FURTHER = 6.0  # [m] of paint beyond a bridge, as much as its asphalt goes on
 
 
-class Plan:
+class MapLayers:
     """Everything on the map but its words and signs.
 
     Attributes:
@@ -111,12 +111,12 @@ class Plan:
             border: how far the country reaches beyond the streets [m].
         """
         self.town = town
-        self.detail = markings.Detail.at(scale)
+        self.detail = markings.MapDetail.at(scale)
         self._border = border
-        self._samples = samples = Samples.of(town)
+        self._samples = samples = TownSamples.of(town)
         self.borders = borders = find_borders(town, samples)
         self.stretches = stretches(town, samples)
-        self.raised = Places(samples, self.stretches)
+        self.raised = LevelLookup(samples, self.stretches)
         self.stops = markings.stop_stations(town)
         self.ruled = markings.ruled_lanes(town)
         shared = {*borders.right_neighbour, *borders.right_neighbour.values()}
@@ -142,7 +142,7 @@ class Plan:
     def _open_lines(self) -> Iterator[Border]:
         """The lines beside lanes where no street covers them."""
         tunnels = [part for part in self.stretches if part.level < 0]
-        covered = Places(self._samples, tunnels)
+        covered = LevelLookup(self._samples, tunnels)
         for line in self.borders.lines:
             yield from (line.part(run) for run in held(line, covered, wanted=False))
 
@@ -153,10 +153,10 @@ class Plan:
             places = np.zeros((0, 3))
         else:
             places = np.array([[*shape.points.mean(axis=0), shape.height] for shape in paint])
-        hidden = Places(samples, [part for part in self.stretches if part.level < 0]).hold(places)
+        hidden = LevelLookup(samples, [part for part in self.stretches if part.level < 0]).hold(places)
         yield from (shape for shape, under in zip(paint, hidden.tolist(), strict=True) if not under)
         for level in sorted({part.level for part in self.stretches if part.level > 0}):
             parts = [part for part in self.stretches if part.level == level]
-            yield from deck(self.town, parts, self.borders.lines, Places(samples, parts))
-            above = Places(samples, parts, _FURTHER).hold(places)
+            yield from deck(self.town, parts, self.borders.lines, LevelLookup(samples, parts))
+            above = LevelLookup(samples, parts, _FURTHER).hold(places)
             yield from (shape for shape, over in zip(paint, above.tolist(), strict=True) if over)

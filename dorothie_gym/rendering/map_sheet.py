@@ -15,7 +15,7 @@ from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.borders import BorderKind
 from dorothie_gym.rendering.ground import town_bounds
 from dorothie_gym.rendering.icons import pin_icon, sign_icon, stamp
-from dorothie_gym.rendering.map_layers import Plan
+from dorothie_gym.rendering.map_layers import MapLayers
 from dorothie_gym.rendering.markings import one_way_arrow, one_way_places, turn_arrow
 from dorothie_gym.rendering.text import words
 from dorothie_gym.rendering.town_map import GROUND, MapPainter
@@ -34,7 +34,7 @@ class Legend:
         entries: what it explains, in order: the words and the function that draws the swatch.
     """
 
-    def __init__(self, town: Town, plan: Plan, unit: float) -> None:
+    def __init__(self, town: Town, plan: MapLayers, unit: float) -> None:
         """Finds out what there is to explain; `unit` is what the sheet is measured in [px]."""
         self._unit = unit
         kinds = {border.kind for border in plan.borders.lines}

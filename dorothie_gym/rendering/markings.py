@@ -140,7 +140,7 @@ _LOOK_BACK = 14.0  # [m] of a lane's end in which a crossing moves the stop line
 
 
 @dataclass(frozen=True)
-class Detail:
+class MapDetail:
     """What is worth drawing at a scale.
 
     Attributes:
@@ -154,12 +154,12 @@ class Detail:
     arrows: bool
 
     @classmethod
-    def at(cls, scale: float) -> Detail:
+    def at(cls, scale: float) -> MapDetail:
         """For a picture of a scale [px/m]."""
         return cls(pen=0.8 / scale, fine=scale >= 4.0, arrows=scale >= 2.0)
 
 
-def lines(borders: Iterable[Border], detail: Detail) -> Iterator[Shape]:
+def lines(borders: Iterable[Border], detail: MapDetail) -> Iterator[Shape]:
     """Dashes between lanes of one direction, a double line between the two, solid lines at the edges."""
     for border in borders:
         match border.kind:
@@ -181,7 +181,7 @@ def _dashed(border: Border, width: float) -> Iterator[Shape]:
         yield Shape(stroke(piece[:, :2], width), palette.LANE_LINE, float(piece[:, 2].mean()))
 
 
-def _centre(border: Border, detail: Detail) -> Iterator[Shape]:
+def _centre(border: Border, detail: MapDetail) -> Iterator[Shape]:
     middle = border.gap / 2.0
     if not detail.fine:
         yield from _solid(border, border.shifted(-middle), max(0.25, detail.pen), palette.CENTRE_LINE)

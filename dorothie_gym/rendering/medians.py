@@ -12,7 +12,7 @@ from dorothie_gym.maps.model import Array, Lane
 from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.borders import Border, BorderKind, Borders
-from dorothie_gym.rendering.levels import Places
+from dorothie_gym.rendering.levels import LevelLookup
 from dorothie_gym.rendering.shapes import Shape, disc, longer, stroke
 
 SHORTEST_MEDIAN = 8.0
@@ -23,7 +23,7 @@ _TREE_SPACING = 11.0  # [m]
 _TREE_ROOM = 2.2  # [m] of median that a tree needs
 
 
-def medians(lines: Iterable[Border], bridges: Places) -> Iterator[Shape]:
+def medians(lines: Iterable[Border], bridges: LevelLookup) -> Iterator[Shape]:
     """The strips between the two directions, each half from its own side: a kerb, grass, and trees where they fit."""
     strips = []
     for line in lines:
@@ -47,7 +47,7 @@ def medians(lines: Iterable[Border], bridges: Places) -> Iterator[Shape]:
                 yield Shape(disc(centre, radius, 16), palette.MEDIAN_TREE)
 
 
-def held(line: Border, places: Places, wanted: bool = True) -> Iterator[NDArray[np.int64]]:
+def held(line: Border, places: LevelLookup, wanted: bool = True) -> Iterator[NDArray[np.int64]]:
     """Index runs of a border that lie on some places, or do not."""
     on = places.hold(line.points) == wanted
     for run in np.split(np.arange(len(on)), np.flatnonzero(np.diff(on.astype(int)) != 0) + 1):

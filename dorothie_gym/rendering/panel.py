@@ -8,7 +8,7 @@ from dorothie_gym.ontology import Role
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.aerial import weather_summary
 from dorothie_gym.rendering.palette import Colour
-from dorothie_gym.rendering.scene import Line, Scene
+from dorothie_gym.rendering.scene import Scene, SpokenLine
 from dorothie_gym.rendering.text import shorten, words, wrap
 
 _FINE = 2  # drawn so much larger, then scaled down: smooth edges
@@ -123,7 +123,7 @@ class Panel:
 class _Bubble:
     """One thing said, laid out: its speaker and time above the words, its acts below."""
 
-    def __init__(self, line: Line, room: int) -> None:
+    def __init__(self, line: SpokenLine, room: int) -> None:
         self.name, self.colour, self.side = _SPEAKERS[line.speaker]
         self.line, self.room = line, room
         widest = int(room * (0.8 if self.side != 0.5 else 0.92)) - 24

@@ -13,7 +13,7 @@ from dorothie_gym.maps import Town
 from dorothie_gym.ontology import DialogueAct, PhysicalAction, Role, parse_landmark
 from dorothie_gym.recording import FRAME_RATE, ActorKind, EventType, Session
 from dorothie_gym.recording.header import LandmarkRow
-from dorothie_gym.rendering.scene import Actor, CarView, Line, Pin, Scene, State
+from dorothie_gym.rendering.scene import Actor, CarView, Pin, Scene, SpokenLine, SubgoalState
 
 _KINDS: Final = {
     int(ActorKind.VEHICLE): "vehicle",
@@ -23,7 +23,7 @@ _KINDS: Final = {
     int(ActorKind.OTHER): "prop",
 }
 
-_STATES: Final[dict[str, State]] = {
+_STATES: Final[dict[str, SubgoalState]] = {
     "complete": "complete", "abandoned": "abandoned", "ongoing": "ongoing", "pending": "pending",
 }  # fmt: skip
 
@@ -135,7 +135,7 @@ class Playback:
             after = {int(row["key"]): row for row in table.rows[table.offsets[k + 1] : table.offsets[k + 2]]}
         return [_actor(row, after.get(int(row["key"]), row), share) for row in here]
 
-    def _goals(self, frame: int) -> dict[int, tuple[str, State]]:
+    def _goals(self, frame: int) -> dict[int, tuple[str, SubgoalState]]:
         """Words and state of the subgoals that are tasks at a frame, by number."""
         subgoals = self._session.header.subgoals
         told: dict[int, tuple[str, str]] = {}
@@ -144,7 +144,7 @@ class Playback:
             if event.frame <= frame and isinstance(number, int) and 0 <= number < len(subgoals):
                 told[number] = str(event.data.get("status", "")).lower(), str(event.data.get("cause", ""))
         reached = {number for number, (status, _) in told.items() if status == "complete"}
-        goals: dict[int, tuple[str, State]] = {}
+        goals: dict[int, tuple[str, SubgoalState]] = {}
         for number, row in enumerate(subgoals):
             status, cause = told.get(number, ("", ""))
             if row["trigger"] and not status:
@@ -194,10 +194,10 @@ def _waypoint(row: LandmarkRow, town: Town) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def _lines(session: Session) -> list[Line]:
+def _lines(session: Session) -> list[SpokenLine]:
     """Everything that is said, in order of time."""
     lines = [
-        Line(
+        SpokenLine(
             time=said.start,
             speaker=said.speaker,
             text=said.text,
@@ -206,7 +206,7 @@ def _lines(session: Session) -> list[Line]:
         for said in session.utterances()
     ]
     lines += [
-        Line(time=event.time, speaker=Role.AD_WIZARD, text=str(event.data.get("text", "")))
+        SpokenLine(time=event.time, speaker=Role.AD_WIZARD, text=str(event.data.get("text", "")))
         for event in session.of_type(EventType.MESSAGE)
     ]
     return sorted(lines, key=lambda line: line.time)

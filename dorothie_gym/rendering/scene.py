@@ -13,7 +13,7 @@ from dorothie_gym.maps import Town
 from dorothie_gym.ontology import Role
 
 ActorKind: TypeAlias = Literal["vehicle", "cyclist", "pedestrian", "prop"]
-State: TypeAlias = Literal["none", "pending", "ongoing", "complete", "abandoned"]
+SubgoalState: TypeAlias = Literal["none", "pending", "ongoing", "complete", "abandoned"]
 
 
 def _no_points() -> NDArray[np.float64]:
@@ -57,16 +57,16 @@ class Pin:
     x: float
     y: float
     waypoint: tuple[float, float]
-    state: State = "none"
+    state: SubgoalState = "none"
     hidden: bool = False
 
     def __post_init__(self) -> None:
-        if self.state not in get_args(State):
-            raise ValueError(f"Pin.state: {self.state!r} is none of {', '.join(get_args(State))}")
+        if self.state not in get_args(SubgoalState):
+            raise ValueError(f"Pin.state: {self.state!r} is none of {', '.join(get_args(SubgoalState))}")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line:
+class SpokenLine:
     """Something said: when [s], by whom, the words, and the dialogue acts in short."""
 
     time: float
@@ -103,8 +103,8 @@ class Scene:
     waypoints: NDArray[np.float64] = field(default_factory=_no_points)
     others: Sequence[Actor] = ()
     landmarks: Sequence[Pin] = ()
-    subgoals: Sequence[tuple[str, State]] = ()
-    utterances: Sequence[Line] = ()
+    subgoals: Sequence[tuple[str, SubgoalState]] = ()
+    utterances: Sequence[SpokenLine] = ()
     notes: Sequence[str] = ()
     weather: Mapping[str, float] = field(default_factory=dict)
     caption: str = ""

@@ -192,7 +192,7 @@ STEP = 2.0  # [m] between samples, at most
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class TownSamples:
     """Places on lanes, lane after lane and along each.
 
     Attributes:
@@ -212,7 +212,7 @@ class Samples:
     bounds: NDArray[np.int64]
 
     @classmethod
-    def of(cls, town: Town) -> Samples:
+    def of(cls, town: Town) -> TownSamples:
         """Samples every lane of a town about every two metres, its ends included."""
         columns: list[list[Array]] = [[], [], [], []]
         owners, bounds, count = [], [], 0

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.model import Array, Lane
 from dorothie_gym.rendering.borders import Border
-from dorothie_gym.rendering.map_layers import Plan
+from dorothie_gym.rendering.map_layers import MapLayers
 from dorothie_gym.rendering.markings import ARROW_LENGTH
 from dorothie_gym.rendering.medians import pocket_places
 from dorothie_gym.rendering.shapes import sample, side_line
@@ -21,7 +21,7 @@ from dorothie_gym.rendering.street_axes import Axis, across_junctions, beside_ax
 from dorothie_gym.rendering.text import font
 
 
-class Level(enum.IntEnum):
+class LabelClearance(enum.IntEnum):
     """What a name has to keep clear of: less and less, but always of bridges, pins and signs."""
 
     ALL = 0
@@ -41,7 +41,7 @@ _CELL = 8  # nearest circles that are looked at
 class Obstacles:
     """Circles [px] that names keep clear of, by kind and by level."""
 
-    def __init__(self, plan: Plan, scale: float, origin: Array, fixed: Array) -> None:
+    def __init__(self, plan: MapLayers, scale: float, origin: Array, fixed: Array) -> None:
         """Finds them on a plan; `fixed` are circles (n, 3) [px] that count on all levels."""
         lanes = plan.town.lanes
 
@@ -69,16 +69,16 @@ class Obstacles:
         crossings = [_around((crossing.outline - origin) * scale) for crossing in plan.town.crosswalks]
         paint = np.concatenate((fixed, tunnels, bars, np.array(crossings).reshape(-1, 3)))
         self._levels = {
-            Level.ALL: (paint, arrows, junctions),
-            Level.ARROWS_HIDDEN: (paint, junctions),
-            Level.JUNCTIONS_TOUCHED: (paint, junctions * np.array([1.0, 1.0, _NARROW])),
-            Level.JUNCTIONS_CROSSED: (paint, arrows),
-            Level.FIXED_ALONE: (fixed,),
-            Level.OFF_ROAD: (fixed, circles((lane, 0.0, lane.length) for lane in lanes)[:, :3]),
+            LabelClearance.ALL: (paint, arrows, junctions),
+            LabelClearance.ARROWS_HIDDEN: (paint, junctions),
+            LabelClearance.JUNCTIONS_TOUCHED: (paint, junctions * np.array([1.0, 1.0, _NARROW])),
+            LabelClearance.JUNCTIONS_CROSSED: (paint, arrows),
+            LabelClearance.FIXED_ALONE: (fixed,),
+            LabelClearance.OFF_ROAD: (fixed, circles((lane, 0.0, lane.length) for lane in lanes)[:, :3]),
         }
-        self._circles: dict[Level, _Circles] = {}
+        self._circles: dict[LabelClearance, _Circles] = {}
 
-    def clearance(self, axis: Axis, level: Level) -> Array:
+    def clearance(self, axis: Axis, level: LabelClearance) -> Array:
         """Distance (n,) [px] from the points of an axis to the nearest obstacle of a level."""
         if level not in axis.clear:
             if level not in self._circles:
@@ -107,14 +107,14 @@ class _Circles:
         return np.asarray(free.min(axis=1))
 
 
-def _arrow_stretches(plan: Plan) -> Iterator[tuple[Lane, float, float]]:
+def _arrow_stretches(plan: MapLayers) -> Iterator[tuple[Lane, float, float]]:
     """Stretches of lanes that arrows take."""
     for arrow in plan.arrows if plan.detail.arrows else ():
         lane = plan.town.lanes[arrow.lane]
         yield lane, arrow.station, min(arrow.station + ARROW_LENGTH, lane.length)
 
 
-def _stop_stretches(plan: Plan) -> Iterator[tuple[Lane, float, float]]:
+def _stop_stretches(plan: MapLayers) -> Iterator[tuple[Lane, float, float]]:
     """Stretches of lanes that stop lines take."""
     for number in plan.ruled:
         lane = plan.town.lanes[number]
@@ -158,7 +158,7 @@ class _Manner:
     """
 
     size: int
-    level: Level
+    level: LabelClearance
     forced: bool = False
     across: bool = False
     bent: float = 0.9
@@ -224,7 +224,7 @@ class LabelPlacer:
     placed: list[Label] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
 
-    def place(self, plan: Plan, fixed: Array) -> list[Label]:
+    def place(self, plan: MapLayers, fixed: Array) -> list[Label]:
         """Sets every name at least once where its street can be seen, and again where it is long.
 
         Streets with the least room come first. A name first gives way to all markings, then hides arrows, then gets
@@ -258,23 +258,23 @@ class LabelPlacer:
         manners = [
             _Manner(size=size, level=level)
             for part in (sizes[:2], sizes[2:4], sizes[4:])
-            for level in (Level.ALL, Level.ARROWS_HIDDEN)
+            for level in (LabelClearance.ALL, LabelClearance.ARROWS_HIDDEN)
             for size in part
         ]
         manners += [
             _Manner(size=size, level=level, rows=2, bent=0.3)
             for size in sizes
-            for level in (Level.ALL, Level.ARROWS_HIDDEN)
+            for level in (LabelClearance.ALL, LabelClearance.ARROWS_HIDDEN)
         ]
         manners += [
             _Manner(size=size, level=level, forced=True, bent=bent)
             for size, bent in ((small, 0.9), (small, 1.8), (tiny, 1.8))
-            for level in (Level.ALL, Level.ARROWS_HIDDEN)
+            for level in (LabelClearance.ALL, LabelClearance.ARROWS_HIDDEN)
         ]
         manners += [
-            _Manner(size=small, level=Level.JUNCTIONS_TOUCHED, forced=True, bent=1.2),
-            _Manner(size=small, level=Level.JUNCTIONS_CROSSED, forced=True, across=True, bent=0.3),
-            _Manner(size=tiny, level=Level.JUNCTIONS_TOUCHED, forced=True, bent=1.8),
+            _Manner(size=small, level=LabelClearance.JUNCTIONS_TOUCHED, forced=True, bent=1.2),
+            _Manner(size=small, level=LabelClearance.JUNCTIONS_CROSSED, forced=True, across=True, bent=0.3),
+            _Manner(size=tiny, level=LabelClearance.JUNCTIONS_TOUCHED, forced=True, bent=1.8),
         ]
         return any(self._set(street, manner) for manner in manners)
 
@@ -289,9 +289,9 @@ class LabelPlacer:
     def _set_beside(self, street: int, lines: Sequence[Border]) -> bool:
         small = self.sizes[1]
         for size, level in (
-            (small, Level.OFF_ROAD),
-            (round(_TINY * small), Level.OFF_ROAD),
-            (small, Level.FIXED_ALONE),
+            (small, LabelClearance.OFF_ROAD),
+            (round(_TINY * small), LabelClearance.OFF_ROAD),
+            (small, LabelClearance.FIXED_ALONE),
         ):
             more = font(size, bold=True).size(self.names[street])[0] * _LONGER / 2.0
             axes = list(beside_axes(lines, street, self.scale, self.origin, _ASIDE * self.scale + _HALF * size, more))
@@ -307,11 +307,15 @@ class LabelPlacer:
         large, small = first.size, max(self.sizes[1], round(_REPEATED * first.size))
         forced, rows = first.size <= self.sizes[1] and len(first.rows) == 1, len(first.rows)
         for size in dict.fromkeys((large, small)):
-            while self._set(street, _Manner(size=size, level=Level.ALL, forced=forced, rows=rows), self.spacing):
+            while self._set(
+                street, _Manner(size=size, level=LabelClearance.ALL, forced=forced, rows=rows), self.spacing
+            ):
                 pass
         farthest = max(self.farthest, self.spacing)
         for size in dict.fromkeys((large, small, self.sizes[1])):
-            while self._set(street, _Manner(size=size, level=Level.ARROWS_HIDDEN, forced=forced, rows=rows), farthest):
+            while self._set(
+                street, _Manner(size=size, level=LabelClearance.ARROWS_HIDDEN, forced=forced, rows=rows), farthest
+            ):
                 pass
 
     def _tell(self, axes: Iterable[Axis]) -> None:

@@ -14,10 +14,10 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.borders import Border, BorderKind
 from dorothie_gym.rendering.ground import junction_areas
-from dorothie_gym.rendering.levels import Places, Stretch, cuttings
+from dorothie_gym.rendering.levels import LevelLookup, LevelStretch, cuttings
 from dorothie_gym.rendering.medians import Pocket, flat_strip, held, medians, pocket_grounds
 from dorothie_gym.rendering.palette import Colour
-from dorothie_gym.rendering.shapes import Samples, Shape, cut, disc, polyline_length, ribbon, side_line, strokes
+from dorothie_gym.rendering.shapes import Shape, TownSamples, cut, disc, polyline_length, ribbon, side_line, strokes
 from dorothie_gym.rendering.tunnels import portals, tunnel_floors, walls
 
 _EDGE = 0.15  # [m]
@@ -121,7 +121,11 @@ _FURTHER = 6.0  # [m] of asphalt beyond a bridge: lanes side by side do not star
 
 
 def streets(
-    town: Town, samples: Samples, lines: Sequence[Border], parts: Sequence[Stretch], turn_lanes: Sequence[Pocket]
+    town: Town,
+    samples: TownSamples,
+    lines: Sequence[Border],
+    parts: Sequence[LevelStretch],
+    turn_lanes: Sequence[Pocket],
 ) -> Iterator[Shape]:
     """Everything on the ground, from the pavements to the medians; what lies in tunnels comes first.
 
@@ -133,8 +137,8 @@ def streets(
         turn_lanes: the beginnings of turn lanes.
     """
     tunnels = [part for part in parts if part.level < 0]
-    covered = Places(samples, tunnels)
-    yield from walls(lines, Places(samples, cuttings(town, tunnels)), covered)
+    covered = LevelLookup(samples, tunnels)
+    yield from walls(lines, LevelLookup(samples, cuttings(town, tunnels)), covered)
     yield from tunnel_floors(town, tunnels, lines, covered)
     pieces = list(_open_pieces(town, tunnels))
     areas = junction_areas(town)
@@ -157,16 +161,16 @@ def streets(
     yield from pocket_grounds(town, turn_lanes)
     # Grass goes on below the ends of bridges: those of lanes side by side are not at the same place.
     shorter = [_longer(part, -_FURTHER) for part in parts if part.level > 0]
-    yield from medians(lines, Places(samples, [*shorter, *(_longer(part, _BEFORE_PORTAL) for part in tunnels)]))
+    yield from medians(lines, LevelLookup(samples, [*shorter, *(_longer(part, _BEFORE_PORTAL) for part in tunnels)]))
     yield from portals(town, tunnels)
 
 
-def _longer(part: Stretch, more: float) -> Stretch:
+def _longer(part: LevelStretch, more: float) -> LevelStretch:
     """A stretch that begins and ends so much further out [m]."""
     return replace(part, start=part.start - more, end=part.end + more)
 
 
-def deck(town: Town, parts: Sequence[Stretch], lines: Iterable[Border], places: Places) -> Iterator[Shape]:
+def deck(town: Town, parts: Sequence[LevelStretch], lines: Iterable[Border], places: LevelLookup) -> Iterator[Shape]:
     """The bridges of one level: their shadow on what lies below, the parapets, and the asphalt.
 
     Args:
@@ -194,9 +198,9 @@ def deck(town: Town, parts: Sequence[Stretch], lines: Iterable[Border], places: 
                 yield Shape(ribbon(lane, margin, *reach), colour)
 
 
-def _open_pieces(town: Town, tunnels: Sequence[Stretch]) -> Iterator[tuple[Lane, float, float]]:
+def _open_pieces(town: Town, tunnels: Sequence[LevelStretch]) -> Iterator[tuple[Lane, float, float]]:
     """Lanes, or what of them lies not in tunnels."""
-    hidden: dict[int, list[Stretch]] = defaultdict(list)
+    hidden: dict[int, list[LevelStretch]] = defaultdict(list)
     for part in tunnels:
         hidden[part.lane].append(part)
     for lane in town.lanes:
@@ -224,7 +228,7 @@ def _layer(
             yield from rim(np.concatenate((outline, outline[:1])), margin, colour)
 
 
-def _bays(town: Town, samples: Samples) -> Iterator[Shape]:
+def _bays(town: Town, samples: TownSamples) -> Iterator[Shape]:
     """A lay-by at every landmark site where there is room beside the lane, and a path from it to the site."""
     tree = cKDTree(samples.centre[:, :2])
     for site in town.sites:

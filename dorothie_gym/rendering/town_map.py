@@ -15,7 +15,7 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.ground import town_bounds
 from dorothie_gym.rendering.icons import lamp_colour, pin_icon, sign_icon, stamp
-from dorothie_gym.rendering.map_layers import Plan
+from dorothie_gym.rendering.map_layers import MapLayers
 from dorothie_gym.rendering.markings import ARROW_LENGTH, one_way_arrow, one_way_places, stop_bar
 from dorothie_gym.rendering.medians import FACING, pocket_places
 from dorothie_gym.rendering.shapes import Shape, longer, strokes
@@ -94,7 +94,7 @@ class MapPainter:
             np.array([x0, y0]) - (np.array([left, top]) + (room - extent * self.scale) / 2.0) / self.scale
         )
         border = float(max(size)) / self.scale / 3.0 if border is None else border
-        self.plan = Plan(town, scale=self.scale, border=border)
+        self.plan = MapLayers(town, scale=self.scale, border=border)
         self._pins = _sized(_PIN, self.scale, 0.7 * smallest_sign) if numbered else 0
         self._signs = _sized(_SIGN, self.scale, smallest_sign)
         placer = LabelPlacer(

@@ -11,7 +11,7 @@ from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.borders import Border, BorderKind
-from dorothie_gym.rendering.levels import Places, Stretch
+from dorothie_gym.rendering.levels import LevelLookup, LevelStretch
 from dorothie_gym.rendering.medians import flat_strip, held
 from dorothie_gym.rendering.shapes import (
     Shape,
@@ -34,7 +34,7 @@ _JITTER = 2.0  # [m] between the places at which borders are known
 _ABREAST = 14.0  # [m] between lanes that go through one portal
 
 
-def walls(lines: Iterable[Border], deep: Places, covered: Places) -> Iterator[Shape]:
+def walls(lines: Iterable[Border], deep: LevelLookup, covered: LevelLookup) -> Iterator[Shape]:
     """Slopes beside roads in cuttings, hachured from their upper edges, broader where they are deeper."""
     for line in lines:
         if line.kind is not BorderKind.EDGE:
@@ -65,7 +65,9 @@ def _runs(wanted: NDArray[np.bool_]) -> Iterator[NDArray[np.int64]]:
             yield run
 
 
-def tunnel_floors(town: Town, parts: Sequence[Stretch], lines: Sequence[Border], covered: Places) -> Iterator[Shape]:
+def tunnel_floors(
+    town: Town, parts: Sequence[LevelStretch], lines: Sequence[Border], covered: LevelLookup
+) -> Iterator[Shape]:
     """Light asphalt with broken edges between walls: what is seen of a road that runs under a street.
 
     Args:
@@ -88,7 +90,7 @@ def tunnel_floors(town: Town, parts: Sequence[Stretch], lines: Sequence[Border],
                     yield from (Shape(outline, palette.TUNNEL_EDGE) for outline in strokes(piece, 0.6))
 
 
-def portals(town: Town, parts: Sequence[Stretch]) -> Iterator[Shape]:
+def portals(town: Town, parts: Sequence[LevelStretch]) -> Iterator[Shape]:
     """The walls over the mouths of tunnels: one for all lanes side by side, straight across them."""
     mouths = []
     for part in parts:

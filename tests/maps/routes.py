@@ -9,7 +9,7 @@ import pytest
 
 from dorothie_gym.maps import Junction, Lane, LaneLink, LinkType, Town
 from dorothie_gym.maps.lane_neighbours import oncoming_lanes
-from dorothie_gym.maps.routing import CHANGE_LENGTH, SHORT_CHANGE, Entry, Leg, Route, router
+from dorothie_gym.maps.routing import CHANGE_LENGTH, SHORT_CHANGE, LaneEntry, Leg, Route, router
 from dorothie_gym.maps.routing_graph import CHANGE_LEAD, SHARED, U_TURN_LENGTH, U_TURN_REST
 from dorothie_gym.sim.ego.planner import LocalPlanner
 
@@ -17,7 +17,7 @@ NAMES = ["brookside", "Town02", "Town05"]
 Place = tuple[int, float]
 Points = list[tuple[float, float]]
 
-SIDE = {Entry.CHANGE_LEFT: LinkType.LANE_CHANGE_LEFT, Entry.CHANGE_RIGHT: LinkType.LANE_CHANGE_RIGHT}
+SIDE = {LaneEntry.CHANGE_LEFT: LinkType.LANE_CHANGE_LEFT, LaneEntry.CHANGE_RIGHT: LinkType.LANE_CHANGE_RIGHT}
 
 
 def small_town(
@@ -100,11 +100,11 @@ def check_drivable(town: Town, route: Route, start: Place, goal: Place) -> None:
     for leg in route.legs[:-1]:
         assert leg.start <= leg.end + 1e-9
     for one, two in itertools.pairwise(route.legs):
-        if two.entry is Entry.FOLLOW:
+        if two.entry is LaneEntry.FOLLOW:
             assert two.lane in [link.target for link in town.successors(one.lane)]
             assert one.end == pytest.approx(town.lanes[one.lane].length)
             assert two.start == 0.0
-        elif two.entry is Entry.U_TURN:
+        elif two.entry is LaneEntry.U_TURN:
             oncoming = oncoming_lanes(town).at(one.lane, one.end)
             assert oncoming is not None
             assert (oncoming.lane, oncoming.station + U_TURN_REST) == (two.lane, pytest.approx(two.start))

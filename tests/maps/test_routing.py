@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from dorothie_gym.maps import LinkType, load_town
 from dorothie_gym.maps.lane_neighbours import oncoming_lanes
-from dorothie_gym.maps.routing import SHORT_CHANGE, Entry, Router, router
+from dorothie_gym.maps.routing import SHORT_CHANGE, LaneEntry, Router, router
 from dorothie_gym.maps.routing_graph import CHANGE_LEAD
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.sim.ego.manoeuvre_lanes import LEAD, MIN_SWITCH
@@ -106,7 +106,7 @@ def test_a_roadblock_is_driven_round_on_the_lane_beside() -> None:
     town = two_lanes(300.0)
     route = Router(town).route((1, 30.0), (1, 280.0), [(1, 150.0)])
     assert route is not None
-    assert [leg.entry for leg in route.legs] == [Entry.FOLLOW, Entry.CHANGE_LEFT, Entry.CHANGE_RIGHT]
+    assert [leg.entry for leg in route.legs] == [LaneEntry.FOLLOW, LaneEntry.CHANGE_LEFT, LaneEntry.CHANGE_RIGHT]
     assert route.legs[0].end < 140.0
     assert route.legs[2].start > 160.0
     check_drivable(town, route, (1, 30.0), (1, 280.0))
@@ -134,7 +134,7 @@ def test_a_turn_lane_is_reached_by_a_change_that_the_planner_makes(pocket: float
     route = Router(town).route(start, goal)
     assert route is not None
     assert route.lanes == (0, 1, 2, 4, 6)
-    assert [leg.entry for leg in route.legs][2] is Entry.CHANGE_LEFT
+    assert [leg.entry for leg in route.legs][2] is LaneEntry.CHANGE_LEFT
     check_drivable(town, route, start, goal)
     change, turn = route.turns(town)
     assert (change.type, turn.type, turn.angle) == (LinkType.LANE_CHANGE_LEFT, LinkType.LEFT, 90)
@@ -162,9 +162,9 @@ def test_two_lanes_are_changed_within_a_turn_lane_of_usual_length() -> None:
     route = Router(town).route((0, 5.0), (4, 40.0))
     assert route is not None
     assert [leg.entry for leg in route.legs] == [
-        *(Entry.FOLLOW, Entry.FOLLOW),
-        *(Entry.CHANGE_LEFT, Entry.CHANGE_LEFT),
-        Entry.FOLLOW,
+        *(LaneEntry.FOLLOW, LaneEntry.FOLLOW),
+        *(LaneEntry.CHANGE_LEFT, LaneEntry.CHANGE_LEFT),
+        LaneEntry.FOLLOW,
     ]
     check_drivable(town, route, (0, 5.0), (4, 40.0))
 
@@ -239,7 +239,7 @@ def test_who_does_what_a_route_tells_comes_along_its_lanes(name: str) -> None:
             while lanes[-1] != instruction.lane:
                 (only,) = town.successors(lanes[-1])
                 lanes.append(only.target)
-            if instruction.entry is Entry.FOLLOW:
+            if instruction.entry is LaneEntry.FOLLOW:
                 (way,) = [way for way in town.exits(lanes[-1]) if way.angle == instruction.angle]
                 assert (way.type, way.junction_id) == (instruction.type, instruction.junction_id)
                 assert (way.lane, town.lanes[way.lane].street) == (instruction.onto, instruction.street)
@@ -248,7 +248,7 @@ def test_who_does_what_a_route_tells_comes_along_its_lanes(name: str) -> None:
                 turned += 1
             else:
                 assert (instruction.angle, instruction.choice) == (
-                    {Entry.CHANGE_LEFT: 90, Entry.CHANGE_RIGHT: -90, Entry.U_TURN: -180}[instruction.entry],
+                    {LaneEntry.CHANGE_LEFT: 90, LaneEntry.CHANGE_RIGHT: -90, LaneEntry.U_TURN: -180}[instruction.entry],
                     True,
                 )
                 lanes.append(instruction.onto)
@@ -256,7 +256,7 @@ def test_who_does_what_a_route_tells_comes_along_its_lanes(name: str) -> None:
             (only,) = town.successors(lanes[-1])
             lanes.append(only.target)
         assert tuple(lanes) == route.lanes
-        crossed = [step.junction_id for step in told if step.entry is Entry.FOLLOW]
+        crossed = [step.junction_id for step in told if step.entry is LaneEntry.FOLLOW]
         assert tuple(number for number, _ in itertools.groupby(crossed)) == route.junctions(town)
         distances = [step.distance for step in told]
         assert distances == sorted(distances)

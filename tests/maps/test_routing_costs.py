@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from dorothie_gym.maps import Lane, LinkType, Town
-from dorothie_gym.maps.routing import CHANGE_COST, TURN_COST, Entry, Router, router
-from dorothie_gym.maps.routing_graph import SPEEDS, USUAL_SPEED, CellGraph, Moves
+from dorothie_gym.maps.routing import CHANGE_COST, TURN_COST, LaneEntry, Router, router
+from dorothie_gym.maps.routing_graph import SPEEDS, USUAL_SPEED, CellGraph, RoutingEdges
 from tests.maps.routes import Points, pairs, small_town, two_lanes
 from tests.sim.driving import network
 
 
-def bellman_ford(moves: Moves, source: int) -> dict[int, float]:
+def bellman_ford(moves: RoutingEdges, source: int) -> dict[int, float]:
     edges = list(zip(moves.source.tolist(), moves.target.tolist(), moves.cost.tolist(), strict=True))
     cost = {source: 0.0}
     changed = True
@@ -30,7 +30,7 @@ def test_costs_are_those_of_a_plain_search() -> None:
     search, graph = Router(town), CellGraph(town)
     for start, goal in pairs(town, 6, seed=3):
         ends = [graph.departures(start, goal, ()), graph.arrivals(goal)]
-        cost = bellman_ford(Moves.join([graph.moves, *ends]), graph.start)
+        cost = bellman_ford(RoutingEdges.join([graph.edges, *ends]), graph.start)
         route = search.route(start, goal)
         assert route is not None
         assert route.cost == pytest.approx(cost[graph.goal])
@@ -47,7 +47,7 @@ def test_distances_to_a_goal_are_the_costs_of_routes_there(name: str) -> None:
         assert route is not None
         # a route may begin with a U-turn or lane change at once, where the table counts from the middle of the cell on
         assert route.cost <= distances[search.cell(lane.id, 0.0)] + 1e-6
-        if len(route.legs) > 1 and route.legs[1].entry is Entry.FOLLOW:
+        if len(route.legs) > 1 and route.legs[1].entry is LaneEntry.FOLLOW:
             assert route.cost == pytest.approx(distances[search.cell(lane.id, 0.0)])
 
 
@@ -164,7 +164,7 @@ def test_a_lane_change_costs_its_worth_in_detour() -> None:
     town = two_lanes(200.0)
     route = Router(town).route((1, 10.0), (0, 190.0))
     assert route is not None
-    assert [leg.entry for leg in route.legs] == [Entry.FOLLOW, Entry.CHANGE_LEFT]
+    assert [leg.entry for leg in route.legs] == [LaneEntry.FOLLOW, LaneEntry.CHANGE_LEFT]
     assert route.length == pytest.approx(180.0)
     assert route.cost == pytest.approx(180.0 + CHANGE_COST, abs=1.0)
 

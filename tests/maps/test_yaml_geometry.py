@@ -10,15 +10,15 @@ from dorothie_gym.maps.yaml.courses import STEEPEST, height_profile
 from dorothie_gym.maps.yaml.geometry import (
     CHORD_ERROR,
     CLOSEST,
-    Path,
-    Piece,
+    Curve,
+    CurveSegment,
     bend_stations,
     connect,
     line,
     rounded,
 )
 
-RIGHT_ARC = Piece(0.0, 0.0, 0.0, 10.0 * math.pi / 2.0, 0.1)
+RIGHT_ARC = CurveSegment(0.0, 0.0, 0.0, 10.0 * math.pi / 2.0, 0.1)
 HOOK = rounded([(0.0, 0.0), (60.0, 0.0), (60.0, 50.0), (0.0, 50.0)], [20.0, 10.0])
 
 
@@ -55,7 +55,7 @@ def test_stations_of_bends_are_the_middles_of_their_arcs() -> None:
 
 
 def test_no_two_samples_are_nearly_the_same_place() -> None:
-    path = Path((line((0.0, 0.0), (0.02, 0.0)), Piece(0.02, 0.0, 0.0, 8.0, 0.1)))
+    path = Curve((line((0.0, 0.0), (0.02, 0.0)), CurveSegment(0.02, 0.0, 0.0, 8.0, 0.1)))
     points, _ = path.sample()
     assert np.hypot(*np.diff(points, axis=0).T).min() >= CLOSEST
     assert points[0] == pytest.approx((0.0, 0.0)) and points[-1] == pytest.approx(path.end[:2])
@@ -88,7 +88,7 @@ def test_a_connection_between_lines_that_meet_does_not_swing_out(before: float, 
 
 @given(radius=st.floats(5.5, 500.0), angle=st.floats(0.1, 3.0))
 def test_chords_stay_within_a_centimetre_of_their_arc(radius: float, angle: float) -> None:
-    points, _ = Path((Piece(0.0, 0.0, 0.0, radius * angle, 1.0 / radius),)).sample()
+    points, _ = Curve((CurveSegment(0.0, 0.0, 0.0, radius * angle, 1.0 / radius),)).sample()
     middles = (points[:-1] + points[1:]) / 2.0
     assert np.max(radius - np.hypot(middles[:, 0], middles[:, 1] - radius)) <= CHORD_ERROR + 1e-9
 

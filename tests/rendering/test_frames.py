@@ -10,7 +10,7 @@ from dorothie_gym.maps import Town, load_town
 from dorothie_gym.ontology import Role
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.frames import HumanWindow, SceneRenderer
-from dorothie_gym.rendering.scene import Actor, CarView, Line, Pin, Scene
+from dorothie_gym.rendering.scene import Actor, CarView, Pin, Scene, SpokenLine
 
 SIZE = (1280, 800)
 
@@ -47,10 +47,10 @@ def scene(town: Town) -> Scene:
         landmarks=[Pin(label="KFC", x=site.position[0], y=site.position[1], waypoint=site.waypoint, state="ongoing")],
         subgoals=[("Fetch lunch at the KFC.", "ongoing")],
         utterances=[
-            Line(time=3.0, speaker=Role.PARTICIPANT, text="To the KFC, please.", acts="Instruct(KFC)"),
-            Line(time=5.0, speaker=Role.CO_WIZARD, text="Okay.", acts="Acknowledge"),
-            Line(time=60.0, speaker=Role.AD_WIZARD, text="It starts to rain."),
-            Line(time=70.0, speaker=Role.AGENT, text="Stopped for a pedestrian."),
+            SpokenLine(time=3.0, speaker=Role.PARTICIPANT, text="To the KFC, please.", acts="Instruct(KFC)"),
+            SpokenLine(time=5.0, speaker=Role.CO_WIZARD, text="Okay.", acts="Acknowledge"),
+            SpokenLine(time=60.0, speaker=Role.AD_WIZARD, text="It starts to rain."),
+            SpokenLine(time=70.0, speaker=Role.AGENT, text="Stopped for a pedestrian."),
         ],
         notes=["Hazard stop"],
         caption="Lunch",
@@ -125,8 +125,8 @@ def test_speakers_have_their_own_bubbles(renderer: SceneRenderer, scene: Scene) 
 
 
 def test_a_long_conversation_keeps_its_end(renderer: SceneRenderer, scene: Scene) -> None:
-    talk = [Line(time=float(k), speaker=Role.CO_WIZARD, text=f"Message number {k}, " * 6) for k in range(60)]
-    last = Line(time=61.0, speaker=Role.PARTICIPANT, text="Stop here.")
+    talk = [SpokenLine(time=float(k), speaker=Role.CO_WIZARD, text=f"Message number {k}, " * 6) for k in range(60)]
+    last = SpokenLine(time=61.0, speaker=Role.PARTICIPANT, text="Stop here.")
     panel = renderer.draw(dataclasses.replace(scene, utterances=[*talk, last]), follow=False)[:, 880:]
     assert count(panel[700:, :60], palette.BUBBLE_PARTICIPANT) > 200
 

@@ -14,7 +14,7 @@ from dorothie_gym.maps import Lane, Street, Town, load_town, town_names
 from dorothie_gym.rendering import MapPainter, palette, town_picture
 from dorothie_gym.rendering.ground import town_bounds
 from dorothie_gym.rendering.icons import pin_icon
-from dorothie_gym.rendering.map_layers import Plan
+from dorothie_gym.rendering.map_layers import MapLayers
 from dorothie_gym.rendering.map_sheet import Legend, sheet_painter, sheet_size
 from dorothie_gym.rendering.street_axes import roadways
 
@@ -202,7 +202,7 @@ def test_the_middle_of_a_road_is_where_its_edges_are_equally_far() -> None:
     town = Town(
         name="uneven", lanes=lanes, links=[], junctions=[], streets=[Street(id=0, name="Elm Street", lanes=(0, 1, 2))]
     )
-    (way,) = roadways(Plan(town).borders)
+    (way,) = roadways(MapLayers(town).borders)
     assert np.allclose(way.width, 10.5, atol=0.2) and np.allclose(way.line[:, 1], 1.75, atol=0.2)
 
 
@@ -229,9 +229,12 @@ def test_the_fold_stands_in_the_title(tmp_path: Path) -> None:
 
 def test_the_legend_explains_what_is_there_and_nothing_else() -> None:
     town = Town(name="plain", lanes=[straight(0, 100.0), straight(1, 100.0, y=3.5)], links=[], junctions=[])
-    assert [text for text, _ in Legend(town, Plan(town), 20.0).entries] == ["one-way street", "lanes of one direction"]
+    assert [text for text, _ in Legend(town, MapLayers(town), 20.0).entries] == [
+        "one-way street",
+        "lanes of one direction",
+    ]
     brookside = load_town("brookside")
-    words = [text for text, _ in Legend(brookside, Plan(brookside), 20.0).entries]
+    words = [text for text, _ in Legend(brookside, MapLayers(brookside), 20.0).entries]
     assert {"landmark site", "traffic light", "crosswalk", "ways on from a lane"} <= set(words)
     assert "tunnel" not in words and "bridge" not in words
 

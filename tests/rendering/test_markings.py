@@ -29,7 +29,7 @@ from dorothie_gym.maps import (
 )
 from dorothie_gym.rendering import MapPainter, palette
 from dorothie_gym.rendering.borders import Border, BorderKind
-from dorothie_gym.rendering.map_layers import Plan
+from dorothie_gym.rendering.map_layers import MapLayers
 from dorothie_gym.rendering.markings import ARROW_LENGTH, TURNS, one_way_places
 from dorothie_gym.rendering.shapes import Shape
 
@@ -89,11 +89,11 @@ def approach(kind: SignalKind, crosswalks: Sequence[Crosswalk] = (), programmes:
 
 
 def lines_of(town: Town, kind: BorderKind) -> list[Border]:
-    return [border for border in Plan(town).borders.lines if border.kind is kind]
+    return [border for border in MapLayers(town).borders.lines if border.kind is kind]
 
 
 def painted(town: Town, colour: palette.Colour) -> list[Shape]:
-    return [shape for shape in Plan(town).shapes if shape.colour == colour]
+    return [shape for shape in MapLayers(town).shapes if shape.colour == colour]
 
 
 def colour_at(painter: MapPainter, xy: tuple[float, float], time: float | None = None) -> tuple[int, ...]:
@@ -132,7 +132,7 @@ def test_grass_grows_between_directions_that_lie_apart() -> None:
 
 def test_arrows_show_every_way_on_and_no_other() -> None:
     town = load_town("brookside")
-    arrows = Plan(town).arrows
+    arrows = MapLayers(town).arrows
     ends = {lane.id for lane in town.lanes if not lane.in_junction and len(town.exits(lane.id)) > 1}
     assert {arrow.shows for arrow in arrows} >= {k for k in ends if town.lanes[k].length > 20.0}
     for arrow in arrows:
@@ -197,7 +197,7 @@ def test_a_light_of_the_left_lane_alone_stands_on_its_left() -> None:
         Signal(id=k, kind=SignalKind.TRAFFIC_LIGHT, position=(80.0, 9.0, 3.0), heading=0.0, lanes=(k,)) for k in (0, 1)
     ]
     junctions = [Junction(id=5, position=(70.0, 1.75), connectors=(2, 3))]
-    posts = Plan(town_of(*lanes, links=links, junctions=junctions, signals=signals)).posts
+    posts = MapLayers(town_of(*lanes, links=links, junctions=junctions, signals=signals)).posts
     assert {post.lanes: post.at[1] for post in posts} == pytest.approx({(0,): -3.25, (1,): 6.75})
 
 
@@ -208,12 +208,12 @@ def test_one_way_arrows_stand_on_one_way_streets_alone() -> None:
         road(2, [(0.0, 60.0), (100.0, 60.0)]),
     )
     town = town_of(*lanes)
-    assert {lane for lane, _ in one_way_places(town, Plan(town).borders)} == {2}
+    assert {lane for lane, _ in one_way_places(town, MapLayers(town).borders)} == {2}
 
 
 def test_a_road_deep_under_a_street_is_a_tunnel() -> None:
     town = town_of(road(0, [(0.0, 0.0), (120.0, 0.0)]), road(1, [(60.0, -60.0), (60.0, 60.0)], z=-6.0))
-    plan = Plan(town)
+    plan = MapLayers(town)
     assert [(part.level, part.lane) for part in plan.stretches] == [(-1, 1)]
     painter = MapPainter(town, size=(900, 900))
     assert colour_at(painter, (60.0, 4.0)) == palette.TUNNEL
@@ -236,7 +236,7 @@ def dual_carriageway_under_a_street(angle: float = 0.0) -> Town:
 def test_a_tunnel_is_as_long_as_what_covers_it(angle: float) -> None:
     """The street is 3.5 m wide; its pavements add some metres, and crossing at an angle makes the way longer."""
     town = dual_carriageway_under_a_street(angle)
-    parts = Plan(town).stretches
+    parts = MapLayers(town).stretches
     assert {part.lane for part in parts} == {1, 2, 3, 4}
     for part in parts:
         lane = town.lanes[part.lane]
@@ -258,7 +258,7 @@ def test_slopes_lie_beside_an_open_cutting_and_nowhere_else() -> None:
     slope = {palette.CUTTING, palette.CUTTING_EDGE}
     assert colour_at(painter, (11.6, 30.0)) in slope and colour_at(painter, (-11.6, 30.0)) in slope
     level = town_of(road(0, [(0.0, 0.0), (120.0, 0.0)]), road(1, [(60.0, -60.0), (60.0, 60.0)], z=6.0))
-    assert not slope & {shape.colour for shape in Plan(level).shapes}
+    assert not slope & {shape.colour for shape in MapLayers(level).shapes}
 
 
 def avenue_with_turn_lanes() -> Town:
@@ -281,7 +281,7 @@ def avenue_with_turn_lanes() -> Town:
 
 def test_turn_lanes_that_open_back_to_back_share_a_hatched_island() -> None:
     town = avenue_with_turn_lanes()
-    assert [(pocket.lane, pocket.back) for pocket in Plan(town).pockets] == [(2, 2.0), (7, 2.0)]
+    assert [(pocket.lane, pocket.back) for pocket in MapLayers(town).pockets] == [(2, 2.0), (7, 2.0)]
     hatching = painted(town, palette.HATCHING)
     low = np.min([shape.points.min(axis=0) for shape in hatching], axis=0)
     high = np.max([shape.points.max(axis=0) for shape in hatching], axis=0)
@@ -303,7 +303,7 @@ def test_a_lane_that_grows_from_nothing_has_no_island() -> None:
         lane if lane.id != 2 else road(2, [(62.0, 2.0), (70.0, 0.25), (120.0, 0.25)], widths=(0.1, 3.5, 3.5))
         for lane in town.lanes
     ]
-    assert 2 not in [pocket.lane for pocket in Plan(town_of(*wide, links=town.links)).pockets]
+    assert 2 not in [pocket.lane for pocket in MapLayers(town_of(*wide, links=town.links)).pockets]
 
 
 def test_the_pavement_goes_on_around_a_roundabout() -> None:

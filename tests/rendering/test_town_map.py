@@ -11,7 +11,7 @@ from dorothie_gym.maps import Junction, Lane, LaneLink, LinkType, Signal, Signal
 from dorothie_gym.rendering import MapPainter, palette, town_picture
 from dorothie_gym.rendering.aerial import darkness, weather_summary
 from dorothie_gym.rendering.borders import BorderKind
-from dorothie_gym.rendering.map_layers import Plan
+from dorothie_gym.rendering.map_layers import MapLayers
 from dorothie_gym.rendering.text import font, font_path, shorten, wrap
 
 MAPS = Path(__file__).parents[2] / "../shared/maps"
@@ -57,13 +57,13 @@ def test_road_is_painted_where_the_lanes_are_and_country_elsewhere() -> None:
 
 
 def test_a_line_parts_the_two_directions() -> None:
-    kinds = [border.kind for border in Plan(two_way_street()).borders.lines]
+    kinds = [border.kind for border in MapLayers(two_way_street()).borders.lines]
     assert sorted(kinds) == [BorderKind.CENTRE, BorderKind.EDGE, BorderKind.EDGE]
 
 
 def test_dashes_part_lanes_of_the_same_direction() -> None:
     lanes = [straight(0, (0.0, 0.0), (100.0, 0.0)), straight(1, (0.0, 3.5), (100.0, 3.5))]
-    plan = Plan(Town(name="wide", lanes=lanes, links=[], junctions=[]))
+    plan = MapLayers(Town(name="wide", lanes=lanes, links=[], junctions=[]))
     inner = [border for border in plan.borders.lines if border.kind is BorderKind.LANE]
     assert [(border.lanes, border.sign) for border in inner] == [((1,), -1)]
     assert plan.borders.right_neighbour == {0: 1}
@@ -71,7 +71,7 @@ def test_dashes_part_lanes_of_the_same_direction() -> None:
 
 @pytest.mark.parametrize("upper_first", [True, False])
 def test_the_higher_road_is_painted_over_the_lower(upper_first: bool) -> None:
-    plan = Plan(overpass(upper_first))
+    plan = MapLayers(overpass(upper_first))
     assert [(part.level, part.lane) for part in plan.stretches] == [(1, 0 if upper_first else 1)]
     painter = MapPainter(overpass(upper_first), size=(600, 600))
     along = (0.0, 3.2) if upper_first else (3.2, 0.0)  # just beside the upper road, on the lower one
@@ -135,7 +135,7 @@ def test_a_stop_line_and_an_arrow_stand_before_a_choice() -> None:
     junction = Junction(id=3, position=(66.0, 0.0), connectors=(1, 2))
     stop = Signal(id=0, kind=SignalKind.STOP, position=(59.0, 3.0, 2.0), heading=0.0, lanes=(0,))
     town = Town(name="fork", lanes=lanes, links=links, junctions=[junction], signals=[stop])
-    plan = Plan(town)
+    plan = MapLayers(town)
     bars = [shape for shape in plan.shapes if shape.colour == palette.STOP_LINE]
     assert len(bars) == 1 and bars[0].bounds[2] <= 60.0 and bars[0].bounds[0] > 58.0
     assert [(arrow.shows, arrow.turns) for arrow in plan.arrows] == [(0, (LinkType.STRAIGHT, LinkType.LEFT))]

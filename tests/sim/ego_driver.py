@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from dorothie_gym.maps import Site, Town
-from dorothie_gym.maps.routing import Entry, Leg, router
+from dorothie_gym.maps.routing import LaneEntry, Leg, router
 from dorothie_gym.ontology import ARRIVAL_DISTANCE, PhysicalAction
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.ego_controller import GoalAhead
@@ -24,7 +24,7 @@ FRAMES = 15
 DECISION = FRAMES / FRAME_RATE
 """An instruction is given at most this often [s]."""
 
-STRAIGHT = {Entry.CHANGE_LEFT: 90, Entry.CHANGE_RIGHT: -90}
+STRAIGHT = {LaneEntry.CHANGE_LEFT: 90, LaneEntry.CHANGE_RIGHT: -90}
 
 
 def guided_trip(roads: TownNetwork, start: Site, goal: Site, *, most: float = 1200.0) -> Trip:
@@ -68,7 +68,7 @@ def _next(town: Town, planner: LocalPlanner, goal: Site, speed: float) -> Instru
     route = router(town).route((planner.lane, planner.station), (goal.lane, goal.station))
     assert route is not None, (planner.lane, planner.station, goal)
     for before, leg in zip(route.legs, route.legs[1:], strict=False):
-        if leg.entry is not Entry.FOLLOW:
+        if leg.entry is not LaneEntry.FOLLOW:
             return _aside(planner, before, leg, speed)
         if town.lanes[leg.lane].in_junction and Lanes(town).offers_turns(before.lane):
             (angle,) = (way.angle for way in town.exits(before.lane) if way.connector == leg.lane)
@@ -82,7 +82,7 @@ def _aside(planner: LocalPlanner, before: Leg, leg: Leg, speed: float) -> Instru
     if busy or before.lane != planner.lane:
         return None
     left = before.end - planner.station
-    if leg.entry is Entry.U_TURN:
+    if leg.entry is LaneEntry.U_TURN:
         braking = LEAD + max(speed**2 - U_TURN_SPEED**2, 0.0) / (2.0 * BRAKING)
         return (PhysicalAction.U_TURN, 0) if left <= max(3.0, braking + DECISION * speed) else None
     if left > max(3.0, 0.8 * speed):

@@ -12,7 +12,7 @@ import numpy as np
 from dorothie_gym.baselines.selfplay.heard import Remark, listen
 from dorothie_gym.baselines.selfplay.seat import Mask, Seat, one_hot
 from dorothie_gym.dialogue import Direction, load_lexicon, understand
-from dorothie_gym.maps.routing import Entry, Place
+from dorothie_gym.maps.routing import LaneEntry, Place
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role
 from dorothie_gym.policies.observation_parser import read_landmarks, read_subgoals, scalar
 from dorothie_gym.policies.route_progress import RouteProgress
@@ -22,7 +22,7 @@ ACROSS, FAR, CLOSE = 500.0, 100.0, 10.0
 """Ways are shares of these [m]."""
 
 _DIRECTIONS = tuple(Direction)
-_ENTRIES = (Entry.CHANGE_LEFT, Entry.CHANGE_RIGHT, Entry.U_TURN)
+_ENTRIES = (LaneEntry.CHANGE_LEFT, LaneEntry.CHANGE_RIGHT, LaneEntry.U_TURN)
 
 
 class Phrase(enum.IntEnum):

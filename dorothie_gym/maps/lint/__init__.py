@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from itertools import chain
 
-from dorothie_gym.maps.lint.centre_lines import centre_line_faults, joint_faults
-from dorothie_gym.maps.lint.clearance import space_faults
-from dorothie_gym.maps.lint.connectivity import reach_faults
+from dorothie_gym.maps.lint.centre_lines import centre_line_faults, continuity_faults
+from dorothie_gym.maps.lint.clearance import clearance_faults
+from dorothie_gym.maps.lint.connectivity import connectivity_faults
 from dorothie_gym.maps.lint.fault import Fault, FaultKind
 from dorothie_gym.maps.lint.kerbs import kerb_faults
 from dorothie_gym.maps.lint.samples import sample_lanes
-from dorothie_gym.maps.lint.turn_types import promise_faults
+from dorothie_gym.maps.lint.turn_types import turn_type_faults
 from dorothie_gym.maps.town import Town
 
 __all__ = ["Fault", "FaultKind", "check_town"]
@@ -29,12 +29,12 @@ def check_town(town: Town) -> tuple[Fault, ...]:
         return ()
     samples = sample_lanes(town)
     faults = chain(
-        reach_faults(town),
-        joint_faults(town),
+        connectivity_faults(town),
+        continuity_faults(town),
         centre_line_faults(town),
         kerb_faults(town, samples),
-        space_faults(town, samples),
-        promise_faults(town),
+        clearance_faults(town, samples),
+        turn_type_faults(town),
     )
     rank = {kind: k for k, kind in enumerate(FaultKind)}
     return tuple(sorted(faults, key=lambda fault: (rank[fault.kind], fault.lanes, fault.position)))

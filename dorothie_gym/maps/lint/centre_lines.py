@@ -25,7 +25,7 @@ _SLACK = 1e-9
 """Rounding that is no fault [m or rad]."""
 
 
-def joint_faults(town: Town) -> Iterator[Fault]:
+def continuity_faults(town: Town) -> Iterator[Fault]:
     """Gaps, steps and kinks between lanes that are linked, lane changes left out."""
     for link in town.links:
         if link.type.is_lane_change:

@@ -41,7 +41,7 @@ class _Pairs:
         )
 
 
-def space_faults(town: Town, samples: LaneSamples) -> Iterator[Fault]:
+def clearance_faults(town: Town, samples: LaneSamples) -> Iterator[Fault]:
     """Lanes in the same place, connectors over lanes that they have nothing to do with, and low bridges."""
     pairs = _pairs(town, samples)
     level = pairs.rise < SAME_LEVEL

@@ -15,7 +15,7 @@ from dorothie_gym.maps.town import Town
 _LANES_NAMED = 8  # in a message
 
 
-def reach_faults(town: Town) -> Iterator[Fault]:
+def connectivity_faults(town: Town) -> Iterator[Fault]:
     """Dead ends, and lanes outside the largest strongly connected part of the town, lane changes counted.
 
     A dead end is not reported a second time as a lane without a way back; the lanes that lead only there are.

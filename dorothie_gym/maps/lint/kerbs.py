@@ -31,7 +31,7 @@ THIRD_MOUTH = 0.5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Pose:
+class LaneEndPose:
     """An end of a lane: its place and direction (2,), and its width [m]."""
 
     place: Array
@@ -53,7 +53,7 @@ class Pose:
 class Corner:
     """The rounded kerb on the inner side of a right turn."""
 
-    def __init__(self, connector: int, start: Pose, end: Pose, corner: Array, turn: float) -> None:
+    def __init__(self, connector: int, start: LaneEndPose, end: LaneEndPose, corner: Array, turn: float) -> None:
         """Round off a corner.
 
         Args:
@@ -117,12 +117,12 @@ def mouths(town: Town, junction: Junction) -> Array:
     return np.concatenate(edges)
 
 
-def end_of(town: Town, lane: int, point: int) -> Pose:
+def end_of(town: Town, lane: int, point: int) -> LaneEndPose:
     """First (point 0) or last (point -1) end of a lane."""
     row = town.lanes[lane]
     heading = row.headings[point]
     along = np.array([np.cos(heading), np.sin(heading)])
-    return Pose(place=row.points[point, :2], along=along, width=float(row.widths[point]))
+    return LaneEndPose(place=row.points[point, :2], along=along, width=float(row.widths[point]))
 
 
 def corners(town: Town, connectors: Iterable[int], kerb_lanes: frozenset[int], edges: Array) -> list[Corner]:
@@ -141,7 +141,7 @@ def corners(town: Town, connectors: Iterable[int], kerb_lanes: frozenset[int], e
             continue
         start, end = end_of(town, before[0], -1), end_of(town, after[0], 0)
         turn = float(np.arctan2(start.along @ -end.right, start.along @ end.along))
-        shifted = [Pose(place=pose.edges[1], along=pose.along, width=0.0) for pose in (start, end)]
+        shifted = [LaneEndPose(place=pose.edges[1], along=pose.along, width=0.0) for pose in (start, end)]
         meeting = _meeting(*shifted)
         if meeting is None or not CORNER_TURNS[0] <= turn <= CORNER_TURNS[1]:
             continue
@@ -151,7 +151,7 @@ def corners(town: Town, connectors: Iterable[int], kerb_lanes: frozenset[int], e
     return found
 
 
-def outside(edges: Array, start: Pose, end: Pose, room: float, places: Array) -> Array:
+def outside(edges: Array, start: LaneEndPose, end: LaneEndPose, room: float, places: Array) -> Array:
     """How far places (n, 2) lie off the ground between the mouths, 0 on it (n,) [m].
 
     Args:
@@ -179,7 +179,7 @@ def outside(edges: Array, start: Pose, end: Pose, room: float, places: Array) ->
     return distance
 
 
-def _meeting(start: Pose, end: Pose) -> Array | None:
+def _meeting(start: LaneEndPose, end: LaneEndPose) -> Array | None:
     """Where the straight on from the start meets the one that comes to the end; None if not between them."""
     (d, e), gap = (start.along, end.along), end.place - start.place
     cross = float(d[0] * e[1] - d[1] * e[0])

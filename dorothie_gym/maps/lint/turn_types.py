@@ -31,7 +31,7 @@ MAX_DIVERGENCE = math.radians(20.0)
 _HEEDED = (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP, SignalKind.YIELD)
 
 
-def promise_faults(town: Town) -> Iterator[Fault]:
+def turn_type_faults(town: Town) -> Iterator[Fault]:
     """Turns and lane changes that are not what their type says, and signals without meaning."""
     for link in town.links:
         if link.type.is_lane_change:

@@ -13,7 +13,7 @@ from dorothie_gym.maps.opendrive.centrelines import sample_centrelines, sample_r
 from dorothie_gym.maps.opendrive.furniture import lay_sidewalks, place_crosswalks, place_signals
 from dorothie_gym.maps.opendrive.parse import parse_opendrive
 from dorothie_gym.maps.opendrive.records import OpenDriveRecords, RoadRecord
-from dorothie_gym.maps.opendrive.topology import Piece, Topology, build_topology, successor_links
+from dorothie_gym.maps.opendrive.topology import LanePiece, Topology, build_topology, successor_links
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_light_programs import derive_programmes
 
@@ -87,7 +87,7 @@ def _speed_limits(records: OpenDriveRecords, topology: Topology) -> list[float]:
     return [min(linked[k], default=DEFAULT_SPEED_LIMIT) if limit is None else limit for k, limit in enumerate(own)]
 
 
-def _own_limit(road: RoadRecord, chain: tuple[Piece, ...]) -> float | None:
+def _own_limit(road: RoadRecord, chain: tuple[LanePiece, ...]) -> float | None:
     """The lowest limit that holds anywhere on the lane, where the road or the lane names one."""
     limits = [speed for p in chain for _, speed in road.sections[p.section].lanes[p.lane].speeds]
     if not limits:
@@ -107,7 +107,7 @@ def _lane_change_links(records: OpenDriveRecords, topology: Topology, lanes: tup
         road = records.roads[piece.road]
         section = road.sections[piece.section]
         outward = 1 if piece.lane > 0 else -1
-        outer = lane_of.get(Piece(piece.road, piece.section, piece.lane + outward))
+        outer = lane_of.get(LanePiece(piece.road, piece.section, piece.lane + outward))
         if lanes[inner].in_junction or outer is None:
             continue
         changes = section.lanes[piece.lane].changes  # the mark on a lane's outer edge

@@ -12,7 +12,7 @@ from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import NO_STREET, Array, Crosswalk, Lane, Sidewalk, Signal, SignalKind
 from dorothie_gym.maps.opendrive.centrelines import RoadSamples, thin
 from dorothie_gym.maps.opendrive.records import SIDEWALK, CrosswalkRecord, OpenDriveRecords, RoadRecord, SignalRecord
-from dorothie_gym.maps.opendrive.topology import Piece, Topology, runs_forward
+from dorothie_gym.maps.opendrive.topology import LanePiece, Topology, runs_forward
 
 # Types of signal that CARLA's maps use: lights as in OpenDRIVE 1.4, annex, signs by their numbers in German law.
 SIGNAL_TYPES = {
@@ -61,7 +61,7 @@ class _Ways:
 
     def __init__(self, topology: Topology, lanes: tuple[Lane, ...]) -> None:
         self._lanes = lanes
-        self._at: defaultdict[int, list[tuple[Piece, int]]] = defaultdict(list)  # by road
+        self._at: defaultdict[int, list[tuple[LanePiece, int]]] = defaultdict(list)  # by road
         for k, chain in enumerate(topology.chains):
             for piece in chain:
                 self._at[piece.road].append((piece, k))
@@ -74,7 +74,7 @@ class _Ways:
     def ruled(self, road: RoadRecord, record: SignalRecord, controls: bool) -> Iterator[int]:
         """Lanes of this road that a signal rules: those that it names, else those of its direction."""
 
-        def away(piece: Piece) -> tuple[float, int]:
+        def away(piece: LanePiece) -> tuple[float, int]:
             section = road.sections[piece.section]
             return max(section.start - record.s, record.s - section.end, 0.0), -piece.section
 

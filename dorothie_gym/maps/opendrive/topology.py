@@ -28,7 +28,7 @@ SHORTEST_LANE = 0.1
 _log = logging.getLogger(__name__)
 
 
-class Piece(NamedTuple):
+class LanePiece(NamedTuple):
     """One driving lane of one lane section."""
 
     road: int
@@ -45,7 +45,7 @@ class Topology:
         links: pairs (source, target) of indices in `chains`, sorted.
     """
 
-    chains: tuple[tuple[Piece, ...], ...]
+    chains: tuple[tuple[LanePiece, ...], ...]
     links: tuple[tuple[int, int], ...]
 
 
@@ -67,7 +67,7 @@ def build_topology(records: OpenDriveRecords) -> Topology:
         for k, section in enumerate(road.sections):
             for lane in section.lanes.values():
                 if lane.drives:
-                    graph.add(Piece(road.id, k, lane.id), section.end - section.start)
+                    graph.add(LanePiece(road.id, k, lane.id), section.end - section.start)
     for source, target in (*_lane_links(records, graph), *_connection_links(records, graph)):
         graph.link(source, target)
     for piece in [p for p, length in graph.length.items() if length < JOINT_LENGTH]:
@@ -92,26 +92,26 @@ class _Graph:
     """Pieces and links between them; dictionaries as ordered sets, so that the order is the file's."""
 
     def __init__(self) -> None:
-        self.length: dict[Piece, float] = {}
-        self.after: dict[Piece, dict[Piece, None]] = {}
-        self.before: dict[Piece, dict[Piece, None]] = {}
+        self.length: dict[LanePiece, float] = {}
+        self.after: dict[LanePiece, dict[LanePiece, None]] = {}
+        self.before: dict[LanePiece, dict[LanePiece, None]] = {}
 
-    def add(self, piece: Piece, length: float) -> None:
+    def add(self, piece: LanePiece, length: float) -> None:
         self.length[piece] = length
         self.after[piece], self.before[piece] = {}, {}
 
-    def link(self, source: Piece, target: Piece) -> None:
+    def link(self, source: LanePiece, target: LanePiece) -> None:
         self.after[source][target] = None
         self.before[target][source] = None
 
-    def contract(self, piece: Piece) -> None:
+    def contract(self, piece: LanePiece) -> None:
         """Takes a piece out and links what comes before it to what comes after it."""
         before, after = self.remove(piece)
         for source in before:
             for target in after:
                 self.link(source, target)
 
-    def remove(self, piece: Piece) -> tuple[tuple[Piece, ...], tuple[Piece, ...]]:
+    def remove(self, piece: LanePiece) -> tuple[tuple[LanePiece, ...], tuple[LanePiece, ...]]:
         """Takes a piece out; returns what came before it and what came after it."""
         before, after = self.before.pop(piece), self.after.pop(piece)
         before.pop(piece, None)
@@ -123,7 +123,7 @@ class _Graph:
         del self.length[piece]
         return tuple(before), tuple(after)
 
-    def chains(self) -> list[tuple[Piece, ...]]:
+    def chains(self) -> list[tuple[LanePiece, ...]]:
         """Pieces that go on one to one within a road, joined."""
         follower = {}
         for piece, after in self.after.items():
@@ -150,7 +150,7 @@ class _Touch(NamedTuple):
     at_start: bool
 
 
-def _lane_links(records: OpenDriveRecords, graph: _Graph) -> Iterator[tuple[Piece, Piece]]:
+def _lane_links(records: OpenDriveRecords, graph: _Graph) -> Iterator[tuple[LanePiece, LanePiece]]:
     """Links that the lanes themselves name, in driving direction."""
     for piece in graph.length:
         road = records.roads[piece.road]
@@ -178,7 +178,7 @@ def _touched(records: OpenDriveRecords, road: int, contact: str) -> _Touch:
 
 def _joined(
     records: OpenDriveRecords, graph: _Graph, a: tuple[_Touch, int], b: tuple[_Touch, int], where: str
-) -> Iterator[tuple[Piece, Piece]]:
+) -> Iterator[tuple[LanePiece, LanePiece]]:
     """The link between two lanes that meet at ends of their sections, in driving direction; nothing if there is none.
 
     Args:
@@ -195,7 +195,7 @@ def _joined(
                 "%s: %s: links lane %d of road %d: no such lane there", records.source, where, number, touch.road
             )
             return
-        pieces.append(Piece(touch.road, touch.section, number))
+        pieces.append(LanePiece(touch.road, touch.section, number))
     if any(piece not in graph.length for piece in pieces):
         return
     leaves = [runs_forward(records.roads[t.road], number) != t.at_start for t, number in (a, b)]
@@ -205,7 +205,7 @@ def _joined(
         yield (pieces[0], pieces[1]) if leaves[0] else (pieces[1], pieces[0])
 
 
-def _connection_links(records: OpenDriveRecords, graph: _Graph) -> Iterator[tuple[Piece, Piece]]:
+def _connection_links(records: OpenDriveRecords, graph: _Graph) -> Iterator[tuple[LanePiece, LanePiece]]:
     """Links that the junctions name."""
     for junction, connections in records.junctions.items():
         for connection in connections:

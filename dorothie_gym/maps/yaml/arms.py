@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import Lane
-from dorothie_gym.maps.yaml.geometry import Piece, Pose
+from dorothie_gym.maps.yaml.geometry import CurveSegment, Pose
 from dorothie_gym.maps.yaml.plan import StreetPlan
 from dorothie_gym.maps.yaml.stretches import Crossing, Stretch
 
@@ -42,7 +42,7 @@ class Arm:
     index: int
     stretch: int
     at_start: bool
-    leg: Piece
+    leg: CurveSegment
     street: StreetPlan
     incoming: tuple[LaneEnd, ...]
     outgoing: tuple[LaneEnd, ...]

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.yaml.arms import Arm
 from dorothie_gym.maps.yaml.courses import Course
-from dorothie_gym.maps.yaml.movements import SMALLEST_RING_TRIM, SMALLEST_TRIM, Way
+from dorothie_gym.maps.yaml.movements import SMALLEST_RING_TRIM, SMALLEST_TRIM, MovementPath
 from dorothie_gym.maps.yaml.stretches import Crossing, Stretch
 
 Indices: TypeAlias = NDArray[np.int64]
@@ -86,7 +86,7 @@ def check_clearance(
     crossings: Sequence[Crossing],
     stretches: Sequence[Stretch],
     courses: Sequence[Course],
-    ways: Mapping[int, tuple[Way, ...]],
+    ways: Mapping[int, tuple[MovementPath, ...]],
 ) -> None:
     """Compares all roads and ways through crossings with one another.
 
@@ -165,7 +165,7 @@ def _samples(
     crossings: Sequence[Crossing],
     stretches: Sequence[Stretch],
     courses: Sequence[Course],
-    ways: Mapping[int, tuple[Way, ...]],
+    ways: Mapping[int, tuple[MovementPath, ...]],
 ) -> _Samples:
     """Samples of all stretches, then of all crossings: along the ways through them, and their centres."""
     rows = []  # each (n, 8): the attributes in their order

@@ -16,7 +16,7 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.yaml.arms import POCKET, Approach, Arm, LaneEnd
 from dorothie_gym.maps.yaml.furniture import crosswalks, place_signals, place_sites, sidewalks
 from dorothie_gym.maps.yaml.layout import Layout, lay_out
-from dorothie_gym.maps.yaml.movements import Way, kinds_of
+from dorothie_gym.maps.yaml.movements import MovementPath, kinds_of
 from dorothie_gym.maps.yaml.schema import read_plan
 from dorothie_gym.maps.yaml.stretches import Crossing
 
@@ -152,7 +152,7 @@ class _Build:
     def add_crossing(self, crossing: Crossing) -> None:
         """Adds a connector for every way through a crossing."""
         begin = len(self.lanes)
-        onward: dict[int, dict[int, Way]] = defaultdict(dict)
+        onward: dict[int, dict[int, MovementPath]] = defaultdict(dict)
         for way in self.layout.ways[crossing.id]:
             source, connector = self._connect(crossing, way)
             onward[source][connector] = way
@@ -162,7 +162,7 @@ class _Build:
         connectors = tuple(range(begin, len(self.lanes)))
         self.junctions.append(Junction(id=crossing.id, position=crossing.centre, connectors=connectors))
 
-    def _connect(self, crossing: Crossing, way: Way) -> tuple[int, int]:
+    def _connect(self, crossing: Crossing, way: MovementPath) -> tuple[int, int]:
         """Adds the connector of a way; returns the lane that leads into it and the connector."""
         movement = way.movement
         source = self.lanes[self._incoming(movement.source, movement.source_lane)]

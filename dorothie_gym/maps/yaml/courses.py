@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.yaml.geometry import LINE_SPACING, Path, Point, bend_stations, line, rounded, turn_at
+from dorothie_gym.maps.yaml.geometry import LINE_SPACING, Curve, Point, bend_stations, line, rounded, turn_at
 from dorothie_gym.maps.yaml.stretches import Stretch
 
 STEEPEST = 0.12
@@ -99,7 +99,7 @@ _SLOPE_SLACK = 1e-3
 class Course:
     """Where a stretch runs: its line from the edge of one crossing to that of the next, and how high it is."""
 
-    path: Path
+    path: Curve
     heights: HeightProfile
 
     def beside(self, offset: float, span: tuple[float, float] | None = None) -> Array:
@@ -140,7 +140,7 @@ def course_of(stretch: Stretch, trim_start: float, trim_end: float) -> Course:
     return Course(path=path, heights=heights)
 
 
-def _on_ring(stretch: Stretch, trim_start: float, trim_end: float) -> Path:
+def _on_ring(stretch: Stretch, trim_start: float, trim_end: float) -> Curve:
     arc = stretch.arc
     left = 0.0 if arc is None else arc.length - trim_start - trim_end
     if arc is None or left < SMALLEST_RING_STRETCH:
@@ -149,7 +149,7 @@ def _on_ring(stretch: Stretch, trim_start: float, trim_end: float) -> Path:
             f" {SMALLEST_RING_STRETCH - left:.1f} m of ring are missing between them; give it a larger radius or let"
             " them arrive from directions further apart"
         )
-    return Path((arc,)).part(trim_start, arc.length - trim_end)
+    return Curve((arc,)).part(trim_start, arc.length - trim_end)
 
 
 def _between(stretch: Stretch, trim_start: float, trim_end: float) -> list[Point]:

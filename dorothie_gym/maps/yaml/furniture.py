@@ -16,7 +16,7 @@ from dorothie_gym.maps.traffic_lights import LightPhase, LightProgramme
 from dorothie_gym.maps.yaml.arms import Approach, find_slips
 from dorothie_gym.maps.yaml.geometry import Point
 from dorothie_gym.maps.yaml.layout import Layout
-from dorothie_gym.maps.yaml.nodes import Entry
+from dorothie_gym.maps.yaml.nodes import YamlEntry
 from dorothie_gym.maps.yaml.plan import GreenPlan, LightsPlan, StreetPlan
 from dorothie_gym.maps.yaml.stretches import Crossing
 
@@ -235,7 +235,7 @@ _STOP_ROOM = 1.0
 """A waypoint is this far from the ends of its lane, at least [m]."""
 
 
-def place_sites(places: Sequence[tuple[Point, Entry]], lanes: Sequence[Lane]) -> tuple[Site, ...]:
+def place_sites(places: Sequence[tuple[Point, YamlEntry]], lanes: Sequence[Lane]) -> tuple[Site, ...]:
     """Finds the nearest lane at a kerb for each place.
 
     Raises:
@@ -271,7 +271,7 @@ def place_sites(places: Sequence[tuple[Point, Entry]], lanes: Sequence[Lane]) ->
     return tuple(sites)
 
 
-def _check(entry: Entry, lane: Lane, station: float, aside: float, *, kerb: bool) -> None:
+def _check(entry: YamlEntry, lane: Lane, station: float, aside: float, *, kerb: bool) -> None:
     if abs(aside) > FARTHEST_SITE:
         entry.fail(f"it is {abs(aside):.1f} m from the nearest street; {FARTHEST_SITE:g} m are possible: move it")
     if abs(aside) < lane.width_at(station) / 2.0 + 0.5:

@@ -32,7 +32,7 @@ _TINY = 1e-6  # [m] pieces shorter than this are left out
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class CurveSegment:
     """A line or an arc: where it starts [m, m, rad], how long it is [m], and its curvature [1/m]."""
 
     x: float
@@ -52,17 +52,17 @@ class Piece:
             heading,
         )
 
-    def reversed(self) -> Piece:
+    def reversed(self) -> CurveSegment:
         """The same piece, driven the other way."""
         x, y, heading = self.at(self.length)
-        return Piece(x, y, heading + math.pi, self.length, -self.curvature)
+        return CurveSegment(x, y, heading + math.pi, self.length, -self.curvature)
 
-    def offset(self, right: float) -> Piece:
+    def offset(self, right: float) -> CurveSegment:
         """The parallel piece a distance to the right [m]; the distance must be smaller than the radius on that side."""
         scale = 1.0 - self.curvature * right
         x = self.x - right * math.sin(self.heading)
         y = self.y + right * math.cos(self.heading)
-        return Piece(x, y, self.heading, self.length * scale, self.curvature / scale)
+        return CurveSegment(x, y, self.heading, self.length * scale, self.curvature / scale)
 
     def points(self, s: Array) -> Array:
         """Places (n, 2) [m] at distances (n,) along the piece [m]."""
@@ -86,10 +86,10 @@ class Piece:
 
 
 @dataclass(frozen=True)
-class Path:
+class Curve:
     """Pieces one after the other, each starting where the one before ends and with its heading."""
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[CurveSegment, ...]
 
     @property
     def length(self) -> float:
@@ -111,15 +111,15 @@ class Path:
         """Radius of the tightest arc [m], infinite where there is none."""
         return 1.0 / max(max((abs(piece.curvature) for piece in self.pieces), default=0.0), 1e-12)
 
-    def part(self, start: float, end: float) -> Path:
+    def part(self, start: float, end: float) -> Curve:
         """What lies between two distances along the path [m]."""
         pieces, begin = [], 0.0
         for piece in self.pieces:
             low, high = max(start - begin, 0.0), min(end - begin, piece.length)
             if high - low > _TINY:
-                pieces.append(Piece(*piece.at(low), high - low, piece.curvature))
+                pieces.append(CurveSegment(*piece.at(low), high - low, piece.curvature))
             begin += piece.length
-        return Path(tuple(pieces))
+        return Curve(tuple(pieces))
 
     def sample(self, right: float = 0.0, *, line_spacing: float = LINE_SPACING) -> tuple[Array, Array]:
         """Points on the parallel path a distance to the right, its ends included.
@@ -164,9 +164,9 @@ def _apart(points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     return keep
 
 
-def line(a: Point, b: Point) -> Piece:
+def line(a: Point, b: Point) -> CurveSegment:
     """The straight from one point to another."""
-    return Piece(a[0], a[1], math.atan2(b[1] - a[1], b[0] - a[0]), math.dist(a, b))
+    return CurveSegment(a[0], a[1], math.atan2(b[1] - a[1], b[0] - a[0]), math.dist(a, b))
 
 
 def turn_at(a: Point, b: Point, c: Point) -> float:
@@ -174,25 +174,25 @@ def turn_at(a: Point, b: Point, c: Point) -> float:
     return wrap_radians(line(b, c).heading - line(a, b).heading)
 
 
-def rounded(points: Sequence[Point], radii: Sequence[float]) -> Path:
+def rounded(points: Sequence[Point], radii: Sequence[float]) -> Curve:
     """The polyline through `points` with each inner point replaced by an arc.
 
     Args:
         points: at least two, no two successive ones equal [m].
         radii: radius of the arc at each inner point [m]; the arcs must fit into the legs.
     """
-    pieces: list[Piece] = []
+    pieces: list[CurveSegment] = []
     here = points[0]
     for k, radius in enumerate(radii, start=1):
         turn = turn_at(points[k - 1], points[k], points[k + 1])
         tangent = radius * math.tan(abs(turn) / 2.0)
         leg = line(here, points[k])
-        pieces.append(Piece(leg.x, leg.y, leg.heading, leg.length - tangent))
+        pieces.append(CurveSegment(leg.x, leg.y, leg.heading, leg.length - tangent))
         x, y, heading = pieces[-1].at(pieces[-1].length)
-        pieces.append(Piece(x, y, heading, radius * abs(turn), math.copysign(1.0 / radius, turn)))
+        pieces.append(CurveSegment(x, y, heading, radius * abs(turn), math.copysign(1.0 / radius, turn)))
         here = pieces[-1].at(pieces[-1].length)[:2]
     pieces.append(line(here, points[-1]))
-    return Path(tuple(piece for piece in pieces if piece.length > _TINY))
+    return Curve(tuple(piece for piece in pieces if piece.length > _TINY))
 
 
 def bend_stations(points: Sequence[Point], radii: Sequence[float]) -> list[float]:
@@ -208,7 +208,7 @@ def bend_stations(points: Sequence[Point], radii: Sequence[float]) -> list[float
     return stations
 
 
-def connect(entry: Pose, exit_: Pose) -> Path:
+def connect(entry: Pose, exit_: Pose) -> Curve:
     """A smooth way from one pose to another: line-arc-line where it exists, else two arcs.
 
     No way that turns to one side only is gentler than the one with a single arc; two arcs may be, but where there is
@@ -217,7 +217,7 @@ def connect(entry: Pose, exit_: Pose) -> Path:
     return _fillet(entry, exit_) or _biarc(entry, exit_)
 
 
-def _fillet(entry: Pose, exit_: Pose) -> Path | None:
+def _fillet(entry: Pose, exit_: Pose) -> Curve | None:
     """One arc between the lines through the two poses, if they meet ahead of the first and behind the second."""
     turn = wrap_radians(exit_[2] - entry[2])
     if abs(math.sin(turn)) < 1e-3:  # as good as parallel
@@ -232,7 +232,7 @@ def _fillet(entry: Pose, exit_: Pose) -> Path | None:
     return rounded((entry[:2], corner, exit_[:2]), (radius,))
 
 
-def _biarc(entry: Pose, exit_: Pose) -> Path:
+def _biarc(entry: Pose, exit_: Pose) -> Curve:
     """Two arcs with equal tangent lengths (Bolton, "Biarc curves", Computer-Aided Design 7(2), 1975)."""
     dx, dy = exit_[0] - entry[0], exit_[1] - entry[1]
     tx, ty, ux, uy = math.cos(entry[2]), math.sin(entry[2]), math.cos(exit_[2]), math.sin(exit_[2])
@@ -247,13 +247,13 @@ def _biarc(entry: Pose, exit_: Pose) -> Path:
     )
     first = _arc_to(entry, middle)
     second = _arc_to(first.at(first.length), exit_[:2])
-    return Path((first, second))
+    return Curve((first, second))
 
 
-def _arc_to(start: Pose, end: Point) -> Piece:
+def _arc_to(start: Pose, end: Point) -> CurveSegment:
     """The arc that leaves a pose and ends in a point."""
     chord = line(start[:2], end)
     half = wrap_radians(chord.heading - start[2])
     if abs(half) < 1e-9:
-        return Piece(*start, chord.length)
-    return Piece(*start, chord.length * half / math.sin(half), 2.0 * math.sin(half) / chord.length)
+        return CurveSegment(*start, chord.length)
+    return CurveSegment(*start, chord.length * half / math.sin(half), 2.0 * math.sin(half) / chord.length)

@@ -10,7 +10,7 @@ from functools import cached_property
 from dorothie_gym.maps.yaml.arms import LARGEST_ANGLE, SMALLEST_ANGLE, Arm, arms_at, find_slips
 from dorothie_gym.maps.yaml.clearance import check_clearance, check_crossings
 from dorothie_gym.maps.yaml.courses import Course, course_of
-from dorothie_gym.maps.yaml.movements import Way, make_room, movements_at, with_pockets
+from dorothie_gym.maps.yaml.movements import MovementPath, make_room, movements_at, with_pockets
 from dorothie_gym.maps.yaml.plan import StreetPlan, TownPlan
 from dorothie_gym.maps.yaml.roundabout import lay_ring
 from dorothie_gym.maps.yaml.stretches import Crossing, Stretch, split, stretch_of
@@ -45,7 +45,7 @@ class Layout:
     stretches: tuple[Stretch, ...]
     courses: tuple[Course, ...]
     arms: Mapping[int, tuple[Arm, ...]]
-    ways: Mapping[int, tuple[Way, ...]]
+    ways: Mapping[int, tuple[MovementPath, ...]]
     pockets: Mapping[tuple[int, bool], float]
     hosts: Mapping[int, int]
 
@@ -77,7 +77,7 @@ def lay_out(plan: TownPlan) -> Layout:
         ends[stretch.start.id].append((k, True))
         ends[stretch.end.id].append((k, False))
     arms: dict[int, tuple[Arm, ...]] = {}
-    ways: dict[int, tuple[Way, ...]] = {}
+    ways: dict[int, tuple[MovementPath, ...]] = {}
     trims: dict[tuple[int, bool], float] = {}
     for crossing in crossings:
         here = with_pockets(crossing, arms_at(crossing, stretches, ends[crossing.id]), stretches)

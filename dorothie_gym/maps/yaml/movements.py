@@ -18,7 +18,7 @@ from dorothie_gym.maps.yaml.arms import (
     neighbours,
     turn_between,
 )
-from dorothie_gym.maps.yaml.geometry import Path, connect
+from dorothie_gym.maps.yaml.geometry import Curve, connect
 from dorothie_gym.maps.yaml.stretches import Crossing, Stretch
 
 STRAIGHT_BELOW = math.radians(35.0)
@@ -195,11 +195,11 @@ _ROUNDING = math.radians(0.5)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Way:
+class MovementPath:
     """A movement and its course through the crossing."""
 
     movement: Movement
-    path: Path
+    path: Curve
 
     @property
     def turn(self) -> float:
@@ -208,7 +208,7 @@ class Way:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Room:
+class CrossingRoom:
     """What a crossing takes.
 
     Attributes:
@@ -217,10 +217,10 @@ class Room:
     """
 
     trims: tuple[float, ...]
-    ways: tuple[Way, ...]
+    ways: tuple[MovementPath, ...]
 
 
-def make_room(crossing: Crossing, arms: Sequence[Arm], movements: Sequence[Movement]) -> Room:
+def make_room(crossing: Crossing, arms: Sequence[Arm], movements: Sequence[Movement]) -> CrossingRoom:
     """Trims the arms until roads do not overlap beside the crossing and no way through it is too tight.
 
     Raises:
@@ -241,7 +241,7 @@ def make_room(crossing: Crossing, arms: Sequence[Arm], movements: Sequence[Movem
             trims[movement.source.index] = max(trims[movement.source.index], mine)
             trims[movement.target.index] = max(trims[movement.target.index], its)
     ways = _ways(crossing, movements, trims)
-    return Room(trims=tuple(trims), ways=ways)
+    return CrossingRoom(trims=tuple(trims), ways=ways)
 
 
 def _check_angles(crossing: Crossing, arms: Sequence[Arm], movements: Sequence[Movement]) -> None:
@@ -281,7 +281,7 @@ def _wanted_radius(movement: Movement) -> float:
     return BEND_RADIUS if abs(movement.turn) < STRAIGHT_BELOW and not on_ring else CORNER_RADIUS
 
 
-def _ways(crossing: Crossing, movements: Sequence[Movement], trims: list[float]) -> tuple[Way, ...]:
+def _ways(crossing: Crossing, movements: Sequence[Movement], trims: list[float]) -> tuple[MovementPath, ...]:
     """The courses of all movements; `trims` grow until none is too tight."""
     for _ in range(_STEPS):
         ways = [_way(movement, trims) for movement in movements]
@@ -298,8 +298,8 @@ def _ways(crossing: Crossing, movements: Sequence[Movement], trims: list[float])
     )
 
 
-def _way(movement: Movement, trims: Sequence[float]) -> Way:
+def _way(movement: Movement, trims: Sequence[float]) -> MovementPath:
     source, target = movement.source, movement.target
     entry = source.ending(movement.source_lane, trims[source.index])
     exit_ = target.beginning(movement.target_lane, trims[target.index])
-    return Way(movement=movement, path=connect(entry, exit_))
+    return MovementPath(movement=movement, path=connect(entry, exit_))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from dorothie_gym.maps.yaml.geometry import Point
-from dorothie_gym.maps.yaml.nodes import Entry
+from dorothie_gym.maps.yaml.nodes import YamlEntry
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,7 +18,7 @@ class Bend:
     height: float | None = None
 
 
-Step: TypeAlias = "str | Bend"
+CourseStep: TypeAlias = "str | Bend"
 """A step of a street's course: a junction's name or a point that bends the street."""
 
 
@@ -49,7 +49,7 @@ class JunctionPlan:
     centre: Point
     height: float = 0.0
     roundabout: RoundaboutPlan | None = None
-    entry: Entry
+    entry: YamlEntry
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +74,7 @@ class StreetPlan:
 
     id: int
     name: str
-    course: tuple[Step, ...]
+    course: tuple[CourseStep, ...]
     forward: int = 1
     backward: int = 1
     median: float = 0.0
@@ -84,7 +84,7 @@ class StreetPlan:
     width: float
     radius: float | None = None
     sidewalk: float = 2.0
-    entry: Entry
+    entry: YamlEntry
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +106,7 @@ class LightsPlan:
     junction: str
     phases: tuple[GreenPlan, ...] = ()
     offset: float = 0.0
-    entry: Entry
+    entry: YamlEntry
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,4 +131,4 @@ class TownPlan:
     stops: tuple[tuple[str, StreetPlan], ...] = ()
     yields: tuple[tuple[str, StreetPlan], ...] = ()
     crosswalks: tuple[tuple[str, StreetPlan], ...] = ()
-    sites: tuple[tuple[Point, Entry], ...] = ()
+    sites: tuple[tuple[Point, YamlEntry], ...] = ()

@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dorothie_gym.maps.yaml.geometry import Piece, line
+from dorothie_gym.maps.yaml.geometry import CurveSegment, line
 from dorothie_gym.maps.yaml.plan import JunctionPlan, StreetPlan
-from dorothie_gym.maps.yaml.stretches import Crossing, CrossSection, Run, Stretch
+from dorothie_gym.maps.yaml.stretches import Crossing, CrossSection, StreetRun, Stretch
 
 SMALLEST_RING = 8.0
 """Radius of the innermost lane of a ring, at least [m]: cars have to come round without stopping."""
@@ -32,7 +32,7 @@ class Ring:
     stretches: tuple[Stretch, ...]
 
 
-def lay_ring(junction: JunctionPlan, runs: Sequence[Run], *, street_id: int, crossing_id: int) -> Ring:
+def lay_ring(junction: JunctionPlan, runs: Sequence[StreetRun], *, street_id: int, crossing_id: int) -> Ring:
     """Lays out a roundabout; traffic drives round it counter-clockwise as seen on a map.
 
     Args:
@@ -99,7 +99,7 @@ def _ring_stretch(
 ) -> Stretch:
     """The piece of the ring from one bearing [rad] back to a smaller one, or once round."""
     angle = (from_ - to) % (2.0 * math.pi) if start is not end else 2.0 * math.pi
-    arc = Piece(*start.centre, from_ - math.pi / 2.0, radius * angle, -1.0 / radius)
+    arc = CurveSegment(*start.centre, from_ - math.pi / 2.0, radius * angle, -1.0 / radius)
     return Stretch(
         street=street,
         section=CrossSection(street),

@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from dorothie_gym.maps.yaml.geometry import Point
-from dorothie_gym.maps.yaml.nodes import Entry, listed, read_nodes
+from dorothie_gym.maps.yaml.nodes import YamlEntry, listed, read_nodes
 from dorothie_gym.maps.yaml.plan import Bend, GreenPlan, JunctionPlan, LightsPlan, RoundaboutPlan, StreetPlan, TownPlan
 from dorothie_gym.maps.yaml.streets import (
     StreetDefaults,
@@ -49,7 +49,7 @@ Junctions: TypeAlias = Mapping[str, JunctionPlan]
 Pairs: TypeAlias = tuple[tuple[str, StreetPlan], ...]
 
 
-def read_lights(entry: Entry, junctions: Junctions, streets: Sequence[StreetPlan]) -> tuple[LightsPlan, ...]:
+def read_lights(entry: YamlEntry, junctions: Junctions, streets: Sequence[StreetPlan]) -> tuple[LightsPlan, ...]:
     """Reads the traffic lights, each a junction's name or a mapping.
 
     Raises:
@@ -66,8 +66,8 @@ def read_lights(entry: Entry, junctions: Junctions, streets: Sequence[StreetPlan
 
 
 def read_signs(
-    stops: Entry | None,
-    yields: Entry | None,
+    stops: YamlEntry | None,
+    yields: YamlEntry | None,
     junctions: Junctions,
     streets: Sequence[StreetPlan],
     lights: Sequence[LightsPlan],
@@ -94,7 +94,7 @@ def read_signs(
     return found[0], found[1]
 
 
-def read_crosswalks(entry: Entry, junctions: Junctions, streets: Sequence[StreetPlan]) -> Pairs:
+def read_crosswalks(entry: YamlEntry, junctions: Junctions, streets: Sequence[StreetPlan]) -> Pairs:
     """Reads the crosswalks.
 
     Raises:
@@ -108,11 +108,11 @@ def read_crosswalks(entry: Entry, junctions: Junctions, streets: Sequence[Street
 
 
 def _pairs(
-    entry: Entry, junctions: Junctions, streets: Sequence[StreetPlan]
-) -> tuple[tuple[Entry, str, StreetPlan], ...]:
+    entry: YamlEntry, junctions: Junctions, streets: Sequence[StreetPlan]
+) -> tuple[tuple[YamlEntry, str, StreetPlan], ...]:
     """Pairs [junction, street] and where they are written."""
     by_name = {street.name: street for street in streets}
-    found: dict[tuple[str, str], Entry] = {}
+    found: dict[tuple[str, str], YamlEntry] = {}
     for element in entry.elements("a list of [junction, street]"):
         first, second = element.pair("[junction, street], each pair in its own brackets")
         name = first.choice(junctions, "junction", "the name of a junction")
@@ -126,7 +126,7 @@ def _pairs(
     return tuple((element, name, by_name[street]) for (name, street), element in found.items())
 
 
-def _lights(entry: Entry, junctions: Junctions, streets: Sequence[StreetPlan]) -> LightsPlan:
+def _lights(entry: YamlEntry, junctions: Junctions, streets: Sequence[StreetPlan]) -> LightsPlan:
     fields = entry.fields(LIGHTS_KEYS, required=("at",)) if entry.is_mapping else {}
     at = fields.get("at", entry).named(entry.element)
     name = at.choice(junctions, "junction", "the name of a junction")
@@ -137,7 +137,7 @@ def _lights(entry: Entry, junctions: Junctions, streets: Sequence[StreetPlan]) -
     return LightsPlan(junction=name, phases=phases, offset=offset, entry=entry)
 
 
-def _phases(entry: Entry, junction: str, streets: Sequence[StreetPlan]) -> tuple[GreenPlan, ...]:
+def _phases(entry: YamlEntry, junction: str, streets: Sequence[StreetPlan]) -> tuple[GreenPlan, ...]:
     entry = entry.named(f"lights at {junction!r}")
     here = {street.name: street for street in streets if junction in street.course}
     phases = tuple(
@@ -155,7 +155,7 @@ def _phases(entry: Entry, junction: str, streets: Sequence[StreetPlan]) -> tuple
     return phases
 
 
-def _phase(entry: Entry, junction: str, here: Mapping[str, StreetPlan], streets: Sequence[StreetPlan]) -> GreenPlan:
+def _phase(entry: YamlEntry, junction: str, here: Mapping[str, StreetPlan], streets: Sequence[StreetPlan]) -> GreenPlan:
     fields = entry.fields(PHASE_KEYS, required=("seconds",))
     green = _green(fields["green"], junction, here, streets) if "green" in fields else ()
     left = _green(fields["left"], junction, here, streets) if "left" in fields else ()
@@ -175,7 +175,7 @@ def _phase(entry: Entry, junction: str, here: Mapping[str, StreetPlan], streets:
 
 
 def _green(
-    entry: Entry, junction: str, here: Mapping[str, StreetPlan], streets: Sequence[StreetPlan]
+    entry: YamlEntry, junction: str, here: Mapping[str, StreetPlan], streets: Sequence[StreetPlan]
 ) -> tuple[str, ...]:
     found: list[str] = []
     for element in entry.names("a list of streets"):
@@ -236,7 +236,7 @@ def read_plan(path: Path) -> TownPlan:
     )
 
 
-def _junctions(entry: Entry, defaults: StreetDefaults) -> dict[str, JunctionPlan]:
+def _junctions(entry: YamlEntry, defaults: StreetDefaults) -> dict[str, JunctionPlan]:
     junctions: dict[str, JunctionPlan] = {}
     for k, (key, value) in enumerate(entry.items("junctions by name, each [x, y]")):
         name = key.text("a name")
@@ -254,7 +254,7 @@ def _junctions(entry: Entry, defaults: StreetDefaults) -> dict[str, JunctionPlan
     return junctions
 
 
-def _junction(entry: Entry, defaults: StreetDefaults) -> tuple[Bend, RoundaboutPlan | None]:
+def _junction(entry: YamlEntry, defaults: StreetDefaults) -> tuple[Bend, RoundaboutPlan | None]:
     """Where a junction is, and its ring."""
     if not entry.is_mapping:
         return point(entry), None
@@ -274,8 +274,8 @@ def _junction(entry: Entry, defaults: StreetDefaults) -> tuple[Bend, RoundaboutP
     )
 
 
-def _sites(entry: Entry) -> tuple[tuple[Point, Entry], ...]:
-    sites: dict[Point, Entry] = {}
+def _sites(entry: YamlEntry) -> tuple[tuple[Point, YamlEntry], ...]:
+    sites: dict[Point, YamlEntry] = {}
     for element in entry.elements("a list of points [x, y] in metres"):
         bend = point(element, flat=True)
         place = bend.at

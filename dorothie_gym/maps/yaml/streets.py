@@ -6,8 +6,8 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from dorothie_gym.maps.yaml.nodes import Entry
-from dorothie_gym.maps.yaml.plan import Bend, JunctionPlan, Step, StreetPlan
+from dorothie_gym.maps.yaml.nodes import YamlEntry
+from dorothie_gym.maps.yaml.plan import Bend, CourseStep, JunctionPlan, StreetPlan
 
 STREET_KEYS = (
     "through", "lanes", "one_way", "ramp", "median", "turn_lanes", "speed", "width", "radius", "sidewalk",
@@ -43,22 +43,22 @@ class StreetDefaults:
         return dataclasses.replace(self, **{key: value})
 
 
-def speed(entry: Entry) -> float:
+def speed(entry: YamlEntry) -> float:
     """A speed limit [km/h]."""
     return entry.number(*SPEED, "km/h")
 
 
-def lane_width(entry: Entry) -> float:
+def lane_width(entry: YamlEntry) -> float:
     """The width of a lane [m]."""
     return entry.number(*WIDTH, "metres")
 
 
-def pavement(entry: Entry) -> float:
+def pavement(entry: YamlEntry) -> float:
     """The width of a pavement [m]."""
     return entry.number(*SIDEWALK, "metres")
 
 
-def point(entry: Entry, *, flat: bool = False) -> Bend:
+def point(entry: YamlEntry, *, flat: bool = False) -> Bend:
     """A point [x, y] or, if not `flat`, [x, y, height] [m]."""
     expected = "a point [x, y] in metres" if flat else "a point [x, y] or [x, y, height] in metres"
     numbers = entry.elements(expected)
@@ -69,7 +69,7 @@ def point(entry: Entry, *, flat: bool = False) -> Bend:
 
 
 def read_street(
-    k: int, key: Entry, value: Entry, junctions: Mapping[str, JunctionPlan], defaults: StreetDefaults
+    k: int, key: YamlEntry, value: YamlEntry, junctions: Mapping[str, JunctionPlan], defaults: StreetDefaults
 ) -> StreetPlan:
     """Reads the street with number `k`.
 
@@ -115,10 +115,10 @@ def approaches(street: StreetPlan, junction: str) -> bool:
     return junction in street.course[1:] or (street.backward > 0 and junction in street.course[:-1])
 
 
-def _course(entry: Entry, junctions: Mapping[str, JunctionPlan]) -> tuple[Step, ...]:
-    course: list[Step] = []
+def _course(entry: YamlEntry, junctions: Mapping[str, JunctionPlan]) -> tuple[CourseStep, ...]:
+    course: list[CourseStep] = []
     for element in entry.elements("a list of junctions and points that it runs through"):
-        step: Step = (
+        step: CourseStep = (
             point(element)
             if element.is_sequence
             else element.choice(junctions, "junction", "the name of a junction or a point [x, y]")
@@ -134,12 +134,12 @@ def _course(entry: Entry, junctions: Mapping[str, JunctionPlan]) -> tuple[Step, 
     return tuple(course)
 
 
-def told(step: Step) -> str:
+def told(step: CourseStep) -> str:
     """A step of a course, for messages."""
     return repr(step) if isinstance(step, str) else f"[{step.at[0]:g}, {step.at[1]:g}]"
 
 
-def _lanes(fields: Mapping[str, Entry], *, ramp: bool) -> tuple[int, int]:
+def _lanes(fields: Mapping[str, YamlEntry], *, ramp: bool) -> tuple[int, int]:
     """Lanes along the course and against it."""
     one_way = fields["one_way"].boolean() if "one_way" in fields else ramp
     if ramp and not one_way:
@@ -162,7 +162,9 @@ def _lanes(fields: Mapping[str, Entry], *, ramp: bool) -> tuple[int, int]:
     return forward, backward
 
 
-def _turn_lanes(entry: Entry, course: tuple[Step, ...], junctions: Mapping[str, JunctionPlan]) -> tuple[str, ...]:
+def _turn_lanes(
+    entry: YamlEntry, course: tuple[CourseStep, ...], junctions: Mapping[str, JunctionPlan]
+) -> tuple[str, ...]:
     found: list[str] = []
     on_course = list(dict.fromkeys(step for step in course if isinstance(step, str)))
     for element in entry.names("a list of junctions"):
@@ -177,7 +179,7 @@ def _turn_lanes(entry: Entry, course: tuple[Step, ...], junctions: Mapping[str, 
     return tuple(found)
 
 
-def _check_room(entry: Entry, *, backward: int, median: float, width: float) -> None:
+def _check_room(entry: YamlEntry, *, backward: int, median: float, width: float) -> None:
     """Turn lanes lie in the median."""
     if not backward:
         entry.fail("a one-way street has no median for turn lanes; remove them, or the key 'one_way' or 'ramp'")

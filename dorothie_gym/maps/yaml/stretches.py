@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from dorothie_gym.maps.yaml.geometry import Piece, Point, line
+from dorothie_gym.maps.yaml.geometry import CurveSegment, Point, line
 from dorothie_gym.maps.yaml.plan import Bend, JunctionPlan, StreetPlan, TownPlan
 
 
@@ -108,7 +108,7 @@ class Stretch:
     end: Crossing
     corners: tuple[Point, ...]
     heights: tuple[float | None, ...]
-    arc: Piece | None = None
+    arc: CurveSegment | None = None
 
     def label(self) -> str:
         """What it is called in messages."""
@@ -118,7 +118,7 @@ class Stretch:
         """The crossing at one of its ends."""
         return self.start if at_start else self.end
 
-    def leg(self, at_start: bool) -> Piece:
+    def leg(self, at_start: bool) -> CurveSegment:
         """Its first piece, seen from the crossing at one of its ends outwards."""
         if self.arc is not None:
             return self.arc if at_start else self.arc.reversed()
@@ -126,7 +126,7 @@ class Stretch:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class StreetRun:
     """A stretch before roundabouts are laid out: its street, its two junctions, and the points between."""
 
     street: StreetPlan
@@ -144,7 +144,7 @@ class Run:
         return points[1] if at_start else points[-2]
 
 
-def split(plan: TownPlan) -> list[Run]:
+def split(plan: TownPlan) -> list[StreetRun]:
     """Cuts the streets of a plan at their junctions.
 
     Raises:
@@ -153,28 +153,28 @@ def split(plan: TownPlan) -> list[Run]:
     return [run for street in plan.streets for run in _runs(street, plan.junctions)]
 
 
-def _runs(street: StreetPlan, junctions: Mapping[str, JunctionPlan]) -> list[Run]:
-    runs, bends = list[Run](), list[Bend]()
+def _runs(street: StreetPlan, junctions: Mapping[str, JunctionPlan]) -> list[StreetRun]:
+    runs, bends = list[StreetRun](), list[Bend]()
     start = junctions[str(street.course[0])]
     for step in street.course[1:]:
         if isinstance(step, Bend):
             bends.append(step)
             continue
         end = junctions[step]
-        runs.append(Run(street=street, start=start, end=end, bends=tuple(bends)))
+        runs.append(StreetRun(street=street, start=start, end=end, bends=tuple(bends)))
         _check_points(runs[-1])
         start, bends = end, []
     return runs
 
 
-def _check_points(run: Run) -> None:
+def _check_points(run: StreetRun) -> None:
     points = [run.start.centre, *(bend.at for bend in run.bends), run.end.centre]
     for a, b in zip(points, points[1:], strict=False):
         if abs(a[0] - b[0]) + abs(a[1] - b[1]) < 1.0:
             run.street.entry.fail(f"points {list(a)} and {list(b)} of its course are less than 1 m apart; remove one")
 
 
-def stretch_of(run: Run, start: Crossing, end: Crossing) -> Stretch:
+def stretch_of(run: StreetRun, start: Crossing, end: Crossing) -> Stretch:
     """The stretch of a run between two crossings."""
     return Stretch(
         street=run.street,
