@@ -1,6 +1,6 @@
-"""What a bare map does not say: streets as people name them, and places beside the lanes where landmarks may stand.
+"""Streets and landmark sites inferred for maps that do not define them.
 
-Both are functions of the lanes and links alone: the same map always gives the same streets and sites.
+Both depend on lanes and links alone, so that a map always yields the same streets and sites.
 """
 
 from __future__ import annotations
@@ -17,28 +17,28 @@ from scipy.spatial import cKDTree
 from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.maps.model import NO_STREET, Array, Lane, LaneLink, Site, Street
 
-# A street goes on across a junction where it turns by less than this [degrees].
+# Largest change of direction at which a street continues across a junction [degrees].
 STREET_BEND = 35.0
-# Streets that a large map has at least, and that any map has at most.
+# Smallest number of streets of a large map, and largest number of any map.
 FEWEST_STREETS, MOST_STREETS = 8, 14
-# A street is only divided into parts of which each has at least this much lane [m].
+# Shortest length of lane in each part of a divided street [m].
 SHORTEST_PART = 100.0
 
 # Distance from the lane's edge to a landmark [m].
 SITE_OFFSET = 6.0
-# Distance between the places that are considered [m].
+# Spacing of the candidate sites [m].
 SITE_STEP = 5.0
-# (shortest lane, distance from either of its ends) [m]: the next pair is tried where a map has too few such places.
+# (shortest lane, distance from both of its ends) [m]: the next pair is tried if there are too few candidates.
 SITE_RULES = ((40.0, 15.0), (25.0, 10.0), (12.0, 5.0), (2.0, 1.0))
-# Nobody stops beside a faster road than this [m/s], 70 km/h and a little.
+# Largest speed limit of a lane with a site [m/s]: just above 70 km/h.
 FASTEST_STOP = 20.0
-# A landmark must be nearer to its lane than to any other by this [m].
+# Smallest difference between the distances of a landmark to the nearest other lane and to its own [m].
 SITE_CLEARANCE = 0.5
 
 
 @dataclass(frozen=True)
 class _Joint:
-    """A way on from one end of a road to an end of another; an end is (road, 0 at its start or 1)."""
+    """Connection between the ends of two roads; an end is (road id, 0 at its start or 1 at its end)."""
 
     ends: tuple[tuple[int, int], tuple[int, int]]
     bend: float  # degrees, not negative
@@ -46,18 +46,18 @@ class _Joint:
 
 
 def name_streets(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> tuple[tuple[Lane, ...], tuple[Street, ...]]:
-    """Joins roads that go on straight across junctions to streets.
+    """Joins roads that continue straight across junctions to streets.
 
-    Every lane outside junctions belongs to one street; a connector belongs to the street that all lanes at both of its
-    ends belong to, if there is one. Where there are too many streets the shortest is added to the one that it meets
-    most straightly; where a large map has too few the longest is divided at a junction.
+    Every lane outside junctions belongs to one street; a connector belongs to the common street of all lanes at both of
+    its ends, if there is one. If there are too many streets, the shortest is merged into the one that it meets most
+    straight; if a large map has too few, the longest is divided at a junction.
 
     Args:
-        lanes: lanes of the town; their `street` is ignored.
+        lanes: lanes of the town; `street` is ignored.
         links: links between them.
 
     Returns:
-        The lanes with their street set, and the streets, longest first, with placeholder names.
+        The lanes with `street` set, and the streets, longest first, with placeholder names.
     """
     length: dict[int, float] = defaultdict(float)
     for lane in lanes:
@@ -83,7 +83,7 @@ def name_streets(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> tuple[tupl
 
 
 def _ways_on(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> Iterator[tuple[Lane, Lane, bool]]:
-    """Lanes outside junctions and those that they lead to, with whether a junction lies between."""
+    """Yields pairs of successive lanes outside junctions, with whether a junction lies between them."""
     after = _followers(lanes, links)
     for lane in lanes:
         if lane.in_junction:
@@ -108,7 +108,7 @@ def _followers(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> list[list[in
 
 
 def _joints(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> list[_Joint]:
-    """Every way from road to road once, at its smallest bend, the straightest first."""
+    """Returns each connection between roads once, at its smallest change of direction, the straightest first."""
     best: dict[tuple[tuple[int, int], tuple[int, int]], _Joint] = {}
     for source, target, crosses in _ways_on(lanes, links):
         if source.road_id == target.road_id:
@@ -122,20 +122,20 @@ def _joints(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> list[_Joint]:
 
 
 def _unbroken(joints: list[_Joint]) -> frozenset[tuple[int, int]]:
-    """Pairs of roads, smaller number first, that touch without a junction between: no name changes there."""
+    """Returns the pairs of roads, smaller id first, that touch without a junction: the name does not change there."""
     touching = (joint.ends for joint in joints if not joint.crosses)
     return frozenset(_pair(a[0], b[0]) for a, b in touching)
 
 
 def _chains(roads: list[int], joints: list[_Joint]) -> list[list[int]]:
-    """Roads in the order in which one drives along each street; every end of a road is joined once at most."""
+    """Returns the roads of each street in driving order; each end of a road is joined at most once."""
     beyond: dict[tuple[int, int], tuple[int, int]] = {}
     for joint in joints:
         a, b = joint.ends
         if joint.bend < STREET_BEND and a not in beyond and b not in beyond:
             beyond[a], beyond[b] = b, a
     unbroken = _unbroken(joints)
-    # Streets with an end first, from that end; what is left then are rings, cut open at a junction if they cross one.
+    # Streets with an end first, from that end; the rest are rings, opened at a junction if they cross one.
     starts = [(road, side) for road in roads for side in (0, 1) if (road, side) not in beyond]
     rings = sorted(roads, key=lambda road: _pair(road, beyond.get((road, 0), (road, 0))[0]) in unbroken)
     chains, done = [], dict.fromkeys(roads, False)
@@ -155,10 +155,10 @@ def _pair(a: int, b: int) -> tuple[int, int]:
 
 
 def _divide(streets: list[list[int]], joints: list[_Joint], length: dict[int, float]) -> list[list[int]]:
-    """Divides streets until there are enough or parts get too short.
+    """Divides streets until there are enough or the parts become too short.
 
-    The longest street that crosses a junction is cut at the junction nearest its middle; where none is left, the
-    longest one of several roads is cut where two of them touch (exporters begin a new road at corners).
+    The longest street that crosses a junction is cut at the junction nearest its middle; if there is none, the longest
+    street of several roads is cut where two of them touch (exporters begin a new road at corners).
     """
     streets = [list(roads) for roads in streets]
     unbroken = _unbroken(joints)
@@ -179,7 +179,7 @@ def _divide(streets: list[list[int]], joints: list[_Joint], length: dict[int, fl
 
 
 def _gather(streets: list[list[int]], joints: list[_Joint], length: dict[int, float]) -> list[list[int]]:
-    """Adds the shortest street to the one that it meets most straightly until there are few enough."""
+    """Merges the shortest street into the one that it meets most straight until there are few enough."""
     streets = [list(roads) for roads in streets]
     while len(streets) > MOST_STREETS:
         short = min(range(len(streets)), key=lambda k: (sum(length[r] for r in streets[k]), min(streets[k])))
@@ -189,7 +189,7 @@ def _gather(streets: list[list[int]], joints: list[_Joint], length: dict[int, fl
             for joint in joints
             if short in (met := (street_of[joint.ends[0][0]], street_of[joint.ends[1][0]])) and met[0] != met[1]
         ]
-        # A street that meets no other (a map in two halves) goes to the shortest of the rest.
+        # A street that meets no other (a map in two parts) is merged into the shortest of the rest.
         others = (k for k in range(len(streets)) if k != short)
         host = min(meeting)[1] if meeting else min(others, key=lambda k: sum(length[r] for r in streets[k]))
         streets[host].extend(streets[short])
@@ -198,7 +198,7 @@ def _gather(streets: list[list[int]], joints: list[_Joint], length: dict[int, fl
 
 
 def _lane_streets(lanes: Sequence[Lane], links: Sequence[LaneLink], street_of: dict[int, int]) -> list[int]:
-    """Street of each lane; that of a connector is the one that all ways through it begin and end in."""
+    """Returns the street of each lane; that of a connector is the common street of all paths through it."""
     touched: list[dict[int, None]] = [{} for _ in lanes]
     after = _followers(lanes, links)
     before: list[list[int]] = [[] for _ in lanes]
@@ -219,7 +219,7 @@ def _lane_streets(lanes: Sequence[Lane], links: Sequence[LaneLink], street_of: d
 
 
 def _plain_ends(lanes: Sequence[Lane], table: list[list[int]], start: int) -> Iterator[int]:
-    """Lanes outside junctions that are met first, going along `table` from a connector."""
+    """Yields the first lanes outside junctions on all paths along `table` from a connector."""
     seen, todo = {start: None}, [start]
     while todo:
         for lane in table[todo.pop()]:
@@ -233,19 +233,19 @@ def _plain_ends(lanes: Sequence[Lane], table: list[list[int]], start: int) -> It
 def lay_sites(
     lanes: Sequence[Lane], links: Sequence[LaneLink], count: int = 24, avoid: Collection[int] = ()
 ) -> tuple[Site, ...]:
-    """Lays places for landmarks at the kerb, spread over the town by farthest-point sampling.
+    """Places landmark sites at the kerb, spread over the town by farthest-point sampling.
 
-    A site stands to the right of the outermost lane of a road, at half the lane's width and 6 m more, where no other
-    lane is as near. From its lane, and to it, one can drive from and to everywhere in the largest part of the town.
+    A site lies to the right of the outermost lane of a road, at half the lane width plus 6 m, where no other lane is as
+    close. Its lane belongs to the largest strongly connected part of the town.
 
     Args:
-        lanes: lanes of the town, with their streets.
+        lanes: lanes of the town, with streets.
         links: links between them, lane changes included.
-        count: how many sites are wanted.
-        avoid: lanes that no site is reached from.
+        count: number of sites.
+        avoid: lanes without sites.
 
     Returns:
-        At most `count` sites; fewer on a map that has no room for them.
+        At most `count` sites; fewer if the map has no room.
     """
     usable = _calm([lane for lane in _kerb_lanes(lanes, links) if lane.id not in avoid])
     for shortest, margin in SITE_RULES:
@@ -259,7 +259,7 @@ def lay_sites(
 
 
 def _kerb_lanes(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> list[Lane]:
-    """Outermost lanes outside junctions in the largest strongly connected part of the town."""
+    """Returns the outermost lanes outside junctions in the largest strongly connected part of the town."""
     pairs = np.array([(link.source, link.target) for link in links], dtype=int).reshape(-1, 2)
     graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(lanes), len(lanes)))
     _, part = connected_components(graph, directed=True, connection="strong")
@@ -278,13 +278,13 @@ def _kerb_lanes(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> list[Lane]:
 
 
 def _calm(lanes: list[Lane]) -> list[Lane]:
-    """Those lanes on which a car may stop for a landmark: not a motorway's, unless most of the map is that fast."""
+    """Returns the lanes slow enough to stop on, or all lanes if most of the map is fast."""
     calm = [lane for lane in lanes if lane.speed_limit <= FASTEST_STOP]
     return calm if 2 * len(calm) >= len(lanes) else lanes
 
 
 def _candidates(lanes: Iterable[Lane], margin: float) -> Array:
-    """Places every few metres along lanes: rows of lane, station, landmark x, y, waypoint x, y [m]."""
+    """Returns candidate sites along lanes: rows of lane, station, landmark x, y, waypoint x, y [m]."""
     tables = [np.empty((0, 6))]
     for lane in lanes:
         room = lane.length - 2.0 * margin
@@ -304,7 +304,7 @@ def _candidates(lanes: Iterable[Lane], margin: float) -> Array:
 
 
 def _is_clear(lanes: Sequence[Lane], places: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Which places have their own waypoint as the closest point of all lanes."""
+    """Returns which candidates have their own waypoint as the closest point of all lanes (n,)."""
     points, owner = [], []
     for lane in lanes:
         s = np.linspace(0.0, lane.length, int(np.ceil(lane.length)) + 1)
@@ -312,7 +312,7 @@ def _is_clear(lanes: Sequence[Lane], places: Array) -> np.ndarray[tuple[int], np
         owner.append(np.full(len(s), lane.id))
     tree, owners = cKDTree(np.concatenate(points, axis=1).T), np.concatenate(owner)
     aside = np.hypot(*(places[:, 2:4] - places[:, 4:6]).T)
-    # Lanes are looked at every metre, which is at most 2 cm off their true distance here: the waypoint must come out.
+    # Lanes are sampled every metre, which is at most 2 cm off their true distance: the waypoint must be closest.
     near, index = tree.query(places[:, 2:4], k=1)
     clear = (owners[index] == places[:, 0].astype(int)) & (near >= aside - 0.05)
     rows = np.flatnonzero(clear)
@@ -323,7 +323,7 @@ def _is_clear(lanes: Sequence[Lane], places: Array) -> np.ndarray[tuple[int], np
 
 
 def _spread(positions: Array, count: int) -> list[int]:
-    """Rows of positions (n, 2) far from one another: each next one is the farthest from all before it."""
+    """Returns rows of positions (n, 2) by farthest-point sampling."""
     middle = positions.mean(axis=0)
     chosen = [int(np.argmax(np.hypot(*(positions - middle).T)))]
     distance = np.hypot(*(positions - positions[chosen[0]]).T)
@@ -334,7 +334,7 @@ def _spread(positions: Array, count: int) -> list[int]:
 
 
 def _site(number: int, lane: Lane, row: Array) -> Site:
-    """Site of a candidate; its waypoint is looked up exactly, where the candidate's normal was interpolated."""
+    """Returns the site of a candidate; its waypoint is projected exactly."""
     station, _ = lane.project(row[2:4])
     x, y = lane.position(station)
     return Site(

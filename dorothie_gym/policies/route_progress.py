@@ -12,7 +12,7 @@ from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import Exit, LinkType
-from dorothie_gym.maps.routing import Entry, Leg, Place, Route, router
+from dorothie_gym.maps.routing import LaneEntry, Leg, Place, Route, router
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import StreetName
 from dorothie_gym.policies.observation_parser import street_of
@@ -261,10 +261,10 @@ class RouteProgress:
         legs = self.legs
         if len(legs) == 1:
             return station > self.goal[1] + PASSED
-        if legs[1].entry is Entry.FOLLOW:
+        if legs[1].entry is LaneEntry.FOLLOW:
             return False
         room = town.lanes[legs[0].lane].length - station
-        if legs[1].entry is Entry.U_TURN:
+        if legs[1].entry is LaneEntry.U_TURN:
             return station > legs[0].end + (LATE if room > END_ROOM else 0.0)
         return room < SWITCH_ROOM or station > legs[0].end + LATE
 
@@ -280,7 +280,7 @@ class RouteProgress:
     def way_in(self) -> Place | None:
         """Returns the place of the last lane change of the route; None if it has none."""
         for before, leg in reversed(list(itertools.pairwise(self.route.legs if self.route is not None else ()))):
-            if leg.entry in (Entry.CHANGE_LEFT, Entry.CHANGE_RIGHT):
+            if leg.entry in (LaneEntry.CHANGE_LEFT, LaneEntry.CHANGE_RIGHT):
                 return before.lane, (before.start + before.end) / 2
         return None
 
@@ -295,16 +295,16 @@ class RouteProgress:
         for k, leg in enumerate(legs[:-1]):
             distance += max(leg.end - (station if k == 0 else leg.start), 0.0)
             following = legs[k + 1]
-            if following.entry is Entry.FOLLOW and is_choice(town, leg.lane):
+            if following.entry is LaneEntry.FOLLOW and is_choice(town, leg.lane):
                 way = next((way for way in town.exits(leg.lane) if way.connector == following.lane), None)
                 if way is not None:
                     yield RouteJunction(lane=leg.lane, exit=way, distance=distance)
 
-    def next_manoeuvre(self, station: float) -> tuple[Entry, float] | None:
+    def next_manoeuvre(self, station: float) -> tuple[LaneEntry, float] | None:
         """Returns the next lane change or U-turn on the route and its distance [m]; None without one."""
         distance = 0.0
         for k, leg in enumerate(self.legs):
-            if k and leg.entry is not Entry.FOLLOW:
+            if k and leg.entry is not LaneEntry.FOLLOW:
                 return leg.entry, distance
             distance += max(leg.end - (station if k == 0 else leg.start), 0.0)
         return None
@@ -312,16 +312,16 @@ class RouteProgress:
     def turns_round_on(self, lane: int) -> bool:
         """Whether the next U-turn of the route begins on a lane."""
         for before, leg in itertools.pairwise(self.legs):
-            if leg.entry is Entry.U_TURN:
+            if leg.entry is LaneEntry.U_TURN:
                 return before.lane == lane
         return False
 
     def run_up(self) -> tuple[float, int] | None:
         """Returns distance and number of lane changes from the next U-turn to the goal [m]; None without a U-turn."""
         for k, leg in enumerate(self.legs):
-            if k and leg.entry is Entry.U_TURN:
+            if k and leg.entry is LaneEntry.U_TURN:
                 after = self.legs[k:]
-                changes = sum(one.entry in (Entry.CHANGE_LEFT, Entry.CHANGE_RIGHT) for one in after)
+                changes = sum(one.entry in (LaneEntry.CHANGE_LEFT, LaneEntry.CHANGE_RIGHT) for one in after)
                 return sum(one.end - one.start for one in after), changes
         return None
 
@@ -350,7 +350,7 @@ class RouteProgress:
     def changes_before(self, crossing: RouteJunction | None) -> bool:
         """Whether the route turns round before the given junction (or before the goal, where None)."""
         for leg in self.legs[1:]:
-            if leg.entry is Entry.U_TURN:
+            if leg.entry is LaneEntry.U_TURN:
                 return True
             if crossing is not None and leg.lane == crossing.exit.connector:
                 return False

@@ -23,7 +23,7 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dorothie_gym.maps.model import wrap_degrees
+from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, U_TURN_ANGLE, ArgumentKind, DialogueAct, PhysicalAction, Role
 from dorothie_gym.recording.events import ActionRecord, Event, EventType, MoveRecord, UtteranceRecord
 from dorothie_gym.recording.header import LandmarkRow

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dorothie_gym.maps.routing import Entry
+from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role, Slot
 from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE
 from dorothie_gym.policies.participant.config import ParticipantConfig
@@ -113,4 +113,4 @@ def test_who_turns_round_for_a_place_keeps_road_enough_to_stop() -> None:
 def test_the_run_up_of_a_way_without_a_u_turn_is_none() -> None:
     human = Guide(10.0)
     assert human.state.route.progress is not None and human.state.route.progress.run_up() is None
-    assert Entry.U_TURN not in {leg.entry for leg in human.state.route.progress.legs}
+    assert LaneEntry.U_TURN not in {leg.entry for leg in human.state.route.progress.legs}

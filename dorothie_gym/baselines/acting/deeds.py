@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.maps import Exit, Town
-from dorothie_gym.maps.model import LinkType, wrap_degrees
+from dorothie_gym.maps.model import LinkType
 from dorothie_gym.ontology import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, PhysicalAction
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, u_turn_start

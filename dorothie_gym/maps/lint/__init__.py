@@ -1,6 +1,6 @@
-"""Faults of a town that a driver would meet, in our own towns and imported maps alike.
+"""Checks of towns for faults that affect driving, in shipped towns and imported maps alike.
 
-`check_town` is the way in. Every other module knows one family of faults; its limits are constants there.
+Entry point: `check_town`. Each module checks one family of faults; its limits are constants of the module.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ __all__ = ["Fault", "FaultKind", "check_town"]
 
 
 def check_town(town: Town) -> tuple[Fault, ...]:
-    """Looks for everything that a driver would stumble over.
+    """Runs all checks.
 
     Returns:
-        The faults in the order of their kinds, then of their lanes; none for a sound town.
+        The faults, sorted by kind, then by lanes; empty for a sound town.
     """
     if not town.lanes:
         return ()

@@ -1,4 +1,4 @@
-"""Whether a lane by itself can be driven: kinks, curves, steps and width along its centre line."""
+"""Centre lines: checks for kinks, tight curves, steps and narrow places, within lanes and between linked lanes."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from dorothie_gym.maps.model import Array, Lane
 from dorothie_gym.maps.town import Town
 
 MAX_GAP = 0.05
-"""Largest distance in the plane between the ends of linked lanes [m]; demanded of the towns."""
+"""Largest distance in the plane between the ends of linked lanes [m]; a requirement of all towns."""
 
 MAX_STEP = 0.05
-"""Largest step in the road [m]: more is felt as a lowered kerb is, which is built 2 to 5 cm high."""
+"""Largest step in height [m]: lowered kerbs, 2 to 5 cm high, are noticeable."""
 
 MAX_KINK = math.radians(5.0)
-"""Largest sudden change of direction [rad]; demanded of the towns."""
+"""Largest sudden change of direction [rad]; a requirement of all towns."""
 
 _SLACK = 1e-9
-"""Rounding that is no fault [m or rad]."""
+"""Tolerance for rounding [m or rad]."""
 
 
 def continuity_faults(town: Town) -> Iterator[Fault]:
-    """Gaps, steps and kinks between lanes that are linked, lane changes left out."""
+    """Yields gaps, steps and kinks between linked lanes, lane changes excluded."""
     for link in town.links:
         if link.type.is_lane_change:
             continue
@@ -48,24 +48,24 @@ def continuity_faults(town: Town) -> Iterator[Fault]:
             yield Fault(kind=FaultKind.KINK, lanes=lanes, position=position, message=message)
 
 
-# --- Whether a lane by itself can be driven: kinks, curves, steps and width along its centre line --------------------
+# --- Faults within a lane --------------------------------------------------------------------------------------------
 
 MAX_DEPARTURE = 0.5
-"""A car on its smallest turning circle may leave the centre line of a tighter curve by this [m]; demanded of drives.
-Tight curves that turn by little are no fault by that: Town05 has right turns on 1.7 m, which the car takes well."""
+"""Largest deviation from the centre line of a car on its smallest turning circle [m]; a requirement of all drives.
+Short tight curves are acceptable: Town05 has right turns with a radius of 1.7 m that the car can follow."""
 
 MAX_CHORD_ERROR = 0.1
-"""Largest distance of a polyline from the arc that it stands for [m]; a coarser one is driven corner by corner."""
+"""Largest distance between a polyline and the arc that it approximates [m]; the corners of a coarser one are kinks."""
 
 MAX_GRADE = 0.35
-"""Steepest street [m/m]: that of Baldwin Street in Dunedin, said to be the steepest in the world."""
+"""Largest slope [m/m]: Baldwin Street in Dunedin, said to be the steepest street in the world."""
 
 _ROOM_BETWEEN = 5.0
-"""Kinks closer than this are told as one [m]."""
+"""Kinks closer than this are reported as one [m]."""
 
 
 def centre_line_faults(town: Town) -> Iterator[Fault]:
-    """Kinks, tight curves, steps and narrow places within lanes."""
+    """Yields kinks, tight curves, steps and narrow places within lanes."""
     for lane in town.lanes:
         yield from _bends(lane)
         yield from _steps(lane)
@@ -89,20 +89,20 @@ def _bends(lane: Lane) -> Iterator[Fault]:
 
 
 def _kinks(turns: Array, length: Array) -> NDArray[np.bool_]:
-    """Inner points where the line turns by more than the arcs before and behind it explain.
+    """Returns the inner points at which the line turns by more than the arcs before and after them explain (n,).
 
     Args:
-        turns: change of direction at the inner points (n,) [rad].
-        length: of the segments (n + 1,) [m].
+        turns: changes of direction at the inner points (n,) [rad].
+        length: lengths of the segments (n + 1,) [m].
     """
     before, after = length[:-1], length[1:]
     curvature = turns / _share(before, after)
-    # A point at the end has one neighbour, a single one has none: then the curve is taken to go on as it is.
+    # The curvature is extrapolated at points with one neighbour or none.
     ends = curvature[[min(1, len(turns) - 1), max(len(turns) - 2, 0)]]
     previous, following = np.append(ends[0], curvature[:-1]), np.append(curvature[1:], ends[1])
     # Each half of the segments beside the point lies on the arc of its own side.
     explained = 0.5 * (previous * before + following * after)
-    # What the arcs would add the other way, or beyond the turn itself, is not held against the point.
+    # The arcs explain at most the turn itself, and nothing in the opposite direction.
     low, high = np.minimum(explained, 0.0), np.maximum(explained, 0.0)
     left_over = turns - np.clip(turns, low, high)
     coarse = np.abs(turns) * np.minimum(before, after) / 8.0 > MAX_CHORD_ERROR
@@ -111,13 +111,13 @@ def _kinks(turns: Array, length: Array) -> NDArray[np.bool_]:
 
 
 def _share(before: Array, after: Array) -> Array:
-    """Length of line that an inner point stands for [m]; beside a long straight that is what the shorter side tells."""
+    """Returns the length of line of each inner point [m], limited by the shorter side beside a long straight."""
     share: Array = np.minimum(0.5 * (before + after), 1.5 * np.minimum(before, after))
     return share
 
 
 def _tight_curves(lane: Lane, turns: Array, length: Array) -> Iterator[Fault]:
-    """Stretches of curve in which a car at full lock would be carried too far from the centre line."""
+    """Yields curves on which a car at full lock would leave the centre line too far."""
     share = _share(length[:-1], length[1:])
     side = np.where(np.abs(turns) > share / SMALLEST_RADIUS, np.sign(turns), 0.0)
     edges = np.flatnonzero(np.diff(np.concatenate(([0.0], side, [0.0]))))
@@ -126,8 +126,8 @@ def _tight_curves(lane: Lane, turns: Array, length: Array) -> Iterator[Fault]:
             continue
         turn = float(np.sum(np.abs(turns[begin:end])))
         radius = float(np.sum(share[begin:end])) / turn
-        # The car swings out, cuts the corner by as much, and its arc still turns by the same angle: of the arcs of its
-        # radius the best one stays within this.
+        # The car swings out and cuts the corner equally while its arc turns by the same angle: the best of the
+        # arcs of its radius deviates by this distance.
         apart = (SMALLEST_RADIUS - radius) * np.tan(0.25 * min(turn, 2.0 * np.pi - 0.1)) ** 2
         if apart > MAX_DEPARTURE:
             message = (
@@ -138,7 +138,7 @@ def _tight_curves(lane: Lane, turns: Array, length: Array) -> Iterator[Fault]:
 
 
 def _steps(lane: Lane) -> Iterator[Fault]:
-    """Places where the lane rises or falls faster than any street does."""
+    """Yields places where a lane is steeper than any street."""
     length = np.diff(lane.stations)
     rise = np.abs(np.diff(lane.points[:, 2]))
     steep = np.flatnonzero(rise > MAX_GRADE * length + MAX_STEP)
@@ -149,7 +149,7 @@ def _steps(lane: Lane) -> Iterator[Fault]:
 
 
 def _narrow(town: Town, lane: Lane) -> Iterator[Fault]:
-    """The narrowest place of a lane, unless that is where a lane opens or runs out and nobody has to drive."""
+    """Yields the narrowest place of a lane, except where the lane opens or closes."""
     narrow = lane.widths < CAR_WIDTH - 1e-9
     wide = np.flatnonzero(~narrow)
     if len(wide):
@@ -164,7 +164,7 @@ def _narrow(town: Town, lane: Lane) -> Iterator[Fault]:
 
 
 def _runs(rows: NDArray[np.intp], stations: Array) -> list[NDArray[np.intp]]:
-    """Rows with less than `_ROOM_BETWEEN` from one to the next."""
+    """Returns groups of rows less than `_ROOM_BETWEEN` apart."""
     return [run for run in np.split(rows, np.flatnonzero(np.diff(stations[rows]) > _ROOM_BETWEEN) + 1) if len(run)]
 
 

@@ -1,4 +1,4 @@
-"""Whether lanes have their place to themselves: beside one another, and one above the other."""
+"""Overlap and headroom: checks that lanes do not share ground and that bridges are high enough."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 
 MAX_OVERLAP = 0.5
-"""Lanes may overlap sideways by this [m]: roads that meet in a mouth do, and markings are not that exact."""
+"""Largest sideways overlap of lanes [m]: merging roads overlap, and markings are not exact."""
 
 SHORTEST_OVERLAP = 2.0
-"""A shorter stretch of overlap is none [m]: where two roads touch with a corner, nobody drives into anybody."""
+"""Shortest overlap that is reported [m]: roads may touch at a corner."""
 
 MIN_CLEARANCE = 4.0
-"""Smallest height of one lane above another that crosses it [m]: the height to which lorries may be built in Europe."""
+"""Smallest headroom under a crossing lane [m]: the largest height of lorries in Europe."""
 
 JOINT = 5.0
-"""Lanes that follow one another are not held against each other this near to their ends [m]."""
+"""Distance from their ends within which successive lanes are not compared [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Pairs:
-    """Samples of different lanes beside each other: rows of both, and how far they reach into each other [m]."""
+    """Samples of different lanes beside each other: indices of both, overlap [m] and difference of height [m]."""
 
     first: NDArray[np.intp]
     second: NDArray[np.intp]
@@ -42,27 +42,27 @@ class _Pairs:
 
 
 def clearance_faults(town: Town, samples: LaneSamples) -> Iterator[Fault]:
-    """Lanes in the same place, connectors over lanes that they have nothing to do with, and low bridges."""
+    """Yields lanes on the same ground, connectors across unrelated lanes, and low bridges."""
     pairs = _pairs(town, samples)
     level = pairs.rise < SAME_LEVEL
     for lane, other, rows in _by_lanes(samples, pairs.select(level)):
         if not _follow(town, lane, other) and not _fork_or_join(town, lane, other):
             yield from _overlap(town, samples, lane, other, rows)
     for lane, other, rows in _by_lanes(samples, pairs.select(~level & (pairs.rise < MIN_CLEARANCE))):
-        if _follow(town, lane, other):  # a step where they meet is told as what it is
+        if _follow(town, lane, other):  # a step where they meet is reported separately
             rows = rows.select(~(_at_ends(samples, rows.first) & _at_ends(samples, rows.second)))
         yield from _clearance(samples, lane, other, rows)
 
 
 def _pairs(town: Town, samples: LaneSamples) -> _Pairs:
-    """Samples that reach into each other; of connectors at the same height only those with other lanes."""
+    """Returns the overlapping pairs of samples; connectors at the same height are only compared with other lanes."""
     junction = np.array([lane.in_junction for lane in town.lanes], dtype=np.bool_)[samples.owner]
     pairs = samples.tree.query_pairs(float(samples.widths.max()) + SPACING, output_type="ndarray")
     a, b = pairs[:, 0], pairs[:, 1]
     rise = np.abs(samples.heights[a] - samples.heights[b])
     keep = (samples.owner[a] != samples.owner[b]) & (~(junction[a] & junction[b]) | (rise >= SAME_LEVEL))
     a, b, rise = a[keep], b[keep], rise[keep]
-    # Measured on the lane that is no connector: a car's side on its ground is what matters.
+    # Measured on the lane that is not a connector: the side of a car on the ground of that lane counts.
     a, b = np.where(junction[a], b, a), np.where(junction[a], a, b)
     offset = samples.points[b] - samples.points[a]
     along = np.einsum("ij,ij->i", offset, samples.along[a])
@@ -84,18 +84,18 @@ def _by_lanes(samples: LaneSamples, pairs: _Pairs) -> Iterator[tuple[int, int, _
 
 
 def _follow(town: Town, lane: int, other: int) -> bool:
-    """Whether one of two lanes follows the other."""
+    """Returns whether one of two lanes follows the other."""
     return lane in town.predecessors(other) or other in town.predecessors(lane)
 
 
 def _fork_or_join(town: Town, lane: int, other: int) -> bool:
-    """Whether two lanes follow the same lane, or the same lane follows them."""
+    """Returns whether two lanes have a common predecessor or successor."""
     after, after_other = ({link.target for link in town.successors(k)} for k in (lane, other))
     return bool(after & after_other) or not set(town.predecessors(lane)).isdisjoint(town.predecessors(other))
 
 
 def _at_ends(samples: LaneSamples, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Which samples lie less than `JOINT` from an end of their lane."""
+    """Returns which samples lie less than `JOINT` from an end of their lane."""
     owner = samples.owner[rows]
     place = np.minimum(rows - samples.first[owner], samples.first[owner + 1] - 1 - rows)
     at_ends: NDArray[np.bool_] = place * SPACING < JOINT
@@ -103,7 +103,7 @@ def _at_ends(samples: LaneSamples, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
 
 
 def _overlap(town: Town, samples: LaneSamples, lane: int, other: int, pairs: _Pairs) -> Iterator[Fault]:
-    # Where they cross only one of them has many samples in the other one.
+    # Where lanes cross, only one of them has many samples inside the other.
     if max(len(np.unique(rows)) for rows in (pairs.first, pairs.second)) * SPACING <= SHORTEST_OVERLAP:
         return
     worst = int(np.argmax(pairs.overlap))

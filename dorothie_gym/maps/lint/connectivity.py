@@ -1,4 +1,4 @@
-"""Lanes that cannot be reached, or not be left again."""
+"""Connectivity: checks for lanes without a route from or to the rest of the town."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _LANES_NAMED = 8  # in a message
 
 
 def connectivity_faults(town: Town) -> Iterator[Fault]:
-    """Dead ends, and lanes outside the largest strongly connected part of the town, lane changes counted.
+    """Yields dead ends, and lanes outside the largest strongly connected part of the town, lane changes included.
 
-    A dead end is not reported a second time as a lane without a way back; the lanes that lead only there are.
+    A dead end is not also reported as a lane without a route back; lanes that only lead to dead ends are.
     """
     dead_ends = _dead_ends(town)
     for lane in dead_ends:
@@ -38,7 +38,7 @@ def connectivity_faults(town: Town) -> Iterator[Fault]:
 
 
 def _name(lanes: Sequence[int]) -> str:
-    """Lanes as they are named in messages: "lane 3", "lanes 3, 5, 8 and 20 more"."""
+    """Returns the names of lanes for messages: "lane 3", "lanes 3, 5, 8 and 20 more"."""
     named = ", ".join(map(str, lanes[:_LANES_NAMED]))
     more = f" and {len(lanes) - _LANES_NAMED} more" if len(lanes) > _LANES_NAMED else ""
     return f"lane{'s' if len(lanes) > 1 else ''} {named}{more}"
@@ -51,7 +51,7 @@ def _matrix(town: Town) -> csr_array:
 
 
 def _dead_ends(town: Town) -> list[int]:
-    """Lanes without a successor that no lane changes lead away from, to one that has any."""
+    """Returns the lanes without successors from which no lane changes lead to a lane with successors."""
     ends = [lane.id for lane in town.lanes if not town.successors(lane.id)]
     beside: dict[int, list[int]] = {}
     for link in town.links:
@@ -70,7 +70,7 @@ def _dead_ends(town: Town) -> list[int]:
 
 
 def _from_largest(onward: csr_array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which lanes can be reached from the largest strongly connected part, and from which one gets there."""
+    """Returns which lanes the largest strongly connected part reaches, and which lanes reach it."""
     _, part = connected_components(onward, directed=True, connection="strong")
     start = int(np.argmax(part == np.argmax(np.bincount(part))))
     found = []
@@ -82,7 +82,7 @@ def _from_largest(onward: csr_array) -> tuple[NDArray[np.bool_], NDArray[np.bool
 
 
 def _groups(onward: csr_array, members: NDArray[np.bool_]) -> Iterator[tuple[int, ...]]:
-    """Lanes among `members` that hang together, in order of their smallest lane."""
+    """Yields the connected groups among `members`, in order of their smallest lane id."""
     lanes = np.flatnonzero(members)
     if len(lanes) == 0:
         return

@@ -1,4 +1,4 @@
-"""What may be wrong with a town, in the eyes of somebody who drives in it."""
+"""Fault of a town, and the dimensions of the car that the roads must fit."""
 
 from __future__ import annotations
 
@@ -7,47 +7,47 @@ from dataclasses import dataclass
 
 
 class FaultKind(enum.StrEnum):
-    """Kinds of faults, in the order in which they are reported."""
+    """Kinds of faults, in the order of the report."""
 
     UNREACHABLE = "unreachable"
-    """Lanes to which no way leads from the rest of the town."""
+    """Lanes without a route from the rest of the town."""
     NO_RETURN = "no_return"
-    """Lanes from which no way leads back to the rest of the town."""
+    """Lanes without a route back to the rest of the town."""
     DEAD_END = "dead_end"
-    """A lane that goes on in none, nor does one that a car can change to."""
+    """A lane without successors, as have all lanes that a car can change to."""
     GAP = "gap"
     """Linked lanes that do not touch."""
     HEIGHT_STEP = "height_step"
-    """A step in the road, between linked lanes or within one."""
+    """A step in height, between linked lanes or within a lane."""
     KINK = "kink"
-    """A sudden change of direction, between linked lanes or within one."""
+    """A sudden change of direction, between linked lanes or within a lane."""
     TIGHT_CURVE = "tight_curve"
     """A curve that the car cannot follow at full lock."""
     NARROW = "narrow"
-    """A lane that is narrower than the car."""
+    """A lane narrower than the car."""
     KERB = "kerb"
-    """A way that leads over a kerb: off the junction's paved ground, across a corner, or over a pavement."""
+    """A path across a kerb: off the junction's asphalt, across a corner, or over a pavement."""
     OVERLAP = "overlap"
-    """A lane in the place of another one, or a connector that runs over a lane it has nothing to do with."""
+    """A lane on top of another one, or a connector across a lane that it does not lead to."""
     CLEARANCE = "clearance"
-    """A lane above another one, but not high enough to pass under."""
+    """A lane above another one without sufficient headroom."""
     TURN_TYPE = "turn_type"
-    """A way on that is called something else than it is."""
+    """A turn with a type that contradicts its geometry."""
     LANE_CHANGE = "lane_change"
-    """A lane change to a lane that does not run beside."""
+    """A lane change to a lane that is not parallel."""
     SIGNAL = "signal"
-    """A light or sign that nobody has to heed, or a light that never shows anything."""
+    """A light or sign that applies to no lane, or a light without a programme."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fault:
-    """A fault of a town.
+    """Fault of a town.
 
     Attributes:
-        kind: what is wrong.
-        lanes: lanes that it is about; empty for a signal that rules none.
-        position: where it is (x, y) [m].
-        message: what is wrong in figures, one sentence without its full stop.
+        kind: kind of the fault.
+        lanes: ids of the affected lanes; empty for a signal that applies to none.
+        position: location (x, y) [m].
+        message: description with figures, one sentence without a full stop.
     """
 
     kind: FaultKind
@@ -56,13 +56,13 @@ class Fault:
     message: str
 
 
-# --- The car that the roads have to fit: highway-env's, in figures ---------------------------------------------------
+# --- Dimensions of the car (highway-env) -----------------------------------------------------------------------------
 
 CAR_WIDTH = 2.0
 """Width of the car [m]."""
 
 HALF_WIDTH = 0.5 * CAR_WIDTH
-"""From the car's middle to its side [m]."""
+"""Half the width of the car [m]."""
 
 SMALLEST_RADIUS = 3.82
-"""Radius of its smallest turning circle [m]: a bicycle 5 m long with its front wheel at 60 degrees."""
+"""Radius of the smallest turning circle [m]: a kinematic bicycle of 5 m with the front wheel at 60 degrees."""

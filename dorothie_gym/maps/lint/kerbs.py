@@ -1,4 +1,4 @@
-"""Whether a car that follows the lanes stays off kerbs: those around junctions, and pavements."""
+"""Kerbs: checks that a car that follows the lanes stays on the asphalt of junctions and off pavements."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from dorothie_gym.maps.model import Array, Junction, Lane, Sidewalk
 from dorothie_gym.maps.town import Town
 
 CORNER_TURNS = np.radians([20.0, 160.0])
-"""Turns between these have a corner on their inner side [rad]."""
+"""Range of turns with a corner on the inner side [rad]."""
 
 FURTHEST_CORNER = 3.0
-"""The straights of a connector's ends meet no further away than this many times the distance between the ends."""
+"""Largest distance to the intersection of the tangents of a connector, relative to the distance between its ends."""
 
 SHORTEST_EDGE = 0.1
-"""The edges beside a corner are taken to be this long at least [m], so that there is a kerb to be rounded."""
+"""Shortest assumed length of the edges beside a corner [m], for a kerb that can be rounded."""
 
 DRAWN_OUT = 2.0
-"""An arc is drawn out to at most this many times its length; what is left beside the further mouth is straight. With 2
-sound crossings of five and more arms have no faults, with 1.5 some do."""
+"""Largest stretch factor of the arc of a corner; the rest beside the farther mouth is straight. With 2, correct
+crossings with five and more arms have no faults; with 1.5 some do."""
 
 THIRD_MOUTH = 0.5
-"""A mouth that lies this far to the right of both streets of a right turn is that of a third one between them [m]."""
+"""Distance to the right of both streets of a right turn of a mouth that belongs to a third street [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LaneEndPose:
-    """An end of a lane: its place and direction (2,), and its width [m]."""
+    """End of a lane: position (2,) [m], direction (2,) and width [m]."""
 
     place: Array
     along: Array
@@ -40,27 +40,27 @@ class LaneEndPose:
 
     @property
     def right(self) -> Array:
-        """Direction to the right (2,)."""
+        """Unit vector to the right (2,)."""
         return np.array([-self.along[1], self.along[0]])
 
     @property
     def edges(self) -> Array:
-        """Left and right edge of the lane (2, 2) [m]."""
+        """Left and right edge point (2, 2) [m]."""
         aside = 0.5 * self.width * self.right
         return np.array([self.place - aside, self.place + aside])
 
 
 class Corner:
-    """The rounded kerb on the inner side of a right turn."""
+    """Rounded kerb on the inner side of a right turn."""
 
     def __init__(self, connector: int, start: LaneEndPose, end: LaneEndPose, corner: Array, turn: float) -> None:
-        """Round off a corner.
+        """Rounds off a corner.
 
         Args:
-            connector: the turn around it.
-            start: where the turn begins.
-            end: where it ends.
-            corner: where the right edges of the two would meet (2,) [m].
+            connector: id of the lane of the turn.
+            start: start of the turn.
+            end: end of the turn.
+            corner: intersection of the right edges of both streets (2,) [m].
             turn: change of direction [rad], positive.
         """
         self.connector = connector
@@ -71,10 +71,10 @@ class Corner:
         self._middle = self._radius * start.right - start.along
 
     def _drawing(self, drawn_out: float) -> Array:
-        """Matrix (2, 2) to draw the rounded part of both edges, seen from the corner, to length 1: the kerb is an arc.
+        """Returns the matrix (2, 2) that scales the rounded part of both edges to length 1, so that the kerb is an arc.
 
         Args:
-            drawn_out: the longer part is at most this many times as long as the shorter one.
+            drawn_out: largest ratio of the longer part to the shorter one.
         """
         edges = np.column_stack((-self._start.along, self._end.along))
         length = np.maximum([float(np.hypot(*(self._corner - kerb))) for kerb in self._kerbs], SHORTEST_EDGE)
@@ -83,13 +83,13 @@ class Corner:
         return drawing
 
     def beyond(self, places: Array) -> Array:
-        """How far places (n, 2) lie to the right of both streets, however far away (n,) [m]."""
+        """Returns the distance of positions (n, 2) to the right of both streets, without limit along them (n,) [m]."""
         (kerb, kerb_behind), start, end = self._kerbs, self._start, self._end
         beyond: Array = np.minimum((places - kerb) @ start.right, (places - kerb_behind) @ end.right)
         return beyond
 
     def depth(self, places: Array, connector: int) -> Array:
-        """How far places (n, 2) on a connector lie behind the kerb, 0 before it (n,) [m]."""
+        """Returns the distance of positions (n, 2) of a connector behind the kerb, 0 before it (n,) [m]."""
         (kerb, kerb_behind), start, end = self._kerbs, self._start, self._end
         drawing = self._drawing(1.0 if connector == self.connector else DRAWN_OUT)
         from_middle = (places - self._corner) @ drawing.T - self._middle
@@ -98,14 +98,14 @@ class Corner:
         rounded = (from_middle @ start.along > 0.0) & (from_middle @ end.along < 0.0)
         depth = self.beyond(places)
         depth = np.where(rounded, np.minimum(depth, (self._radius - distance) / scale), depth)
-        # The kerb ends where the mouths are: what lies behind them is another street.
+        # The kerb ends at the mouths: another street begins behind them.
         between = ((places - kerb) @ start.along > 0.0) & ((places - kerb_behind) @ end.along < 0.0)
         result: Array = np.where(between, np.maximum(depth, 0.0), 0.0)
         return result
 
 
 def mouths(town: Town, junction: Junction) -> Array:
-    """Edges (n, 2) of all lanes where they meet a junction, and of connectors that meet none there [m]."""
+    """Returns the edge points (n, 2) of all lanes at a junction, and of connectors without a lane at an end [m]."""
     edges = [np.empty((0, 2))]
     for number in junction.connectors:
         before, after = town.predecessors(number), tuple(link.target for link in town.successors(number))
@@ -118,7 +118,7 @@ def mouths(town: Town, junction: Junction) -> Array:
 
 
 def end_of(town: Town, lane: int, point: int) -> LaneEndPose:
-    """First (point 0) or last (point -1) end of a lane."""
+    """Returns the first (point 0) or last (point -1) end of a lane."""
     row = town.lanes[lane]
     heading = row.headings[point]
     along = np.array([np.cos(heading), np.sin(heading)])
@@ -126,13 +126,13 @@ def end_of(town: Town, lane: int, point: int) -> LaneEndPose:
 
 
 def corners(town: Town, connectors: Iterable[int], kerb_lanes: frozenset[int], edges: Array) -> list[Corner]:
-    """Corners beside the right turns from kerb to kerb; none where a third street comes in between.
+    """Returns the corners of right turns from kerb to kerb; none where a third street lies in between.
 
     Args:
         town: the town.
-        connectors: of the junction.
-        kerb_lanes: lanes beside the kerb on their right.
-        edges: the junction's mouths (n, 2) [m].
+        connectors: ids of the connectors of the junction.
+        kerb_lanes: ids of the lanes with a kerb on their right.
+        edges: mouths of the junction (n, 2) [m].
     """
     found = []
     for number in connectors:
@@ -152,19 +152,19 @@ def corners(town: Town, connectors: Iterable[int], kerb_lanes: frozenset[int], e
 
 
 def outside(edges: Array, start: LaneEndPose, end: LaneEndPose, room: float, places: Array) -> Array:
-    """How far places (n, 2) lie off the ground between the mouths, 0 on it (n,) [m].
+    """Returns the distance of positions (n, 2) from the ground between the mouths, 0 on it (n,) [m].
 
     Args:
-        edges: the junction's mouths (m, 2) [m].
-        start: where the connector in question begins.
-        end: where it ends.
-        room: space to either side that a car on it needs [m].
-        places: to look at.
+        edges: mouths of the junction (m, 2) [m].
+        start: start of the connector.
+        end: end of the connector.
+        room: half the width that a car on it needs [m].
+        places: positions to check.
     """
     corner = _meeting(start, end)
     if corner is not None:
         bends = corner, corner
-    else:  # an S or a U: each end goes straight on for half of the way at most
+    else:  # S or U curve: both ends continue straight for at most half of the distance
         reach = room + 0.5 * float(np.hypot(*(end.place - start.place)))
         bends = start.place + reach * start.along, end.place - reach * end.along
     aside = [
@@ -173,14 +173,14 @@ def outside(edges: Array, start: LaneEndPose, end: LaneEndPose, room: float, pla
     edges = np.concatenate((edges, np.array(aside)))
     try:
         hull = ConvexHull(edges)
-    except QhullError:  # all in a line, or fewer than three: there is no ground to leave
+    except QhullError:  # collinear, or fewer than three points: no ground
         return np.zeros(len(places))
     distance: Array = np.maximum(np.max(places @ hull.equations[:, :2].T + hull.equations[:, 2], axis=1), 0.0)
     return distance
 
 
 def _meeting(start: LaneEndPose, end: LaneEndPose) -> Array | None:
-    """Where the straight on from the start meets the one that comes to the end; None if not between them."""
+    """Returns the intersection of the tangents of both ends, or None if it does not lie between them."""
     (d, e), gap = (start.along, end.along), end.place - start.place
     cross = float(d[0] * e[1] - d[1] * e[0])
     if abs(cross) < 1e-6:
@@ -192,19 +192,19 @@ def _meeting(start: LaneEndPose, end: LaneEndPose) -> Array | None:
     return meeting
 
 
-# --- Whether a car that follows the lanes stays off kerbs: those around junctions, and pavements ---------------------
+# --- Checks ----------------------------------------------------------------------------------------------------------
 
 KERB_SLACK = 0.15
-"""The car's side may come this far over a kerb before it is told [m]: kerbs are estimated, and curves are polylines."""
+"""Tolerance of the side of the car beyond a kerb [m]: kerbs are estimates, and curves are polylines."""
 
 LOOP = np.radians(190.0)
-"""A connector that turns by more is a loop [rad]; of U-turns some turn by a little more than a half circle."""
+"""Smallest turn of a loop [rad]; some U-turns turn slightly more than a half circle."""
 
 _SIDES = HALF_WIDTH * np.array([-1.0, 0.0, 1.0])
 
 
 def kerb_faults(town: Town, samples: LaneSamples) -> Iterator[Fault]:
-    """Connectors that lead off the junction's ground or across a corner, and lanes that run over a pavement."""
+    """Yields connectors that leave the ground of their junction or cut a corner, and lanes across pavements."""
     beside_kerb = _kerb_lanes(town.lanes)
     faulty: set[int] = set()
     for junction in town.junctions:
@@ -217,7 +217,7 @@ def kerb_faults(town: Town, samples: LaneSamples) -> Iterator[Fault]:
 
 
 def _kerb_lanes(lanes: Sequence[Lane]) -> frozenset[int]:
-    """Lanes outside junctions that run beside the kerb on their right, as their numbers tell."""
+    """Returns the lanes outside junctions with a kerb on their right, according to their lane numbers."""
     widest: dict[tuple[int, bool], int] = {}
     for lane in lanes:
         side = lane.road_id, lane.lane_id > 0
@@ -252,7 +252,7 @@ def _junction_faults(
 
 
 def _fault(samples: LaneSamples, rows: slice, over: Array, what: str) -> Fault:
-    """Fault of the lane at some rows, of which `over` (n, 3) or (3 n,) tells how far the car's sides get [m]."""
+    """Returns the fault of a lane; `over` (n, 3) or (3 n,) holds how far the sides of the car protrude [m]."""
     worst = rows.start + int(np.argmax(over)) // len(_SIDES)
     lane, (x, y) = int(samples.owner[worst]), samples.points[worst]
     message = f"a car on lane {lane} gets {over.max():.1f} m over {what}"
@@ -260,13 +260,13 @@ def _fault(samples: LaneSamples, rows: slice, over: Array, what: str) -> Fault:
 
 
 def _car_sides(samples: LaneSamples, rows: slice) -> Array:
-    """Left side, middle and right side of a car along a lane (n, 3, 2) [m]."""
+    """Returns the left side, middle and right side of a car along a lane (n, 3, 2) [m]."""
     sides: Array = samples.points[rows, None] + _SIDES[:, None] * samples.right[rows, None]
     return sides
 
 
 def _on_lanes(town: Town, samples: LaneSamples, places: Array, heights: Array) -> Array:
-    """Which places (3 n, 2) at heights (n,) lie on lanes outside junctions (3 n,): those are paved, too."""
+    """Returns which positions (3 n, 2) at heights (n,) lie on lanes outside junctions (3 n,), which are paved too."""
     road = np.flatnonzero(~np.array([lane.in_junction for lane in town.lanes])[samples.owner])
     if len(road) == 0:
         return np.zeros(len(places), dtype=np.bool_)
@@ -281,7 +281,7 @@ def _on_lanes(town: Town, samples: LaneSamples, places: Array, heights: Array) -
 
 
 def _pavement_faults(sidewalks: Sequence[Sidewalk], samples: LaneSamples) -> Iterator[Fault]:
-    """Lanes on which a car gets onto a pavement of the same height."""
+    """Yields lanes on which a car touches a pavement at the same height."""
     if not sidewalks:
         return
     places = np.concatenate([_along(sidewalk) for sidewalk in sidewalks])  # (m, 6)
@@ -299,7 +299,7 @@ def _pavement_faults(sidewalks: Sequence[Sidewalk], samples: LaneSamples) -> Ite
 
 
 def _along(sidewalk: Sidewalk) -> Array:
-    """Places along a pavement, at most `SPACING` apart: rows of x, y, z, direction x, y, and width."""
+    """Returns samples along a pavement, at most `SPACING` apart: rows of x, y, z, direction x, y, and width."""
     steps = np.diff(sidewalk.points[:, :2], axis=0)
     length = np.hypot(*steps.T)
     station = np.concatenate(([0.0], np.cumsum(length)))

@@ -1,4 +1,4 @@
-"""Places along all lanes of a town at once, for whatever compares lanes with one another."""
+"""Samples along all lanes of a town as arrays, for checks that compare lanes."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ SPACING = 1.0
 """Largest distance between samples of a lane [m]."""
 
 SAME_LEVEL = 0.5
-"""Places less than this above each other are the same ground [m]: one floor of a bridge is thicker than that."""
+"""Largest difference of height of points on the same ground [m]: bridges are thicker than this."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LaneSamples:
-    """Samples of all lanes, lane after lane in driving direction.
+    """Samples of all lanes, lane by lane in driving direction.
 
     Attributes:
-        owner: lane of each sample (n,).
-        points: places on the centre lines (n, 2) [m].
+        owner: lane id of each sample (n,).
+        points: positions on the centre lines (n, 2) [m].
         heights: (n,) [m].
-        along: directions of the lanes (n, 2), of length 1.
+        along: unit direction vectors of the lanes (n, 2).
         widths: (n,) [m].
-        first: row of the first sample of each lane, and n at the end (lanes + 1,).
+        first: index of the first sample of each lane, and n (lanes + 1,).
     """
 
     owner: NDArray[np.intp]
@@ -41,21 +41,21 @@ class LaneSamples:
 
     @cached_property
     def right(self) -> Array:
-        """Directions to the right of the lanes (n, 2), of length 1."""
+        """Unit vectors to the right of the lanes (n, 2)."""
         return np.column_stack((-self.along[:, 1], self.along[:, 0]))
 
     @cached_property
     def tree(self) -> cKDTree:
-        """The points, to look up what is near."""
+        """Search tree over `points`."""
         return cKDTree(self.points)
 
     def rows(self, lane: int) -> slice:
-        """Samples of one lane."""
+        """Returns the range of samples of one lane."""
         return slice(int(self.first[lane]), int(self.first[lane + 1]))
 
 
 def sample_lanes(town: Town) -> LaneSamples:
-    """Samples every lane at both ends and at most `SPACING` apart."""
+    """Samples every lane at both ends and at most `SPACING` apart in between."""
     rows = []
     for lane in town.lanes:
         s = np.linspace(0.0, lane.length, max(2, int(np.ceil(lane.length / SPACING)) + 1))

@@ -1,4 +1,4 @@
-"""Whether turns, lane changes and signals are what they are called."""
+"""Turn types, lane changes and signals: checks that types agree with the geometry."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from dorothie_gym.maps.model import Lane, LaneLink, LinkType, SignalKind
 from dorothie_gym.maps.town import Town
 
 WRONG_WAY = 10.0
-"""A left turn may lead this far to the right, and a right turn to the left [degrees]: where a road forks into two that
-both go nearly straight on, the two are called left and right."""
+"""Largest angle of a left turn to the right, or of a right turn to the left [degrees]: the branches of a fork that are
+both almost straight are called left and right."""
 
 STRAIGHT_BELOW = 50.0
-"""Straight on turns by less than this [degrees]; towns call it a turn from 35 degrees, people somewhere between."""
+"""Largest angle of a straight movement [degrees]; towns use 35 degrees, human judgement varies."""
 
 U_TURN_FROM = 120.0
-"""A U-turn turns by at least this [degrees]."""
+"""Smallest angle of a U-turn [degrees]."""
 
 MAX_SEPARATION = 1.0
-"""Largest space between lanes that one changes between, or overlap of them [m]."""
+"""Largest gap or overlap between the lanes of a lane change [m]."""
 
 MAX_DIVERGENCE = math.radians(20.0)
-"""Largest angle between lanes that one changes between [rad]."""
+"""Largest angle between the lanes of a lane change [rad]."""
 
 _HEEDED = (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP, SignalKind.YIELD)
 
 
 def turn_type_faults(town: Town) -> Iterator[Fault]:
-    """Turns and lane changes that are not what their type says, and signals without meaning."""
+    """Yields turns and lane changes that contradict their type, and signals without effect."""
     for link in town.links:
         if link.type.is_lane_change:
             yield from _lane_change(town.lanes[link.source], town.lanes[link.target], link.type)
@@ -43,13 +43,13 @@ def turn_type_faults(town: Town) -> Iterator[Fault]:
 
 
 def _turn(town: Town, link: LaneLink) -> Iterator[Fault]:
-    """A turn is judged by where it leads; one of more than a half circle also by the way there."""
+    """Checks a turn by its net change of direction, and beyond a half circle also by the driven one."""
     if not town.lanes[link.target].in_junction:
         if link.type is not LinkType.STRAIGHT and not town.lanes[link.source].in_junction:
             yield _turn_fault(town, link, "leads into a lane that only goes on, across no junction")
         return
     if town.lanes[link.source].in_junction:
-        return  # the type is that of the link that enters the junction
+        return  # the link into the junction carries the type
     net, driven = _turned(town, link)
     if not any(_fits(link.type, angle) for angle in (net, driven)):
         direction = "right" if driven < 0 else "left"
@@ -57,7 +57,7 @@ def _turn(town: Town, link: LaneLink) -> Iterator[Fault]:
 
 
 def _fits(kind: LinkType, angle: float) -> bool:
-    """Whether a turn by an angle [degrees], positive left, may be called that."""
+    """Returns whether a type fits a turn by an angle [degrees], positive left."""
     if kind is LinkType.STRAIGHT:
         return abs(angle) < STRAIGHT_BELOW
     if kind is LinkType.U_TURN:
@@ -66,7 +66,7 @@ def _fits(kind: LinkType, angle: float) -> bool:
 
 
 def _turned(town: Town, link: LaneLink) -> tuple[float, float]:
-    """Change of direction from before a junction to behind it [degrees], positive left: in [-180, 180), and driven."""
+    """Returns the change of direction across a junction [degrees], positive left: net in [-180, 180), and driven."""
     before, target = town.lanes[link.source], town.lanes[link.target]
     driven, seen = 0.0, {target.id}
     while True:
@@ -81,7 +81,7 @@ def _turned(town: Town, link: LaneLink) -> tuple[float, float]:
 
 
 def _order_of_turns(town: Town) -> Iterator[Fault]:
-    """Of the ways on from a lane the left turns must lie left of straight on, and the right turns right of it."""
+    """Checks that left turns lie to the left of the straight movement and right turns to the right of it."""
     for lane in town.lanes:
         ways = [link for link in town.successors(lane.id) if town.lanes[link.target].in_junction]
         straight = [link for link in ways if link.type is LinkType.STRAIGHT]
@@ -91,7 +91,7 @@ def _order_of_turns(town: Town) -> Iterator[Fault]:
         for link in ways:
             net, driven = _turned(town, link)
             if abs(driven) > 180.0 or not _fits(link.type, net):
-                continue  # it comes out on the other side of where it sets off, or is told already
+                continue  # it ends on the other side of its start, or is reported already
             if (link.type is LinkType.LEFT and net < min(angles) - WRONG_WAY) or (
                 link.type is LinkType.RIGHT and net > max(angles) + WRONG_WAY
             ):
@@ -107,7 +107,7 @@ def _turn_fault(town: Town, link: LaneLink, what: str) -> Fault:
 
 
 def _lane_change(source: Lane, target: Lane, side: LinkType) -> Iterator[Fault]:
-    """Somewhere along the source the target must run beside it, on the side that is told."""
+    """Checks that the target lies beside the source somewhere, on the side of the lane change."""
     reasons: list[str] = []
     for station in np.linspace(0.0, source.length, max(3, int(source.length / 5.0) + 2))[1:-1]:
         found = _why_not_beside(source, float(station), target, side)
@@ -123,7 +123,7 @@ def _lane_change(source: Lane, target: Lane, side: LinkType) -> Iterator[Fault]:
 
 
 def _why_not_beside(source: Lane, station: float, target: Lane, side: LinkType) -> str | None:
-    """Why one cannot change from a place on a lane to another lane; None if one can."""
+    """Returns the reason against a lane change at a station, or None if it is possible."""
     there, across = target.project(source.position(station))
     apart = abs(across) - 0.5 * (source.width_at(station) + target.width_at(there))
     turn = math.remainder(target.heading_at(there) - source.heading_at(station), math.tau)
@@ -133,7 +133,7 @@ def _why_not_beside(source: Lane, station: float, target: Lane, side: LinkType) 
         return f"which runs at {math.degrees(abs(turn)):.0f} degrees to it"
     if abs(apart) > MAX_SEPARATION:
         return f"which is {abs(apart):.1f} m {'away from' if apart > 0 else 'into'} it"
-    # Seen from the target the source lies on its other side.
+    # as seen from the target, the source lies on the other side
     if (across > 0.0) != (side is LinkType.LANE_CHANGE_LEFT):
         return "which runs on its other side"
     return None

@@ -6,8 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dorothie_gym.maps.model import Exit, LinkType, wrap_degrees
-from dorothie_gym.maps.routing import Entry, Place
+from dorothie_gym.angles import wrap_degrees
+from dorothie_gym.maps.model import Exit, LinkType
+from dorothie_gym.maps.routing import LaneEntry, Place
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, LandmarkName, ObjectClass, PhysicalAction
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Wish
@@ -157,7 +158,7 @@ def _follow_route(state: CoWizardState, view: CoWizardView) -> Physical | None:
     crossing = progress.next_crossing(state.town, view.station)
     if crossing is not None and crossing.distance < distance:
         return None
-    if entry is Entry.U_TURN:
+    if entry is LaneEntry.U_TURN:
         if not progress.turns_round_on(view.lane):
             return None
         held_up = view.standing and view.motion is Motion.HAZARD and view.hazard is ObjectClass.STATIC
@@ -165,7 +166,7 @@ def _follow_route(state: CoWizardState, view: CoWizardView) -> Physical | None:
         return _turn_round(state, view) if distance <= slowing_distance(view.speed) or held_up else None
     if not _needs_switch(state, view, crossing):
         return None
-    side = LinkType.LANE_CHANGE_LEFT if entry is Entry.CHANGE_LEFT else LinkType.LANE_CHANGE_RIGHT
+    side = LinkType.LANE_CHANGE_LEFT if entry is LaneEntry.CHANGE_LEFT else LinkType.LANE_CHANGE_RIGHT
     return _switch(state, view, side)
 
 

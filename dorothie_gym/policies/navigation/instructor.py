@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from dorothie_gym.maps import Town
-from dorothie_gym.maps.routing import Entry, Place
+from dorothie_gym.maps.routing import LaneEntry, Place
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.feasibility import slowing_distance
 from dorothie_gym.policies.guidance_config import GuidanceConfig
@@ -227,11 +227,11 @@ class Instructor:
         if manoeuvre is not None and (crossing is None or manoeuvre[1] < crossing.distance):
             entry, distance = manoeuvre
             alone = crossing is None or progress.needs_switch(self._town, lane, station, crossing)
-            own_step = alone or entry is Entry.U_TURN
+            own_step = alone or entry is LaneEntry.U_TURN
             step = self._manoeuvre_step(observation, lane, entry, distance) if own_step else None
             if step is not None:
                 return step
-            if crossing is None or entry is Entry.U_TURN:
+            if crossing is None or entry is LaneEntry.U_TURN:
                 return _send_on(waits)
         if crossing is None:
             return self._stop_step(progress.left(station), waits=waits)
@@ -245,17 +245,17 @@ class Instructor:
         return GuidanceStep(("turn", crossing.lane, crossing.exit.connector), values, sector, crossing.distance)
 
     def _manoeuvre_step(
-        self, observation: Observation, lane: int, entry: Entry, distance: float
+        self, observation: Observation, lane: int, entry: LaneEntry, distance: float
     ) -> GuidanceStep | None:
         """Returns a U-turn, or a lane switch that is not part of a turn, if it is near."""
         config = self._config
-        if entry is Entry.U_TURN:
+        if entry is LaneEntry.U_TURN:
             speed = scalar(observation, "speed")
             near = distance <= config.reaction_time * speed + slowing_distance(speed, config.u_turn_speed_squared)
             return GuidanceStep(("round", lane), (ActionValue.U_TURN,), None, distance) if near else None
         if distance > config.switch_distance:
             return None
-        left = entry is Entry.CHANGE_LEFT
+        left = entry is LaneEntry.CHANGE_LEFT
         sector = nearest_sector(90.0 if left else -90.0)
         return GuidanceStep(("lane", lane, left), (ActionValue.LANE_SWITCH,), sector, distance)
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from dorothie_gym.dialogue import Direction, Wording, speech_seconds, word_act
-from dorothie_gym.maps.routing import Entry
+from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, Slot, SlotValue, StreetName
 from dorothie_gym.policies.feasibility import slowing_distance
 from dorothie_gym.policies.observation_parser import street_of
@@ -196,7 +196,7 @@ def _is_easily_missed(state: ParticipantState, view: ParticipantView) -> bool:
     crossing = progress.next_crossing(state.town, view.station)
     if crossing is None:
         manoeuvre = progress.next_manoeuvre(view.station)
-        return manoeuvre is not None and manoeuvre[0] is not Entry.U_TURN
+        return manoeuvre is not None and manoeuvre[0] is not LaneEntry.U_TURN
     told = step is not None and step[0] == "turn"
     return told and crossing.distance < config.corner_distance and left - crossing.distance < config.behind_corner
 
@@ -223,7 +223,7 @@ def _takes_run_up(state: ParticipantState, view: ParticipantView) -> bool:
     missing = config.run_up + changes * config.run_up_per_lane - rest
     if missing < 0.0 or room < END_ROOM + view.speed or not _turns_better(state, view, min(missing, room - END_ROOM)):
         return False
-    if progress.next_manoeuvre(view.station) == (Entry.U_TURN, 0.0):
+    if progress.next_manoeuvre(view.station) == (LaneEntry.U_TURN, 0.0):
         state.route = state.route.replanned(state.town, view.place)
     _send_on(state, view)
     return True
@@ -267,7 +267,7 @@ def next_step(
         return None
     crossing = progress.next_crossing(state.town, view.station)
     manoeuvre = progress.next_manoeuvre(view.station)
-    if manoeuvre is not None and manoeuvre[0] is Entry.U_TURN:
+    if manoeuvre is not None and manoeuvre[0] is LaneEntry.U_TURN:
         if crossing is None or manoeuvre[1] < crossing.distance:
             return ("round", 0, 0), manoeuvre[1], remark(move, ActionValue.U_TURN)
     switch = manoeuvre is not None and (
@@ -278,7 +278,7 @@ def next_step(
         key = ("turn", crossing.lane, crossing.exit.connector)
         return key, crossing.distance, _turn_remark(state, view, move, crossing, rng)
     if manoeuvre is not None:
-        left = manoeuvre[0] is Entry.CHANGE_LEFT
+        left = manoeuvre[0] is LaneEntry.CHANGE_LEFT
         wording = Wording(direction=Direction.LEFT if left else Direction.RIGHT)
         return ("lane", view.lane, int(left)), manoeuvre[1], remark(move, ActionValue.LANE_SWITCH, wording=wording)
     return ("on", view.lane, 0), progress.left(view.station), remark(move, ActionValue.LANE_FOLLOW)

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from dorothie_gym.maps.model import wrap_degrees
+from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.recording.events import Event, EventType
 from dorothie_gym.recording.sdn.maps import SdnMap
