@@ -1,4 +1,4 @@
-"""What a driver with pedals and a steering wheel observes: the path, where the car is on it, what is in the way."""
+"""Observation vector of `Navigation-continuous-v0`: the path, the car's place on it, and what is ahead."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import ObjectColumn, Observation
 
 AHEAD = (2.0, 4.0, 7.0, 10.0, 14.0, 19.0, 25.0, 32.0, 40.0, 50.0)
-"""Points of the path are shown this far ahead [m]."""
+"""Distances ahead of the path points in the vector [m]."""
 
 REACH = 50.0
-"""Their places are shares of this [m]."""
+"""Unit of the positions of path points [m]."""
 
 ASIDE = 4.0
-"""The distance from the path is a share of this [m]."""
+"""Unit of the distance from the path [m]."""
 
 NEAREST = 4
-"""Bodies that are shown, the nearest first."""
+"""Number of objects in the vector, the nearest first."""
 
 _WET = tuple(WeatherParameter).index(WeatherParameter.WETNESS)
 
@@ -32,32 +32,32 @@ CONTINUOUS_FIELDS: Mapping[str, int] = MappingProxyType(
     {
         "speed": 1,  # of FAST
         "controls": 3,  # throttle, steer and brake as they are
-        "offset": 1,  # how far the car is to the right of the path, of ASIDE
+        "offset": 1,  # distance of the car to the right of the path, of ASIDE
         "course": 2,  # sine and cosine of the angle from the path to the car's heading, positive right
         "path": 2 * len(AHEAD),  # points ahead in the car's frame: ahead and to the right, of REACH
-        "allowed": 1 + len(AHEAD),  # speed that curves, limits and the end of the path allow here and there, of FAST
-        "room": 1,  # path that is left before a junction where no way was told, of FAR; 1 if it goes on
-        "obstacle": 4,  # whether something is in the way, how far, of FAR, its speed, of FAST; whether it is a line
-        "stop": 3,  # whether the car is to stop, what is left of the way to there, of FAR and of CLOSE
+        "allowed": 1 + len(AHEAD),  # speed allowed by curves, limits and the path, here and at each point, of FAST
+        "room": 1,  # remaining path before a junction without instruction, of FAR; 1 if it goes on
+        "obstacle": 4,  # whether something is ahead, its distance, of FAR, its speed, of FAST; whether it is a line
+        "stop": 3,  # whether the car is to stop, the remaining distance, of FAR and of CLOSE
         "objects": NEAREST * (4 + len(KINDS)),  # distance [50 m], sine and cosine of bearing, speed, one-hot class
         "wetness": 1,  # of the road
-        "time": 1,  # share of the time there is
+        "time": 1,  # share of the time limit
     }
 )
-"""Fields of the observation and their sizes, in order; shares are clipped to -1..1."""
+"""Fields of the observation and their sizes, in order; values are clipped to -1..1."""
 
 
 def observe_continuous(world: World, seen: Observation, heard: HeardInstruction, max_seconds: float) -> Vector:
-    """The observation of a driver with pedals.
+    """Encodes the observation of a driver.
 
     Args:
-        world: the car and its path; the path ahead and what is in the way are seen from the car.
-        seen: what the Co-Wizard observes.
-        heard: what it remembers of what was said.
-        max_seconds: time there is [s].
+        world: the car and its path.
+        seen: observation of the Co-Wizard.
+        heard: last instruction.
+        max_seconds: time limit [s].
 
     Returns:
-        Numbers (n,) within -1 and 1, see `CONTINUOUS_FIELDS`.
+        Vector (n,) in [-1, 1], see `CONTINUOUS_FIELDS`.
     """
     car, planner = world.car, world.planner
     control = car.control

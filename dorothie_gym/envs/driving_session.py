@@ -44,26 +44,26 @@ from dorothie_gym.spaces import (
 from dorothie_gym.tasks import StoryboardTemplate, load_template
 
 NEARER = 1.0
-"""Only a way left that is shorter by this counts as having come nearer [m]."""
+"""Decrease of the cost to go that counts as progress for `patience` [m]."""
 
 OFF_ROAD = 15.0
-"""A car that is farther from its path than this has left the road for good [m]."""
+"""Distance from the path beyond which the car has left the road for good [m]."""
 
 _RULES = tuple(kind.value for kind in INFRACTION_KINDS if kind is not WorldEventKind.COLLISION)
 _SILENCE, _INTACT = ParticipantAction(), AdWizardAction()
 
 
 class DrivingSession:
-    """A session in progress.
+    """Session in progress.
 
     Attributes:
         stage: the session.
-        exits: exits on at the town's junctions.
-        instructor: who tells the way.
-        heard: what the Co-Wizard remembers of it.
-        seen: what all roles observe now.
-        reward: of the last decision.
-        terms: the same by terms.
+        exits: exits of the town's junctions.
+        instructor: built-in participant.
+        heard: last instruction, as the Co-Wizard remembers it.
+        seen: present observations of all roles.
+        reward: reward of the last decision.
+        terms: its terms.
         terminated: whether the destination was reached, or the participant gave up.
         truncated: whether time is up.
     """
@@ -78,7 +78,7 @@ class DrivingSession:
         seed = policy_seed(stage.scenario.seed, Role.AD_WIZARD)
         self._plans = self._adversary.initial_state(seed, town) if self._adversary is not None else None
         self.heard, self._notes = HeardInstruction(), list[Mental]()
-        self._aim: tuple[Place | None, tuple[Place, ...]] = (None, ())  # what `_nearest` is measured to
+        self._aim: tuple[Place | None, tuple[Place, ...]] = (None, ())  # goal and roadblocks that `_nearest` refers to
         self.seen: Mapping[str, Observation] = stage.observations()
         marks = read_landmarks(self.seen[Role.CO_WIZARD], town)  # those on its map, for the whole session
         self._known = frozenset(mark.place for mark in marks)
@@ -88,25 +88,25 @@ class DrivingSession:
         self.terminated = self.truncated = False
         self.reason: str | None = None
         self._listen()
-        self._left = self._way_left()
+        self._left = self._cost_to_go()
 
     @classmethod
     def begin(
         cls, town: Town, network: TownNetwork, template: StoryboardTemplate | None, config: NavigationConfig,
         seed: int, scenario: Scenario | None = None,
     ) -> DrivingSession:  # fmt: skip
-        """A new session.
+        """Begins a session.
 
         Args:
             town: the map.
             network: its lanes.
-            template: of the storyboard; None draws one.
+            template: template of the storyboard; None draws one.
             config: settings.
-            seed: of the scenario.
-            scenario: played in lieu of one that is drawn.
+            seed: seed of the scenario.
+            scenario: scenario to play instead of a drawn one.
 
         Raises:
-            ValueError: `scenario` is none.
+            ValueError: `scenario` is not a `Scenario`.
         """
         if scenario is None:
             scenario = draw_scenario(town, template, seed)
@@ -118,7 +118,7 @@ class DrivingSession:
     # --- a decision -------------------------------------------------------------------------------------------------
 
     def play(self, action: CoWizardAction) -> None:
-        """Plays one decision; the Co-Wizard's next note goes with its action."""
+        """Plays one decision; the next belief update of the Co-Wizard is sent with its action."""
         if self.terminated or self.truncated:
             from gymnasium.error import ResetNeeded
 
@@ -131,17 +131,17 @@ class DrivingSession:
         self.heard = self.heard.driven_on(before[Role.CO_WIZARD], self.seen[Role.CO_WIZARD])
         progress = self._progress()
         self._listen()
-        self._left = self._way_left()
+        self._left = self._cost_to_go()
         self._note_patience()
         self._end()
         self._reward(progress, self._count_reached() - reached, action.physical is not None)
 
     def observe(self) -> Vector:
-        """What the driver observes."""
+        """Returns the observation of the driver."""
         return self._viewpoint.observe(self.seen[Role.CO_WIZARD], self.heard, self.instructor.blocked)
 
     def info(self) -> dict[str, Any]:
-        """What else the driver is told; everything in it is the taker's own."""
+        """Returns the info of the last decision, as a new dictionary."""
         info: dict[str, Any] = {
             "reward_terms": dict(self.terms),
             "refused": list(self.stage.refused[Role.CO_WIZARD]),
@@ -152,17 +152,17 @@ class DrivingSession:
             info["subgoals"] = {"live": len(self.stage.task.live), "reached": self._count_reached()}
         return info
 
-    # --- the others -------------------------------------------------------------------------------------------------
+    # --- other roles -------------------------------------------------------------------------------------------------
 
     def interfere(self) -> RoleAction:
-        """What the Ad-Wizard does now."""
+        """Returns the present action of the Ad-Wizard."""
         if self._adversary is None or self._plans is None:
             return _INTACT
         action, self._plans = self._adversary.step(self.seen[Role.AD_WIZARD], self._plans)
         return self._decoder(action)
 
     def _listen(self) -> None:
-        """Lets the instructor speak, and notes what that says about the goal."""
+        """Lets the instructor speak, and updates the goal."""
         planner = self.stage.world.planner
         waits = planner.held and float(self.stage.world.car.speed) <= STANDING
         turning = max(planner.manoeuvre_end - planner.s, 0.1) if planner.in_manoeuvre else 0.0
@@ -179,7 +179,7 @@ class DrivingSession:
             self._note_goal(name, said.distance, by_name=said.action is None)
 
     def _note_goal(self, name: LandmarkName, distance: float, *, by_name: bool) -> None:
-        """The Co-Wizard heads for a place: one that is on its map, or one so far ahead as was said."""
+        """Queues the belief updates for a goal: a place on the map, or one as far ahead as was said."""
         goal = self.instructor.goal
         assert goal is not None
         self._notes = [Mental(action=MentalAction.GOAL_UPDATE, goals=(name,))]
@@ -192,15 +192,15 @@ class DrivingSession:
             mark = LanePosition(lane=lane, metres=int(station))
             self._notes.append(Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=name, place=mark))
 
-    # --- what comes of it -------------------------------------------------------------------------------------------
+    # --- progress and reward ------------------------------------------------------------------------------------------
 
-    def _way_left(self) -> float:
+    def _cost_to_go(self) -> float:
         planner = self.stage.world.planner
         return self.instructor.cost_to_go.from_place(planner.lane, planner.station)
 
     def _progress(self) -> float:
-        """By how much the way to the goal has got shorter [m]; to be asked before there is another goal."""
-        left = self._way_left()
+        """Returns the decrease of the cost to go [m]; to be called before the goal changes."""
+        left = self._cost_to_go()
         return self._left - left if math.isfinite(left) and math.isfinite(self._left) else 0.0
 
     def _note_patience(self) -> None:
@@ -252,7 +252,7 @@ Action = TypeVar("Action")
 
 
 class DrivingEnv(gym.Env[Vector, Action]):
-    """A drive in a town; subclasses say what is observed and what can be done."""
+    """Base class of the navigation environments; subclasses define observations and actions."""
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
         "render_modes": ["human", "rgb_array"],
@@ -276,7 +276,7 @@ class DrivingEnv(gym.Env[Vector, Action]):
 
     @property
     def drive(self) -> DrivingSession:
-        """The session being played; raises `gymnasium.error.ResetNeeded` before the first reset."""
+        """Session in progress; raises `gymnasium.error.ResetNeeded` before the first reset."""
         if self._drive is None:
             raise gym.error.ResetNeeded("no session is being played: call reset() first")
         return self._drive
@@ -310,10 +310,10 @@ class DrivingEnv(gym.Env[Vector, Action]):
 
 
 class NavigationMask:
-    """Tells which actions would be carried out, for the car of a session.
+    """Mask of the actions that the car of a session would carry out, computed from its planned path.
 
     Attributes:
-        exits: exits on at the town's junctions.
+        exits: exits of the town's junctions.
     """
 
     def __init__(self, world: World, exits: JunctionExits) -> None:
@@ -322,12 +322,12 @@ class NavigationMask:
 
     @property
     def choice(self) -> tuple[int, float] | None:
-        """The lane at whose end the car has to choose a way, and how far it is [m]; None if the path comes to none."""
+        """Lane before the next junction with a choice, and the distance to it [m]; None if the path comes to none."""
         options = self._prospect.options()
         return (options.lane, options.distance) if options.exits else None
 
     def mask(self, seen: Mapping[str, Any]) -> NDArray[np.int8]:
-        """Which actions the car follows now (18,): 1 for those; `seen` is what the Co-Wizard observes."""
+        """Returns the mask (18,), 1 for feasible actions; `seen` is the observation of the Co-Wizard."""
         world, planner = self._world, self._world.planner
         speed, cruise = float(world.car.speed), world.ego.cruise
         mask = np.zeros(len(ACTIONS), dtype=np.int8)

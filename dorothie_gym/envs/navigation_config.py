@@ -1,4 +1,4 @@
-"""Settings of driving alone: how hard it is, how the way is told, and what is rewarded."""
+"""Settings of the navigation environments: difficulty, guidance and reward."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from dorothie_gym.sim.config import WorldConfig
 TRAFFIC: Mapping[str, tuple[int, int]] = MappingProxyType(
     {"none": (0, 0), "light": (4, 2), "medium": (10, 4), "heavy": (30, 20)}
 )
-"""Vehicles and pedestrians of each degree of traffic, as many as fit."""
+"""Numbers of vehicles and pedestrians of each traffic density; upper bounds where the town is small."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NavigationWeights:
-    """Weights of the reward's terms; a term whose weight is 0 is told as 0.
+    """Weights of the reward terms; a term of weight 0 is reported as 0.
 
     Attributes:
-        progress: for each metre by which the way left gets shorter (negative: longer). The way left is the cost of the
-            route to the present goal in metres at 40 km/h. It is a difference of potentials, which leaves the best
-            policy as it is (Ng, Harada and Russell 1999).
+        progress: for each metre by which the cost to go decreases. The cost to go is that of the route to the present
+            goal in metres at 40 km/h; as a difference of potentials it leaves the optimal policy unchanged (Ng, Harada
+            and Russell 1999).
         subgoal: for each subgoal reached.
         success: at the end, if every live subgoal was reached and nothing was hit.
         collision: for each collision of the car's own making.
         infraction: for each red light, stop sign, stretch off the road or on the wrong side.
-        gave_up: at the end, if the participant has given up, or the car has left the road.
+        gave_up: at the end, if the participant has given up or the car has left the road.
         time: for each second.
-        action: for each action that is carried out: who fiddles about is no good driver.
+        action: for each action that is carried out; discourages needless actions.
         refusal: for each action that is refused.
     """
 
@@ -63,12 +63,11 @@ class NavigationConfig:
     Attributes:
         guidance: a `Guidance` or its name.
         traffic: one of `TRAFFIC`.
-        exceptions: of a session on average, 0 to 4, by the scripted Ad-Wizard.
-        max_seconds: the session is cut off (truncated) after this long [s].
-        patience: the participant gives up (the episode terminates) when the car has come no nearer to its goal than it
-            once was for this long [s].
-        decision_frequency: decisions a second [Hz]; it divides the 30 Hz of the physics.
-        weights: of the reward.
+        exceptions: average number of exceptions in a session, 0 to 4, by the scripted Ad-Wizard.
+        max_seconds: time after which the session is truncated [s].
+        patience: time without progress after which the participant gives up and the episode terminates [s].
+        decision_frequency: decisions per second [Hz]; it divides the 30 Hz of the physics.
+        weights: weights of the reward terms.
     """
 
     guidance: Guidance | str = Guidance.TURNS
@@ -89,11 +88,11 @@ class NavigationConfig:
             raise ValueError(f"exceptions is {self.exceptions}; it must be in 0..{MOST_TRICKS:g} a session")
         if not 10.0 <= self.patience <= 86400.0:
             raise ValueError(f"patience is {self.patience}; it must be in 10..86400 s")
-        EnvConfig(decision_frequency=self.decision_frequency, max_seconds=self.max_seconds)  # which checks them
+        EnvConfig(decision_frequency=self.decision_frequency, max_seconds=self.max_seconds)  # validates both
 
     @property
     def session(self) -> EnvConfig:
-        """Settings of the session that is driven in."""
+        """Settings of the session."""
         vehicles, pedestrians = TRAFFIC[self.traffic]
         return EnvConfig(
             decision_frequency=self.decision_frequency,
@@ -103,7 +102,7 @@ class NavigationConfig:
 
 
 def weights_of(reward: str | NavigationWeights) -> NavigationWeights:
-    """Weights by name or as they are; raises `ValueError` where there is no such name."""
+    """Returns weights given by name or directly; raises `ValueError` for an unknown name."""
     if isinstance(reward, NavigationWeights):
         return reward
     if reward not in REWARDS:

@@ -1,4 +1,4 @@
-"""`Navigation-continuous-v0`: the car's pedals and steering wheel, for reinforcement learning."""
+"""`Navigation-continuous-v0`: driving with throttle, steering and brake, for reinforcement learning."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from dorothie_gym.spaces import CoWizardAction, Physical
 from dorothie_gym.tasks import StoryboardTemplate
 
 LOST = 4.0
-"""A car that is farther from its path than this is shown a path from the lane that it is on [m]."""
+"""Distance from the path beyond which a new path from the present lane is planned [m]."""
 
 END = 2.0
-"""So is one that has come this close to the end of its path [m]."""
+"""Distance to the end of the path within which a new one is planned [m]."""
 
 LATE = 5.0
-"""A manoeuvre that should have begun this long ago is not prepared any more [m]."""
+"""Distance behind its planned place from which on a manoeuvre is no longer prepared [m]."""
 
 _MANOEUVRES = {
     ActionValue.J_TURN: PhysicalAction.J_TURN,
@@ -40,18 +40,18 @@ _MANOEUVRES = {
 
 
 class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
-    """The same drive with throttle, steering wheel and brake.
+    """Driving with throttle, steering and brake.
 
     ## Description
-    As `NavigationEnv`, guided by turns, but nothing drives the car except the agent: it follows the path, keeps to
-    the limits, stops for lights, people and vehicles, and at the goals. What is told becomes the path ahead: turns,
-    lane switches and U-turns are laid for the driver.
+    As `NavigationEnv`, guided turn by turn, but the agent controls the car itself: it follows the path, keeps to the
+    limits, and stops for lights, people and vehicles, and at the goals. Instructions become the path ahead: turns, lane
+    switches and U-turns are planned for the driver.
 
     ## Observation Space
     `Box(-1, 1, (n,), float32)`, see `dorothie_gym.envs.continuous_observation.CONTINUOUS_FIELDS`.
 
     ## Action Space
-    `Box(-1, 1, (3,), float32)`: throttle, steer (positive right) and brake; a throttle or brake below 0 is none.
+    `Box(-1, 1, (3,), float32)`: throttle, steer (positive right) and brake; negative throttle and brake count as 0.
 
     ## Rewards
     As `NavigationEnv`.
@@ -99,8 +99,8 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         """Plays one decision.
 
         Raises:
-            ValueError: the action is not three numbers.
-            gymnasium.error.ResetNeeded: no session is being played, or it is over.
+            ValueError: the action does not consist of three finite numbers.
+            gymnasium.error.ResetNeeded: no session is in progress, or it is over.
         """
         values = np.asarray(action, dtype=np.float64)
         if values.shape != (3,) or not np.isfinite(values).all():
@@ -118,7 +118,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         return observe_continuous(drive.stage.world, drive.seen[Role.CO_WIZARD], drive.heard, self.config.max_seconds)
 
     def _prepare(self, drive: DrivingSession) -> Physical | None:
-        """The manoeuvre that was told, if it is not yet laid into the path."""
+        """Returns the manoeuvre of the last instruction, if it is not part of the path yet."""
         told, planner = drive.heard.instruction, drive.stage.world.planner
         if told is None or told.action not in _MANOEUVRES or planner.in_manoeuvre:
             return None
@@ -135,7 +135,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         return Physical(action=action, angle=angle)
 
     def _angle(self, told: NavigationInstruction) -> int | None:
-        """The angle of the turn or lane switch that was told [degrees, positive left]; None where there is none."""
+        """Returns the angle of the instructed turn or lane switch [degrees, positive left], or None."""
         assert self._controls is not None
         if told.sector is None:
             return None
@@ -146,7 +146,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         return None if way is None else way.angle
 
     def _keep_path(self, drive: DrivingSession) -> None:
-        """Shows a path again to a car that has left its own, or come to its end."""
+        """Plans a new path for a car that has left its path or reached its end."""
         planner = drive.stage.world.planner
         if abs(planner.offset) > LOST or (planner.room < END and not planner.waits_at_end):
             drive.stage.world.find_path()

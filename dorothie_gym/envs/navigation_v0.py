@@ -1,4 +1,4 @@
-"""`Navigation-v0`: the Co-Wizard's driving alone, for reinforcement learning."""
+"""`Navigation-v0`: driving as the Co-Wizard, for reinforcement learning."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ from dorothie_gym.tasks import StoryboardTemplate
 
 
 class NavigationEnv(DrivingEnv[np.int64]):
-    """The Co-Wizard drives; a participant tells the way, and the Ad-Wizard may interfere.
+    """Driving as the Co-Wizard; a built-in participant guides, and the Ad-Wizard may interfere.
 
     ## Description
-    A session of `DuoWizardEnv` with its town, storyboard, traffic and weather, in which nothing is left to the agent
-    but the Co-Wizard's physical actions. The participant is a built-in instructor who says, as a dialogue act with its
-    slots, where to go; the scripted Ad-Wizard plays the exceptions. The Co-Wizard's notes (mental actions) are kept
-    for it: it heads for the goal that was named, so that the car slows down near it.
+    A session of `DuoWizardEnv` with its town, storyboard, traffic and weather, in which the agent chooses only the
+    physical actions of the Co-Wizard. The participant is a built-in instructor that guides by dialogue acts with slots;
+    the scripted Ad-Wizard plays the exceptions. The belief updates (mental actions) of the Co-Wizard are made
+    automatically: the named goal becomes its goal, so that the car slows down near it.
 
     ## Observation Space
-    `Box(-1, 1, (n,), float32)`: see `dorothie_gym.policies.navigation.FIELDS`, and `layout()` for where each field is.
-    Everything follows from the Co-Wizard's observation, the map, and what was said.
+    `Box(-1, 1, (n,), float32)`: see `dorothie_gym.policies.navigation.FIELDS` and, for the slices, `layout()`.
+    The vector depends only on the Co-Wizard's observation, the map, and the instructions.
 
     ## Action Space
-    `Discrete(18)`: see `NavigationAction`. `info["action_mask"]` tells which the car would follow (int8, for
-    `action_space.sample(mask)`), and so does `action_masks()`, which sb3-contrib asks for. A turn, lane switch or
-    U-turn that is being prepared just goes on when it is asked for again. An action that cannot be carried out is
-    refused and told in `info["refused"]`.
+    `Discrete(18)`: see `NavigationAction`. `info["action_mask"]` marks the feasible actions (int8, for
+    `action_space.sample(mask)`), and so does `action_masks()`, which sb3-contrib calls. A turn, lane switch or U-turn
+    that is being prepared continues when it is chosen again. An infeasible action is refused and reported in
+    `info["refused"]`.
 
     ## Rewards
     The sum of the terms in `info["reward_terms"]`, see `NavigationWeights`: progress, subgoals, success, collisions,
@@ -46,8 +46,8 @@ class NavigationEnv(DrivingEnv[np.int64]):
 
     ## Episode End
     Terminates when the destination, the last subgoal, is reached (the car stands within 2 m of its waypoint), or when
-    the participant gives up: the car has come no nearer to its goal for `patience` seconds. Truncates after
-    `max_seconds`. Then `info["is_success"]` tells whether every subgoal was reached and nothing was hit, and
+    the participant gives up because the car has made no progress for `patience` seconds. Truncates after
+    `max_seconds`. At the end `info["is_success"]` reports whether every subgoal was reached and nothing was hit, and
     `info["reason"]` is "arrived", "gave up" or "out of time".
 
     ## Arguments
@@ -55,12 +55,12 @@ class NavigationEnv(DrivingEnv[np.int64]):
     - `storyboard`: name of a template, path of a `.json` file, or a `StoryboardTemplate`; None draws one each reset.
     - `guidance`: "turns" (before each junction) or "goals" (by name, where the place is on the Co-Wizard's map).
     - `traffic`: "none", "light", "medium" or "heavy".
-    - `exceptions`: of a session on average, 0 to 4.
+    - `exceptions`: average number of exceptions in a session, 0 to 4.
     - `reward`: "dense", "sparse" or `NavigationWeights`.
     - `max_seconds`, `patience`: see above [s].
     - `render_mode`: None, `"rgb_array"` or `"human"`.
 
-    `reset(seed=...)` has the scenario that `DuoWizardEnv` has for this seed; `reset(options={"scenario": Scenario})`
+    `reset(seed=...)` plays the scenario of `DuoWizardEnv` for this seed; `reset(options={"scenario": Scenario})`
     plays a given one.
 
     ## Version History
@@ -94,7 +94,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
         """Begins a session.
 
         Args:
-            seed: of the session; without one it is drawn.
+            seed: seed of the session; None draws one.
             options: `scenario` plays a given `Scenario`; other options are ignored.
         """
         drive = self.begin(seed, options)
@@ -105,8 +105,8 @@ class NavigationEnv(DrivingEnv[np.int64]):
         """Plays one decision.
 
         Raises:
-            ValueError: the action is none of `NavigationAction`.
-            gymnasium.error.ResetNeeded: no session is being played, or it is over.
+            ValueError: the action is not a `NavigationAction`.
+            gymnasium.error.ResetNeeded: no session is in progress, or it is over.
         """
         drive = self.drive
         if not 0 <= int(action) < len(ACTIONS):
@@ -118,7 +118,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
         return self._observe(), drive.reward, drive.terminated, drive.truncated, self._info()
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """Which actions would be carried out now (18,); sb3-contrib's algorithms ask for it."""
+        """Returns which actions are feasible now (18,); called by the algorithms of sb3-contrib."""
         return self._mask.astype(np.bool_)
 
     def _observe(self) -> Vector:

@@ -25,7 +25,7 @@ NUDGE_DISTANCE = 3.0
 
 @dataclass(frozen=True, kw_only=True)
 class GuidanceConfig:
-    """Distances and times of turn-by-turn guidance, for everyone who gives it or expects it.
+    """Distances and times of turn-by-turn guidance, for agents that give it or expect it.
 
     Attributes:
         turn_distance: distance to a junction at which a turn is announced [m]; about 10 s at the usual speed.

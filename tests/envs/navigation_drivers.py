@@ -1,4 +1,4 @@
-"""Drivers that do what they are told, from the observation alone."""
+"""Drivers that follow instructions, from the observation alone."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Driver = Callable[[Any, Any], int]
 
 
 def obey(observation: Any, mask: Any) -> int:
-    """Carries out what was said last, once it has not been passed."""
+    """Carries out the last instruction, unless its place has been passed."""
 
     def field(name: str) -> Any:
         return observation[FIELD[name]]
@@ -46,7 +46,7 @@ def obey(observation: Any, mask: Any) -> int:
 
 
 def seek(observation: Any, mask: Any) -> int:
-    """Drives to a goal on its map by the shortest ways."""
+    """Drives to a goal on the map by the cheapest exits."""
 
     def field(name: str) -> Any:
         return observation[FIELD[name]]
@@ -67,12 +67,12 @@ def seek(observation: Any, mask: Any) -> int:
 
 
 def stops_in_time(speed: float, left: float) -> bool:
-    """Whether the car comes to stand closer to a place if it brakes now than half a second later."""
+    """Whether braking now stops the car closer to a place than braking half a second later."""
     return -2.0 < left - LAG * speed - speed**2 / (2.0 * BRAKING) <= speed / 4.0
 
 
 def follow_lane(observation: Any, mask: Any) -> int:
-    """Does nothing."""
+    """Returns the action that does nothing."""
     return NavigationAction.NOTHING
 
 
@@ -92,7 +92,7 @@ FULL_LOCK = math.pi / 3.0  # [rad]
 
 
 def pursue(observation: Any) -> Any:
-    """Throttle, steer and brake of a driver who looks at a point of the path, and keeps to what is allowed."""
+    """Returns throttle, steering and brake of a pure-pursuit driver that keeps to the allowed speeds."""
 
     def field(name: str) -> Any:
         return observation[PEDALS[name]]

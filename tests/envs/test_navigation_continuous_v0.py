@@ -17,7 +17,7 @@ def env() -> NavigationContinuousEnv:
 
 
 @pytest.mark.parametrize("seed", [0, 6])
-def test_a_driver_who_follows_the_path_and_stops_where_told_succeeds(env: NavigationContinuousEnv, seed: int) -> None:
+def test_path_following_driver_succeeds(env: NavigationContinuousEnv, seed: int) -> None:
     observation, _ = env.reset(seed=seed)
     over = False
     while not over:
@@ -26,7 +26,7 @@ def test_a_driver_who_follows_the_path_and_stops_where_told_succeeds(env: Naviga
     assert info["is_success"], info
 
 
-def test_nothing_drives_the_car_but_the_pedals(env: NavigationContinuousEnv) -> None:
+def test_car_moves_only_by_throttle_and_brake(env: NavigationContinuousEnv) -> None:
     observation, _ = env.reset(seed=1)
     for _ in range(20):
         observation, _, _, _, _ = env.step(np.array((-1.0, 0.0, -1.0), dtype=np.float32))
@@ -48,7 +48,7 @@ def test_steering_to_the_right_leaves_the_path_to_the_right(env: NavigationConti
     assert observation[FIELD["path"]].reshape(-1, 2)[3, 1] < 0.0  # the path is to the left
 
 
-def test_a_car_that_has_left_its_path_is_shown_another(env: NavigationContinuousEnv) -> None:
+def test_car_off_its_path_gets_new_path(env: NavigationContinuousEnv) -> None:
     env.reset(seed=2)
     planner = env.drive.stage.world.planner
     paths = {id(planner.path)}
@@ -63,7 +63,7 @@ def test_a_car_that_has_left_its_path_is_shown_another(env: NavigationContinuous
     assert len(paths) > 1
 
 
-def test_a_car_that_leaves_the_road_for_good_ends_the_episode(env: NavigationContinuousEnv) -> None:
+def test_leaving_the_road_terminates_episode(env: NavigationContinuousEnv) -> None:
     env.reset(seed=2)
     for _ in range(400):
         _, _, terminated, _, info = env.step(np.array((0.5, 0.0, -1.0), dtype=np.float32))
@@ -73,7 +73,7 @@ def test_a_car_that_leaves_the_road_for_good_ends_the_episode(env: NavigationCon
     assert info["reward_terms"]["gave_up"] < 0.0 and info["infractions"]["off_road"] > 0
 
 
-def test_decisions_are_as_frequent_as_asked() -> None:
+def test_decision_frequency_is_respected() -> None:
     env = NavigationContinuousEnv(decision_frequency=5.0, traffic="none")
     env.reset(seed=0)
     for _ in range(5):
@@ -84,7 +84,7 @@ def test_decisions_are_as_frequent_as_asked() -> None:
 
 
 @pytest.mark.parametrize("action", [np.zeros(2), np.array((0.0, np.nan, 0.0)), 3])
-def test_malformed_actions_are_told(env: NavigationContinuousEnv, action: object) -> None:
+def test_malformed_actions_raise_error(env: NavigationContinuousEnv, action: object) -> None:
     env.reset(seed=0)
     with pytest.raises(ValueError, match="throttle, steer, brake"):
         env.step(action)  # type: ignore[arg-type]

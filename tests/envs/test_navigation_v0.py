@@ -24,14 +24,14 @@ def env() -> NavigationEnv:
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_who_does_as_told_succeeds(env: NavigationEnv, seed: int) -> None:
+def test_obedient_driver_succeeds(env: NavigationEnv, seed: int) -> None:
     info = drive(env, obey, seed)
     assert info["is_success"], info
     assert info["subgoals"]["reached"] == info["subgoals"]["live"]
 
 
 @pytest.mark.parametrize("seed", [3, 4])
-def test_goals_on_the_map_are_found_without_being_led(seed: int) -> None:
+def test_goals_on_the_map_are_found_without_turn_guidance(seed: int) -> None:
     assert drive(NavigationEnv(guidance="goals"), obey, seed)["is_success"]
 
 
@@ -44,12 +44,12 @@ def test_obedient_drivers_succeed_in_all_towns(town: str, guidance: str, excepti
     assert np.mean([drive(env, obey, seed)["is_success"] for seed in range(100, 120)]) >= 0.9
 
 
-def test_a_car_that_only_follows_its_lane_is_given_up() -> None:
+def test_participant_gives_up_on_lane_following() -> None:
     info = drive(NavigationEnv(patience=20.0), follow_lane, 0)
     assert (info["is_success"], info["reason"]) == (False, "gave up")
 
 
-def test_time_runs_out() -> None:
+def test_episode_is_truncated_at_time_limit() -> None:
     env = NavigationEnv(max_seconds=12.0)
     info = drive(env, follow_lane, 1)
     assert info["reason"] == "out of time"
@@ -58,7 +58,7 @@ def test_time_runs_out() -> None:
 
 
 def play(env: NavigationEnv, seed: int, steps: int) -> list[tuple[Any, float]]:
-    """Plays at random."""
+    """Plays random feasible actions."""
     rng = np.random.default_rng(seed)
     observation, info = env.reset(seed=seed)
     played = [(observation, 0.0)]
@@ -79,7 +79,7 @@ def test_equal_seeds_and_actions_make_equal_episodes(env: NavigationEnv) -> None
 
 
 @pytest.mark.parametrize("settings", [{}, {"guidance": "goals", "exceptions": 4.0, "traffic": "heavy"}])
-def test_what_the_mask_lets_through_is_not_refused(settings: dict[str, Any]) -> None:
+def test_masked_actions_are_not_refused(settings: dict[str, Any]) -> None:
     env = NavigationEnv(**settings)
     for seed in range(3):
         rng = np.random.default_rng(seed)
@@ -92,7 +92,7 @@ def test_what_the_mask_lets_through_is_not_refused(settings: dict[str, Any]) -> 
                 break
 
 
-def test_a_turn_that_is_planned_may_be_asked_for_again(env: NavigationEnv) -> None:
+def test_planned_turn_may_be_repeated(env: NavigationEnv) -> None:
     env.reset(seed=0)
     planner, again = env.drive.stage.world.planner, 0
     for _ in range(60):
@@ -105,7 +105,7 @@ def test_a_turn_that_is_planned_may_be_asked_for_again(env: NavigationEnv) -> No
     assert again > 5
 
 
-def test_what_the_mask_holds_back_is_refused(env: NavigationEnv) -> None:
+def test_infeasible_action_is_refused(env: NavigationEnv) -> None:
     _, info = env.reset(seed=0)
     assert not info["action_mask"][NavigationAction.START]
     _, _, _, _, info = env.step(NavigationAction.START)
@@ -121,8 +121,8 @@ def test_the_reward_is_the_sum_of_its_terms(env: NavigationEnv) -> None:
         assert set(info["reward_terms"]) == set(asdict(NavigationWeights()))
 
 
-def test_progress_adds_up_to_the_way_that_was_left(env: NavigationEnv) -> None:
-    """It is a difference of potentials: no way of driving about earns more than driving there."""
+def test_progress_adds_up_to_decrease_of_cost_to_go(env: NavigationEnv) -> None:
+    """Progress is a difference of potentials, so detours do not earn more."""
     env.reset(seed=0)
     left, rng, total = env.drive.instructor.cost_to_go, np.random.default_rng(1), 0.0
     planner = env.drive.stage.world.planner
@@ -135,14 +135,14 @@ def test_progress_adds_up_to_the_way_that_was_left(env: NavigationEnv) -> None:
     assert total == pytest.approx(NavigationWeights().progress * (before - after))
 
 
-def test_a_sparse_reward_comes_with_subgoals_only() -> None:
+def test_sparse_reward_is_given_for_subgoals_only() -> None:
     env = NavigationEnv(reward="sparse")
     assert drive(env, follow_lane, 2)["return"] == 0.0
     reached = drive(env, obey, 2)
     assert reached["return"] == pytest.approx(reached["subgoals"]["reached"] + 2.0)
 
 
-def test_scenarios_are_those_of_all_environments(env: NavigationEnv) -> None:
+def test_scenario_of_seed_is_that_of_all_environments(env: NavigationEnv) -> None:
     env.reset(seed=17)
     assert env.drive.stage.scenario == draw_scenario(env.town, None, 17)
     scenario = draw_scenario(env.town, None, 18)
@@ -152,7 +152,7 @@ def test_scenarios_are_those_of_all_environments(env: NavigationEnv) -> None:
         env.reset(options={"scenario": 3})
 
 
-def test_turns_are_told_with_their_distance_before_the_junction(env: NavigationEnv) -> None:
+def test_turn_instructions_have_distance_to_junction(env: NavigationEnv) -> None:
     observation, info = env.reset(seed=0)
     told = []
     for _ in range(200):
@@ -168,15 +168,15 @@ def test_turns_are_told_with_their_distance_before_the_junction(env: NavigationE
     assert np.median(np.abs(told)) < 0.03  # of 100 m: what was said is how far it is
 
 
-def test_in_guidance_by_turns_the_goal_shows_nowhere(env: NavigationEnv) -> None:
+def test_turn_guidance_does_not_reveal_goal(env: NavigationEnv) -> None:
     observation, info = env.reset(seed=0)
     for _ in range(60):
         assert not observation[FIELD["goal"]].any() and not observation[FIELD["detours"]].any()
         observation, _, _, _, info = env.step(obey(observation, info["action_mask"]))
 
 
-def test_places_that_are_not_on_the_map_do_not_show_when_named() -> None:
-    """The way to a hidden goal is told by turns, also where goals are named."""
+def test_named_places_off_the_map_are_not_revealed() -> None:
+    """Guidance to a hidden goal is turn by turn, also where goals are named."""
     env = NavigationEnv(guidance="goals")
     seen = {True: 0, False: 0}
     for seed in range(6):
@@ -195,13 +195,13 @@ def test_places_that_are_not_on_the_map_do_not_show_when_named() -> None:
     assert min(seen.values()) > 20
 
 
-def test_exceptions_happen_when_asked_for() -> None:
+def test_exceptions_happen_when_enabled() -> None:
     env = NavigationEnv(exceptions=4.0)
     drive(env, obey, 1)
     assert env.drive.stage.counts["exceptions"] > 0
 
 
-def test_everything_handed_out_is_the_takers_own(env: NavigationEnv) -> None:
+def test_returned_objects_may_be_changed(env: NavigationEnv) -> None:
     observation, info = env.reset(seed=0)
     before = observation.copy()
     info["action_mask"][:] = 0
@@ -242,7 +242,7 @@ def test_steps_need_a_session() -> None:
         env.step(0)
 
 
-def test_many_play_at_once() -> None:
+def test_vector_environment_equals_single_ones() -> None:
     vector = gym.make_vec("dorothie_gym/Navigation-v0", num_envs=3, max_seconds=5.0)
     observations, infos = vector.reset(seed=4)
     assert observations.shape == (3, sum(FIELDS.values())) and infos["action_mask"].shape == (3, len(NavigationAction))
@@ -253,7 +253,7 @@ def test_many_play_at_once() -> None:
     vector.close()
 
 
-def test_stable_baselines_accepts_it_as_it_is() -> None:
+def test_environments_pass_stable_baselines_checker() -> None:
     checker = pytest.importorskip("stable_baselines3.common.env_checker", reason="needs the extra 'baselines'")
     checker.check_env(NavigationEnv())
     checker.check_env(NavigationContinuousEnv())

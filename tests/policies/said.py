@@ -1,4 +1,4 @@
-"""Observations in which somebody has just said something."""
+"""Observations with an utterance that has just been completed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dorothie_gym.policies.utterance_input import HeardUtterance, heard_utteranc
 
 
 def with_words(observation: dict[str, Any], speaker: Role, text: str, *acts: DialogueAct) -> dict[str, Any]:
-    """The observation of a listener to whom a speaker has just said something."""
+    """Returns an observation of a listener with an utterance of a speaker."""
     moves, slots = observation[f"{speaker}_moves"].copy(), np.zeros_like(observation[f"{speaker}_slots"])
     for k, act in enumerate(acts):
         moves[k], slots[k] = int(act.move), encode_slots(act.slots)
@@ -22,7 +22,7 @@ def with_words(observation: dict[str, Any], speaker: Role, text: str, *acts: Dia
 def heard(
     observation: dict[str, Any], speaker: Role, move: DialogueMove, *values: SlotValue, wording: Wording | None = None
 ) -> HeardUtterance:
-    """What a listener has of one act, worded by the grammar."""
+    """Returns one act, worded by the grammar, as a listener receives it."""
     act = DialogueAct.of(move, *values)
     text = word_act(act, speaker, np.random.default_rng(1), wording)
     found = heard_utterance(with_words(observation, speaker, text, act), speaker)

@@ -26,18 +26,18 @@ def heard_moves(words: str, action: ActionValue, seed: int, **style: float) -> l
     return [item.act.move for item in state.speech.queue]
 
 
-def test_the_silent_say_nothing_to_a_command():
+def test_silent_style_does_not_acknowledge():
     assert all(heard_moves("turn left", ActionValue.J_TURN, seed, silent=1.0) == [] for seed in range(20))
 
 
-def test_who_repeats_says_which_way():
+def test_echo_names_direction():
     state = state_of(echoes=1.0)
     acknowledge(state, ActionValue.J_TURN, understand("left at the next one"), np.random.default_rng(5))
     told = [item for item in state.speech.queue if item.act.slots]
     assert told and told[0].wording.direction is Direction.LEFT
 
 
-def test_a_stop_is_never_asked_back_about():
+def test_stop_is_never_checked():
     moves = [heard_moves("stop", ActionValue.STOP, seed, checks=1.0) for seed in range(60)]
     assert all(DialogueMove.CHECK not in found for found in moves)
     turns = [heard_moves("turn left", ActionValue.J_TURN, seed, checks=1.0) for seed in range(60)]
@@ -45,11 +45,11 @@ def test_a_stop_is_never_asked_back_about():
 
 
 @pytest.mark.parametrize(("rambles", "expected"), [(0.0, 0), (1.0, 1)])
-def test_only_who_rambles_tells_what_it_is_up_to(rambles, expected):
+def test_only_rambling_style_mentions_plan(rambles, expected):
     assert len(plan_remark(state_of(rambles=rambles), np.random.default_rng(1))) == expected
 
 
-def test_sessions_have_speakers_of_different_styles_and_the_same_session_the_same():
+def test_speaker_style_depends_on_seed_only():
     env = DuoWizardEnv(town="brookside")
     env.reset(seed=0)
     for policy, role in ((ScriptedParticipant(), Role.PARTICIPANT), (ScriptedCoWizard(), Role.CO_WIZARD)):

@@ -17,13 +17,13 @@ def test_one_to_four_tricks_are_planned_and_none_at_rate_zero():
     assert not ScriptedAdWizard(rate=0.0).initial_state(1, TOWN).planned
 
 
-def test_only_the_kinds_asked_for_are_planned():
+def test_only_permitted_kinds_are_planned():
     wizard = ScriptedAdWizard(rate=4.0, kinds=["weather"])
     tricks = {item.trick for seed in range(10) for item in wizard.initial_state(seed, TOWN).planned}
     assert tricks == {Trick.WEATHER}
 
 
-def test_wrong_arguments_are_told():
+def test_invalid_arguments_raise_value_error():
     with pytest.raises(ValueError, match="rate is 9"):
         ScriptedAdWizard(rate=9.0)
     with pytest.raises(ValueError, match="earthquake"):

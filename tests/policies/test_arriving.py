@@ -1,4 +1,4 @@
-"""The last metres: the human talks the car up to the place, and answers what it asks there."""
+"""Guidance on the last stretch to the goal, and answers to questions there."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ M = DialogueMove
 
 
 class Guide(Human):
-    """A participant who tells the way, of a car on the lane of the place, some way before it."""
+    """Participant that guides a car on the lane of the goal, some way before it."""
 
     def __init__(self, before: float, speed: float = 0.0) -> None:
         super().__init__()
@@ -44,14 +44,14 @@ class Guide(Human):
         return [value for item in self.state.speech.queue for value in item.act.values(Slot.ACTION)]
 
 
-def test_a_bit_further_never_leads_from_one_side_of_the_place_to_the_other() -> None:
+def test_nudge_is_shorter_than_arrival_zone() -> None:
     rolls_on = 0.6  # what the car needs to stop, measured
     within = ParticipantConfig.arrived_within
     assert within - NUDGE_DISTANCE - rolls_on > -within
 
 
 @pytest.mark.parametrize(("before", "told"), [(4.0, "bit"), (14.0, "10"), (26.0, "10"), (30.0, "20")])
-def test_a_car_that_stands_before_the_place_is_told_a_distance_that_does_not_lead_past_it(before, told) -> None:
+def test_standing_car_is_told_distance_that_does_not_pass_goal(before, told) -> None:
     human = Guide(before)
     assert human.says() == [ActionValue.LANE_FOLLOW]
     distance = human.state.speech.queue[0].wording.distance
@@ -60,13 +60,13 @@ def test_a_car_that_stands_before_the_place_is_told_a_distance_that_does_not_lea
         assert 10 * round(distance / 10) <= before
 
 
-def test_is_this_it_before_the_place_is_answered_by_no_and_a_bit_further() -> None:
+def test_arrival_question_before_goal_is_denied_with_nudge() -> None:
     human = Guide(4.0)
     human.hears(M.QUERY_YN)
     assert human.moves() == [M.REPLY_N, M.INSTRUCT]
 
 
-def test_where_to_is_not_answered_again_by_who_has_just_said_it() -> None:
+def test_goal_question_right_after_announcement_is_not_answered() -> None:
     human = Human()
     human.observation["time"] = np.array([60.0])
     human.state.speech = replace(human.state.speech, last_end=58.0)  # the place was named in the last breath
@@ -75,7 +75,7 @@ def test_where_to_is_not_answered_again_by_who_has_just_said_it() -> None:
 
 
 @pytest.mark.parametrize("uptake", [True, False])
-def test_what_takes_up_an_instruction_is_not_nodded_at(uptake: bool) -> None:
+def test_acknowledged_instruction_is_not_acknowledged_again(uptake: bool) -> None:
     human = Human()
     human.state.style = replace(human.state.style, nods=1.0)
     turning = DialogueAct.of(M.EXPLAIN, ActionValue.J_TURN)
@@ -85,7 +85,7 @@ def test_what_takes_up_an_instruction_is_not_nodded_at(uptake: bool) -> None:
     assert (M.ACKNOWLEDGE in human.moves()) is not uptake
 
 
-def test_who_turns_round_for_a_place_keeps_road_enough_to_stop() -> None:
+def test_u_turn_leaves_enough_road_to_stop() -> None:
     human = Guide(1.0)
     longest = max(human.env.town.lanes, key=lambda lane: lane.length)
     goal = replace(human.state.errand.goal, lane=longest.id, station=longest.length / 2)
@@ -110,7 +110,7 @@ def test_who_turns_round_for_a_place_keeps_road_enough_to_stop() -> None:
     assert told[False] and not any(told[False])
 
 
-def test_the_run_up_of_a_way_without_a_u_turn_is_none() -> None:
+def test_route_without_u_turn_has_no_run_up() -> None:
     human = Guide(10.0)
     assert human.state.route.progress is not None and human.state.route.progress.run_up() is None
     assert LaneEntry.U_TURN not in {leg.entry for leg in human.state.route.progress.legs}

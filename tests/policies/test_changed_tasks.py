@@ -12,7 +12,7 @@ M = DialogueMove
 
 
 def with_tasks(human: Human, **changes) -> ParticipantView:
-    """What it sees when one of the tasks, `index`, has changed."""
+    """Returns the view after a change of one subgoal, `index`."""
     index = changes.pop("index")
     tasks = tuple(
         replace(task, **changes) if task.index == index else task for task in human.state.errand.subgoals if task.live
@@ -27,7 +27,7 @@ def keep_live_subgoals(human: Human) -> None:
 
 
 def another_task(human: Human):
-    """An open task other than the one under way, at a place of another name."""
+    """Returns an open subgoal other than the target, at a place of another name."""
     assert human.state.errand.goal is not None
     view = human.view
     for task in view.subgoals:
@@ -43,7 +43,7 @@ def planned(human: Human) -> list[tuple[DialogueMove, frozenset]]:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_car_is_told_of_a_task_that_is_dropped(seed):
+def test_dropped_task_is_reported(seed):
     human = Human()
     task, place = another_task(human)
     note_tasks(human.state, with_tasks(human, index=task.index, live=False), np.random.default_rng(seed))
@@ -52,14 +52,14 @@ def test_the_car_is_told_of_a_task_that_is_dropped(seed):
     assert {place.name, GoalStatus.ABANDONED} <= slots
 
 
-def test_the_task_under_way_is_left_when_it_is_dropped():
+def test_dropped_target_is_abandoned():
     human = Human()
     note_tasks(human.state, with_tasks(human, index=human.state.errand.target, live=False), human.rng)
     assert human.state.errand.goal is None
     assert human.state.errand.goes_on
 
 
-def test_what_is_done_is_said_after_a_breath():
+def test_completion_is_reported_after_delay():
     human = Human()
     view = with_tasks(human, index=human.state.errand.target, reached=True)
     note_tasks(human.state, view, human.rng)
@@ -69,7 +69,7 @@ def test_what_is_done_is_said_after_a_breath():
 
 
 def interrupted(seed: int) -> tuple[Human, object]:
-    """A human to whom a task comes up that is nearer than the one under way."""
+    """Returns a participant after a new subgoal nearer than the target."""
     human = Human()
     task, place = another_task(human)
     progress = human.state.route.progress
@@ -84,7 +84,7 @@ def interrupted(seed: int) -> tuple[Human, object]:
 
 
 class Far:
-    """A journey that is longer than any."""
+    """Route that is longer than any other."""
 
     def __init__(self, journey) -> None:
         self._journey = journey
@@ -96,7 +96,7 @@ class Far:
         return getattr(self._journey, name)
 
 
-def test_a_new_task_on_the_way_is_done_first_and_the_other_is_resumed():
+def test_new_task_on_the_way_interrupts_target_that_is_resumed_later():
     human, place = next(found for seed in range(20) if (found := interrupted(seed))[0].state.errand.put_off)
     told = planned(human)
     assert human.state.errand.goal == place
@@ -111,7 +111,7 @@ def test_a_new_task_on_the_way_is_done_first_and_the_other_is_resumed():
     assert again.wording.topic == "resume" and GoalStatus.ONGOING in again.act.slots
 
 
-def test_a_later_task_that_changes_is_told_by_both_names():
+def test_changed_later_task_is_reported_with_both_names():
     human = Human()
     task, place = another_task(human)
     names = {place.name, human.state.errand.goal.name}

@@ -22,7 +22,7 @@ from dorothie_gym.spaces import NO_MOVE, CoWizardAction, Motion, ParticipantActi
 
 
 class Talk:
-    """A human of the test's own in front of the scripted Co-Wizard."""
+    """Session of the scripted Co-Wizard with a participant controlled by the test."""
 
     def __init__(self, seed: int = 2, acts: bool = True) -> None:
         self.env = DuoWizardEnv(town="brookside", config=EnvConfig(observe_acts=acts))
@@ -61,7 +61,7 @@ class Talk:
         return [mark for mark in self.env.scenario.storyboard.landmarks if mark.hidden is hidden]
 
 
-def test_a_known_place_becomes_the_goal_with_a_plan():
+def test_known_place_becomes_goal_with_plan():
     talk = Talk()
     name = next(mark.name for mark in talk.landmarks(hidden=False) if mark.name.label in ("KFC", "Ikea", "Coco"))
     talk.say(DialogueMove.INSTRUCT, name)
@@ -69,7 +69,7 @@ def test_a_known_place_becomes_the_goal_with_a_plan():
     assert talk.state.beliefs.plan
 
 
-def test_a_place_that_is_not_on_the_map_is_said_to_be_unknown():
+def test_place_off_the_map_is_reported_unknown():
     talk = Talk()
     hidden = talk.landmarks(hidden=True)[0]
     street = talk.env.scenario.street_names[hidden.street]
@@ -79,7 +79,7 @@ def test_a_place_that_is_not_on_the_map_is_said_to_be_unknown():
 
 
 @pytest.mark.parametrize("acts", [True, False])
-def test_stop_is_obeyed_whether_acts_are_seen_or_only_words(acts):
+def test_stop_is_obeyed_with_and_without_observed_acts(acts):
     talk = Talk(acts=acts)
     for _ in range(4):
         talk.step()
@@ -87,7 +87,7 @@ def test_stop_is_obeyed_whether_acts_are_seen_or_only_words(acts):
     assert PhysicalAction.STOP in talk.physical()
 
 
-def test_the_way_is_asked_for_at_a_junction_without_a_plan():
+def test_way_is_asked_for_at_junction_without_plan():
     talk = Talk()
     for _ in range(60):
         talk.step()
@@ -95,7 +95,7 @@ def test_the_way_is_asked_for_at_a_junction_without_a_plan():
     assert PhysicalAction.J_TURN not in talk.physical()
 
 
-def test_a_direction_becomes_a_turn_that_way():
+def test_direction_becomes_turn():
     talk = Talk()
     for _ in range(40):
         talk.step()
@@ -106,7 +106,7 @@ def test_a_direction_becomes_a_turn_that_way():
     assert turns and np.sign(turns[0].angle) == np.sign(side.angle)
 
 
-def test_lights_and_speed_are_changed_on_request():
+def test_lights_and_speed_change_on_request():
     talk = Talk()
     talk.say(DialogueMove.INSTRUCT, ActionValue.LIGHT_CHANGE, wording=Wording(lights=True))
     talk.say(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=Wording(faster=False, speed=25))
@@ -114,7 +114,7 @@ def test_lights_and_speed_are_changed_on_request():
     assert talk.observations["co_wizard"]["cruise_speed"][0] == 25.0
 
 
-def test_a_step_leaves_the_state_it_was_given_as_it_was():
+def test_step_does_not_change_given_state():
     talk = Talk()
     before = dict(vars(talk.state))
     observation = dict(talk.observations["co_wizard"])
@@ -125,7 +125,7 @@ def test_a_step_leaves_the_state_it_was_given_as_it_was():
     assert first["move"] <= NO_MOVE
 
 
-def test_red_light_is_explained_and_makes_nobody_turn_round_or_ask():
+def test_red_light_is_explained_without_u_turn_or_question():
     talk = Talk()
     talk.say(DialogueMove.INSTRUCT, talk.landmarks(hidden=False)[0].name)
     assert talk.state.route.progress is not None
@@ -152,7 +152,7 @@ def test_red_light_is_explained_and_makes_nobody_turn_round_or_ask():
     assert told > 0
 
 
-def test_wish_is_not_given_up_at_a_red_light():
+def test_wish_is_kept_at_red_light():
     talk = Talk()
     talk.say(DialogueMove.INSTRUCT, ActionValue.U_TURN, decisions=0)
     observation, state = dict(talk.observations["co_wizard"]), talk.state
@@ -170,7 +170,7 @@ def test_wish_is_not_given_up_at_a_red_light():
     assert state.intentions.wish is None
 
 
-def test_a_proposed_way_is_taken_when_the_human_says_yes():
+def test_proposed_way_is_taken_after_yes():
     talk = Talk(seed=2)
     talk.state = replace(talk.state, style=replace(talk.state.style, proposes=1.0))
     while talk.state.dialogue.proposed is None:
@@ -182,7 +182,7 @@ def test_a_proposed_way_is_taken_when_the_human_says_yes():
     assert talk.state.intentions.directive == proposed
 
 
-def test_an_instruction_that_was_not_caught_is_asked_for_again_and_not_carried_out():
+def test_misheard_instruction_is_queried_and_not_carried_out():
     talk = Talk()
     talk.state = replace(talk.state, style=replace(talk.state.style, mishears=1.0))
     known = talk.landmarks(hidden=False)[0]
@@ -191,7 +191,7 @@ def test_an_instruction_that_was_not_caught_is_asked_for_again_and_not_carried_o
     assert talk.state.beliefs.goal is None
 
 
-def test_a_place_that_is_described_is_looked_for_in_its_street():
+def test_described_place_is_searched_for_in_its_street():
     talk = Talk()
     hidden = talk.landmarks(hidden=True)[0]
     street = talk.env.scenario.street_names[hidden.street]
@@ -202,7 +202,7 @@ def test_a_place_that_is_described_is_looked_for_in_its_street():
     assert talk.env.scenario.street_names[talk.env.town.lanes[talk.state.route.progress.goal[0]].street] is street
 
 
-def test_what_one_should_be_doing_is_as_good_as_a_command():
+def test_explained_action_counts_as_instruction():
     talk = Talk()
     wording = Wording(direction=Direction.LEFT)
     talk.say(DialogueMove.EXPLAIN, ActionValue.J_TURN, wording=wording, decisions=5)

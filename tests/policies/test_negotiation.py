@@ -15,7 +15,7 @@ M = DialogueMove
 
 
 def driving_far() -> tuple[Talk, LandmarkName, LandmarkName]:
-    """A car under way to the farther of two places, and the nearer one."""
+    """Returns a car on its way to the farther of two places, and both names."""
     talk = Talk(seed=2)
     talk.state = replace(talk.state, style=replace(talk.state.style, offers=1.0, mishears=0.0, checks=0.0))
     here = int(talk.observations["co_wizard"]["lane"]), float(talk.observations["co_wizard"]["station"][0])
@@ -40,7 +40,7 @@ def statuses(state: CoWizardState) -> dict[LandmarkName, GoalStatus]:
 
 
 @pytest.mark.parametrize(("answer", "accepted"), [(M.REPLY_Y, True), (M.REPLY_N, False)])
-def test_the_car_proposes_a_nearer_task_first_and_goes_by_the_answer(answer, accepted):
+def test_nearer_task_is_offered_first_and_answer_is_followed(answer, accepted):
     talk, near, far = driving_far()
     talk.say(M.INSTRUCT, near, GoalStatus.PENDING, decisions=14)
     assert said_about(talk, M.QUERY_YN, near)
@@ -49,7 +49,7 @@ def test_the_car_proposes_a_nearer_task_first_and_goes_by_the_answer(answer, acc
     assert statuses(talk.state)[far] is (GoalStatus.PENDING if accepted else GoalStatus.ONGOING)
 
 
-def test_a_later_task_that_replaces_another_does_not_change_where_the_car_goes():
+def test_replaced_later_task_does_not_change_goal():
     talk, near, far = driving_far()
     talk.state = replace(talk.state, style=replace(talk.state.style, offers=0.0))
     talk.say(M.INSTRUCT, near, GoalStatus.PENDING, decisions=14)
@@ -63,7 +63,7 @@ def test_a_later_task_that_replaces_another_does_not_change_where_the_car_goes()
 
 
 @pytest.mark.parametrize("agrees", [True, False])
-def test_the_human_agrees_to_its_own_way_round_and_insists_on_it_otherwise(agrees):
+def test_participant_accepts_own_detour_and_insists_on_it_otherwise(agrees):
     human = Human()
     own = first_new_street(human.observation, human.env.town, human.view.lane, human.state.route.progress)
     assert own is not None
@@ -74,7 +74,7 @@ def test_the_human_agrees_to_its_own_way_round_and_insists_on_it_otherwise(agree
         assert own in human.state.speech.queue[1].act.values(Slot.STREET)
 
 
-def test_the_car_that_has_not_got_an_answer_asks_again():
+def test_unanswered_question_is_followed_by_confusion():
     talk, _, _ = driving_far()
     talk.state.dialogue = talk.state.dialogue.after_asking(float(talk.observations["co_wizard"]["time"][0]))
     talk.step(Speech(act=DialogueAct.of(M.REPLY_W), text="hm hm"))
@@ -83,7 +83,7 @@ def test_the_car_that_has_not_got_an_answer_asks_again():
     assert M.CONFUSE in talk.moves()
 
 
-def test_which_of_two_tasks_comes_first_is_told():
+def test_order_of_tasks_is_answered():
     human = Human()
     human.hears(M.QUERY_W, human.state.errand.goal.name, wording=Wording(topic="order"))
     first, *others = human.state.speech.queue

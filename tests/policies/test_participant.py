@@ -20,13 +20,13 @@ def first_words(style: ParticipantStyle) -> str:
     return str(said[0].data["slots"])
 
 
-def test_goal_level_participants_name_a_place_and_step_level_ones_an_action():
+def test_guidance_level_determines_first_instruction():
     assert "Landmark" in first_words(BY_GOALS)
     assert "Action" in first_words(BY_STEPS)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_tasks_are_done_by_talk(seed):
+def test_tasks_are_done_by_dialogue(seed):
     played = play(seed, names={"ad_wizard": "silent"})
     assert played.env.summary()["arrived"]
     assert "Complete" in {
@@ -34,18 +34,18 @@ def test_tasks_are_done_by_talk(seed):
     }
 
 
-def test_tasks_are_done_where_acts_are_not_seen():
+def test_tasks_are_done_without_observed_acts():
     played = play(1, names={"ad_wizard": "silent"}, config=EnvConfig(observe_acts=False))
     assert played.env.summary()["arrived"]
 
 
-def test_nothing_is_reached_without_a_car_that_listens():
+def test_silent_car_reaches_nothing():
     played = play(0, decisions=200, names={"co_wizard": "silent", "ad_wizard": "silent"})
     assert played.env.summary()["subgoals"]["reached"] == 0
     assert played.moves(Role.PARTICIPANT).count("Instruct") >= 2
 
 
-def test_utterances_do_not_pour_out():
+def test_number_of_utterances_is_limited():
     played = play(0, decisions=240, names={"co_wizard": "silent", "ad_wizard": "silent"})
     assert len(played.moves(Role.PARTICIPANT)) < 25
 
@@ -58,7 +58,7 @@ def test_same_seed_same_session():
 
 
 @pytest.mark.parametrize("lit", [True, False])
-def test_nobody_asks_why_the_car_waits_at_a_red_light(lit):
+def test_standstill_at_red_light_is_not_asked_about(lit):
     env = DuoWizardEnv(town="brookside")
     observations, _ = env.reset(seed=3)
     policy = ScriptedParticipant(env.limits, style=BY_GOALS)

@@ -40,11 +40,11 @@ def test_every_policy_is_made_for_every_role(name, role):
     assert make_policy(name, role, LIMITS).role is role
 
 
-def test_unknown_policy_is_told_with_the_names_there_are():
+def test_unknown_policy_raises_error_with_known_names():
     with pytest.raises(ValueError, match="scripted, silent, random"):
         make_policy("clever", Role.PARTICIPANT, LIMITS)
 
 
-def test_the_car_itself_has_no_policy():
+def test_agent_role_has_no_policy():
     with pytest.raises(ValueError, match="agent"):
         make_policy("silent", Role.AGENT, LIMITS)

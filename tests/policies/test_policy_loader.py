@@ -27,7 +27,7 @@ def load_silent(path: Path, role: Role, limits: SpaceLimits) -> Policy[Any]:
 
 
 @pytest.fixture(autouse=True)
-def nobody_else(monkeypatch: pytest.MonkeyPatch) -> None:
+def no_other_loaders(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(policy_loader, "_LOADERS", {})
 
 
@@ -35,7 +35,7 @@ def test_player_by_name_makes_its_policy() -> None:
     assert isinstance(find_player("lane-follow", Role.CO_WIZARD).make(Role.CO_WIZARD, LIMITS), LaneFollowPolicy)
 
 
-def test_name_of_another_role_is_told_with_those_there_are() -> None:
+def test_policy_of_another_role_raises_error_with_known_names() -> None:
     with pytest.raises(
         PolicyLoadError, match="participant: there is no policy 'lane-follow'.*scripted, silent, random$"
     ):
@@ -43,7 +43,7 @@ def test_name_of_another_role_is_told_with_those_there_are() -> None:
 
 
 @pytest.mark.parametrize("as_folder", [False, True])
-def test_file_is_played_by_the_loader_of_its_kind(tmp_path: Path, as_folder: bool) -> None:
+def test_file_is_read_by_loader_of_its_kind(tmp_path: Path, as_folder: bool) -> None:
     register_loader("quiet", load_silent)
     (tmp_path / "model.json").write_text(json.dumps({"kind": "quiet"}))
     player = find_player(str(tmp_path if as_folder else tmp_path / "model.json"), Role.CO_WIZARD)
@@ -51,7 +51,7 @@ def test_file_is_played_by_the_loader_of_its_kind(tmp_path: Path, as_folder: boo
     assert loadable_kinds() == ("quiet",)
 
 
-def test_file_without_a_kind_goes_by_its_ending(tmp_path: Path) -> None:
+def test_file_without_kind_is_read_by_suffix(tmp_path: Path) -> None:
     register_loader(".weights", load_silent)
     (tmp_path / "one.weights").write_bytes(b"1")
     (tmp_path / "two.weights").write_bytes(b"2")
@@ -59,7 +59,7 @@ def test_file_without_a_kind_goes_by_its_ending(tmp_path: Path) -> None:
     assert one.sha256 != two.sha256
 
 
-def test_kind_that_nobody_reads_is_told(tmp_path: Path) -> None:
+def test_kind_without_loader_raises_error(tmp_path: Path) -> None:
     (tmp_path / "model.json").write_text(json.dumps({"kind": "quiet"}))
     with pytest.raises(PolicyLoadError, match=r"of the kind quiet or .json, which cannot be played \(known: none"):
         find_player(str(tmp_path / "model.json"), Role.CO_WIZARD)
@@ -68,7 +68,7 @@ def test_kind_that_nobody_reads_is_told(tmp_path: Path) -> None:
         find_player(str(tmp_path), Role.CO_WIZARD)
 
 
-def test_folder_without_a_description_and_torn_json_are_told(tmp_path: Path) -> None:
+def test_folder_without_description_and_damaged_json_raise_error(tmp_path: Path) -> None:
     with pytest.raises(PolicyLoadError, match="folder without model.json"):
         find_player(str(tmp_path), Role.CO_WIZARD)
     (tmp_path / "model.json").write_text('{"kind": ')
@@ -76,7 +76,7 @@ def test_folder_without_a_description_and_torn_json_are_told(tmp_path: Path) -> 
         find_player(str(tmp_path), Role.CO_WIZARD)
 
 
-def test_two_loaders_for_one_kind_are_refused() -> None:
+def test_second_loader_of_a_kind_is_refused() -> None:
     register_loader("quiet", load_silent)
     register_loader("quiet", load_silent)
     with pytest.raises(ValueError, match="have a loader already"):

@@ -34,13 +34,13 @@ def answer(talk: Talk, view: CoWizardView, *values) -> DialogueAct:
     return talk.state.speech.queue[0].act
 
 
-def test_asked_why_it_stands_the_car_tells_what_it_stands_for():
+def test_standstill_is_explained_by_hazard():
     talk = on_the_way()
     hazard = {"motion": np.int64(Motion.HAZARD), "hazard": np.int64(ObjectClass.PEDESTRIAN.value)}
     assert answer(talk, view_of(talk, **hazard), ActionValue.STOP).slots == {ObjectClass.PEDESTRIAN}
 
 
-def test_who_has_stopped_for_a_light_remembers_what_it_stands_for():
+def test_stop_for_red_light_is_remembered_as_reason():
     talk = on_the_way()
     since = float(view_of(talk).time) - 9.0
     resting = talk.state.commands.resting(since, ObjectClass.TRAFFIC_LIGHT)
@@ -49,12 +49,12 @@ def test_who_has_stopped_for_a_light_remembers_what_it_stands_for():
     assert answer(talk, stopped, ActionValue.STOP).slots == {ObjectClass.TRAFFIC_LIGHT}
 
 
-def test_asked_why_it_turns_round_the_car_names_where_it_wants_to_go():
+def test_u_turn_is_explained_by_goal():
     talk = on_the_way()
     assert talk.state.beliefs.goal in answer(talk, view_of(talk), ActionValue.U_TURN).slots
 
 
-def test_asked_what_it_sees_the_car_names_what_is_in_sight():
+def test_question_about_objects_names_objects_in_sight():
     talk = on_the_way()
     view = view_of(talk)
     told = answer(talk, view, ObjectClass.QUERIED)
@@ -62,7 +62,7 @@ def test_asked_what_it_sees_the_car_names_what_is_in_sight():
     assert told.move is M.REPLY_W and set(told.values(Slot.OBJECT)) <= seen
 
 
-def test_asked_for_its_plan_the_car_names_turns_or_streets():
+def test_question_about_plan_names_turns_or_streets():
     talk = on_the_way()
     told = answer(talk, view_of(talk), ActionValue.QUERIED)
     assert told.move is M.REPLY_W
@@ -70,7 +70,7 @@ def test_asked_for_its_plan_the_car_names_turns_or_streets():
 
 
 @pytest.mark.parametrize("colour", [LightColour.RED, LightColour.GREEN])
-def test_the_car_stops_for_a_red_light_and_goes_on_when_it_is_green(colour):
+def test_car_rests_at_red_light_until_green(colour):
     talk = on_the_way()
     town = talk.env.town
     lit = [lane for lane in town.lanes if town.light(lane.id, 0.0) is not None]

@@ -19,7 +19,7 @@ CALM = ParticipantStyle(guides=0.0, names_goal=1.0, names_street=0.0, hurries=1.
 
 
 class Human:
-    """A participant of brookside who has just told the car where to go."""
+    """Participant in brookside after its first instruction."""
 
     def __init__(self, seed: int = 4) -> None:
         self.env = DuoWizardEnv(town="brookside")
@@ -52,20 +52,20 @@ class Human:
 
 
 @pytest.mark.parametrize("move", [M.ACKNOWLEDGE, M.CONFIRM])
-def test_a_car_that_takes_up_another_place_is_told_the_right_one_again(move):
+def test_wrong_place_is_corrected(move):
     human = Human()
     human.hears(move, human.another_place())
     clarified = [item.act for item in human.state.speech.queue if item.act.move is M.CLARIFY]
     assert clarified and human.state.errand.goal.name in clarified[0].slots
 
 
-def test_a_car_that_takes_up_the_right_place_is_not_corrected():
+def test_right_place_is_not_corrected():
     human = Human()
     human.hears(M.ACKNOWLEDGE, human.state.errand.goal.name)
     assert M.CLARIFY not in human.moves()
 
 
-def test_a_place_that_was_to_be_given_up_may_be_repeated():
+def test_repeated_abandoned_place_is_not_corrected():
     human = Human()
     other = human.another_place()
     dropped = remark(M.INSTRUCT, human.state.errand.goal.name, wording=Wording(dropped=other))
@@ -74,7 +74,7 @@ def test_a_place_that_was_to_be_given_up_may_be_repeated():
     assert correction(human.state, human.view, said.acts[0], said.words) is None
 
 
-def test_a_car_that_takes_up_the_other_side_is_told_the_side_again():
+def test_wrong_side_is_corrected():
     human = Human()
     left = remark(M.INSTRUCT, ActionValue.J_TURN, wording=Wording(direction=Direction.LEFT))
     human.state.speech = replace(human.state.speech, said=(left,), last_end=human.view.time)
@@ -86,7 +86,7 @@ def test_a_car_that_takes_up_the_other_side_is_told_the_side_again():
 
 
 @pytest.mark.parametrize(("ended", "caught"), [(0.0, False), (30.0, True)])
-def test_only_what_is_said_into_ones_own_words_is_not_caught(ended, caught):
+def test_only_overlapping_speech_is_missed(ended, caught):
     human = Human()
     human.observation["time"] = np.array([40.0])
     human.state.speech = replace(human.state.speech, last_end=40.0 - ended)
@@ -94,7 +94,7 @@ def test_only_what_is_said_into_ones_own_words_is_not_caught(ended, caught):
     assert has_missed(human.state, human.view, question, human.rng) is not caught
 
 
-def test_a_question_that_was_not_caught_is_answered_once_it_is_made_clear():
+def test_missed_question_is_answered_after_clarification():
     human = Human()
     human.observation["time"] = np.array([40.0])
     human.state.speech = replace(human.state.speech, last_end=40.0)

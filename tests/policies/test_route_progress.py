@@ -30,7 +30,7 @@ def test_every_direction_of_a_junction_finds_its_exit():
             assert found is not None and found.type is way.type
 
 
-def test_a_street_tells_exits_apart():
+def test_street_identifies_exit():
     choice = next_choice(TOWN, CHOICES[0], 0.0)
     assert choice is not None
     for way in choice.exits:
@@ -39,7 +39,7 @@ def test_a_street_tells_exits_apart():
         assert found is not None and TOWN.lanes[found.lane].street in street
 
 
-def test_journey_counts_down_to_its_goal_and_notices_a_wrong_turn():
+def test_route_counts_down_to_goal_and_detects_wrong_turn():
     start, goal = TOWN.sites[0], TOWN.sites[-1]
     journey = RouteProgress.plan(TOWN, (start.lane, start.station), (goal.lane, goal.station))
     before = journey.left(start.station)
@@ -49,14 +49,14 @@ def test_journey_counts_down_to_its_goal_and_notices_a_wrong_turn():
     assert journey.followed(TOWN, off, 1.0).astray == 1
 
 
-def test_journey_that_nothing_leads_past_ignores_what_blocks_it():
+def test_route_ignores_roadblocks_that_cannot_be_avoided():
     start, goal = TOWN.sites[0], TOWN.sites[-1]
     everywhere = tuple((lane.id, s * lane.length) for lane in TOWN.lanes for s in (0.0, 0.25, 0.5, 0.75, 1.0))
     journey = RouteProgress.plan(TOWN, (start.lane, start.station), (goal.lane, goal.station), everywhere)
     assert journey.route is not None
 
 
-def test_goal_that_was_passed_is_astray():
+def test_passed_goal_counts_as_astray():
     goal = TOWN.sites[0]
     journey = RouteProgress.plan(TOWN, (goal.lane, max(goal.station - 10.0, 0.0)), (goal.lane, goal.station))
     assert journey.followed(TOWN, goal.lane, goal.station + 1.0).astray == 0
@@ -67,7 +67,7 @@ def test_stopping_distance_grows_with_speed():
     assert 0.0 == stopping_distance(0.0) < stopping_distance(4.0) < stopping_distance(8.0)
 
 
-def test_only_a_traffic_light_in_sight_is_seen():
+def test_only_near_traffic_light_is_found():
     lane = next(lane for lane in TOWN.lanes if lane.length > 75.0 and TOWN.light(lane.id, 0.0) is not None)
     colours = {light_ahead(TOWN, lane.id, lane.length - 5.0, float(time)) for time in range(120)}
     assert colours == set(LightColour)
@@ -76,7 +76,7 @@ def test_only_a_traffic_light_in_sight_is_seen():
     assert light_ahead(TOWN, dark.id, dark.length - 5.0, 0.0) is None
 
 
-def test_a_goal_right_behind_a_junction_needs_its_lane_before_it() -> None:
+def test_goal_right_behind_junction_needs_lane_change_before_it() -> None:
     town = load_town("northgate")
     tried = 0
     for site in town.sites:

@@ -21,32 +21,32 @@ def test_a_question_is_followed_by_silence_for_an_answer():
     assert spoken is not None
 
 
-def test_an_answer_of_the_other_ends_the_silence():
+def test_answer_ends_silence():
     _, speaker = voice().plan(remark(DialogueMove.QUERY_W), remark(DialogueMove.EXPLAIN)).speak(0.0, 0.0, RNG)
     spoken, _ = speaker.heard_other(2.0).speak(2.0, 0.0, RNG)
     assert spoken is not None
 
 
-def test_joined_remarks_go_on_in_the_same_breath():
+def test_joined_remarks_follow_without_pause():
     two = voice().plan(remark(DialogueMove.REPLY_N), remark(DialogueMove.INSTRUCT, LandmarkName.KFC, joined=True))
     _, speaker = two.speak(0.0, 0.0, RNG)
     spoken, _ = speaker.speak(0.5, 0.4, RNG)
     assert spoken is not None and "KFC" in spoken.text
 
 
-def test_nobody_interrupts_himself():
+def test_speaker_does_not_interrupt_own_utterance():
     _, speaker = voice().plan(remark(DialogueMove.EXPLAIN), remark(DialogueMove.EXPLAIN)).speak(0.0, 0.0, RNG)
     spoken, _ = speaker.speak(0.5, 1.0, RNG)
     assert spoken is None
 
 
-def test_what_has_expired_is_dropped_with_what_goes_on_from_it():
+def test_expired_remark_is_dropped_with_joined_ones():
     late = voice().plan(remark(DialogueMove.EXPLAIN, expires=1.0), remark(DialogueMove.INSTRUCT, joined=True))
     spoken, speaker = late.speak(2.0, 0.0, RNG)
     assert spoken is None and speaker.idle
 
 
-def test_what_is_joined_is_worded_with_what_it_goes_on_from():
+def test_joined_remark_is_worded_with_previous_one():
     two = voice().plan(remark(DialogueMove.REPLY_N), remark(DialogueMove.INSTRUCT, LandmarkName.KFC, joined=True))
     first, speaker = two.speak(0.0, 0.0, np.random.default_rng(4))
     second, _ = speaker.speak(0.5, 0.4, np.random.default_rng(9))
@@ -56,7 +56,7 @@ def test_what_is_joined_is_worded_with_what_it_goes_on_from():
     assert second == again  # the words were settled with those of the first
 
 
-def test_a_speaker_of_some_style_does_not_talk_like_another():
+def test_wording_depends_on_speaker_style():
     plans = (
         remark(DialogueMove.INSTRUCT, LandmarkName.KFC),
         remark(DialogueMove.IRRELEVANT),

@@ -23,24 +23,24 @@ def decide(motion: Motion, *angles: float) -> Any:
     return decode_action(Role.CO_WIZARD, action, SpaceLimits())
 
 
-def test_it_lets_the_car_drive() -> None:
+def test_moving_car_is_left_alone() -> None:
     for motion in (Motion.DRIVING, Motion.HAZARD):
         assert decide(motion, -90.0, 0.0).physical is None
 
 
 @pytest.mark.parametrize(("angles", "chosen"), [((-90.0, 2.0, 88.0), 2), ((-85.0, 95.0), -85), ((-20.0, 10.0), 10)])
-def test_it_goes_as_straight_on_as_it_can(angles: tuple[float, ...], chosen: int) -> None:
+def test_straightest_exit_is_taken(angles: tuple[float, ...], chosen: int) -> None:
     physical = decide(Motion.WAITING, *angles).physical
     assert physical.action is PhysicalAction.J_TURN
     assert (physical.angle + 180) % 360 - 180 == chosen
 
 
-def test_it_goes_on_after_a_stop_and_turns_round_where_the_road_ends() -> None:
+def test_stopped_car_starts_and_dead_end_leads_to_u_turn() -> None:
     assert decide(Motion.STOPPED).physical.action is PhysicalAction.START
     assert decide(Motion.WAITING).physical.action is PhysicalAction.U_TURN
 
 
-def test_it_drives_through_a_town_and_never_talks() -> None:
+def test_lane_follow_drives_through_town_without_talking() -> None:
     env = DuoWizardEnv("brookside", config=EnvConfig(max_seconds=60.0))
     policies = {role: make_policy("silent", role, env.limits) for role in AGENT_ROLES}
     lanes: set[int] = set()

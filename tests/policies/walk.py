@@ -1,4 +1,4 @@
-"""Plays policies in the environment, briefly, and notes what was said and done."""
+"""Short sessions of policies, with their actions and events."""
 
 from __future__ import annotations
 

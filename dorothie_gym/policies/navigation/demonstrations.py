@@ -50,7 +50,7 @@ class DemonstrationRecorder:
     """Converts the decisions of another Co-Wizard in a session to demonstrations.
 
     Two kinds of decisions are left out: those at which a driver would not be asked, see `has_nothing_to_do`, and stops
-    that nobody asked for, because scripted Co-Wizards stop before a junction to ask for the way, or behind obstacles.
+    without an instruction, because scripted Co-Wizards stop before a junction to ask for the way, or behind obstacles.
     """
 
     def __init__(self, town: Town, max_seconds: float = MAX_SECONDS) -> None:

@@ -11,7 +11,7 @@ from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 
 
 @pytest.mark.parametrize("town", ["brookside", "midtown"])
-def test_way_left_is_the_cost_of_the_route(town: str) -> None:
+def test_cost_to_go_is_cost_of_route(town: str) -> None:
     model, rng = load_town(town), np.random.default_rng(0)
     way = CostToGo(model)
     lanes = [lane for lane in model.lanes if not lane.in_junction and lane.length > 25.0]
@@ -28,7 +28,7 @@ def test_way_left_is_the_cost_of_the_route(town: str) -> None:
     assert np.median(errors) < 5.0 and np.mean(np.array(errors) < 35.0) > 0.9
 
 
-def test_it_falls_to_nothing_at_the_goal_and_rises_behind_it() -> None:
+def test_cost_falls_to_zero_at_goal_and_rises_behind_it() -> None:
     town = load_town("brookside")
     lane = max((lane for lane in town.lanes if not lane.in_junction), key=lambda lane: lane.length)
     goal = lane.length / 2
@@ -40,7 +40,7 @@ def test_it_falls_to_nothing_at_the_goal_and_rises_behind_it() -> None:
     assert way.from_place(lane.id, goal + 6.0) > 30.0
 
 
-def test_a_roadblock_makes_it_longer() -> None:
+def test_roadblock_raises_cost() -> None:
     town = load_town("brookside")
     lane = max((lane for lane in town.lanes if not lane.in_junction), key=lambda lane: lane.length)
     way = CostToGo(town)
@@ -51,5 +51,5 @@ def test_a_roadblock_makes_it_longer() -> None:
     assert way.from_place(lane.id, 2.0) > free + 20.0
 
 
-def test_without_a_goal_there_is_no_way() -> None:
+def test_cost_is_infinite_without_goal() -> None:
     assert math.isinf(CostToGo(load_town("brookside")).from_place(0, 0.0))

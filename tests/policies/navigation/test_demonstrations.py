@@ -23,7 +23,7 @@ def env() -> NavigationEnv:
     return NavigationEnv(guidance="goals")
 
 
-def test_who_watches_a_driver_sees_what_the_driver_saw() -> None:
+def test_recorded_observations_equal_those_of_the_driver() -> None:
     env = DuoWizardEnv("brookside", config=EnvConfig(max_seconds=120.0))
     seen: list[tuple[Any, int]] = []
 
@@ -53,7 +53,7 @@ def test_who_watches_a_driver_sees_what_the_driver_saw() -> None:
     assert {lesson.action for lesson in driven} > {NavigationAction.NOTHING, NavigationAction.STOP}
 
 
-def test_an_action_that_was_carried_out_is_read_back(env: NavigationEnv) -> None:
+def test_action_of_inverts_physical_of(env: NavigationEnv) -> None:
     rng = np.random.default_rng(0)
     told = 0
     for seed in range(4):
@@ -72,7 +72,7 @@ def test_an_action_that_was_carried_out_is_read_back(env: NavigationEnv) -> None
     assert told > 50
 
 
-def test_a_stop_that_nobody_asked_for_is_no_lesson() -> None:
+def test_unrequested_stop_is_left_out() -> None:
     env = DuoWizardEnv("brookside")
     observations, _ = env.reset(seed=0)
     player = NavigationPolicy(obey, env.limits)

@@ -28,7 +28,7 @@ def test_every_exit_has_a_sector_of_its_road_only(town: str) -> None:
 
 
 @pytest.mark.parametrize("town", TOWNS)
-def test_lanes_beside_one_another_share_their_sectors(town: str) -> None:
+def test_parallel_lanes_share_sectors(town: str) -> None:
     model = load_town(town)
     ways = JunctionExits(model)
     for link in model.links:
@@ -37,7 +37,7 @@ def test_lanes_beside_one_another_share_their_sectors(town: str) -> None:
             assert [way is None for way in mine] == [way is None for way in theirs]
 
 
-def test_sectors_are_the_eighths_of_a_circle() -> None:
+def test_sectors_are_eighths_of_a_circle() -> None:
     assert [nearest_sector(angle) for angle in SECTORS] == list(range(8))
     assert SECTORS[nearest_sector(100.0)] == 90 and SECTORS[nearest_sector(-20.0)] == 0
     assert SECTORS[nearest_sector(175.0)] == -180

@@ -28,15 +28,15 @@ def cast(env: DuoWizardEnv, driver: Any) -> dict[Role, Any]:
 
 
 @pytest.mark.parametrize(("seed", "observe_acts"), [(1, True), (4, True), (10, False)])
-def test_who_does_as_told_gets_errands_done_by_talk(seed: int, observe_acts: bool) -> None:
+def test_obedient_driver_completes_tasks_by_dialogue(seed: int, observe_acts: bool) -> None:
     env = DuoWizardEnv("brookside", config=EnvConfig(observe_acts=observe_acts))
     summary = play_session(env, cast(env, obey), seed=seed)
     assert summary["success"], summary
 
 
 @pytest.mark.parametrize("guidance", ["turns", "goals"])
-def test_the_same_is_observed_as_while_learning(guidance: str) -> None:
-    """The same drive in both environments: what is told apart, all follows from the Co-Wizard's observation."""
+def test_observation_equals_that_of_training(guidance: str) -> None:
+    """The vector depends only on the Co-Wizard's observation, in both environments."""
     learning = NavigationEnv(guidance=guidance, exceptions=4.0)
     observation, info = learning.reset(seed=3)
     drive = learning.drive
@@ -55,7 +55,7 @@ def test_the_same_is_observed_as_while_learning(guidance: str) -> None:
 
 
 class Ride:
-    """A participant's words, and what a driver observes after them."""
+    """Session in which the test speaks as the participant and keeps the driver's observations."""
 
     def __init__(self, seed: int = 0) -> None:
         self.env = DuoWizardEnv("brookside", config=EnvConfig(words_per_second=20.0))
@@ -89,13 +89,13 @@ def instruct(*values: Any) -> DialogueAct:
     return DialogueAct.of(DialogueMove.INSTRUCT, *values)
 
 
-def test_nobody_is_asked_to_drive_before_anything_is_said() -> None:
+def test_driver_is_not_asked_before_first_instruction() -> None:
     ride = Ride()
     ride.go(4)
     assert ride.seen is None
 
 
-def test_a_place_that_is_named_becomes_the_goal_with_its_ways() -> None:
+def test_named_place_becomes_goal_with_route() -> None:
     ride = Ride()
     mark = read_landmarks(ride.observations["co_wizard"], ride.env.town)[0]
     ride.go(4, instruct(mark.name), f"go to the {mark.name.label}")
@@ -104,7 +104,7 @@ def test_a_place_that_is_named_becomes_the_goal_with_its_ways() -> None:
     assert ride.env.stage.beliefs.goals == (mark.name,)
 
 
-def test_a_turn_that_is_told_has_the_sector_of_its_exit() -> None:
+def test_instructed_turn_has_sector_of_its_exit() -> None:
     ride = Ride()
     ride.go(3, instruct(ActionValue.J_TURN), "turn left")
     turns = [k for k in range(8) if ride.field("said_sector")[k]]
@@ -114,7 +114,7 @@ def test_a_turn_that_is_told_has_the_sector_of_its_exit() -> None:
     assert ride.field("said_distance")[0] <= ride.field("junction")[1] + 1e-6
 
 
-def test_a_car_that_is_told_to_stop_is_told_how_far_it_takes() -> None:
+def test_stop_instruction_has_stopping_distance() -> None:
     ride = Ride()
     ride.go(12, instruct(ActionValue.LANE_FOLLOW), "keep going straight")
     ride.go(3, instruct(ActionValue.STOP), "stop")
@@ -122,7 +122,7 @@ def test_a_car_that_is_told_to_stop_is_told_how_far_it_takes() -> None:
     assert 0.0 < ride.field("said_distance")[0] * 100.0 < 30.0
 
 
-def test_speed_and_lights_are_set_as_they_are_asked_for() -> None:
+def test_speed_and_lights_are_set_on_request() -> None:
     ride = Ride()
     ride.go(5, instruct(ActionValue.LIGHT_CHANGE), "turn on your lights")
     assert ride.observations["co_wizard"]["lights"]
@@ -130,7 +130,7 @@ def test_speed_and_lights_are_set_as_they_are_asked_for() -> None:
     assert float(ride.observations["co_wizard"]["cruise_speed"][0]) < 30.0
 
 
-def test_the_mask_is_nearly_that_of_the_environment() -> None:
+def test_estimated_mask_agrees_with_environment() -> None:
     env = NavigationEnv(guidance="goals", traffic="medium")
     same = total = 0
     for seed in range(4):
