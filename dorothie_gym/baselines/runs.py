@@ -25,8 +25,8 @@ from dorothie_gym.baselines.training.trainer import OnEpoch
 from dorothie_gym.benchmark import ActionPredictions, ActPredictions, TaskPredictions, write_predictions
 from dorothie_gym.benchmark.features import Columns, PointTable
 from dorothie_gym.errors import CheckpointError
+from dorothie_gym.files import write_atomically
 from dorothie_gym.recording import Task
-from dorothie_gym.recording.json_io import write_atomically
 
 PREDICTIONS_FILE: Final = "predictions.parquet"
 RESULT_FILE: Final = "result.json"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import PredictionError
+from dorothie_gym.files import replacing
 from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, DialogueMove, SlotValue
 from dorothie_gym.recording import DecisionPoint, InferencePoint, Task
-from dorothie_gym.recording.file_names import PART
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -222,11 +221,9 @@ def write_predictions(
     if about is not None:
         schema = schema.with_metadata({ABOUT: json.dumps(about, sort_keys=True, allow_nan=False).encode()})
     target = Path(path)
-    part = target.with_name(target.name + PART)
-    with pq.ParquetWriter(part, schema, compression="zstd") as writer:
+    with replacing(target) as part, pq.ParquetWriter(part, schema, compression="zstd") as writer:
         for given in predictions:
             writer.write_table(pa.Table.from_pydict(_columns(given), schema=schema))
-    os.replace(part, target)
     return target
 
 

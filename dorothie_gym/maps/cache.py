@@ -9,8 +9,6 @@ import importlib.metadata
 import io
 import json
 import logging
-import os
-import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator
@@ -23,6 +21,7 @@ import numpy as np
 
 from dorothie_gym import angles
 from dorothie_gym.errors import TownArchiveError
+from dorothie_gym.files import PART, write_atomically
 from dorothie_gym.maps.model import (
     Array,
     Crosswalk,
@@ -280,15 +279,7 @@ def _keep(folder: Path, key: str, town: Town) -> None:
     data = pack(town, key)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=folder, suffix=".tmp", delete=False) as draft:
-            try:
-                draft.write(data)
-                draft.close()
-                os.replace(draft.name, folder / f"{key}.npz")
-            except OSError:
-                draft.close()
-                os.unlink(draft.name)
-                raise
+        write_atomically(folder / f"{key}.npz", data, shared=True)
         _prune(folder)
     except OSError as error:
         _log.debug("the town %s cannot be kept in %s: %s", town.name, folder, error)
@@ -296,7 +287,7 @@ def _keep(folder: Path, key: str, town: Town) -> None:
 
 def _prune(folder: Path) -> None:
     """Removes the oldest entries beyond `MOST_TOWNS`, with the temporary files of processes that were killed."""
-    entries = [entry for entry in folder.iterdir() if entry.suffix in (".npz", ".tmp")]
+    entries = [entry for entry in folder.iterdir() if entry.suffix in (".npz", PART)]
     if len(entries) > MOST_TOWNS:
         entries.sort(key=lambda entry: (entry.stat().st_mtime_ns, entry.name))
         for entry in entries[:-MOST_TOWNS]:

@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Any, Final, Self
 
 from dorothie_gym.errors import OntologyError, SessionError
+from dorothie_gym.files import write_atomically
 from dorothie_gym.ontology import ExceptionKind, parse_exception
 from dorothie_gym.recording.events import Event, EventType, decode_event
 from dorothie_gym.recording.export import export_tables
 from dorothie_gym.recording.file_names import EVENTS_FILE
 from dorothie_gym.recording.folder import read_session_file
 from dorothie_gym.recording.header import parse_version
-from dorothie_gym.recording.json_io import Fields, decode_text, from_line, read_bytes, to_page, write_atomically
+from dorothie_gym.recording.json_io import Fields, decode_text, from_line, read_bytes, to_page
 from dorothie_gym.recording.reading import layout_of, read_session, session_folders, sign_of
 from dorothie_gym.recording.sdn import SignVote
 from dorothie_gym.recording.session import Session

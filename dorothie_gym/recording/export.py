@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from dorothie_gym.files import replacing
 from dorothie_gym.ontology import VECTOR_SLOTS, Role
-from dorothie_gym.recording.file_names import PART
 from dorothie_gym.recording.points import PointView, history_angle, nfd_points
 from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.splits import Fold
@@ -39,17 +38,16 @@ def export_tables(sessions: Iterable[tuple[Fold | None, Session]], folder: Path)
 
     folder.mkdir(parents=True, exist_ok=True)
     paths = (folder / UTTERANCES_FILE, folder / DECISIONS_FILE)
-    parts = [path.with_name(path.name + PART) for path in paths]
     schemas = (_utterance_schema(), _decision_schema())
     with (
-        pq.ParquetWriter(parts[0], schemas[0], compression="zstd") as utterances,
-        pq.ParquetWriter(parts[1], schemas[1], compression="zstd") as decisions,
+        replacing(paths[0]) as first,
+        replacing(paths[1]) as second,
+        pq.ParquetWriter(first, schemas[0], compression="zstd") as utterances,
+        pq.ParquetWriter(second, schemas[1], compression="zstd") as decisions,
     ):
         for fold, session in sessions:
             utterances.write_table(pa.Table.from_pylist(list(_utterance_rows(fold, session)), schema=schemas[0]))
             decisions.write_table(pa.Table.from_pylist(list(_decision_rows(fold, session)), schema=schemas[1]))
-    for part, path in zip(parts, paths, strict=True):
-        os.replace(part, path)
     return paths
 
 

@@ -24,9 +24,6 @@ JOURNAL_FILE: Final = "frames.journal"
 PICTURES_FOLDER: Final = "pictures"
 """Optional pictures, `<frame>.png`."""
 
-PART: Final = ".part"
-"""Ending of a file that is being written; it is given its name when it is whole."""
-
 SESSION_FILES: Final = (HEADER_FILE, EVENTS_FILE, ACTIONS_FILE, FRAMES_FILE, JOURNAL_FILE)
 
 MAX_EVENTS: Final = 200_000

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import SessionError
+from dorothie_gym.files import new_folder, write_atomically
 from dorothie_gym.recording.action_log import Decision, encode_decision, read_decisions
 from dorothie_gym.recording.events import Event, EventType, decode_event, encode_event
 from dorothie_gym.recording.file_names import (
@@ -26,7 +26,6 @@ from dorothie_gym.recording.file_names import (
     HEADER_FILE,
     JOURNAL_FILE,
     MAX_EVENTS,
-    PART,
     PICTURES_FOLDER,
     SessionState,
 )
@@ -41,7 +40,6 @@ from dorothie_gym.recording.json_io import (
     read_lines,
     to_line,
     to_page,
-    write_atomically,
 )
 from dorothie_gym.recording.surroundings import Scene
 from dorothie_gym.recording.trajectory import TRAJECTORY_DTYPE, Trajectory, check_rising
@@ -190,27 +188,21 @@ def _pictures(folder: Path) -> Mapping[int, Path]:
 
 
 @contextmanager
-def new_folder(folder: Path) -> Iterator[Path]:
-    """Gives a folder to fill, which takes its name when the block is left, and is gone when the block fails.
+def new_session_folder(folder: Path) -> Iterator[Path]:
+    """Yields a folder to fill, which gets its name when the block is left and is removed when the block fails.
 
     Raises:
-        SessionError: there is something of that name already.
+        SessionError: a file or folder of that name exists.
     """
     if os.path.lexists(folder) and not (folder.is_dir() and not folder.is_symlink() and not any(folder.iterdir())):
         raise SessionError(f"{folder}: exists already; choose another name, or remove it first")
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    part = Path(tempfile.mkdtemp(prefix=f".{folder.name[:80]}.", suffix=PART, dir=folder.parent))
-    try:
-        part.chmod(0o755)  # temporary folders are closed to everybody else
+    with new_folder(folder, hidden=True) as part:
         yield part
-        part.rename(folder)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
 
 
 def save_folder(session: Session, folder: Path) -> Path:
     """Writes a session into a new folder; see `Session.save`."""
-    with new_folder(folder) as part:
+    with new_session_folder(folder) as part:
         lines = [encode_event(event) + "\n" for event in session.events]
         (part / EVENTS_FILE).write_text("".join(lines), encoding="utf-8", newline="\n")
         if session.decisions is not None:

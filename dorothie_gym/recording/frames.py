@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.recording.file_names import MAX_FRAME, MAX_FRAMES, MAX_FRAMES_FILE, PART
+from dorothie_gym.files import replacing
+from dorothie_gym.recording.file_names import MAX_FRAME, MAX_FRAMES, MAX_FRAMES_FILE
 from dorothie_gym.recording.json_io import read_bytes
 from dorothie_gym.recording.surroundings import (
     ACTOR_DTYPE,
@@ -65,8 +66,6 @@ def write_frames(path: Path, trajectory: Trajectory, scene: Scene) -> None:
         SessionError: the scene has a frame, or a column of a length, that the trajectory has not.
         OSError: it cannot be written.
     """
-    import os
-
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -82,19 +81,17 @@ def write_frames(path: Path, trajectory: Trajectory, scene: Scene) -> None:
         columns[name] = pa.array(values.tolist() if values.dtype == object else values)
     arrow = pa.table(columns)
     leaves = _leaves(arrow.schema)
-    temporary = path.with_name(path.name + PART)
-    temporary.unlink(missing_ok=True)
-    pq.write_table(
-        arrow,
-        temporary,
-        compression="zstd",
-        compression_level=1,
-        write_statistics=False,
-        use_dictionary=[leaf for leaf in leaves if leaf not in _SMOOTH],
-        use_byte_stream_split=[leaf for leaf in leaves if leaf in _SMOOTH],
-        store_schema=False,
-    )
-    os.replace(temporary, path)
+    with replacing(path) as part:
+        pq.write_table(
+            arrow,
+            part,
+            compression="zstd",
+            compression_level=1,
+            write_statistics=False,
+            use_dictionary=[leaf for leaf in leaves if leaf not in _SMOOTH],
+            use_byte_stream_split=[leaf for leaf in leaves if leaf in _SMOOTH],
+            store_schema=False,
+        )
 
 
 def read_frames(path: Path, report: ReadReport) -> tuple[Trajectory, Scene]:

@@ -13,7 +13,7 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from dorothie_gym.errors import SessionError, short_repr
-from dorothie_gym.recording.file_names import MAX_TEXT_FILE, PART
+from dorothie_gym.recording.file_names import MAX_TEXT_FILE
 
 MAX_DEPTH: Final = 40
 """Levels of nesting that a session may hold."""
@@ -130,16 +130,6 @@ def decode_text(content: bytes, where: str) -> str:
         return content.decode("utf-8")
     except UnicodeDecodeError as error:
         raise SessionError(f"{where}: not UTF-8 at byte {error.start}") from None
-
-
-def write_atomically(path: Path, content: str | bytes) -> None:
-    """Writes a file whole or not at all: readers never see a part of it, even when the process dies."""
-    temporary = path.with_name(path.name + PART)
-    temporary.unlink(missing_ok=True)  # whatever stands there, a link to somewhere else included
-    data = content.encode("utf-8") if isinstance(content, str) else content
-    with temporary.open("xb") as file:
-        file.write(data)
-    os.replace(temporary, path)
 
 
 # --- Reading named fields of a JSON object with one clear message for each that is wrong -----------------------------

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import SessionError
+from dorothie_gym.files import PART, write_atomically
 from dorothie_gym.maps import LightColour
 from dorothie_gym.ontology import Role
 from dorothie_gym.recording.action_log import Decision, encode_decision
@@ -23,14 +24,13 @@ from dorothie_gym.recording.file_names import (
     HEADER_FILE,
     JOURNAL_FILE,
     MAX_FRAME,
-    PART,
     PICTURES_FOLDER,
     SESSION_FILES,
 )
 from dorothie_gym.recording.folder import SessionFile, picture_name
 from dorothie_gym.recording.frames import ACTORS, CAR, LIGHTS, WEATHER, encode_block, read_journal, write_frames
 from dorothie_gym.recording.header import SessionHeader
-from dorothie_gym.recording.json_io import canonical, write_atomically
+from dorothie_gym.recording.json_io import canonical
 from dorothie_gym.recording.surroundings import Rows, actor_rows, light_rows, weather_rows
 from dorothie_gym.recording.trajectory import check_rising, checked_rows
 

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from dorothie_gym._version import __version__
 from dorothie_gym.errors import SessionError
+from dorothie_gym.files import PART, write_atomically
 from dorothie_gym.recording import FORMAT_VERSION
 
 if sys.platform != "win32":
@@ -43,22 +44,15 @@ def making_in(root: Path, file: str, wanted: Mapping[str, Any]) -> Iterator[None
         shutil.rmtree(root / PARTS)
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Writes a text file whole or not at all; raises `OSError` where it cannot be written."""
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(text, encoding="utf-8")
-    os.replace(temporary, path)
-
-
 def _claim(path: Path, wanted: Mapping[str, Any]) -> None:
     """Notes what is made; raises `SessionError` where the folder holds something that was made from something else."""
     root = path.parent
     page = json.dumps({"package_version": __version__, "format_version": FORMAT_VERSION, **wanted}, indent=1) + "\n"
     if not path.exists():
-        others = [entry.name for entry in root.iterdir() if entry.name != path.name + ".part"]
+        others = [entry.name for entry in root.iterdir() if entry.name != path.name + PART]
         if others:
             raise SessionError(f"{root}: holds something else ({others[0]}); choose a new or an empty folder")
-        write_whole(path, page)
+        write_atomically(path, page)
         return
     try:
         found = json.loads(path.read_text(encoding="utf-8"))

@@ -107,7 +107,7 @@ def test_the_compiler_s_digest_covers_all_of_our_modules_that_compile() -> None:
         "print(json.dumps([m for m in sys.modules if m.startswith('dorothie_gym.')]))"
     )
     loaded = json.loads(subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout)
-    without_effect = {f"dorothie_gym.{name}" for name in ("_registration", "_version", "errors", "user_cache")}
+    without_effect = {f"dorothie_gym.{name}" for name in ("_registration", "_version", "errors", "files", "user_cache")}
     others = {m for m in loaded if not m.startswith("dorothie_gym.maps")} - without_effect
     assert others == {"dorothie_gym.angles"}
 
@@ -178,7 +178,7 @@ def test_a_folder_in_place_of_an_entry_does_no_harm(path: Path, folder: Path) ->
     entry.unlink()
     entry.mkdir()
     assert through_cache(path, Reader()).name == "loop"
-    assert not list(folder.glob("*.tmp"))
+    assert not list(folder.glob("*.part"))
 
 
 def test_a_cache_folder_that_cannot_be_is_no_error(
@@ -207,7 +207,7 @@ def test_a_write_that_fails_leaves_nothing_behind(path: Path, folder: Path, monk
     def refuse(*_: object) -> None:
         raise PermissionError("no")
 
-    monkeypatch.setattr(cache_module.os, "replace", refuse)
+    monkeypatch.setattr(os, "replace", refuse)
     assert through_cache(path, Reader()).name == "loop"
     assert list(folder.iterdir()) == []
 
@@ -245,7 +245,7 @@ def test_nothing_is_kept_where_the_cache_is_turned_off(
 def test_the_cache_does_not_grow_for_ever(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cache_module, "MOST_TOWNS", 3)
     folder.mkdir(parents=True)
-    left_behind = folder / "killed.tmp"
+    left_behind = folder / "killed.part"
     left_behind.write_bytes(b"half a town")
     os.utime(left_behind, ns=(1, 1))
     (folder / "notes.txt").write_text("somebody else's")
@@ -282,4 +282,4 @@ def test_processes_that_write_the_same_entry_at_the_same_time_see_whole_towns(pa
     errors = [writer.communicate(timeout=60)[1].decode() for writer in writers]
     assert [writer.returncode for writer in writers] == [0, 0, 0], errors
     assert len(list(folder.iterdir())) == 2
-    assert not list(folder.glob("*.tmp"))
+    assert not list(folder.glob("*.part"))

@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final, Self
 
+from dorothie_gym.files import write_atomically
 from dorothie_gym.policies.policy_loader import DESCRIPTION
-from dorothie_gym.recording.json_io import write_atomically
 
 KIND: Final = "benchmark"
 """Kind of these files, by which they are played."""

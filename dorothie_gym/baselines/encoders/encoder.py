@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from dorothie_gym.files import replacing
 
 Vectors: TypeAlias = NDArray[np.float32]
 
@@ -93,11 +93,5 @@ def _read(path: Path, shape: tuple[int, int]) -> Vectors | None:
 def _write(path: Path, table: Vectors) -> None:
     """Writes whole or not at all; two processes may write the same at once."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            np.save(file, table, allow_pickle=False)
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+    with replacing(path, shared=True) as part, part.open("wb") as file:
+        np.save(file, table, allow_pickle=False)

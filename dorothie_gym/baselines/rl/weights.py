@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from importlib import import_module
@@ -19,6 +18,7 @@ from dorothie_gym.baselines.drivers import KIND
 from dorothie_gym.baselines.rl.environments import make_env
 from dorothie_gym.baselines.rl.settings import ALGORITHMS, FINAL_RATE, TrainingSettings
 from dorothie_gym.errors import ModelFileError, SettingsError
+from dorothie_gym.files import replacing
 
 TENSORS, DESCRIPTION = "model.safetensors", "model.json"
 """Files of a model in its folder."""
@@ -99,11 +99,9 @@ def save_model(
         "optimisers": groups,
     }
     folder.mkdir(parents=True, exist_ok=True)
-    save_file({name: value.detach().contiguous().clone() for name, value in tensors.items()}, folder / "new.tmp")
-    text = json.dumps(description, indent=1) + "\n"
-    (folder / "new.json.tmp").write_text(text, encoding="utf-8")
-    os.replace(folder / "new.tmp", folder / TENSORS)
-    os.replace(folder / "new.json.tmp", folder / DESCRIPTION)
+    with replacing(folder / DESCRIPTION) as about, replacing(folder / TENSORS) as weights:
+        save_file({name: value.detach().contiguous().clone() for name, value in tensors.items()}, weights)
+        about.write_text(json.dumps(description, indent=1) + "\n", encoding="utf-8")
 
 
 def read_description(folder: Path) -> dict[str, Any]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -15,6 +13,7 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from dorothie_gym.errors import CheckpointError
+from dorothie_gym.files import replacing
 
 _MODEL: Final = "model."
 _OPTIMISER: Final = "optimiser."
@@ -40,14 +39,8 @@ def save(
         for row, state in optimiser.state_dict()["state"].items():
             tensors |= {f"{_OPTIMISER}{row}.{name}": value.cpu().contiguous() for name, value in state.items()}
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
-    os.close(handle)
-    try:
-        save_file(tensors, name, metadata={_ABOUT: json.dumps(about, sort_keys=True)})
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+    with replacing(path, shared=True) as part:
+        save_file(tensors, part, metadata={_ABOUT: json.dumps(about, sort_keys=True)})
 
 
 def about(path: Path) -> dict[str, Any]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
 from dorothie_gym.baselines.training.trainer import Epoch
+from dorothie_gym.files import replacing
 from dorothie_gym.rendering.charts import INK, SHEET, SOFT, hexadecimal
 from dorothie_gym.rendering.palette import CAR, ROAD
 
@@ -44,6 +44,5 @@ def draw_curves(epochs: Sequence[Epoch], title: str, path: Path) -> None:
     axes.legend(frameon=False, fontsize=8, labelcolor=INK)
     for side in axes.spines.values():
         side.set_visible(False)
-    part = path.with_name(path.name + ".part")
-    figure.savefig(part, format="png")
-    os.replace(part, path)
+    with replacing(path) as part:
+        figure.savefig(part, format="png")

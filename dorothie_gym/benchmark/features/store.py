@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 
 from dorothie_gym.benchmark.features.columns import GROUPS, Columns, TownGraph
 from dorothie_gym.errors import FeatureStoreError
+from dorothie_gym.files import PART
 from dorothie_gym.user_cache import cache_folder
 
 INDEX_FILE: Final = "columns.json"
-PART: Final = ".part"
 
 EMPTY: Final = 128
 """Bytes of an `.npy` file without content: its header."""

@@ -24,7 +24,7 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.recording.events import Event, EventType
 from dorothie_gym.recording.file_names import EVENTS_FILE
-from dorothie_gym.recording.folder import new_folder
+from dorothie_gym.recording.folder import new_session_folder
 from dorothie_gym.recording.header import LandmarkRow, SessionHeader
 from dorothie_gym.recording.json_io import canonical
 from dorothie_gym.recording.sdn.event_log import FOREIGN, LEFT, RIGHT
@@ -247,7 +247,7 @@ def write_sdn(session: Session, path: Path | str, *, maps: Path | str | None = N
     """
     town = find_town(session.header.town, None if maps is None else Path(maps))
     first = first_frame_of(session.header)
-    with new_folder(Path(path)) as folder:
+    with new_session_folder(Path(path)) as folder:
         _write(folder / CONFIG_FILE, json.dumps(_config(session, town, first), ensure_ascii=False, indent=1))
         _write(folder / LOG_FILE, _lines(log_rows(session, first)))
         _write(folder / PLAN_FILE, _lines(sorted(plan_rows(session, first), key=lambda row: int(row["frame"]))))

@@ -16,6 +16,7 @@ import numpy as np
 
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import SessionError
+from dorothie_gym.files import write_atomically
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, load_town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import ALL_SCRIPTED, Player
@@ -23,7 +24,7 @@ from dorothie_gym.recording import safe_name
 from dorothie_gym.recording.json_io import to_page
 from dorothie_gym.rollout.closed_loop.results import RESULT_FILE, RolloutResult, Row
 from dorothie_gym.rollout.closed_loop.session_record import measure
-from dorothie_gym.rollout.folder import making_in, write_whole
+from dorothie_gym.rollout.folder import making_in
 from dorothie_gym.rollout.on_ray import share_out_on_ray
 from dorothie_gym.rollout.play import SessionMaker
 from dorothie_gym.rollout.processes import share_out
@@ -218,7 +219,7 @@ def roll_out(
 def write_result(root: Path, settings: RolloutSettings, rows: Iterable[Row]) -> RolloutResult:
     """Writes `rollout.json` from the rows of the sessions that were played; returns what it says."""
     result = RolloutResult(settings=settings.to_json(), rows=tuple(sorted(rows, key=lambda row: row.number)))
-    write_whole(root / RESULT_FILE, to_page(result.to_json()))
+    write_atomically(root / RESULT_FILE, to_page(result.to_json()))
     return result
 
 
@@ -230,7 +231,7 @@ def _add_cost(file: Path, wall: float, processor: float, workers: int) -> None:
     except (FileNotFoundError, ValueError, KeyError, TypeError):
         _LOG.debug("%s: is begun anew", file)
     cost = {"wall_seconds": round(wall, 3), "cpu_seconds": round(processor, 3), "workers": workers}
-    write_whole(file, to_page(cost))
+    write_atomically(file, to_page(cost))
 
 
 @dataclass

@@ -1,0 +1,72 @@
+"""Files and folders that appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+PART: Final = ".part"
+"""Ending of the name of a file or folder that is being written."""
+
+
+@contextmanager
+def replacing(path: Path, *, shared: bool = False) -> Iterator[Path]:
+    """Yields a path beside `path` to write to, which replaces `path` in one step when the block is left.
+
+    Readers see the old file or the whole new one, even if the process dies. If the block fails, the part is removed.
+
+    Args:
+        path: the file.
+        shared: whether several processes may write the file at once: the name of the part is then unique. Otherwise it
+            is `path` with the ending `PART`, so that a later write removes what a killed process left.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    if shared:
+        part = path.with_name(f"{path.name[:80]}.{secrets.token_hex(8)}{PART}")
+    else:
+        part = path.with_name(path.name + PART)
+        part.unlink(missing_ok=True)  # a link to another place must not be followed
+    try:
+        yield part
+        os.replace(part, path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def write_atomically(path: Path, content: str | bytes, *, shared: bool = False) -> None:
+    """Writes a file whole or not at all; a text in UTF-8. Arguments and errors as of `replacing`."""
+    with replacing(path, shared=shared) as part:
+        part.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
+
+
+@contextmanager
+def new_folder(folder: Path, *, hidden: bool = False) -> Iterator[Path]:
+    """Yields an empty folder beside `folder` to fill, which gets its name when the block is left.
+
+    If the block fails, or `folder` exists and is not empty, the new folder is removed.
+
+    Args:
+        folder: the folder.
+        hidden: whether the name begins with a dot until the folder is whole.
+
+    Raises:
+        OSError: the folder cannot be written, or its name is taken.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    prefix = f"{'.' if hidden else ''}{folder.name[:80]}."
+    part = Path(tempfile.mkdtemp(prefix=prefix, suffix=PART, dir=folder.parent))
+    try:
+        part.chmod(0o755)  # temporary folders are closed to other users
+        yield part
+        part.rename(folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)

@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dorothie_gym.files import PART, new_folder, replacing, write_atomically
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_file_is_replaced_and_no_part_is_left(tmp_path: Path, shared: bool) -> None:
+    write_atomically(tmp_path / "a", "one", shared=shared)
+    write_atomically(tmp_path / "a", b"two", shared=shared)
+    assert (tmp_path / "a").read_text() == "two"
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_failed_write_keeps_the_old_file(tmp_path: Path, shared: bool) -> None:
+    (tmp_path / "a").write_text("old")
+    with pytest.raises(KeyboardInterrupt), replacing(tmp_path / "a", shared=shared) as part:
+        part.write_text("half")
+        raise KeyboardInterrupt
+    assert (tmp_path / "a").read_text() == "old"
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+def test_link_in_the_place_of_the_part_is_not_followed(tmp_path: Path) -> None:
+    (tmp_path / "outside").write_text("precious")
+    (tmp_path / f"a{PART}").symlink_to(tmp_path / "outside")
+    write_atomically(tmp_path / "a", "new")
+    assert (tmp_path / "outside").read_text() == "precious"
+
+
+def test_shared_parts_have_names_of_their_own(tmp_path: Path) -> None:
+    with replacing(tmp_path / "a", shared=True) as one, replacing(tmp_path / "a", shared=True) as other:
+        assert one != other
+        one.write_text("first")
+        other.write_text("second")
+    assert (tmp_path / "a").read_text() == "first", "the outer block is left last"
+
+
+def test_folder_appears_when_it_is_whole(tmp_path: Path) -> None:
+    with new_folder(tmp_path / "deep/folder", hidden=True) as part:
+        (part / "file").touch()
+        assert not (tmp_path / "deep/folder").exists() and part.name.startswith(".folder.")
+    assert [path.name for path in (tmp_path / "deep").iterdir()] == ["folder"]
+
+
+def test_failed_folder_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="stop"), new_folder(tmp_path / "folder"):
+        raise ValueError("stop")
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken/file").touch()
+    with pytest.raises(OSError, match="taken"), new_folder(tmp_path / "taken"):
+        pass
+    assert [path.name for path in tmp_path.iterdir()] == ["taken"]
