@@ -1,7 +1,8 @@
-"""What holds for all tests: nothing is written into the user's own folders. And a Ray cluster for who wants one."""
+"""Fixtures of all tests: a cache folder of this run, a compiled simulation, a Ray cluster."""
 
 from __future__ import annotations
 
+import fcntl
 import os
 import tempfile
 import warnings
@@ -10,28 +11,56 @@ from typing import Any
 
 import pytest
 
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.ontology import Role
+from dorothie_gym.sim.config import WorldConfig
+from dorothie_gym.spaces import noop
 from dorothie_gym.user_cache import CACHE_VARIABLE
+
+SIMULATED = frozenset("baselines bench benchmark engine envs policies recording rollout sim testing wrappers".split())
+"""Folders whose tests step the simulation."""
 
 _FOLDER = pytest.StashKey[tempfile.TemporaryDirectory[str]]()
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Towns are kept in a folder of this run, which its parallel workers share."""
+    """Points the package's cache at a folder of this run, which the parallel workers share."""
     if not hasattr(config, "workerinput"):
         config.stash[_FOLDER] = tempfile.TemporaryDirectory(prefix="dorothie_gym-")
         os.environ[CACHE_VARIABLE] = config.stash[_FOLDER].name
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """The folder goes with the run."""
+    """Removes the folder."""
     folder = config.stash.get(_FOLDER, None)
     if folder is not None:
         folder.cleanup()
 
 
+@pytest.fixture(scope="session", autouse=True)
+def compiled_simulation(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> None:
+    """Compiles the simulation before the first test, one worker at a time.
+
+    With a cold numba cache this takes a minute or two. Time limits hold for the body of a test only
+    (`timeout_func_only`), so that no test fails because it happens to be the first. Workers take turns: the later ones
+    find the machine code of the first in the cache.
+    """
+    if not any(SIMULATED & set(item.path.parts) for item in request.session.items):
+        return
+    root = tmp_path_factory.getbasetemp()
+    shared = root.parent if "PYTEST_XDIST_WORKER" in os.environ else root
+    with (shared / "compiling.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        env = DuoWizardEnv("brookside", config=EnvConfig(world=WorldConfig(vehicles=3, pedestrians=3)), max_cycles=4)
+        env.reset(seed=0)
+        while env.agents:
+            env.step({agent: noop(Role(agent), env.limits) for agent in env.agents})
+
+
 @pytest.fixture
 def cluster() -> Iterator[Any]:
-    """A Ray cluster of two nodes with a processor each, the other one than the head being `second`."""
+    """Starts a Ray cluster of two nodes with one processor each; `second` is the node that is not the head."""
     ray = pytest.importorskip("ray")
     from ray.cluster_utils import Cluster
 
@@ -41,5 +70,5 @@ def cluster() -> Iterator[Any]:
         made.second = made.add_node(num_cpus=1)
         made.wait_for_nodes()
     yield made
-    ray.shutdown()  # a test that failed is still connected, and the nodes would wait for it
+    ray.shutdown()  # a failed test is still connected, and the nodes would wait for it
     made.shutdown()

@@ -1,0 +1,19 @@
+"""Contracts of the package as reusable checks, for people who write a policy, a town, an environment or a recorder.
+
+Each check raises `AssertionError` with a message that names the broken rule and where it broke, so that one call is a
+test:
+
+```python
+from dorothie_gym.testing import check_policy
+
+def test_my_policy() -> None:
+    check_policy(MyCoWizard())
+```
+"""
+
+from dorothie_gym.testing.leaks import check_observations_do_not_leak
+from dorothie_gym.testing.policies import check_policy
+from dorothie_gym.testing.sessions import check_session
+from dorothie_gym.testing.towns import check_town
+
+__all__ = ["check_observations_do_not_leak", "check_policy", "check_session", "check_town"]

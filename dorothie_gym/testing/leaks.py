@@ -1,0 +1,123 @@
+"""Check that a role observes nothing that it must not know."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from dorothie_gym.engine.scenario import Scenario, draw_scenario
+from dorothie_gym.maps import Town
+from dorothie_gym.ontology import Role
+from dorothie_gym.spaces import noop
+from dorothie_gym.testing.comparison import first_unequal
+from dorothie_gym.testing.playing import ByAgent, Decision, ParallelSession, play_again, play_random, play_scripted
+
+CO_WIZARD = str(Role.CO_WIZARD)
+AD_WIZARD = str(Role.AD_WIZARD)
+PARTICIPANT = str(Role.PARTICIPANT)
+
+
+def check_observations_do_not_leak(env: ParallelSession, *, seed: int = 0, decisions: int = 60) -> None:
+    """Checks that the Co-Wizard observes neither hidden landmarks nor the participant's tasks.
+
+    A session is played with random and with scripted actions. The same actions are then played in two altered
+    scenarios: hidden landmarks stand at other sites; the story and the order of the errands are others. Observation,
+    action mask and refusals of the Co-Wizard must be equal to the bit at every decision (with other errands: up to the
+    first arrival, which everybody may notice, and with an idle Ad-Wizard, whose refusals depend on the task). The
+    participant's observation must differ, or the check would prove nothing.
+
+    Args:
+        env: a `DuoWizardEnv`, or a wrapper around one with the same parallel API and
+            `reset(options={"scenario": ...})`. It is reset several times.
+        seed: of the first session; the first seed from here on whose scenario has a hidden landmark is used.
+        decisions: decisions played in each session, at 2 Hz by default.
+
+    Raises:
+        AssertionError: a field differs; the message names the scenario, the decision and the field.
+    """
+    for play in (play_random, play_scripted):
+        _check_hidden_landmarks(env, play, _seed_with_hidden_landmark(env.unwrapped.town, seed), decisions)
+        _check_errands(env, play, seed, decisions)
+
+
+Play = Callable[..., Iterator[Decision]]
+
+
+def _check_hidden_landmarks(env: ParallelSession, play: Play, seed: int, decisions: int) -> None:
+    played = list(play(env, seed=seed, decisions=decisions))
+    moved = with_hidden_landmarks_moved(env.unwrapped.scenario, env.unwrapped.town, np.random.default_rng(seed))
+    again = list(play_again(env, moved, [decision.actions for decision in played if decision.actions]))
+    where = f"hidden landmarks moved, seed {seed}"
+    for k, (decision, (observations, infos)) in enumerate(zip(played, again, strict=False)):
+        _check_equal(where, k, (decision.observations, decision.infos), (observations, infos))
+        seen, moved_seen = (part[PARTICIPANT]["landmarks"] for part in (decision.observations, observations))
+        assert not np.array_equal(seen, moved_seen), f"{where}, decision {k}: the participant must see the difference"
+
+
+def _check_errands(env: ParallelSession, play: Play, seed: int, decisions: int) -> None:
+    played = list(play(env, seed=seed, decisions=decisions))
+    idle = noop(Role.AD_WIZARD, env.unwrapped.limits)
+    actions = [{**decision.actions, AD_WIZARD: idle} for decision in played if decision.actions]
+    scenario = env.unwrapped.scenario
+    runs = []
+    for variant in (scenario, with_other_errands(scenario)):
+        run = []
+        for observations, infos in play_again(env, variant, actions):
+            run.append((observations, infos))
+            if any(event.type == "Subgoal" for event in env.unwrapped.last_events):
+                break
+        runs.append(run)
+    where = f"other errands, seed {seed}"
+    for k, (one, other) in enumerate(zip(*runs, strict=False)):
+        _check_equal(where, k, one, other)
+        same = one[0][PARTICIPANT]["story"] == other[0][PARTICIPANT]["story"]
+        assert not same, f"{where}, decision {k}: the participant must see the difference"
+
+
+def _check_equal(where: str, k: int, one: tuple[ByAgent, ByAgent], other: tuple[ByAgent, ByAgent]) -> None:
+    (observations, infos), (others, other_infos) = one, other
+    field = first_unequal(observations[CO_WIZARD], others[CO_WIZARD])
+    assert field is None, f"{where}, decision {k}: the Co-Wizard's observation {field} differs"
+    for key in ("action_mask", "refused"):
+        field = first_unequal(infos[CO_WIZARD][key], other_infos[CO_WIZARD][key], key)
+        assert field is None, f"{where}, decision {k}: the Co-Wizard's info {field} differs"
+
+
+def _seed_with_hidden_landmark(town: Town, seed: int) -> int:
+    for candidate in range(seed, seed + 1000):
+        if any(landmark.hidden for landmark in draw_scenario(town, None, candidate).storyboard.landmarks):
+            return candidate
+    raise AssertionError(f"{town.name}: no scenario of a thousand seeds has a hidden landmark")
+
+
+def with_hidden_landmarks_moved(scenario: Scenario, town: Town, rng: np.random.Generator) -> Scenario:
+    """Returns the scenario with its hidden landmarks at other, free sites."""
+    board = scenario.storyboard
+    taken = {landmark.site for landmark in board.landmarks}
+    free = [site for site in town.sites if site.id not in taken]
+    landmarks = list(board.landmarks)
+    for k in [k for k, landmark in enumerate(landmarks) if landmark.hidden]:
+        site = free.pop(int(rng.integers(len(free))))
+        landmarks[k] = dataclasses.replace(
+            landmarks[k],
+            site=site.id,
+            lane=site.lane,
+            station=site.station,
+            position=site.position,
+            waypoint=site.waypoint,
+            street=site.street,
+        )
+    return dataclasses.replace(scenario, storyboard=dataclasses.replace(board, landmarks=tuple(landmarks)))
+
+
+def with_other_errands(scenario: Scenario) -> Scenario:
+    """Returns the scenario with another story, and with every errand at the place of the next one."""
+    board = scenario.storyboard
+    places = [subgoal.landmark for subgoal in board.subgoals]
+    subgoals = tuple(
+        dataclasses.replace(subgoal, landmark=place, description=f"errand {k}")
+        for k, (subgoal, place) in enumerate(zip(board.subgoals, places[1:] + places[:1], strict=True))
+    )
+    return dataclasses.replace(scenario, storyboard=dataclasses.replace(board, story="A story.", subgoals=subgoals))
