@@ -1,9 +1,6 @@
 """Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
 
 from ._version import __version__ as __version__
-from .benchmark.teacher_forced import NfDEnv as NfDEnv
-from .benchmark.teacher_forced import RfNEnv as RfNEnv
-from .benchmark.teacher_forced import UfNEnv as UfNEnv
 from .engine.config import EnvConfig as EnvConfig
 from .engine.config import RewardWeights as RewardWeights
 from .engine.scenario import Scenario as Scenario
@@ -12,7 +9,11 @@ from .envs.duo_wizard_v0 import DuoWizardEnv as DuoWizardEnv
 from .envs.navigation_config import NavigationWeights as NavigationWeights
 from .envs.navigation_continuous_v0 import NavigationContinuousEnv as NavigationContinuousEnv
 from .envs.navigation_v0 import NavigationEnv as NavigationEnv
+from .envs.nfd_v0 import NfDEnv as NfDEnv
+from .envs.rfn_v0 import RfNEnv as RfNEnv
 from .envs.single_role_v0 import SingleRole as SingleRole
+from .envs.town_v0 import TownEnv as TownEnv
+from .envs.ufn_v0 import UfNEnv as UfNEnv
 from .errors import DorothieGymError as DorothieGymError
 from .maps import Town as Town
 from .maps import load_town as load_town
@@ -23,7 +24,6 @@ from .policies.navigation import NavigationAction as NavigationAction
 from .recording import Session as Session
 from .recording import load_sessions as load_sessions
 from .sim.config import WorldConfig as WorldConfig
-from .sim.town_env import TownEnv as TownEnv
 from .spaces import SpaceLimits as SpaceLimits
 from .spaces import noop as noop
 from .tasks import load_template as load_template

@@ -16,7 +16,7 @@ def register_environments() -> None:
             f"dorothie_gym/{view}-v0", "dorothie_gym.envs.single_role_v0:SingleRole", kwargs={"role": role}
         )
     for task in ("UfN", "RfN", "NfD"):
-        gymnasium.register(f"dorothie_gym/{task}-v0", f"dorothie_gym.benchmark.teacher_forced:{task}Env")
+        gymnasium.register(f"dorothie_gym/{task}-v0", f"dorothie_gym.envs.{task.lower()}_v0:{task}Env")
     gymnasium.register("dorothie_gym/Navigation-v0", "dorothie_gym.envs.navigation_v0:NavigationEnv")
     gymnasium.register(
         "dorothie_gym/Navigation-continuous-v0",
@@ -24,6 +24,6 @@ def register_environments() -> None:
     )
     gymnasium.register(
         "dorothie_gym/Town-v0",
-        "dorothie_gym.sim.town_env:TownEnv",
+        "dorothie_gym.envs.town_v0:TownEnv",
         vector_entry_point="dorothie_gym.sim.batch.town_vector_env:TownVectorEnv",
     )

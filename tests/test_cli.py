@@ -127,16 +127,16 @@ class TestRun:
         assert result.exit_code == 2 and "pip install 'dorothie-gym[video]'" in result.stderr
 
     def test_ctrl_c_keeps_the_session_and_exits_with_130(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+        from dorothie_gym.engine.session_engine import SessionEngine
 
-        step = DuoWizardEnv.step
+        step = SessionEngine.step
 
-        def interrupted(self: DuoWizardEnv, actions: Any) -> Any:
-            if self.stage.world.time >= 3.0:
+        def interrupted(self: SessionEngine, actions: Any) -> Any:
+            if self.session.world.time >= 3.0:
                 raise KeyboardInterrupt
             return step(self, actions)
 
-        monkeypatch.setattr(DuoWizardEnv, "step", interrupted)
+        monkeypatch.setattr(SessionEngine, "step", interrupted)
         result = call("run", "--seed", 3, "--out", "cut", "--json")
         assert result.exit_code == 130 and result.stdout == ""
         assert "Interrupted after 3.0 simulated seconds; what happened until then is kept in cut" in result.stderr

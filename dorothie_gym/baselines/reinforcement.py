@@ -19,7 +19,10 @@ from dorothie_gym.baselines.material import TEST, TRAIN, VALIDATION
 from dorothie_gym.baselines.outputs import allowed_angle
 from dorothie_gym.baselines.training import checkpoints
 from dorothie_gym.benchmark import ActionPredictions, ActPredictions, TaskPredictions
-from dorothie_gym.benchmark.teacher_forced import NfDEnv, RfNEnv, TeacherForcedEnv, UfNEnv
+from dorothie_gym.envs.nfd_v0 import NfDEnv
+from dorothie_gym.envs.rfn_v0 import RfNEnv
+from dorothie_gym.envs.teacher_forced import TeacherForcedEnv
+from dorothie_gym.envs.ufn_v0 import UfNEnv
 from dorothie_gym.errors import SessionError
 from dorothie_gym.recording import Corpus, Task
 from dorothie_gym.wrappers.flatten import FlattenAction, FlattenObservation

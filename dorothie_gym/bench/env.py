@@ -104,7 +104,7 @@ def measure(
     progress("town", 0.0)
     session = Session(town, vehicles, pedestrians, seed)
     lanes = session.env.town.lanes
-    world = session.env.stage.world
+    world = session.env.session.world
     stock = StockIntersection(seed)
     substeps = round(FRAME_RATE / session.env.config.decision_frequency)
     with ExitStack() as stack:

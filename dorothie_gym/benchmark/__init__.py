@@ -1,4 +1,4 @@
-"""The three tasks on recordings: metrics, predictions as files, floors, the table, teacher-forced environments."""
+"""The three tasks on recordings: metrics, prediction files, trivial baselines and the results table."""
 
 from dorothie_gym.benchmark.claims import Claim, Finding, Verdict, above, findings
 from dorothie_gym.benchmark.intervals import Estimate
@@ -30,7 +30,6 @@ from dorothie_gym.benchmark.predictions import (
 )
 from dorothie_gym.benchmark.scoring import RunScore, Scores, score_runs, score_task
 from dorothie_gym.benchmark.table import ResultsTable, evaluate_files, evaluate_predictions
-from dorothie_gym.benchmark.teacher_forced import NfDEnv, RfNEnv, TeacherForcedEnv, UfNEnv
 from dorothie_gym.benchmark.trivial_baselines import (
     FLOORS,
     FloorModel,
@@ -59,12 +58,10 @@ __all__ = [
     "MajorityModel",
     "Metric",
     "MoveAccuracy",
-    "NfDEnv",
     "PaperFigure",
     "PredictionError",
     "RandomModel",
     "ResultsTable",
-    "RfNEnv",
     "RunScore",
     "SPLITS",
     "Scores",
@@ -74,8 +71,6 @@ __all__ = [
     "Split",
     "TaskLabels",
     "TaskPredictions",
-    "TeacherForcedEnv",
-    "UfNEnv",
     "Verdict",
     "above",
     "act_labels",

@@ -11,8 +11,8 @@ from typing import Any, Self
 import numpy as np
 
 from dorothie_gym.cli.video import video_writer
+from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.engine.session_scene import scene_of
-from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.recording import FRAME_RATE
 from dorothie_gym.rendering.frames import SceneRenderer
 from dorothie_gym.rendering.scene import Actor, Scene
@@ -52,13 +52,13 @@ class Film:
         """Closes the file, which can be played from then on."""
         self._writer.close()
 
-    def __call__(self, env: DuoWizardEnv) -> None:
+    def __call__(self, engine: SessionEngine) -> None:
         """Appends the frames of the last decision."""
-        scene = scene_of(env.stage)
+        scene = scene_of(engine.session)
         if self._last is None:
             self._append(scene)
         else:
-            for between in _in_between(self._last, scene, env):
+            for between in _in_between(self._last, scene, engine):
                 self._append(between)
         self._last = scene
 
@@ -67,9 +67,9 @@ class Film:
         self.frames += 1
 
 
-def _in_between(before: Scene, after: Scene, env: DuoWizardEnv) -> list[Scene]:
+def _in_between(before: Scene, after: Scene, engine: SessionEngine) -> list[Scene]:
     """The scenes of a decision, ten a second, the present one last; words and tasks change with the last."""
-    rows = env.last_frames
+    rows = engine.last_frames
     step = FRAME_RATE // FRAMES_PER_SECOND
     scenes = []
     for k in range(step - 1, len(rows) - 1, step):

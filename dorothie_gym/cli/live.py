@@ -13,8 +13,8 @@ from rich.table import Table
 from rich.text import Text
 
 from dorothie_gym.cli.script import SPEAKERS, ScriptLine, script_lines
-from dorothie_gym.engine.session_engine import Stage
-from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.engine.live_session import LiveSession
+from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import GoalStatus
 from dorothie_gym.tasks import TaskState
 
@@ -60,20 +60,20 @@ class LiveShow:
         if self._live is not None:
             self._live.stop()
 
-    def __call__(self, env: DuoWizardEnv) -> None:
+    def __call__(self, engine: SessionEngine) -> None:
         """Shows what happened in the last decision."""
         if self._begun is None:
             self._begun = time.perf_counter()
-            self._console.print(_opening(env.stage, self._console, self._width))
-        lines = script_lines(env.last_events, env.stage.task.description)
+            self._console.print(_opening(engine.session, self._console, self._width))
+        lines = script_lines(engine.last_events, engine.session.task.description)
         if lines:
             self._console.print(_script(lines, self._width))
         if self._live is not None:
-            self._live.update(self._standing(env))
+            self._live.update(self._standing(engine))
 
-    def _standing(self, env: DuoWizardEnv) -> RenderableType:
+    def _standing(self, engine: SessionEngine) -> RenderableType:
         assert self._begun is not None
-        task, seconds = env.stage.task, env.stage.world.time
+        task, seconds = engine.session.task, engine.session.world.time
         wall = max(time.perf_counter() - self._begun, 1e-6)
         reached = sum(task.reached(i) for i in task.live)
         bar = Table.grid(padding=(0, 1))
@@ -133,15 +133,15 @@ def summary(facts: dict[str, Any], files: dict[str, str], console: Console) -> R
     return Group(_rule(console), headline, table)
 
 
-def _opening(stage: Stage, console: Console, width: int) -> RenderableType:
-    board = stage.scenario.storyboard
+def _opening(session: LiveSession, console: Console, width: int) -> RenderableType:
+    board = session.scenario.storyboard
     title = Text.assemble(
-        (stage.world.town.name, "bold"), " · ", (board.name, "bold"), (f" · seed {stage.scenario.seed}", "dim")
+        (session.world.town.name, "bold"), " · ", (board.name, "bold"), (f" · seed {session.scenario.seed}", "dim")
     )
     story = Table.grid()
     story.add_column(width=min(width, 80))
     story.add_row(Text(board.story, style="italic"))
-    return Group(title, story, tasks(stage.task, console), _rule(console))
+    return Group(title, story, tasks(session.task, console), _rule(console))
 
 
 def _rule(console: Console) -> Text:

@@ -26,7 +26,8 @@ from dorothie_gym.cli.players import find_cast
 from dorothie_gym.cli.video import check_video
 
 if TYPE_CHECKING:
-    from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+    from dorothie_gym.engine.live_session import SessionSummary
+    from dorothie_gym.engine.session_engine import SessionEngine
 
 PICTURE = Path("dorothie.png")
 """Picture that is written where none is asked for."""
@@ -111,42 +112,42 @@ def _check_outputs(plan: _Plan) -> None:
 
 def _play(plan: _Plan, *, quiet: bool) -> dict[str, Any]:
     """Plays the session and returns what --json writes."""
-    from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-    from dorothie_gym.ontology import Role
+    from dorothie_gym.engine.session_engine import SessionEngine
+    from dorothie_gym.ontology import AGENT_ROLES
     from dorothie_gym.rollout import play_session
     from dorothie_gym.spaces import noop
 
     cast = find_cast(*plan.players)
     with compiling():
-        env = DuoWizardEnv(plan.town, plan.storyboard, config=env_config(plan.max_seconds, plan.word_errors))
-        env.reset(seed=plan.seed)
-        env.step({agent: noop(Role(agent), env.limits) for agent in env.agents})
+        engine = SessionEngine(plan.town, plan.storyboard, config=env_config(plan.max_seconds, plan.word_errors))
+        engine.reset(seed=plan.seed)
+        engine.step({str(role): noop(role, engine.limits) for role in AGENT_ROLES})
     try:
-        policies = {role: player.make(role, env.limits) for role, player in cast.items()}
+        policies = {role: player.make(role, engine.limits) for role, player in cast.items()}
     except ValueError as error:
         fail(str(error))
     begun = time.perf_counter()
     with ExitStack() as stack:
         watchers = _watchers(plan, stack, quiet=quiet)
 
-        def watch(env: DuoWizardEnv) -> None:
+        def watch(engine: SessionEngine) -> None:
             for watcher in watchers:
-                watcher(env)
+                watcher(engine)
 
         try:
-            ending = play_session(env, policies, seed=plan.seed, folder=plan.out, on_step=watch)
+            ending = play_session(engine, policies, seed=plan.seed, folder=plan.out, on_step=watch)
         except KeyboardInterrupt:
             stack.close()
-            _tell_interruption(env, plan)
+            _tell_interruption(engine, plan)
     wall = time.perf_counter() - begun
     if plan.picture is not None:
-        _draw(env, plan.picture)
-    return _facts(env, ending, wall, plan.out)
+        _draw(engine, plan.picture)
+    return _facts(engine, ending, wall, plan.out)
 
 
-def _watchers(plan: _Plan, stack: ExitStack, *, quiet: bool) -> list[Callable[[DuoWizardEnv], None]]:
+def _watchers(plan: _Plan, stack: ExitStack, *, quiet: bool) -> list[Callable[[SessionEngine], None]]:
     """Who looks on: the show on the terminal, and the camera."""
-    watchers: list[Callable[[DuoWizardEnv], None]] = []
+    watchers: list[Callable[[SessionEngine], None]] = []
     if plan.video is not None:
         from dorothie_gym.cli.film import Film
 
@@ -158,32 +159,32 @@ def _watchers(plan: _Plan, stack: ExitStack, *, quiet: bool) -> list[Callable[[D
     return watchers
 
 
-def _tell_interruption(env: DuoWizardEnv, plan: _Plan) -> None:
+def _tell_interruption(engine: SessionEngine, plan: _Plan) -> None:
     if plan.out is None:
         kept = "nothing was recorded (--out DIR records)"
     else:
         kept = f"what happened until then is kept in {plan.out}"
     stderr().print(
-        f"Interrupted after {env.stage.world.time:.1f} simulated seconds; {kept}.", markup=False, soft_wrap=True
+        f"Interrupted after {engine.session.world.time:.1f} simulated seconds; {kept}.", markup=False, soft_wrap=True
     )
     raise typer.Exit(INTERRUPTED)
 
 
-def _draw(env: DuoWizardEnv, path: Path) -> None:
+def _draw(engine: SessionEngine, path: Path) -> None:
     """The whole town at the end of the session, with the way that was driven and the talk."""
     from dorothie_gym.engine.session_scene import scene_of
     from dorothie_gym.rendering.frames import SceneRenderer
 
-    scenario = env.scenario
-    caption = f"{env.town.name} · {scenario.storyboard.name} · seed {scenario.seed}"
-    SceneRenderer().save(scene_of(env.stage, caption), path, follow=False)
+    scenario = engine.scenario
+    caption = f"{engine.town.name} · {scenario.storyboard.name} · seed {scenario.seed}"
+    SceneRenderer().save(scene_of(engine.session, caption), path, follow=False)
 
 
-def _facts(env: DuoWizardEnv, ending: dict[str, Any], wall: float, out: Path | None) -> dict[str, Any]:
+def _facts(engine: SessionEngine, ending: SessionSummary, wall: float, out: Path | None) -> dict[str, Any]:
     return {
-        "town": env.town.name,
-        "storyboard": env.scenario.storyboard.name,
-        "seed": env.scenario.seed,
+        "town": engine.town.name,
+        "storyboard": engine.scenario.storyboard.name,
+        "seed": engine.scenario.seed,
         **{key: ending[key] for key in ("success", "subgoals", "arrived", "collisions", "seconds")},
         "wall_seconds": round(wall, 3),
         **{key: ending[key] for key in ("utterances", "acts", "physical_actions", "exceptions")},

@@ -1,4 +1,4 @@
-"""What the Co-Wizard said it believes: its goals, and guesses of where hidden landmarks are."""
+"""Belief tracker: goals of the Co-Wizard, and estimates of the places of hidden landmarks."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ GATE = 13.82
 
 @dataclass(frozen=True)
 class PlaceEstimate:
-    """A normal distribution over places.
+    """Normal distribution over places.
 
     Attributes:
         mean: (x, y) [m].
@@ -33,32 +33,32 @@ class PlaceEstimate:
 
     @classmethod
     def of(cls, mean: Array, covariance: Array) -> PlaceEstimate:
-        """From arrays (2,) and (2, 2)."""
+        """Returns an estimate from arrays (2,) and (2, 2); the covariance is made symmetric."""
         (xx, xy), (yx, yy) = covariance.tolist()
         return cls((float(mean[0]), float(mean[1])), ((xx, (xy + yx) / 2), ((xy + yx) / 2, yy)))
 
     def distance(self, x: float, y: float) -> float:
-        """Squared Mahalanobis distance of a place [m] from the mean."""
+        """Returns the squared Mahalanobis distance of a place [m] from the mean."""
         offset = np.array([x, y]) - self.mean
         return float(offset @ np.linalg.solve(np.array(self.covariance), offset))
 
 
 def near(x: float, y: float, sigma: float) -> PlaceEstimate:
-    """Somewhere about a place [m], `sigma` off along each axis [m]."""
+    """Returns an estimate around a place [m] with the standard deviation `sigma` along each axis [m]."""
     return PlaceEstimate((x, y), ((sigma**2, 0.0), (0.0, sigma**2)))
 
 
 def refined(before: PlaceEstimate | None, mark: PlaceEstimate, drift: float = 0.0) -> PlaceEstimate:
-    """The estimate after a mark on the map.
+    """Returns the estimate after a mark on the map (Kalman update).
 
     Args:
-        before: the estimate so far; None if nothing is known.
-        mark: place of the mark, and how exact it is.
-        drift: by how much the estimate may have been off besides, along each axis [m]: a mark is moved for a reason.
+        before: previous estimate; None if nothing is known.
+        mark: place of the mark and its covariance.
+        drift: process noise, as the standard deviation along each axis [m]: a mark that moves corrects an earlier one.
     """
     if before is None:
         return mark
-    # imported here: filterpy brings matplotlib along, which is slow to import
+    # Imported here: filterpy imports matplotlib, which is slow.
     from filterpy.kalman import KalmanFilter
 
     refine = KalmanFilter(dim_x=2, dim_z=2)
@@ -73,15 +73,15 @@ def refined(before: PlaceEstimate | None, mark: PlaceEstimate, drift: float = 0.
 
 
 def about(before: PlaceEstimate | None, points: Array, sigma: float) -> PlaceEstimate:
-    """The estimate after a statement that the place is about one of some points.
+    """Returns the estimate after the statement that the place is near one of several points.
 
-    Each point makes another Gaussian of the estimate, as likely as the point is from it; together they are replaced by
-    one of the same mean and covariance.
+    Each point updates the estimate to a Gaussian, weighted by the likelihood of the point under the estimate. The
+    mixture is replaced by one Gaussian of the same mean and covariance (moment matching).
 
     Args:
-        before: the estimate so far; None if nothing is known.
-        points: any of them as likely as the others (n, 2) [m].
-        sigma: how far off it the place is, along each axis [m].
+        before: previous estimate; None if nothing is known.
+        points: equally likely points (n, 2) [m].
+        sigma: standard deviation of the place around its point, along each axis [m].
 
     Raises:
         ValueError: there are no points.
@@ -108,17 +108,17 @@ def about(before: PlaceEstimate | None, points: Array, sigma: float) -> PlaceEst
     return PlaceEstimate.of(together, (centred * weights[:, None]).T @ centred + (np.eye(2) - gain) @ covariance)
 
 
-# --- Names on the map: points of a street, of a landmark that everybody knows, and of the corners of two  ------------
+# --- Names on the map -------------------------------------------------------------------------------------------------
 
 SPACING = 10.0
-"""Distance between the points of a street [m]."""
+"""Distance between the sampled points of a street [m]."""
 
 
-class Gazetteer:
-    """Places that names stand for, as far as the Co-Wizard's map has them.
+class MapNames:
+    """Positions of the named streets and landmarks on the Co-Wizard's map.
 
     Attributes:
-        landmarks: places of the landmarks that are not hidden, by name (n, 2) [m].
+        landmarks: positions of the landmarks that are not hidden, by name (n, 2) [m].
     """
 
     def __init__(self, town: Town, scenario: Scenario) -> None:
@@ -130,7 +130,7 @@ class Gazetteer:
         self.landmarks = {name: np.array(found) for name, found in places.items()}
 
     def street(self, name: StreetName) -> Array:
-        """Points of the streets of a name, every 10 m of each lane (n, 2) [m]; none if no street has it."""
+        """Returns points on the streets of a name, every 10 m of each lane (n, 2) [m]; (0, 2) for an unknown name."""
         points = [
             lane.position(float(station))
             for lane in self._town.lanes
@@ -140,7 +140,7 @@ class Gazetteer:
         return np.array(points).reshape(-1, 2)
 
     def corners(self, names: Sequence[StreetName]) -> Array:
-        """Middles of the junctions where streets of all these names meet (n, 2) [m]."""
+        """Returns the centres of the junctions where streets of all these names meet (n, 2) [m]."""
         wanted = [self._streets(name) for name in names]
         middles = [
             junction.position
@@ -156,7 +156,7 @@ class Gazetteer:
 
     @functools.cached_property
     def _meeting(self) -> tuple[frozenset[int], ...]:
-        """Streets that lead to or from each junction, in their order."""
+        """Streets that lead to or from each junction, in the order of the junctions."""
         town = self._town
         return tuple(
             frozenset(
@@ -168,70 +168,82 @@ class Gazetteer:
         )
 
 
-# --- What the Co-Wizard said it believes: its goals, and guesses of where hidden landmarks are -----------------------
+# --- Belief tracker ---------------------------------------------------------------------------------------------------
 
 MARK = 20.0
-"""How far off a mark is that is made from afar, along each axis [m]: a house or two."""
+"""Standard deviation of a mark beyond the range of sight, along each axis [m]: the width of one or two houses."""
 
 SIGHTING = 5.0
-"""The same of a place that is in sight [m]: half a house; what camera and pose are off comes on top."""
+"""Standard deviation of a mark in sight [m]: half a house; errors of camera and pose are added."""
 
 STREET_OFFSET = 15.0
-"""How far off a street's line a place on it stands [m]: a building behind the pavement."""
+"""Standard deviation of a place from the centre line of its street [m]: a building behind the pavement."""
 
 BESIDE = 30.0
-"""How far from a landmark a place beside it stands, along each axis [m]: a house or two."""
+"""Standard deviation of a place beside a landmark, along each axis [m]: the width of one or two houses."""
 
 AT_CORNER = 20.0
-"""How far from a junction's middle a place at its corner stands, along each axis [m]."""
+"""Standard deviation of a place at a corner from the centre of the junction, along each axis [m]."""
 
 STATEMENTS = frozenset(
     {DialogueMove.EXPLAIN, DialogueMove.CLARIFY, DialogueMove.REPLY_W, DialogueMove.INSTRUCT, DialogueMove.CONFIRM}
 )
-"""Moves that say how things are, or where to go."""
+"""Moves that make a statement or give an instruction."""
 
-_NOBODY = frozenset({LandmarkName.UNKNOWN, LandmarkName.QUERIED})
+_NO_LANDMARK = frozenset({LandmarkName.UNKNOWN, LandmarkName.QUERIED})
 
 
 @dataclass(frozen=True)
-class Guess:
-    """A place on a lane [m] that the Co-Wizard marked as that of a hidden landmark."""
+class LandmarkGuess:
+    """Place on a lane that the Co-Wizard marked as the place of a hidden landmark.
+
+    Attributes:
+        lane: id of the lane.
+        station: distance along the lane [m].
+    """
 
     lane: int
     station: float
 
 
-class Beliefs:
-    """Goals and guesses of the Co-Wizard in a session.
+class BeliefTracker:
+    """Tracks the goals of the Co-Wizard and the places of hidden landmarks.
+
+    Marks (mental actions of the Co-Wizard) and statements of the participant update one estimate for each landmark.
 
     Attributes:
-        goals: landmarks that the Co-Wizard is heading for.
-        guesses: places it marked last, by the landmark's name.
-        places: where hidden landmarks are by all that was marked and said, by name.
-        version: counts the changes of `places`.
+        goals: landmarks that the Co-Wizard drives to.
+        guesses: last marked places, by name of the landmark.
+        places: estimated places of hidden landmarks after all marks and statements, by name.
+        version: number of changes of `places`.
     """
 
     def __init__(self, town: Town, scenario: Scenario) -> None:
-        self._town, self._names = town, Gazetteer(town, scenario)
+        self._town, self._names = town, MapNames(town, scenario)
         self.goals: tuple[LandmarkName, ...] = ()
-        self.guesses: dict[LandmarkName, Guess] = {}
+        self.guesses: dict[LandmarkName, LandmarkGuess] = {}
         self.places: dict[LandmarkName, PlaceEstimate] = {}
         self.version = 0
-        self._topic: LandmarkName | None = None  # the hidden landmark that was last spoken of
+        self._topic: LandmarkName | None = None  # the hidden landmark mentioned last
         self._said: dict[LandmarkName, set[frozenset[LandmarkName | StreetName]]] = {}
+        self._map_places: dict[LandmarkName, list[GoalAhead]] = {}
+        for landmark in scenario.storyboard.landmarks:
+            if not landmark.hidden:
+                place = GoalAhead(lane=landmark.lane, station=landmark.station)
+                self._map_places.setdefault(landmark.name, []).append(place)
 
     def guess(
         self, name: LandmarkName, lane: int, station: float, *, pose: Array, covariance: Array, sight: float
     ) -> None:  # fmt: skip
-        """Takes in a mark on the map.
+        """Updates the estimate of a landmark with a mark on the map.
 
         Args:
-            name: whose place it is.
-            lane: where it is: the lane,
-            station: and the distance along it [m].
-            pose: where the car believes itself to be (x, y, heading) [m, m, rad].
-            covariance: how surely (3, 3).
-            sight: how far it sees [m]; a mark within it is of what is seen, and as exact as that.
+            name: the landmark.
+            lane: lane of the mark.
+            station: distance of the mark along the lane [m].
+            pose: estimated pose of the ego (x, y, heading) [m, m, rad].
+            covariance: covariance of the pose (3, 3).
+            sight: range of sight [m]; a mark within it is as exact as the perception.
         """
         place = self._town.lanes[lane].position(station)
         distance = float(np.hypot(*(place - pose[:2])))
@@ -239,26 +251,26 @@ class Beliefs:
         if distance > sight:
             error = MARK**2 * np.eye(2)
         last = self.guesses.get(name)
-        self.guesses[name] = Guess(lane, station)
-        if last != self.guesses[name]:  # the same mark again says nothing new
+        self.guesses[name] = LandmarkGuess(lane, station)
+        if last != self.guesses[name]:  # a repeated mark adds no information
             self.places[name] = refined(self.places.get(name), PlaceEstimate.of(place, error), drift=MARK)
             self.version += 1
 
     def hear(self, speaker: Role, acts: Sequence[DialogueAct]) -> None:
-        """Takes in what was said of places of hidden landmarks."""
+        """Updates the estimates with the acts of an utterance about places of hidden landmarks."""
         for act in acts:
-            named = [name for name in act.ordered if isinstance(name, LandmarkName) and name not in _NOBODY]
+            named = [name for name in act.ordered if isinstance(name, LandmarkName) and name not in _NO_LANDMARK]
             known = [name for name in named if name in self._names.landmarks]
             hidden = [name for name in named if name not in self._names.landmarks]
             if len(hidden) == 1:
                 self._topic = hidden[0]
             elif known and act.move is DialogueMove.INSTRUCT:
-                self._topic = None  # a task with a place that is on the map
+                self._topic = None  # an instruction about a place on the map
             if speaker is Role.PARTICIPANT and act.move in STATEMENTS and not act.values(Slot.ACTION):
                 self._locate(act, known)
 
     def _locate(self, act: DialogueAct, known: Sequence[LandmarkName]) -> None:
-        """Takes in where the landmark in question is said to be; the same said again is nothing new."""
+        """Updates the place of the current topic with a statement; a repeated statement adds no information."""
         streets = [value for value in act.ordered if isinstance(value, StreetName)]
         what: frozenset[LandmarkName | StreetName] = frozenset((*known, *streets))
         if self._topic is None or not what or what in self._said.setdefault(self._topic, set()):
@@ -277,16 +289,12 @@ class Beliefs:
             self.places[self._topic] = estimate
             self.version += 1
 
-    def goal_places(self, known: dict[LandmarkName, list[GoalAhead]]) -> list[GoalAhead]:
-        """Places where the car is expected to stop.
-
-        Args:
-            known: places of the landmarks that the Co-Wizard knows, by name.
-        """
+    def goal_places(self) -> list[GoalAhead]:
+        """Returns the places where the ego is expected to stop: of the goals on the map, and of marked ones."""
         places: list[GoalAhead] = []
         for name in self.goals:
             guess = self.guesses.get(name)
-            places.extend(known.get(name, []))
+            places.extend(self._map_places.get(name, []))
             if guess is not None:
                 places.append(GoalAhead(lane=guess.lane, station=guess.station))
         return places

@@ -26,7 +26,7 @@ from dorothie_gym.spaces.limits import UTTERANCE_LENGTH
 
 
 @dataclass(frozen=True, kw_only=True)
-class Heard:
+class HeardUtterance:
     """An utterance whose words are over.
 
     Attributes:
@@ -42,7 +42,7 @@ class Heard:
     records: tuple[dict[str, Any], ...]
 
 
-class Talk:
+class DialogueChannel:
     """The talk of a session.
 
     Attributes:
@@ -97,7 +97,7 @@ class Talk:
         """Takes note of what became of a place, which ends transactions."""
         self._annotator.note(landmark, status)
 
-    def deliver(self, now: float) -> list[Heard]:
+    def deliver(self, now: float) -> list[HeardUtterance]:
         """Hands out the utterances whose words are over at a time [s], in the order in which they began."""
         heard = [self._hear(utterance) for utterance in self._conversation.deliver(now)]
         self._annotator.tick(now)
@@ -111,13 +111,13 @@ class Talk:
         """Words for an act that came without, in the speaker's style."""
         return plain_text(word_act(act, role, self._words, style=self._styles[role]), UTTERANCE_LENGTH)
 
-    def _hear(self, utterance: Utterance) -> Heard:
+    def _hear(self, utterance: Utterance) -> HeardUtterance:
         heard = self._recogniser.hear(utterance)
         # The Co-Wizard's beliefs are of what it takes itself, and the human, to have said.
         understood = self._understood(utterance if utterance.speaker is Role.CO_WIZARD else heard)
         records = self._records(utterance, heard)
         self.said.append(utterance)
-        return Heard(said=utterance, heard=heard, understood=understood, records=records)
+        return HeardUtterance(said=utterance, heard=heard, understood=understood, records=records)
 
     def _understood(self, utterance: Utterance) -> tuple[DialogueAct, ...]:
         """What the Co-Wizard may take from an utterance: its acts, or where they do not show, what words sound like."""

@@ -50,7 +50,7 @@ Outcome: TypeAlias = str | dict[str, Any]
 """A reason for a refusal, or what was done, for the log."""
 
 
-class Adversary:
+class ExceptionExecutor:
     """The Ad-Wizard's hands in the world and the task."""
 
     def __init__(self, world: World, task: TaskState, max_props: int) -> None:
@@ -69,7 +69,7 @@ class Adversary:
             ExceptionKind.MESSAGE: self._message,
         }
 
-    def carry_out(self, action: AdWizardAction) -> Outcome:
+    def execute(self, action: AdWizardAction) -> Outcome:
         """Carries out an exception other than NONE."""
         return self._handlers[action.exception](action)
 

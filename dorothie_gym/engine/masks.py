@@ -8,8 +8,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from dorothie_gym.engine.observation_buffers import Shape, Sheet
-from dorothie_gym.engine.upcoming_junction import Prospect
+from dorothie_gym.engine.observation_buffers import ObservationBuffer, Shape
+from dorothie_gym.engine.upcoming_junction import UpcomingJunction
 from dorothie_gym.maps import LinkType
 from dorothie_gym.ontology import SPEED_STEP, ExceptionKind, PhysicalAction, Role
 from dorothie_gym.sim.ego.ego_controller import MAX_CRUISE, MIN_CRUISE
@@ -31,34 +31,34 @@ EVERY_TIME = (
 """Exceptions that are always worth trying."""
 
 
-class Masks:
+class ActionMasks:
     """Masks of the three roles: what depends on the town once, what depends on the moment each time.
 
     Fields are masked one by one, so an action that passes may still be refused for the way its fields combine. Boxes,
     texts and multi-binary fields take no mask (None).
     """
 
-    def __init__(self, world: World, task: TaskState, limits: SpaceLimits, prospect: Prospect | None = None) -> None:
+    def __init__(self, world: World, task: TaskState, limits: SpaceLimits, junction: UpcomingJunction) -> None:
         self._world, self._task, self._limits = world, task, limits
-        self._prospect = prospect or Prospect(world)
+        self._junction = junction
         self._unmasked: dict[Role, dict[str, None]] = {}
-        self._sheets: dict[Role, Sheet] = {}
+        self._buffers: dict[Role, ObservationBuffer] = {}
         town = world.town
         longest = max(lane.length for lane in town.lanes)
         for role in (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD):
             fields = {name: _shape(space) for name, space in action_space(role, limits).spaces.items()}
             self._unmasked[role] = {name: None for name, shape in fields.items() if shape is None}
-            sheet = Sheet({name: (np.int8, shape) for name, shape in fields.items() if shape is not None})
-            for array in sheet.form.values():
+            buffer = ObservationBuffer({name: (np.int8, shape) for name, shape in fields.items() if shape is not None})
+            for array in buffer.template.values():
                 array[...] = 1
-            if "lane" in sheet.form:
-                sheet.form["lane"][len(town.lanes) :] = 0
-                sheet.form["metres"][int(longest) + 1 :] = 0
-            if "plan" in sheet.form:
-                sheet.form["plan"][:, len(town.junctions) + 1 :] = 0
-            self._sheets[role] = sheet
-        self._sheets[Role.AD_WIZARD].form["exception"][:] = 0
-        self._sheets[Role.AD_WIZARD].form["exception"][[int(kind) for kind in EVERY_TIME]] = 1
+            if "lane" in buffer.template:
+                buffer.template["lane"][len(town.lanes) :] = 0
+                buffer.template["metres"][int(longest) + 1 :] = 0
+            if "plan" in buffer.template:
+                buffer.template["plan"][:, len(town.junctions) + 1 :] = 0
+            self._buffers[role] = buffer
+        self._buffers[Role.AD_WIZARD].template["exception"][:] = 0
+        self._buffers[Role.AD_WIZARD].template["exception"][[int(kind) for kind in EVERY_TIME]] = 1
         self._state: tuple[Any, ...] = ()  # of the car, and what there is in the town, that the forms are of
         self._there = (-1, -1)
         self._beside: dict[int, tuple[bool, ...]] = {}  # whether a lane has one to its left, and to its right
@@ -69,7 +69,7 @@ class Masks:
             self._note_car()
         elif role is Role.AD_WIZARD:
             self._note_town()
-        fields = self._sheets[role].copy()
+        fields = self._buffers[role].copy()
         fields.update(self._unmasked[role])
         if role is Role.CO_WIZARD:
             fields["plan"] = tuple(fields["plan"])
@@ -84,7 +84,7 @@ class Masks:
         if state == self._state:
             return
         self._state = state
-        form = self._sheets[Role.CO_WIZARD].form
+        form = self._buffers[Role.CO_WIZARD].template
         physical, angle = form["physical"], form["angle"]
         lane = planner.lane
         busy = planner.in_manoeuvre or self._world.town.lanes[lane].in_junction
@@ -92,7 +92,7 @@ class Masks:
         left = not busy and beside_left and planner.may_switch(LinkType.LANE_CHANGE_LEFT, speed)
         right = not busy and beside_right and planner.may_switch(LinkType.LANE_CHANGE_RIGHT, speed)
         committed = planner.is_committed(speed)
-        exits = () if committed else self._prospect.options().exits
+        exits = () if committed else self._junction.options().exits
         leaves = not busy and not committed and (planner.held or planner.manoeuvre[0] is not None)
         physical[PhysicalAction.LANE_FOLLOW] = leaves
         physical[PhysicalAction.LANE_SWITCH] = left or right
@@ -123,7 +123,7 @@ class Masks:
         if (task.version, props) == self._there:
             return
         self._there = task.version, props
-        form = self._sheets[Role.AD_WIZARD].form["exception"]
+        form = self._buffers[Role.AD_WIZARD].template["exception"]
         form[ExceptionKind.PLACE_PROP] = props < self._limits.props
         form[ExceptionKind.MOVE_PROP] = form[ExceptionKind.DELETE_PROP] = props > 0
         form[ExceptionKind.TASK_TRIGGER] = bool(task.possible_triggers())

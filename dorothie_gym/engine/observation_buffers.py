@@ -1,4 +1,4 @@
-"""Sets of arrays that are handed out anew in every decision, most of them with what they held in the last one."""
+"""Buffers of arrays that are handed out as a fresh copy at every decision."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 Shape: TypeAlias = tuple[int, ...]
 
 
-class Sheet:
+class ObservationBuffer:
     """Arrays of fixed types and shapes in one block of memory.
 
-    What is written into `form` is on every copy that is handed out from then on. A copy of the block costs what a copy
-    of one array costs, and is its taker's own: nothing on it changes later.
+    A copy of the block costs as much as the copy of one array. The caller owns the copy; later changes of the template
+    do not reach it.
 
     Attributes:
-        form: the arrays that copies are made of, by name.
+        template: arrays that the next copies are made of, by name.
     """
 
     def __init__(self, fields: Mapping[str, tuple[Any, Shape]]) -> None:
-        """Lays out arrays of zeros.
+        """Allocates arrays of zeros.
 
         Args:
             fields: type and shape of each array, by name.
@@ -31,16 +31,16 @@ class Sheet:
         self._layout = np.dtype([(name, kind, shape) for name, (kind, shape) in fields.items()], align=True)
         self._block: NDArray[np.uint8] = np.zeros(self._layout.itemsize, dtype=np.uint8)
         self._names = tuple(fields)
-        self.form: dict[str, NDArray[Any]] = self._arrays(self._block)
+        self.template: dict[str, NDArray[Any]] = self._arrays(self._block)
 
     @classmethod
     def of_space(cls, space: spaces.Dict) -> Self:
-        """One for all fields of a space that are arrays."""
+        """Returns a buffer for all fields of a space that are arrays."""
         arrays = spaces.Box | spaces.MultiDiscrete | spaces.MultiBinary
         return cls({name: (f.dtype, f.shape) for name, f in space.spaces.items() if isinstance(f, arrays)})
 
     def copy(self) -> dict[str, Any]:
-        """The arrays, by name: new ones that hold what the form holds."""
+        """Returns a copy of the template: arrays by name."""
         return self._arrays(self._block.copy())
 
     def _arrays(self, block: NDArray[np.uint8]) -> dict[str, NDArray[Any]]:

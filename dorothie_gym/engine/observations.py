@@ -1,4 +1,4 @@
-"""Builds what each role observes. What a role must not know does not enter its view."""
+"""Observations of the roles. A value that a role must not know is never written into its observation."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.dialogue import Utterance
-from dorothie_gym.engine.beliefs import Beliefs
-from dorothie_gym.engine.observation_buffers import Sheet
-from dorothie_gym.engine.path_measurements import Bearings
+from dorothie_gym.engine.beliefs import BeliefTracker
+from dorothie_gym.engine.observation_buffers import ObservationBuffer
+from dorothie_gym.engine.path_measurements import EgoMeasurements
 from dorothie_gym.engine.scenario import Scenario
-from dorothie_gym.engine.upcoming_junction import Prospect
-from dorothie_gym.ontology import LABELS, GoalStatus, PropKind, Role, Sensor, encode_slots
+from dorothie_gym.engine.upcoming_junction import UpcomingJunction
+from dorothie_gym.ontology import AGENT_ROLES, LABELS, GoalStatus, PropKind, Role, Sensor, encode_slots
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import (
     ExitColumn,
@@ -34,21 +34,21 @@ from dorothie_gym.tasks import Landmark, TaskState
 Table = NDArray[np.float64]
 
 WAYPOINT_SPACING = 5.0
-"""Distance between the planned waypoints shown [m]."""
+"""Distance between the observed waypoints of the planned path [m]."""
 
 _SENSORS = tuple(Sensor)
 _PROP_NUMBERS = {kind: 1.0 + k for k, kind in enumerate(PropKind)}
 
 
 @dataclass(kw_only=True)
-class Moment:
-    """What changed in the decision that a view is of.
+class DeliveredMessages:
+    """Speech and messages that reach the roles at a decision.
 
     Attributes:
-        said: utterances that ended, by speaker.
-        heard: the same, as the one who is spoken to hears them.
-        message: of the Ad-Wizard to the participant.
-        speaking: seconds that each role has still to speak.
+        said: utterances that ended since the last decision, by speaker.
+        heard: the same utterances as the listener recognises them.
+        message: message of the Ad-Wizard to the participant.
+        speaking: remaining speaking time of each role [s].
     """
 
     said: Mapping[Role, Utterance]
@@ -57,11 +57,11 @@ class Moment:
     speaking: Mapping[Role, float]
 
 
-class Views:
-    """Observations of a session.
+class ObservationBuilder:
+    """Builds the observations of a session, for the roles that are asked for.
 
-    Each role has a sheet whose form holds what is the same in most decisions: what never changes is written once, what
-    changes now and then when it does. Copies of it are filled in with the rest and handed out.
+    Each role has a buffer. Its template holds the values that are the same in most decisions: constant values are
+    written once, rarely changing ones when they change. A copy of the template is completed and handed out.
     """
 
     def __init__(
@@ -69,63 +69,84 @@ class Views:
         world: World,
         scenario: Scenario,
         task: TaskState,
-        beliefs: Beliefs,
+        beliefs: BeliefTracker,
         limits: SpaceLimits,
         observe_acts: bool,
-        prospect: Prospect | None = None,
+        junction: UpcomingJunction,
     ) -> None:
         self._world, self._task, self._beliefs = world, task, beliefs
         self._limits, self._observe_acts = limits, observe_acts
-        self._prospect = prospect or Prospect(world)
-        self._sheets = {
-            role: Sheet.of_space(observation_space(role, limits, observe_acts))
-            for role in (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD)
+        self._junction = junction
+        self._buffers = {
+            role: ObservationBuffer.of_space(observation_space(role, limits, observe_acts)) for role in AGENT_ROLES
         }
-        self._agents = [str(role) for role in self._sheets]
-        self._participant = self._sheets[Role.PARTICIPANT]
-        self._co_wizard = self._sheets[Role.CO_WIZARD]
-        self._ad_wizard = self._sheets[Role.AD_WIZARD]
-        self._numbers = [np.int64(number) for number in range(max(limits.lanes, len(LABELS)))]  # made once
+        # Taken for the tables of a role that is not asked for.
+        self._unread = {role: buffer.copy() for role, buffer in self._buffers.items()}
+        self._numbers = [np.int64(number) for number in range(max(limits.lanes, len(LABELS)))]  # created once
         self._story = plain_text(scenario.storyboard.story, STORY_LENGTH)
         self._tasks = ""
         self._weather: tuple[float, ...] = ()
         self._faults: tuple[Sensor, ...] = ()
         self._versions = (-1, -1)
-        self._write_what_stays(scenario)
+        self._write_constants(scenario)
 
-    def observe(self, moment: Moment) -> dict[str, Observation]:
-        """The observations of the three roles, each in its observation space."""
-        self._note_changes()
-        participant, co_wizard, ad_wizard = views = [sheet.copy() for sheet in self._sheets.values()]
+    def build(self, delivered: DeliveredMessages, roles: Sequence[Role]) -> dict[Role, Observation]:
+        """Builds the observations of some roles, each in its observation space.
+
+        Args:
+            delivered: speech and messages of the last decision.
+            roles: the roles that observe.
+        """
+        self._update_templates()
         time, speed = self._world.time, self._world.car.speed
-        for view in views:
+        views: dict[Role, Observation] = {}
+        for role in roles:
+            view = views[role] = self._buffers[role].copy()
             view["time"][0], view["speed"][0] = time, speed
-        bearings = Bearings(self._world)
-        motion = self._numbers[self.motion()]
-        lights = self._numbers[self._world.ego.lights]
-        self._write_true_place(participant, ad_wizard)
-        self._write_believed_place(co_wizard, bearings.pose)
-        bearings.write_path(
-            WAYPOINT_SPACING, ad_wizard["waypoints"], ad_wizard["path_lanes"], co_wizard["waypoints"]
-        )  # fmt: skip
-        bearings.write_objects(participant["objects"], co_wizard["objects"])
-        self._write_exits(co_wizard["exits"], bearings)
-        participant["lights"] = co_wizard["lights"] = lights
-        co_wizard["motion"] = ad_wizard["motion"] = motion
-        participant["story"] = ad_wizard["story"] = self._story
-        participant["tasks"] = self._tasks
-        participant["message"] = plain_text(moment.message, MESSAGE_LENGTH) if moment.message else ""
-        participant["speaking"][0] = moment.speaking[Role.PARTICIPANT]
-        co_wizard["speaking"][0] = moment.speaking[Role.CO_WIZARD]
-        self._write_driving(co_wizard)
-        self._write_props(ad_wizard["props"])
-        for speaker, listener in ((Role.CO_WIZARD, participant), (Role.PARTICIPANT, co_wizard)):
-            self._write_heard(speaker, moment.heard.get(speaker), listener)
-            self._write_heard(speaker, moment.said.get(speaker), ad_wizard)
-        return dict(zip(self._agents, views, strict=True))
+        ego = EgoMeasurements(self._world)
+        participant, co_wizard = views.get(Role.PARTICIPANT), views.get(Role.CO_WIZARD)
+        ad_wizard = views.get(Role.AD_WIZARD)
+        if co_wizard is not None or ad_wizard is not None:
+            true, believed = ad_wizard or self._unread[Role.AD_WIZARD], co_wizard or self._unread[Role.CO_WIZARD]
+            ego.write_path(WAYPOINT_SPACING, true["waypoints"], true["path_lanes"], believed["waypoints"])
+        if participant is not None or co_wizard is not None:
+            true, believed = participant or self._unread[Role.PARTICIPANT], co_wizard or self._unread[Role.CO_WIZARD]
+            ego.write_objects(true["objects"], believed["objects"])
+        if participant is not None:
+            self._build_participant(participant, delivered)
+        if co_wizard is not None:
+            self._build_co_wizard(co_wizard, delivered, ego)
+        if ad_wizard is not None:
+            self._build_ad_wizard(ad_wizard, delivered)
+        return views
+
+    def _build_participant(self, view: Observation, delivered: DeliveredMessages) -> None:
+        self._write_true_place(view)
+        view["lights"] = self._numbers[self._world.ego.lights]
+        view["story"], view["tasks"] = self._story, self._tasks
+        view["message"] = plain_text(delivered.message, MESSAGE_LENGTH) if delivered.message else ""
+        view["speaking"][0] = delivered.speaking[Role.PARTICIPANT]
+        self._write_utterance(Role.CO_WIZARD, delivered.heard.get(Role.CO_WIZARD), view)
+
+    def _build_co_wizard(self, view: Observation, delivered: DeliveredMessages, ego: EgoMeasurements) -> None:
+        self._write_believed_place(view, ego.pose)
+        self._write_exits(view["exits"], ego)
+        view["lights"] = self._numbers[self._world.ego.lights]
+        view["motion"] = self._numbers[self.motion()]
+        view["speaking"][0] = delivered.speaking[Role.CO_WIZARD]
+        self._write_driving(view)
+        self._write_utterance(Role.PARTICIPANT, delivered.heard.get(Role.PARTICIPANT), view)
+
+    def _build_ad_wizard(self, view: Observation, delivered: DeliveredMessages) -> None:
+        self._write_true_place(view)
+        view["motion"] = self._numbers[self.motion()]
+        view["story"] = self._story
+        self._write_props(view["props"])
+        for speaker in (Role.PARTICIPANT, Role.CO_WIZARD):
+            self._write_utterance(speaker, delivered.said.get(speaker), view)
 
     def motion(self) -> Motion:
-        """What the car is about."""
+        """Returns the state of motion of the ego."""
         world = self._world
         if world.planner.held:
             return Motion.STOPPED
@@ -135,42 +156,44 @@ class Views:
             return Motion.WAITING
         return Motion.DRIVING
 
-    # --- what seldom changes ----------------------------------------------------------------------------------------
+    # --- templates --------------------------------------------------------------------------------------------------
 
-    def _write_what_stays(self, scenario: Scenario) -> None:
+    def _write_constants(self, scenario: Scenario) -> None:
         landmarks = scenario.storyboard.landmarks[: self._limits.landmarks]
         known = [landmark for landmark in landmarks if not landmark.hidden]
-        write_landmarks(self._participant.form["landmarks"], landmarks)
-        write_landmarks(self._ad_wizard.form["landmarks"], landmarks)
-        write_landmarks(self._co_wizard.form["landmarks"], known)
-        self._ad_wizard.form["hidden"][: len(landmarks)] = [landmark.hidden for landmark in landmarks]
-        for sheet in self._sheets.values():
-            sheet.form["street_names"][: len(scenario.street_names)] = [name.value for name in scenario.street_names]
-            for name, array in sheet.form.items():
+        write_landmarks(self._buffers[Role.PARTICIPANT].template["landmarks"], landmarks)
+        write_landmarks(self._buffers[Role.AD_WIZARD].template["landmarks"], landmarks)
+        write_landmarks(self._buffers[Role.CO_WIZARD].template["landmarks"], known)
+        self._buffers[Role.AD_WIZARD].template["hidden"][: len(landmarks)] = [landmark.hidden for landmark in landmarks]
+        for buffer in self._buffers.values():
+            buffer.template["street_names"][: len(scenario.street_names)] = [
+                name.value for name in scenario.street_names
+            ]
+            for name, array in buffer.template.items():
                 if name.endswith("_moves"):
                     array[:] = NO_MOVE
 
-    def _note_changes(self) -> None:
-        """Brings the forms up to date."""
+    def _update_templates(self) -> None:
+        """Updates weather, sensor faults, tasks and guesses in the templates where they have changed."""
         weather = tuple(self._world.weather.values.values())
         if weather != self._weather:
             self._weather = weather
-            for sheet in self._sheets.values():
-                sheet.form["weather"][:] = weather
+            for buffer in self._buffers.values():
+                buffer.template["weather"][:] = weather
         faults = tuple(self._world.faults)
         if faults != self._faults:
             self._faults = faults
-            self._ad_wizard.form["sensors"][:] = [sensor in faults for sensor in _SENSORS]
+            self._buffers[Role.AD_WIZARD].template["sensors"][:] = [sensor in faults for sensor in _SENSORS]
         versions = self._task.version, self._beliefs.version
         if versions != self._versions:
             self._versions = versions
             self._write_tasks()
-            self._write_guesses(self._co_wizard.form["guesses"])
+            self._write_guesses(self._buffers[Role.CO_WIZARD].template["guesses"])
 
     def _write_tasks(self) -> None:
         self._tasks = plain_text("\n".join(self._task.description(i) for i in self._task.live), STORY_LENGTH)
-        for sheet, permissions in ((self._participant, False), (self._ad_wizard, True)):
-            write_subgoals(sheet.form["subgoals"], self._task, permissions=permissions)
+        for buffer, permissions in ((self._buffers[Role.PARTICIPANT], False), (self._buffers[Role.AD_WIZARD], True)):
+            write_subgoals(buffer.template["subgoals"], self._task, permissions=permissions)
 
     def _write_guesses(self, table: Table) -> None:
         table[:] = 0.0
@@ -178,18 +201,17 @@ class Views:
             (xx, xy), (_, yy) = guess.covariance
             table[name.value] = (1.0, *guess.mean, xx, yy, xy)
 
-    # --- what is new each time --------------------------------------------------------------------------------------
+    # --- values of the present decision -----------------------------------------------------------------------------
 
-    def _write_true_place(self, participant: Observation, ad_wizard: Observation) -> None:
-        """Where the car is; both know it."""
+    def _write_true_place(self, view: Observation) -> None:
+        """Writes the true pose and place of the ego."""
         car, planner = self._world.car, self._world.planner
-        participant["pose"][:2], participant["pose"][2] = car.position, car.heading
-        ad_wizard["pose"][:] = participant["pose"]
-        participant["lane"] = ad_wizard["lane"] = self._numbers[planner.lane]
-        participant["station"][0] = ad_wizard["station"][0] = planner.station
+        view["pose"][:2], view["pose"][2] = car.position, car.heading
+        view["lane"] = self._numbers[planner.lane]
+        view["station"][0] = planner.station
 
     def _write_believed_place(self, view: Observation, pose: Table) -> None:
-        """Where the Co-Wizard takes the car to be."""
+        """Writes the estimated pose of the ego and the place on the map that belongs to it."""
         world = self._world
         view["pose"][:] = pose
         view["pose_covariance"][:] = world.localizer.covariance
@@ -197,15 +219,15 @@ class Views:
         lane, view["station"][0] = world.network.closest_place(x, y, heading, world.car.height)
         view["lane"] = self._numbers[lane]
 
-    def _write_exits(self, table: Table, bearings: Bearings) -> None:
-        options = self._prospect.options()
+    def _write_exits(self, table: Table, ego: EgoMeasurements) -> None:
+        options = self._junction.options()
         rows = options.rows[: len(table)]
         if len(rows):
             table[: len(rows)] = rows
-            table[: len(rows), ExitColumn.DISTANCE] = bearings.way_left(options.distance)
+            table[: len(rows), ExitColumn.DISTANCE] = ego.distance_left(options.distance)
 
     def _write_driving(self, view: Observation) -> None:
-        """What the car is told to do, and does."""
+        """Writes cruise speed, manoeuvre and hazard stop."""
         world = self._world
         manoeuvre, angle = world.planner.manoeuvre
         hazard = world.hazard
@@ -220,7 +242,7 @@ class Views:
         for row, prop in zip(table, self._world.actors.props, strict=False):
             row[:] = _PROP_NUMBERS[prop.kind], prop.position[0], prop.position[1], prop.heading
 
-    def _write_heard(self, speaker: Role, utterance: Utterance | None, view: Observation) -> None:
+    def _write_utterance(self, speaker: Role, utterance: Utterance | None, view: Observation) -> None:
         if utterance is None:
             view[_TEXT[speaker]] = ""
             return
@@ -247,16 +269,16 @@ def write_subgoals(table: Table, task: TaskState, *, permissions: bool) -> None:
     """Writes the subgoals as rows of `SubgoalColumn`.
 
     Args:
-        table: all of its rows are written.
-        task: the task as it stands.
-        permissions: whether those that wait for their trigger show, and what may be done with each.
+        table: table of which all rows are written.
+        task: present state of the task.
+        permissions: whether untriggered subgoals and the permitted changes of each subgoal are written.
     """
     table[:] = 0.0
     triggers, deletions, changes = task.possible_triggers(), task.possible_deletions(), task.possible_changes()
     for i, (row, subgoal) in enumerate(zip(table, task.storyboard.subgoals, strict=False)):
         live = i in task.live
         if not (live or permissions or task.status(i) is GoalStatus.ABANDONED):
-            continue  # not yet triggered: the participant does not know of it
+            continue  # not yet triggered: unknown to the participant
         row[SubgoalColumn.LIVE] = live
         row[SubgoalColumn.LANDMARK] = task.landmark_of(i)
         row[SubgoalColumn.STATUS] = task.status(i).value

@@ -210,7 +210,7 @@ SEARCH = 6.0
 """Places on the path are looked for this far around where they should be [m], and twice the error of the estimate."""
 
 
-class Bearings:
+class EgoMeasurements:
     """Places told from the true and from the estimated pose.
 
     What the car sees is relative to the car, so on the map it is as far off as the car itself; what is on the map lies
@@ -261,6 +261,6 @@ class Bearings:
             self._x, self._y, math.cos(turn), math.sin(turn), objects, believed,
         )  # fmt: skip
 
-    def way_left(self, distance: float) -> float:
+    def distance_left(self, distance: float) -> float:
         """How far something on the path seems to be [m] that is `distance` ahead of where the car is."""
         return max(distance - (self.progress - self._near), 0.0)

@@ -6,12 +6,13 @@ import itertools
 import math
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import LightColour, LightProgramme, Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
@@ -20,9 +21,6 @@ from dorothie_gym.sim.bodies import Pedestrian
 from dorothie_gym.sim.state.records import Kind, Walk, plain
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import ActionDict, SpaceLimits, action_space, noop
-
-if TYPE_CHECKING:
-    from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 
 _ACTOR_KINDS = np.full(max(Kind) + 1, -1, dtype=np.int64)
 _ACTOR_KINDS[Kind.CAR], _ACTOR_KINDS[Kind.CYCLIST] = ActorKind.VEHICLE, ActorKind.CYCLIST
@@ -190,14 +188,14 @@ class SessionRecorder:
     """Records what the roles decide, what comes of it, and once a decision what is around the car.
 
     Args:
-        env: an environment that has just been reset; what happened in the reset is recorded at once.
-        writer: where it is written.
+        engine: an engine that has just been reset; the events of the reset are recorded at once.
+        writer: writer of the session's folder.
     """
 
-    def __init__(self, env: DuoWizardEnv, writer: SessionWriter) -> None:
-        self._env, self._writer = env, writer
-        self._lights = LightStates(env.town)
-        self._frame = env.stage.world.frame
+    def __init__(self, engine: SessionEngine, writer: SessionWriter) -> None:
+        self._engine, self._writer = engine, writer
+        self._lights = LightStates(engine.town)
+        self._frame = engine.session.world.frame
         self._append()
 
     def record(self, actions: Mapping[str, Mapping[str, Any]]) -> None:
@@ -210,12 +208,12 @@ class SessionRecorder:
             SessionError: something of it cannot be written.
             OSError: the folder cannot be written.
         """
-        self._writer.add_decision(self._frame, compact(actions, self._env.limits))
+        self._writer.add_decision(self._frame, compact(actions, self._engine.limits))
         self._append()
 
     def _append(self) -> None:
-        frames, world = self._env.last_frames, self._env.stage.world
-        self._writer.append(self._env.last_events, frames)
+        frames, world = self._engine.last_frames, self._engine.session.world
+        self._writer.append(self._engine.last_events, frames)
         self._frame = world.frame
         if len(frames) and frames[-1, 0] == world.frame:
             self._writer.add_actors(world.frame, actors_around(world))

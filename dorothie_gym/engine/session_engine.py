@@ -1,333 +1,233 @@
-"""The stage of a session: carries out what the roles decide, and keeps what they may know."""
+"""Engine that plays sessions in one town: draws the scenario, decodes actions, steps the session, ends it in time."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dorothie_gym.dialogue import Utterance
-from dorothie_gym.engine.beliefs import Beliefs
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.dialogue_channel import Talk
-from dorothie_gym.engine.exception_executor import Adversary
-from dorothie_gym.engine.masks import Masks
-from dorothie_gym.engine.observations import Moment, Views
-from dorothie_gym.engine.scenario import Scenario, header_of
-from dorothie_gym.engine.upcoming_junction import Prospect
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import (
-    AGENT_ROLES,
-    ARRIVAL_DISTANCE,
-    NAVIGATION_ACTIONS,
-    ExceptionKind,
-    LandmarkName,
-    MentalAction,
-    PhysicalAction,
-    Role,
-)
-from dorothie_gym.recording import Event, EventType, SessionHeader
-from dorothie_gym.sim.ego.ego_controller import GoalAhead
-from dorothie_gym.sim.infractions import INFRACTION_KINDS, WorldEventKind
+from dorothie_gym.engine.live_session import LiveSession, RewardTerms, SessionSummary
+from dorothie_gym.engine.masks import Mask
+from dorothie_gym.engine.scenario import Scenario, draw_scenario
+from dorothie_gym.maps import Town, load_town
+from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.recording import Event, SessionHeader
 from dorothie_gym.sim.network.network import TownNetwork
-from dorothie_gym.sim.world import World
-from dorothie_gym.spaces import (
-    AdWizardAction,
-    CoWizardAction,
-    Mental,
-    Observation,
-    ParticipantAction,
-    Physical,
-    RoleAction,
-    SpaceLimits,
-)
-from dorothie_gym.tasks import TaskState
+from dorothie_gym.spaces import ActionDecoder, Observation, SpaceLimits
+from dorothie_gym.tasks import StoryboardTemplate, load_template
 
-_SIGNS = ((Role.PARTICIPANT, 1.0), (Role.CO_WIZARD, 1.0), (Role.AD_WIZARD, -1.0))
-"""The Ad-Wizard gets the opposite of what the others share."""
-
-STANDING = 0.1
-"""Slower than this the car stands [m/s]."""
-
-_WORLD_EVENTS = {
-    WorldEventKind.HAZARD_STOP: EventType.HAZARD_STOP,
-    WorldEventKind.HAZARD_END: EventType.HAZARD_END,
-    WorldEventKind.COLLISION: EventType.COLLISION,
-    WorldEventKind.RED_LIGHT: EventType.RED_LIGHT,
-    WorldEventKind.STOP_SIGN: EventType.STOP_SIGN,
-    WorldEventKind.OFF_ROAD: EventType.OFF_ROAD,
-    WorldEventKind.WRONG_WAY: EventType.WRONG_WAY,
-}
-_INFRACTIONS = tuple((kind.value, kind) for kind in INFRACTION_KINDS)
+_AGENTS = {str(role): role for role in AGENT_ROLES}
 
 
-class Stage:
-    """A session in progress.
+class LazyObservations(Mapping[str, Observation]):
+    """Observations of the roles at one decision, each built when it is first read.
+
+    A mapping is valid until the session takes its next step: it raises `RuntimeError` when an observation that was not
+    read in time is asked for afterwards.
+    """
+
+    def __init__(self, session: LiveSession) -> None:
+        self._session, self._decision = session, session.decisions
+        self._built: dict[str, Observation] = {}
+
+    def __getitem__(self, agent: str) -> Observation:
+        return self.of((_AGENTS[agent],))[agent]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_AGENTS)
+
+    def __len__(self) -> int:
+        return len(_AGENTS)
+
+    def of(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
+        """Returns the observations of some roles by agent; those that are missing are built together."""
+        missing = [role for role in roles if role not in self._built]
+        if missing:
+            if self._session.decisions != self._decision:
+                raise RuntimeError(f"the session has taken a step since; the observation of {missing[0]} was not read")
+            self._built.update(self._session.observations(missing))
+        return {str(role): self._built[role] for role in roles}
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepOutcome:
+    """Outcome of one decision.
 
     Attributes:
-        scenario: what it began with.
-        world: where it happens.
-        task: how far the storyboard has been played.
-        beliefs: what the Co-Wizard said it believes.
-        masks: which actions would not be refused now.
-        events: what happened in the last decision.
-        refused: reasons for the refusals of the last decision, by role.
-        trail: places of the car, one a decision.
-        counts: what the summary counts.
+        reward_terms: terms of each role's reward, by name.
+        terminated: whether the destination was reached.
+        truncated: whether the time is up.
+    """
+
+    reward_terms: Mapping[Role, RewardTerms]
+    terminated: bool
+    truncated: bool
+
+
+class SessionEngine:
+    """Plays the sessions of one town, one after the other, for all three roles.
+
+    Environments are views of an engine; corpora, rollouts and replay checks step it without one.
+
+    Args:
+        town: name of a town, path of an `.xodr` or `.yaml` file, or a `Town`.
+        storyboard: name of a template, path of a `.json` file, or a `StoryboardTemplate`; None draws one in each reset.
+        config: settings of the sessions.
+        max_cycles: decisions until truncation, instead of `config.max_seconds`.
+
+    Attributes:
+        town: the map.
+        template: template of the storyboards, or None.
+        config: see above.
+        max_cycles: see above.
+        limits: sizes of the spaces that the town needs.
     """
 
     def __init__(
-        self, town: Town, network: TownNetwork, scenario: Scenario, config: EnvConfig, limits: SpaceLimits
+        self,
+        town: str | Path | Town,
+        storyboard: str | Path | StoryboardTemplate | None = None,
+        *,
+        config: EnvConfig | None = None,
+        max_cycles: int | None = None,
     ) -> None:
-        self.scenario, self.config, self.limits = scenario, config, limits
-        # One more subsystem is one more child: those before it keep theirs.
-        world_seed, word_seed, ear_seed, style_seed = np.random.SeedSequence([scenario.seed, 1]).spawn(4)
-        self.world = World(town, config.world, seed=world_seed, departure=scenario.departure, network=network)
-        self.task = TaskState(scenario.storyboard)
-        self.beliefs = Beliefs(town, scenario)
-        self._adversary = Adversary(self.world, self.task, limits.props)
-        self._talk = Talk(scenario, config, limits.spans, words=word_seed, ears=ear_seed, styles=style_seed)
-        prospect = Prospect(self.world)
-        self._views = Views(self.world, scenario, self.task, self.beliefs, limits, config.observe_acts, prospect)
-        self.masks = Masks(self.world, self.task, limits, prospect)
-        self._moment = self._new_moment("")
-        self._statuses = [self.task.status(i) for i in range(len(scenario.storyboard.subgoals))]
-        self.events: list[Event] = []
-        self.refused: dict[Role, list[str]] = {role: [] for role in AGENT_ROLES}
-        self.messages: list[tuple[float, str]] = []
-        self.trail: list[tuple[float, float]] = [self._car_place()]
-        self.counts = {"utterances": 0, "acts": 0, "physical_actions": 0, "exceptions": 0, "refusals": 0}
-        self._waypoints = [(*landmark.waypoint, landmark.index) for landmark in scenario.storyboard.landmarks]
-        self._time_reward = config.rewards.time / config.decision_frequency
-        self._known_reached = (-1, 0)  # version of the task, and how many of its live subgoals are reached
-        self._outcome: dict[str, Any] | None = None
-
-    # --- a decision -------------------------------------------------------------------------------------------------
-
-    def play(self, actions: Mapping[Role, RoleAction]) -> dict[Role, dict[str, float]]:
-        """Carries out a decision of all roles and runs the physics until the next; returns each role's reward terms."""
-        self.events = []
-        self.refused = {role: [] for role in AGENT_ROLES}
-        collisions, reached = self.world.collisions, self._reached()
-        message = self._play_ad_wizard(actions[Role.AD_WIZARD])
-        spoken = {role: self._speak(role, actions[role]) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
-        self._play_co_wizard(actions[Role.CO_WIZARD])
-        for event in self.world.step(self.config.frames):
-            self._log(_WORLD_EVENTS[event.kind], Role.AGENT, event.data, frame=event.frame)
-        self._note_arrivals()
-        self._moment = self._new_moment(message)
-        self.trail.append(self._car_place())
-        return self._rewards(self._reached() - reached, self.world.collisions - collisions, spoken)
-
-    def observations(self) -> dict[str, Observation]:
-        """What the roles observe now."""
-        return self._views.observe(self._moment)
-
-    def observe(self, role: Role) -> Observation:
-        """What a role observes now."""
-        return self.observations()[str(role)]
-
-    def end(self, reason: str) -> None:
-        """Closes the session."""
-        self._log(EventType.END, Role.AGENT, {"success": self.success, "reason": reason})
-        self._outcome = {"reason": reason}
+        if max_cycles is not None and max_cycles < 1:
+            raise ValueError(f"max_cycles is {max_cycles}; it must be at least 1")
+        self.town = town if isinstance(town, Town) else load_town(town)
+        self.template = load_template(storyboard) if isinstance(storyboard, str | Path) else storyboard
+        self.config = config or EnvConfig()
+        self.max_cycles = max_cycles
+        self.limits = SpaceLimits.for_town(self.town)
+        self._network = TownNetwork(self.town)
+        self._decoders = {role: ActionDecoder(role, self.limits) for role in AGENT_ROLES}
+        self._seeds = np.random.default_rng()
+        self._session: LiveSession | None = None
+        self._observations: LazyObservations | None = None
 
     @property
-    def success(self) -> bool:
-        """Whether every live subgoal was reached, the destination last, without a collision of the car's own making."""
-        return self.world.collisions == 0 and self.task.done and self.task.success
+    def engine(self) -> SessionEngine:
+        """This engine: an engine is played like an environment that has one."""
+        return self
+
+    def reset(self, seed: int | None = None, *, scenario: Scenario | None = None) -> LazyObservations:
+        """Begins a session.
+
+        Args:
+            seed: seed of the scenario; None takes the next number of the series that the last given seed began.
+            scenario: played in place of a drawn one; its seed is then the session's.
+
+        Raises:
+            ValueError: `scenario` is no `Scenario`.
+            StoryboardError: the template does not fit the town.
+        """
+        if scenario is None:
+            if seed is not None:
+                self._seeds = np.random.default_rng(seed)
+            session_seed = seed if seed is not None else int(self._seeds.integers(2**31))
+            scenario = draw_scenario(self.town, self.template, session_seed)
+        elif not isinstance(scenario, Scenario):
+            raise ValueError(f"option 'scenario' is a {type(scenario).__name__}; it must be a Scenario")
+        self._session = LiveSession(self.town, self._network, scenario, self.config, self.limits)
+        self._observations = None
+        return self.observations
+
+    def step(self, actions: Mapping[str, Mapping[str, Any]]) -> StepOutcome:
+        """Plays one decision: the actions of all roles, then the physics until the next decision.
+
+        Args:
+            actions: an action for each agent, see `dorothie_gym.spaces.action_space`.
+
+        Raises:
+            ValueError: an action is missing or malformed; the message names the agent and the field.
+            RuntimeError: no session has begun, or it is over.
+        """
+        session = self.session
+        if session.over:
+            raise RuntimeError("the session is over: call reset() first")
+        decoded = {}
+        for agent, role in _AGENTS.items():
+            if agent not in actions:
+                raise ValueError(f"the action of {agent} is missing; it is needed from {', '.join(_AGENTS)}")
+            decoded[role] = self._decoders[role](actions[agent])
+        self._observations = None
+        terms = session.step(decoded)
+        terminated = session.task.done
+        truncated = self._out_of_time(session) and not terminated
+        if terminated or truncated:
+            session.end("arrived" if terminated else "out of time")
+        return StepOutcome(reward_terms=terms, terminated=terminated, truncated=truncated)
+
+    def _out_of_time(self, session: LiveSession) -> bool:
+        if self.max_cycles is not None:
+            return session.decisions >= self.max_cycles
+        return session.world.time >= self.config.max_seconds - 1e-9
+
+    # --- the present decision ---------------------------------------------------------------------------------------
 
     @property
-    def said(self) -> Sequence[Utterance]:
-        """All utterances that were heard so far."""
-        return self._talk.said
+    def over(self) -> bool:
+        """Whether the session is over; raises `RuntimeError` before the first reset."""
+        return self.session.over
 
     @property
-    def infractions(self) -> dict[str, int]:
-        """How often each rule of the road was broken so far, collisions of whosever making among them."""
-        counts = self.world.reports.infractions
-        return {name: counts.get(kind, 0) for name, kind in _INFRACTIONS}
+    def session(self) -> LiveSession:
+        """The session in progress, or the last one; raises `RuntimeError` before the first reset."""
+        if self._session is None:
+            raise RuntimeError("call reset() first")
+        return self._session
 
-    # --- what the roles do ------------------------------------------------------------------------------------------
+    @property
+    def observations(self) -> LazyObservations:
+        """Observations at the present decision, the same object until the next step."""
+        if self._observations is None:
+            self._observations = LazyObservations(self.session)
+        return self._observations
 
-    def _play_ad_wizard(self, action: RoleAction) -> str:
-        assert isinstance(action, AdWizardAction)
-        if action.exception is ExceptionKind.NONE:
-            return ""
-        outcome = self._adversary.carry_out(action)
-        name = action.exception.name.lower()
-        if isinstance(outcome, str):
-            self._refuse(Role.AD_WIZARD, name, outcome)
-            return ""
-        if action.exception is not ExceptionKind.MESSAGE:
-            self.counts["exceptions"] += 1
-            self._log(EventType.EXCEPTION, Role.AD_WIZARD, {"kind": name, **outcome})
-        if action.exception.is_task:
-            self._note_statuses(name)
-        if action.message:
-            self.messages.append((self.world.time, action.message))
-            self._log(EventType.MESSAGE, Role.AD_WIZARD, {"text": action.message})
-        return action.message
+    def mask(self, role: Role) -> dict[str, Mask | tuple[Mask, ...] | None]:
+        """Returns the mask of a role's action space at the present decision."""
+        return self.session.masks.mask(role)
 
-    def _speak(self, role: Role, action: RoleAction) -> bool:
-        assert isinstance(action, ParticipantAction | CoWizardAction)
-        if action.speech is None:
-            return False
-        reason = self._talk.say(role, action.speech, self.world.time)
-        if reason is not None:
-            self._refuse(role, "speech", reason)
-        return reason is None
+    def info(self, role: Role, terms: RewardTerms | None = None) -> dict[str, Any]:
+        """Returns the info dictionary of a role; the caller owns everything in it.
 
-    def _play_co_wizard(self, action: RoleAction) -> None:
-        assert isinstance(action, CoWizardAction)
-        if action.mental is not None:
-            self._believe(action.mental)
-        if action.physical is not None:
-            self._drive(action.physical)
-
-    def _drive(self, physical: Physical) -> None:
-        action = physical.action
-        reason = self.world.ego.apply(action, angle=physical.angle, up=physical.up)
-        if reason is not None:
-            self._refuse(Role.CO_WIZARD, action.label, reason)
-            return
-        self.counts["physical_actions"] += 1
-        angle = physical.angle if action in (PhysicalAction.J_TURN, PhysicalAction.LANE_SWITCH) else None
-        up = physical.up if action in (PhysicalAction.SPEED_CHANGE, PhysicalAction.LIGHT_CHANGE) else None
-        data = {"action": action.label, "angle": angle, "up": up}
-        self._log(EventType.PHYSICAL_ACTION, Role.CO_WIZARD, data, flagged=action in NAVIGATION_ACTIONS)
-
-    def _believe(self, mental: Mental) -> None:
-        town = self.world.town
-        data: dict[str, Any] = {"action": mental.action.label}
-        if mental.action is MentalAction.PLAN_UPDATE:
-            unknown = [k for k in mental.plan if k >= len(town.junctions)]
-            if unknown:
-                self._refuse(Role.CO_WIZARD, mental.action.label, f"the town has no junction number {unknown[0]}")
-                return
-            data["junctions"] = [town.junctions[k].id for k in mental.plan]
-        elif mental.action is MentalAction.GOAL_UPDATE:
-            self.beliefs.goals = mental.goals
-            data["landmarks"] = [name.label for name in mental.goals]
-        elif mental.action is MentalAction.STATUS_UPDATE:
-            data["landmark"], data["status"] = mental.landmark.label, mental.status.label
-        elif mental.action is MentalAction.KNOWLEDGE_UPDATE:
-            lane, metres = mental.place.lane, float(mental.place.metres)
-            if lane >= len(town.lanes) or metres > town.lanes[lane].length + 1.0:
-                self._refuse(Role.CO_WIZARD, mental.action.label, "the guessed place is not on a lane of the town")
-                return
-            pose, covariance = self.world.localizer.pose, self.world.localizer.covariance
-            self.beliefs.guess(mental.landmark, lane, metres, pose=pose, covariance=covariance, sight=self.world.sight)
-            x, y = town.lanes[lane].position(metres)
-            data.update(landmark=mental.landmark.label, x=round(float(x), 3), y=round(float(y), 3))
-        self.world.ego.set_goals(self.beliefs.goal_places(self._known_places()))
-        self._log(EventType.BELIEF_UPDATE, Role.CO_WIZARD, data)
-
-    def _known_places(self) -> dict[LandmarkName, list[GoalAhead]]:
-        places: dict[LandmarkName, list[GoalAhead]] = {}
-        for landmark in self.scenario.storyboard.landmarks:
-            if not landmark.hidden:
-                places.setdefault(landmark.name, []).append(GoalAhead(lane=landmark.lane, station=landmark.station))
-        return places
-
-    # --- what comes of it -------------------------------------------------------------------------------------------
-
-    def _note_arrivals(self) -> None:
-        if self.world.car.speed > STANDING:
-            return
-        x, y = self._car_place()
-        for place_x, place_y, landmark in self._waypoints:
-            if abs(place_x - x) <= ARRIVAL_DISTANCE and math.hypot(place_x - x, place_y - y) <= ARRIVAL_DISTANCE:
-                for i in self.task.arrive(landmark):
-                    self._log_subgoal(i, "arrival")
-                self._note_statuses("arrival", log=False)
-
-    def _note_statuses(self, cause: str, *, log: bool = True) -> None:
-        for i in range(len(self._statuses)):
-            status = self.task.status(i)
-            if status is not self._statuses[i] and log:
-                self._log_subgoal(i, cause)
-            self._statuses[i] = status
-
-    def _log_subgoal(self, i: int, cause: str) -> None:
-        landmark = self.scenario.storyboard.landmarks[self.task.landmark_of(i)]
-        status = self.task.status(i)
-        self._talk.note(landmark.name, status)
-        data = {"subgoal": i, "landmark": landmark.name.label, "status": status.label, "cause": cause}
-        self._log(EventType.SUBGOAL, Role.AGENT, data)
-
-    def _new_moment(self, message: str) -> Moment:
-        said: dict[Role, Utterance] = {}
-        heard: dict[Role, Utterance] = {}
-        now = self.world.time
-        for words in self._talk.deliver(now):
-            speaker = words.said.speaker
-            said[speaker], heard[speaker] = words.said, words.heard
-            self.beliefs.hear(speaker, words.understood)
-            self.counts["utterances"] += 1
-            self.counts["acts"] += len(words.records)
-            for data in words.records:
-                self._log(EventType.DIALOGUE_MOVE, speaker, data, flagged=True)
-        return Moment(said=said, heard=heard, message=message, speaking=self._talk.speaking(now))
-
-    def _rewards(self, reached: int, collisions: int, spoken: Mapping[Role, bool]) -> dict[Role, dict[str, float]]:
-        weights = self.config.rewards
-        subgoal, success = weights.subgoal * reached, weights.success * self.success
-        collision, time = weights.collision * collisions, self._time_reward
-        terms = {}
-        for role, sign in _SIGNS:
-            terms[role] = {
-                "subgoal": sign * subgoal,
-                "success": sign * success,
-                "collision": sign * collision,
-                "time": sign * time,
-                "refusal": weights.refusal * len(self.refused[role]),
-            }
-            if role in spoken:
-                terms[role]["talk"] = weights.talk * spoken[role]
-        return terms
-
-    def _reached(self) -> int:
-        version, reached = self._known_reached
-        if version != self.task.version:
-            reached = sum(self.task.reached(i) for i in self.task.live)
-            self._known_reached = self.task.version, reached
-        return reached
-
-    def _refuse(self, role: Role, action: str, reason: str) -> None:
-        self.refused[role].append(f"{action}: {reason}")
-        self.counts["refusals"] += 1
-        self._log(EventType.REFUSAL, role, {"action": action, "reason": reason})
-
-    def _log(
-        self, kind: EventType, source: Role, data: Mapping[str, Any], *, flagged: bool = False, frame: int | None = None
-    ) -> None:
-        at = self.world.frame if frame is None else frame
-        self.events.append(Event(frame=at, type=kind, source=source, flagged=flagged, data=dict(data)))
-
-    def _car_place(self) -> tuple[float, float]:
-        x, y = self.world.car.position.tolist()
-        return x, y
-
-    # --- what is kept -----------------------------------------------------------------------------------------------
-
-    def header(self) -> SessionHeader:
-        """What is known of the session before it begins."""
-        return header_of(self.scenario, self.world.town.name, self.config)
-
-    def summary(self) -> dict[str, Any]:
-        """How the session stands: success, subgoals, counts."""
+        Args:
+            role: the role.
+            terms: reward terms of the last decision; None for a session that has just begun.
+        """
+        session = self.session
         return {
-            "success": self.success,
-            "arrived": self.task.done,
-            "subgoals": {"live": len(self.task.live), "reached": self._reached()},
-            "collisions": self.world.collisions,
-            "infractions": self.infractions,
-            "seconds": round(self.world.time, 3),
-            **self.counts,
-            "exchanges": self._talk.exchanges,
-            "transactions": self._talk.transactions,
-            **(self._outcome or {}),
+            "action_mask": self.mask(role),
+            "reward_terms": dict(terms or {}),
+            "refused": list(session.refused[role]),
+            "infractions": dict(session.infractions),
         }
+
+    # --- the record -------------------------------------------------------------------------------------------------
+
+    @property
+    def scenario(self) -> Scenario:
+        """Scenario of the session."""
+        return self.session.scenario
+
+    @property
+    def last_events(self) -> tuple[Event, ...]:
+        """Events of the last decision."""
+        return tuple(self.session.events)
+
+    @property
+    def last_frames(self) -> NDArray[np.float64]:
+        """Trajectory of the last decision (n, 9), see `dorothie_gym.sim.config.FRAME_COLUMNS`."""
+        return self.session.world.frames
+
+    def session_header(self) -> SessionHeader:
+        """Returns the header of the session's record."""
+        return self.session.header()
+
+    def summary(self) -> SessionSummary:
+        """Returns the state of the session in JSON types: success, subgoals, counts."""
+        return self.session.summary()

@@ -1,11 +1,11 @@
-"""Pictures of a session in progress: what happens on the stage, as a scene for the renderer."""
+"""Scene of a session in progress for the renderer."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.engine.session_engine import Stage
+from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.ontology import GoalStatus, Role
 from dorothie_gym.rendering.frames import HumanWindow, SceneRenderer
 from dorothie_gym.rendering.scene import Actor, CarView, Pin, Scene, SpokenLine, SubgoalState
@@ -18,9 +18,14 @@ _STATES: dict[GoalStatus, SubgoalState] = {
 }
 
 
-def scene_of(stage: Stage, caption: str = "") -> Scene:
-    """The present moment of a session."""
-    world, task = stage.world, stage.task
+def scene_of(session: LiveSession, caption: str = "") -> Scene:
+    """Returns the scene of a session at the present decision.
+
+    Args:
+        session: the session.
+        caption: title of the picture; by default the name of the storyboard.
+    """
+    world, task = session.world, session.task
     car, planner = world.car, world.planner
     states: dict[int, SubgoalState] = {}
     for i in range(len(task.storyboard.subgoals)):
@@ -38,9 +43,9 @@ def scene_of(stage: Stage, caption: str = "") -> Scene:
         SpokenLine(
             time=u.start, speaker=u.speaker, text=u.text, acts=" ".join(str(act).removesuffix("()") for act in u.acts)
         )
-        for u in stage.said
+        for u in session.said
     ]
-    lines += [SpokenLine(time=time, speaker=Role.AD_WIZARD, text=text) for time, text in stage.messages]
+    lines += [SpokenLine(time=time, speaker=Role.AD_WIZARD, text=text) for time, text in session.messages]
     lines.sort(key=lambda line: line.time)
     notes = []
     if world.hazard is not None:
@@ -53,8 +58,8 @@ def scene_of(stage: Stage, caption: str = "") -> Scene:
             x=float(car.position[0]), y=float(car.position[1]), heading=float(car.heading), speed=float(car.speed),
             lights=world.ego.lights,
         ),
-        street_names=[name.label for name in stage.scenario.street_names],
-        trail=np.array(stage.trail),
+        street_names=[name.label for name in session.scenario.street_names],
+        trail=np.array(session.trail),
         waypoints=np.array([planner.path.position_at(float(s)) for s in stations]).reshape(-1, 2),
         others=others,
         landmarks=[
@@ -76,17 +81,26 @@ def scene_of(stage: Stage, caption: str = "") -> Scene:
     )  # fmt: skip
 
 
-class Painter:
-    """Paints a stage, into an array or a window."""
+class SessionRenderer:
+    """Draws a session in progress into an array or a window.
+
+    Args:
+        human: whether frames are shown in a window.
+    """
 
     def __init__(self, *, human: bool) -> None:
         self._renderer = SceneRenderer()
         self._human = human
         self._window: HumanWindow | None = None
 
-    def paint(self, stage: Stage, *, follow: bool = True) -> NDArray[np.uint8] | None:
-        """An array (h, w, 3); None when it was shown in a window instead."""
-        frame = self._renderer.draw(scene_of(stage), follow=follow)
+    def draw(self, session: LiveSession, *, follow: bool = True) -> NDArray[np.uint8] | None:
+        """Returns a frame (h, w, 3), or shows it in the window and returns None.
+
+        Args:
+            session: the session.
+            follow: whether the view is centred on the ego.
+        """
+        frame = self._renderer.draw(scene_of(session), follow=follow)
         if not self._human:
             return frame
         if self._window is None:

@@ -14,7 +14,7 @@ from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import ExitColumn
 
 
-class Options(NamedTuple):
+class TurnOptions(NamedTuple):
     """Turn options at a junction.
 
     Attributes:
@@ -30,10 +30,10 @@ class Options(NamedTuple):
     lane: int
 
 
-NO_OPTIONS = Options((), np.zeros((0, len(ExitColumn))), 0.0, -1)
+NO_TURN_OPTIONS = TurnOptions((), np.zeros((0, len(ExitColumn))), 0.0, -1)
 
 
-class Prospect:
+class UpcomingJunction:
     """The path ahead of the car in a session; its answers are those of the planner (`LocalPlanner`)."""
 
     def __init__(self, world: World) -> None:
@@ -43,11 +43,11 @@ class Prospect:
         self._rows: dict[int, Array] = {}
         self._path: Path | None = None  # of which, and of where on it, the options are known
         self._s = 0.0
-        self._options = NO_OPTIONS
+        self._options = NO_TURN_OPTIONS
         # lanes outside junctions at whose end a turn has to be chosen
         self._chooses = np.array([not lane.in_junction and _is_choice(town.exits(lane.id)) for lane in town.lanes])
 
-    def options(self) -> Options:
+    def options(self) -> TurnOptions:
         """Turn options at the next junction with a choice; none where the path comes to none."""
         planner = self._planner
         if planner.path is not self._path or planner.s != self._s:
@@ -55,13 +55,13 @@ class Prospect:
             self._options = self._find(planner.path, planner.s)
         return self._options
 
-    def _find(self, path: Path, s: float) -> Options:
+    def _find(self, path: Path, s: float) -> TurnOptions:
         point = next_choice(path.lanes, path.index_at(s), self._chooses)
         if point < 0:
-            return NO_OPTIONS
+            return NO_TURN_OPTIONS
         lane = int(path.lanes[point])
         left = self._town.lanes[lane].length - float(path.stations[point])
-        return Options(self._town.exits(lane), self._rows_of(lane), float(path.s[point]) + left - s, lane)
+        return TurnOptions(self._town.exits(lane), self._rows_of(lane), float(path.s[point]) + left - s, lane)
 
     def _rows_of(self, lane: int) -> Array:
         rows = self._rows.get(lane)

@@ -12,10 +12,11 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.engine.live_session import STANDING, LiveSession
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
-from dorothie_gym.engine.session_engine import STANDING, Stage
-from dorothie_gym.engine.upcoming_junction import Prospect
+from dorothie_gym.engine.upcoming_junction import UpcomingJunction
 from dorothie_gym.envs.navigation_config import NavigationConfig
+from dorothie_gym.envs.session_view import RENDER_MODES, SessionView
 from dorothie_gym.maps import LinkType, Town, load_town
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import LandmarkName, MentalAction, Role
@@ -57,7 +58,7 @@ class DrivingSession:
     """Session in progress.
 
     Attributes:
-        stage: the session.
+        session: the session.
         exits: exits of the town's junctions.
         instructor: built-in participant.
         heard: last instruction, as the Co-Wizard remembers it.
@@ -68,18 +69,18 @@ class DrivingSession:
         truncated: whether time is up.
     """
 
-    def __init__(self, stage: Stage, config: NavigationConfig, exits: JunctionExits) -> None:
-        self.stage, self.exits, self._config = stage, exits, config
-        town = stage.world.town
+    def __init__(self, session: LiveSession, config: NavigationConfig, exits: JunctionExits) -> None:
+        self.session, self.exits, self._config = session, exits, config
+        town = session.world.town
         self.instructor = Instructor(town, exits, config.guidance)  # type: ignore[arg-type]
         self._viewpoint = NavigationEncoder(town, exits, config.max_seconds)
-        self._decoder = ActionDecoder(Role.AD_WIZARD, stage.limits)
-        self._adversary = ScriptedAdWizard(stage.limits, rate=config.exceptions) if config.exceptions > 0.0 else None
-        seed = policy_seed(stage.scenario.seed, Role.AD_WIZARD)
+        self._decoder = ActionDecoder(Role.AD_WIZARD, session.limits)
+        self._adversary = ScriptedAdWizard(session.limits, rate=config.exceptions) if config.exceptions > 0.0 else None
+        seed = policy_seed(session.scenario.seed, Role.AD_WIZARD)
         self._plans = self._adversary.initial_state(seed, town) if self._adversary is not None else None
         self.heard, self._notes = HeardInstruction(), list[Mental]()
         self._aim: tuple[Place | None, tuple[Place, ...]] = (None, ())  # goal and roadblocks that `_nearest` refers to
-        self.seen: Mapping[str, Observation] = stage.observations()
+        self.seen: Mapping[str, Observation] = session.observations()
         marks = read_landmarks(self.seen[Role.CO_WIZARD], town)  # those on its map, for the whole session
         self._known = frozenset(mark.place for mark in marks)
         self._rules_broken, self._collisions = self._count_infractions(), 0
@@ -113,7 +114,7 @@ class DrivingSession:
         elif not isinstance(scenario, Scenario):
             raise ValueError(f"option 'scenario' is a {type(scenario).__name__}; it must be a Scenario")
         limits = SpaceLimits.for_town(town)
-        return cls(Stage(town, network, scenario, config.session, limits), config, JunctionExits(town))
+        return cls(LiveSession(town, network, scenario, config.session_config, limits), config, JunctionExits(town))
 
     # --- a decision -------------------------------------------------------------------------------------------------
 
@@ -126,8 +127,8 @@ class DrivingSession:
         if self._notes:
             action = replace(action, mental=self._notes.pop(0))
         reached = self._count_reached()
-        self.stage.play({Role.PARTICIPANT: _SILENCE, Role.CO_WIZARD: action, Role.AD_WIZARD: self.interfere()})
-        before, self.seen = self.seen, self.stage.observations()
+        self.session.step({Role.PARTICIPANT: _SILENCE, Role.CO_WIZARD: action, Role.AD_WIZARD: self.interfere()})
+        before, self.seen = self.seen, self.session.observations()
         self.heard = self.heard.driven_on(before[Role.CO_WIZARD], self.seen[Role.CO_WIZARD])
         progress = self._progress()
         self._listen()
@@ -144,12 +145,12 @@ class DrivingSession:
         """Returns the info of the last decision, as a new dictionary."""
         info: dict[str, Any] = {
             "reward_terms": dict(self.terms),
-            "refused": list(self.stage.refused[Role.CO_WIZARD]),
-            "infractions": dict(self.stage.infractions),
+            "refused": list(self.session.refused[Role.CO_WIZARD]),
+            "infractions": dict(self.session.infractions),
         }
         if self.terminated or self.truncated:
-            info["is_success"], info["reason"] = self.stage.success, self.reason
-            info["subgoals"] = {"live": len(self.stage.task.live), "reached": self._count_reached()}
+            info["is_success"], info["reason"] = self.session.success, self.reason
+            info["subgoals"] = {"live": len(self.session.task.live), "reached": self._count_reached()}
         return info
 
     # --- other roles -------------------------------------------------------------------------------------------------
@@ -163,8 +164,8 @@ class DrivingSession:
 
     def _listen(self) -> None:
         """Lets the instructor speak, and updates the goal."""
-        planner = self.stage.world.planner
-        waits = planner.held and float(self.stage.world.car.speed) <= STANDING
+        planner = self.session.world.planner
+        waits = planner.held and float(self.session.world.car.speed) <= STANDING
         turning = max(planner.manoeuvre_end - planner.s, 0.1) if planner.in_manoeuvre else 0.0
         goal = self.instructor.goal
         said = self.instructor.instruct(self.seen[Role.PARTICIPANT], self._known, waits=waits, turning=turning)
@@ -186,7 +187,7 @@ class DrivingSession:
         if by_name:
             self.heard = replace(self.heard, goal=goal.place)
         elif goal.place not in self._known:
-            path, s = self.stage.world.planner.path, self.stage.world.planner.s
+            path, s = self.session.world.planner.path, self.session.world.planner.s
             k = path.index_at(min(s + distance, path.length))
             lane, station = int(path.lanes[k]), float(path.stations[k])
             mark = LanePosition(lane=lane, metres=int(station))
@@ -195,7 +196,7 @@ class DrivingSession:
     # --- progress and reward ------------------------------------------------------------------------------------------
 
     def _cost_to_go(self) -> float:
-        planner = self.stage.world.planner
+        planner = self.session.world.planner
         return self.instructor.cost_to_go.from_place(planner.lane, planner.station)
 
     def _progress(self) -> float:
@@ -204,46 +205,46 @@ class DrivingSession:
         return self._left - left if math.isfinite(left) and math.isfinite(self._left) else 0.0
 
     def _note_patience(self) -> None:
-        now = self.stage.world.time
+        now = self.session.world.time
         way = self.instructor.cost_to_go
         aim = way.goal, way.blocked
         if aim != self._aim or self._left < self._nearest - NEARER:
             self._aim, self._nearest, self._nearest_at = aim, self._left, now
 
     def _end(self) -> None:
-        stage, now = self.stage, self.stage.world.time
-        arrived = stage.task.done
-        left_road = abs(stage.world.planner.offset) > OFF_ROAD
+        session, now = self.session, self.session.world.time
+        arrived = session.task.done
+        left_road = abs(session.world.planner.offset) > OFF_ROAD
         gave_up = now - self._nearest_at >= self._config.patience - 1e-9
         self.terminated = arrived or left_road or gave_up
         self.truncated = not self.terminated and now >= self._config.max_seconds - 1e-9
         if self.terminated or self.truncated:
             reasons = {"arrived": arrived, "left the road": left_road, "gave up": gave_up, "out of time": True}
             self.reason = next(reason for reason, holds in reasons.items() if holds)
-            stage.end(self.reason)
+            session.end(self.reason)
 
     def _reward(self, progress: float, reached: int, physical: bool) -> None:
-        weights, stage = self._config.weights, self.stage
-        rules, collisions = self._count_infractions(), stage.world.collisions
+        weights, session = self._config.weights, self.session
+        rules, collisions = self._count_infractions(), session.world.collisions
         self.terms = {
             "progress": weights.progress * progress,
             "subgoal": weights.subgoal * reached,
-            "success": weights.success * stage.success,
+            "success": weights.success * session.success,
             "collision": weights.collision * (collisions - self._collisions),
             "infraction": weights.infraction * (rules - self._rules_broken),
             "gave_up": weights.gave_up * (self.terminated and self.reason != "arrived"),
             "time": weights.time / self._config.decision_frequency,
-            "action": weights.action * (physical and not stage.refused[Role.CO_WIZARD]),
-            "refusal": weights.refusal * len(stage.refused[Role.CO_WIZARD]),
+            "action": weights.action * (physical and not session.refused[Role.CO_WIZARD]),
+            "refusal": weights.refusal * len(session.refused[Role.CO_WIZARD]),
         }
         self._rules_broken, self._collisions = rules, collisions
         self.reward = float(sum(self.terms.values()))
 
     def _count_reached(self) -> int:
-        return sum(self.stage.task.reached(i) for i in self.stage.task.live)
+        return sum(self.session.task.reached(i) for i in self.session.task.live)
 
     def _count_infractions(self) -> int:
-        infractions = self.stage.infractions
+        infractions = self.session.infractions
         return sum(infractions[name] for name in _RULES)
 
 
@@ -255,7 +256,7 @@ class DrivingEnv(gym.Env[Vector, Action]):
     """Base class of the navigation environments; subclasses define observations and actions."""
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        "render_modes": ["human", "rgb_array"],
+        "render_modes": list(RENDER_MODES),
         "render_fps": 2,
     }
 
@@ -263,16 +264,12 @@ class DrivingEnv(gym.Env[Vector, Action]):
         self, town: str | Path | Town, storyboard: str | Path | StoryboardTemplate | None, config: NavigationConfig,
         render_mode: str | None,
     ) -> None:  # fmt: skip
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(
-                f"render_mode is {render_mode!r}; it must be None or one of {self.metadata['render_modes']}"
-            )
-        self.config, self.render_mode = config, render_mode
+        self.config = config
+        self.render_mode, self._view = render_mode, SessionView(render_mode)
         self.town = town if isinstance(town, Town) else load_town(town)
         self.template = load_template(storyboard) if isinstance(storyboard, str | Path) else storyboard
         self._network = TownNetwork(self.town)
         self._drive: DrivingSession | None = None
-        self._painter: Any = None
 
     @property
     def drive(self) -> DrivingSession:
@@ -291,22 +288,13 @@ class DrivingEnv(gym.Env[Vector, Action]):
             self.render()
         return self._drive
 
-    def render(self) -> NDArray[Any] | None:
+    def render(self) -> NDArray[np.uint8] | None:
         """Draws the aerial view: an array (800, 1280, 3), or in a window in human mode (then returns None)."""
-        if self.render_mode is None:
-            raise RuntimeError("render() needs render_mode='rgb_array' or 'human' when the environment is made")
-        from dorothie_gym.engine.session_scene import Painter
-
-        if self._painter is None:
-            self._painter = Painter(human=self.render_mode == "human")
-        frame: NDArray[Any] | None = self._painter.paint(self.drive.stage)
-        return frame
+        return self._view.render(self.drive.session)
 
     def close(self) -> None:
         """Closes the window, if there is one."""
-        if self._painter is not None:
-            self._painter.close()
-            self._painter = None
+        self._view.close()
 
 
 class NavigationMask:
@@ -318,12 +306,12 @@ class NavigationMask:
 
     def __init__(self, world: World, exits: JunctionExits) -> None:
         self._world, self.exits = world, exits
-        self._prospect = Prospect(world)
+        self._junction = UpcomingJunction(world)
 
     @property
     def choice(self) -> tuple[int, float] | None:
         """Lane before the next junction with a choice, and the distance to it [m]; None if the path comes to none."""
-        options = self._prospect.options()
+        options = self._junction.options()
         return (options.lane, options.distance) if options.exits else None
 
     def mask(self, seen: Mapping[str, Any]) -> NDArray[np.int8]:

@@ -14,43 +14,43 @@ from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.scenario import Scenario, draw_scenario
-from dorothie_gym.engine.session_engine import Stage
-from dorothie_gym.maps import Town, load_town
-from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.engine.live_session import LiveSession, SessionSummary
+from dorothie_gym.engine.scenario import Scenario
+from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.envs.session_view import RENDER_MODES, SessionView
+from dorothie_gym.maps import Town
+from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.recording import Event, SessionHeader
-from dorothie_gym.sim.network.network import TownNetwork
-from dorothie_gym.spaces import ActionDecoder, SpaceLimits, action_space, observation_space
-from dorothie_gym.tasks import StoryboardTemplate, load_template
-
-_AGENTS = {str(role): role for role in AGENT_ROLES}
+from dorothie_gym.spaces import ActionDict, Observation, SpaceLimits, action_space, observation_space
+from dorothie_gym.tasks import StoryboardTemplate
 
 
-class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
-    """Three agents talk while a car drives through a town.
+class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
+    """Dialogue of three agents while a car drives through a town.
 
     ## Description
-    A participant has errands to run (a storyboard) and knows where everything is, but cannot drive. The Co-Wizard
-    drives by discrete actions and talks, but does not know the errands, nor where some of the places are. The
-    Ad-Wizard throws unexpected situations at them: weather, roadblocks, sensor faults, changes of the task.
+    The participant has errands to run (a storyboard) and knows the whole map, but cannot drive. The Co-Wizard drives
+    by discrete actions and talks, but knows neither the errands nor the places of hidden landmarks. The Ad-Wizard
+    creates unexpected situations: weather, roadblocks, sensor faults, changes of the task. The environment is a view of
+    a `SessionEngine`, which is in `engine`.
 
     ## Agents
-    `participant`, `co_wizard`, `ad_wizard`; all act at once, twice a second of simulated time.
+    `participant`, `co_wizard`, `ad_wizard`; all act at the same time, twice per simulated second.
 
     ## Observation Space
     A `Dict` of fixed-shape arrays and texts for each role: see `dorothie_gym.spaces.observation_space`. Utterances of
-    the others are observed in the decision after their last word. The Co-Wizard does not see
-    hidden landmarks, the task, or arrivals; the participant does not see the Ad-Wizard's options.
+    the others are observed at the decision after their last word. The Co-Wizard does not observe hidden landmarks, the
+    task, or arrivals; the participant does not observe the options of the Ad-Wizard.
 
     ## Action Space
     A `Dict` for each role: see `ParticipantAction`, `CoWizardAction` and `AdWizardAction` in `dorothie_gym.spaces`,
-    which encode and decode it. `info["action_mask"]` mirrors it. A well-formed action that cannot be carried out is
-    refused, told in `info["refused"]` and counted; a malformed one raises `ValueError` naming the field.
+    which encode and decode it. `info["action_mask"]` has the same fields. A well-formed action that cannot be carried
+    out is refused, reported in `info["refused"]` and counted; a malformed one raises `ValueError` with the field.
 
     ## Rewards
-    Weighted terms (`RewardWeights`): subgoals reached, success, collisions of the car's own making, time, and each
-    role's own talk and refusals. The Ad-Wizard gets the opposite of the shared terms. The terms are in
-    `info["reward_terms"]`. `info["infractions"]` counts which rules of the road the car has broken so far.
+    Weighted terms (`RewardWeights`): subgoals reached, success, collisions caused by the ego, time, and each role's
+    own talk and refusals. The Ad-Wizard gets the shared terms with the opposite sign. `info["reward_terms"]` has the
+    terms; `info["infractions"]` counts the traffic infractions of the ego so far.
 
     ## Episode End
     Terminates when the destination, the last live subgoal, is reached: the car stands within 2 m of the waypoint of
@@ -72,7 +72,7 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
 
     metadata: ClassVar[dict[str, Any]] = {
         "name": "duo_wizard_v0",
-        "render_modes": ["human", "rgb_array"],
+        "render_modes": list(RENDER_MODES),
         "render_fps": 2,
         "is_parallelizable": True,
     }
@@ -86,74 +86,46 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
         render_mode: str | None = None,
         max_cycles: int | None = None,
     ) -> None:
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(f"render_mode {render_mode!r} is none of {self.metadata['render_modes']}")
-        if max_cycles is not None and max_cycles < 1:
-            raise ValueError(f"max_cycles is {max_cycles}; it must be at least 1")
-        self.config = config or EnvConfig()
-        self.render_mode = render_mode
-        self.town = town if isinstance(town, Town) else load_town(town)
-        self.template = load_template(storyboard) if isinstance(storyboard, str | Path) else storyboard
-        self.max_cycles = max_cycles
-        self.limits = SpaceLimits.for_town(self.town)
+        self.engine = SessionEngine(town, storyboard, config=config, max_cycles=max_cycles)
+        self.render_mode, self._view = render_mode, SessionView(render_mode)
         self.possible_agents = [str(role) for role in AGENT_ROLES]
         self.agents: list[str] = []
         self.observation_spaces = {
             str(role): deepcopy(observation_space(role, self.limits, self.config.observe_acts)) for role in AGENT_ROLES
         }
         self.action_spaces = {str(role): deepcopy(action_space(role, self.limits)) for role in AGENT_ROLES}
-        self._decoders = {role: ActionDecoder(role, self.limits) for role in AGENT_ROLES}
-        self._network = TownNetwork(self.town)
-        self._seeds = np.random.default_rng()
-        self._stage: Stage | None = None
-        self._cycles = 0
-        self._painter: Any = None
 
     # --- PettingZoo -------------------------------------------------------------------------------------------------
 
     def observation_space(self, agent: str) -> spaces.Dict:
-        """The observation space of an agent, always the same object."""
+        """Returns the observation space of an agent, always the same object."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Dict:
-        """The action space of an agent, always the same object."""
+        """Returns the action space of an agent, always the same object."""
         return self.action_spaces[agent]
 
     def reset(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
+    ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """Begins a session.
 
         Args:
-            seed: what everything is drawn from; without one, the next of a series that the last seed began.
+            seed: seed of the session; without one, the next of the series that the last given seed began.
             options: `scenario` plays a given `Scenario`; other options are ignored.
 
         Returns:
             Observations and infos by agent.
         """
-        scenario = (options or {}).get("scenario")
-        if scenario is None:
-            if seed is not None:
-                self._seeds = np.random.default_rng(seed)
-            session = seed if seed is not None else int(self._seeds.integers(2**31))
-            scenario = draw_scenario(self.town, self.template, session)
-        elif not isinstance(scenario, Scenario):
-            raise ValueError(f"option 'scenario' is a {type(scenario).__name__}; it must be a Scenario")
-        self._stage = Stage(self.town, self._network, scenario, self.config, self.limits)
-        self._cycles = 0
+        observations = self.engine.reset(seed, scenario=(options or {}).get("scenario"))
         self.agents = list(self.possible_agents)
-        observations = self._stage.observations()
-        infos = self._infos({role: {} for role in AGENT_ROLES})
-        if self.render_mode == "human":
-            self.render()
-        return observations, infos
+        self._render_window()
+        return observations.of(), {str(role): self.engine.info(role) for role in AGENT_ROLES}
 
     def step(
         self, actions: Mapping[str, Mapping[str, Any]]
-    ) -> tuple[
-        dict[str, dict[str, Any]], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
-    ]:
-        """Plays one decision: actions of all agents, then the physics until the next one.
+    ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+        """Plays one decision: the actions of all agents, then the physics until the next decision.
 
         Args:
             actions: an action for each live agent.
@@ -165,115 +137,102 @@ class DuoWizardEnv(ParallelEnv[str, dict[str, Any], dict[str, Any]]):
             ValueError: an action is missing or malformed; the message names the agent and the field.
             RuntimeError: called before `reset`.
         """
-        stage = self.stage
-        if not self.agents:
+        if self.engine.over:
             return {}, {}, {}, {}, {}
-        decoded = {}
-        for agent, role in _AGENTS.items():
-            if agent not in actions:
-                raise ValueError(f"the action of {agent} is missing; it is needed from {', '.join(self.agents)}")
-            decoded[role] = self._decoders[role](actions[agent])
-        terms = stage.play(decoded)
-        self._cycles += 1
-        out_of_time = (
-            self._cycles >= self.max_cycles
-            if self.max_cycles is not None
-            else stage.world.time >= self.config.max_seconds - 1e-9
-        )
-        terminated, truncated = stage.task.done, out_of_time and not stage.task.done
-        if terminated or truncated:
-            stage.end("arrived" if terminated else "out of time")
-        observations = stage.observations()
-        infos = self._infos(terms)
-        rewards = {agent: float(sum(terms[role].values())) for agent, role in _AGENTS.items()}
-        terminations = dict.fromkeys(self.agents, terminated)
-        truncations = dict.fromkeys(self.agents, truncated)
-        if terminated or truncated:
+        outcome = self.engine.step(actions)
+        terms = outcome.reward_terms
+        rewards = {str(role): float(sum(terms[role].values())) for role in AGENT_ROLES}
+        infos = {str(role): self.engine.info(role, terms[role]) for role in AGENT_ROLES}
+        terminations = dict.fromkeys(self.agents, outcome.terminated)
+        truncations = dict.fromkeys(self.agents, outcome.truncated)
+        if self.engine.over:
             self.agents = []
-        if self.render_mode == "human":
-            self.render()
-        return observations, rewards, terminations, truncations, infos
+        self._render_window()
+        return self.engine.observations.of(), rewards, terminations, truncations, infos
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draws the aerial view: an array (800, 1280, 3), or in a window in human mode (then returns None)."""
-        if self.render_mode is None:
-            raise RuntimeError("render() needs render_mode='rgb_array' or 'human' when the environment is made")
-        from dorothie_gym.engine.session_scene import Painter
+        return self._view.render(self.session)
 
-        if self._painter is None:
-            self._painter = Painter(human=self.render_mode == "human")
-        frame: NDArray[np.uint8] | None = self._painter.paint(self.stage)
-        return frame
+    def _render_window(self) -> None:
+        if self.render_mode == "human":
+            self.render()
 
     def close(self) -> None:
         """Closes the window, if there is one."""
-        if self._painter is not None:
-            self._painter.close()
-            self._painter = None
+        self._view.close()
 
     def state(self) -> NDArray[np.float64]:
-        """The true state in numbers: time, pose, speed, reached subgoals."""
-        stage = self.stage
-        reached = [float(stage.task.reached(i)) for i in range(len(stage.task.storyboard.subgoals))]
+        """Returns the true state as numbers: time [s], pose [m, m, rad], speed [m/s], flags of reached subgoals."""
+        session = self.session
+        reached = [float(session.task.reached(i)) for i in range(len(session.task.storyboard.subgoals))]
         padded = np.zeros(self.limits.subgoals)
         padded[: len(reached)] = reached[: self.limits.subgoals]
-        car = stage.world.car
-        return np.concatenate(([stage.world.time, *car.position, car.heading, car.speed], padded))
+        car = session.world.car
+        return np.concatenate(([session.world.time, *car.position, car.heading, car.speed], padded))
 
-    # --- what recorders and tools read ------------------------------------------------------------------------------
+    # --- the engine inside ------------------------------------------------------------------------------------------
 
     @property
-    def stage(self) -> Stage:
-        """The session being played; raises `RuntimeError` before the first reset."""
-        if self._stage is None:
-            raise RuntimeError("call reset() first")
-        return self._stage
+    def town(self) -> Town:
+        """The map."""
+        return self.engine.town
+
+    @property
+    def config(self) -> EnvConfig:
+        """Settings of the sessions."""
+        return self.engine.config
+
+    @property
+    def limits(self) -> SpaceLimits:
+        """Sizes of the spaces."""
+        return self.engine.limits
+
+    @property
+    def max_cycles(self) -> int | None:
+        """Decisions until truncation; None where `config.max_seconds` limits the session."""
+        return self.engine.max_cycles
+
+    @max_cycles.setter
+    def max_cycles(self, cycles: int | None) -> None:  # PettingZoo's API test sets it
+        self.engine.max_cycles = cycles
+
+    @property
+    def session(self) -> LiveSession:
+        """The session in progress; raises `RuntimeError` before the first reset."""
+        return self.engine.session
 
     @property
     def scenario(self) -> Scenario:
-        """What the session began with."""
-        return self.stage.scenario
+        """Scenario of the session."""
+        return self.engine.scenario
 
     @property
     def last_events(self) -> tuple[Event, ...]:
-        """What happened in the last decision."""
-        return tuple(self.stage.events)
+        """Events of the last decision."""
+        return self.engine.last_events
 
     @property
     def last_frames(self) -> NDArray[np.float64]:
         """Trajectory of the last decision (n, 9), see `dorothie_gym.sim.config.FRAME_COLUMNS`."""
-        return self.stage.world.frames
+        return self.engine.last_frames
 
     def session_header(self) -> SessionHeader:
-        """What is known of the session before it begins."""
-        return self.stage.header()
+        """Returns the header of the session's record."""
+        return self.engine.session_header()
 
-    def summary(self) -> dict[str, Any]:
-        """How the session stands, in JSON types."""
-        return self.stage.summary()
-
-    def _infos(self, terms: Mapping[Role, Mapping[str, float]]) -> dict[str, dict[str, Any]]:
-        """What else an agent is told; everything in it is the taker's own."""
-        stage = self.stage
-        infractions = stage.infractions
-        return {
-            agent: {
-                "action_mask": stage.masks.mask(role),
-                "reward_terms": dict(terms[role]),
-                "refused": list(stage.refused[role]),
-                "infractions": dict(infractions),
-            }
-            for agent, role in _AGENTS.items()
-        }
+    def summary(self) -> SessionSummary:
+        """Returns the state of the session in JSON types."""
+        return self.engine.summary()
 
 
 def parallel_env(**arguments: Any) -> DuoWizardEnv:
-    """The environment, arguments as `DuoWizardEnv`'s."""
+    """Returns the environment; arguments as of `DuoWizardEnv`."""
     return DuoWizardEnv(**arguments)
 
 
-def env(**arguments: Any) -> AECEnv[str, dict[str, Any], dict[str, Any]]:
-    """The environment in PettingZoo's turn-based form, arguments as `DuoWizardEnv`'s."""
+def env(**arguments: Any) -> AECEnv[str, Observation, ActionDict]:
+    """Returns the environment in PettingZoo's turn-based form; arguments as of `DuoWizardEnv`."""
     return parallel_to_aec(parallel_env(**arguments))
 
 

@@ -91,7 +91,7 @@ class NavigationConfig:
         EnvConfig(decision_frequency=self.decision_frequency, max_seconds=self.max_seconds)  # validates both
 
     @property
-    def session(self) -> EnvConfig:
+    def session_config(self) -> EnvConfig:
         """Settings of the session."""
         vehicles, pedestrians = TRAFFIC[self.traffic]
         return EnvConfig(

@@ -91,8 +91,8 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[Vector, Info]:
         """Begins a session; see `NavigationEnv.reset`."""
         drive = self.begin(seed, options)
-        self._controls = NavigationMask(drive.stage.world, drive.exits)
-        drive.stage.world.ego.manual = VehicleControl(throttle=0.0, steer=0.0, brake=0.0)
+        self._controls = NavigationMask(drive.session.world, drive.exits)
+        drive.session.world.ego.manual = VehicleControl(throttle=0.0, steer=0.0, brake=0.0)
         return self._observe(drive), drive.info()
 
     def step(self, action: NDArray[np.float32]) -> tuple[Vector, float, bool, bool, Info]:
@@ -107,7 +107,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
             raise ValueError(f"action is {action}; it must be three numbers: throttle, steer, brake")
         throttle, steer, brake = np.clip(values, (0.0, -1.0, 0.0), 1.0).tolist()
         drive = self.drive
-        drive.stage.world.ego.manual = VehicleControl(throttle=throttle, steer=steer, brake=brake)
+        drive.session.world.ego.manual = VehicleControl(throttle=throttle, steer=steer, brake=brake)
         drive.play(CoWizardAction(physical=self._prepare(drive)))
         self._keep_path(drive)
         if self.render_mode == "human":
@@ -115,11 +115,11 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         return self._observe(drive), drive.reward, drive.terminated, drive.truncated, drive.info()
 
     def _observe(self, drive: DrivingSession) -> Vector:
-        return observe_continuous(drive.stage.world, drive.seen[Role.CO_WIZARD], drive.heard, self.config.max_seconds)
+        return observe_continuous(drive.session.world, drive.seen[Role.CO_WIZARD], drive.heard, self.config.max_seconds)
 
     def _prepare(self, drive: DrivingSession) -> Physical | None:
         """Returns the manoeuvre of the last instruction, if it is not part of the path yet."""
-        told, planner = drive.heard.instruction, drive.stage.world.planner
+        told, planner = drive.heard.instruction, drive.session.world.planner
         if told is None or told.action not in _MANOEUVRES or planner.in_manoeuvre:
             return None
         action = _MANOEUVRES[told.action]
@@ -127,7 +127,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         if left < -LATE or planner.manoeuvre[0] is action is not PhysicalAction.J_TURN:
             return None
         if action is PhysicalAction.U_TURN:
-            may = planner.may_turn_round(float(drive.stage.world.car.speed))
+            may = planner.may_turn_round(float(drive.session.world.car.speed))
             return Physical(action=action) if may else None
         angle = self._angle(told)
         if angle is None or (action is PhysicalAction.J_TURN and planner.turn_ahead == angle):
@@ -147,6 +147,6 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
 
     def _keep_path(self, drive: DrivingSession) -> None:
         """Plans a new path for a car that has left its path or reached its end."""
-        planner = drive.stage.world.planner
+        planner = drive.session.world.planner
         if abs(planner.offset) > LOST or (planner.room < END and not planner.waits_at_end):
-            drive.stage.world.find_path()
+            drive.session.world.find_path()

@@ -98,7 +98,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
             options: `scenario` plays a given `Scenario`; other options are ignored.
         """
         drive = self.begin(seed, options)
-        self._controls = NavigationMask(drive.stage.world, drive.exits)
+        self._controls = NavigationMask(drive.session.world, drive.exits)
         return self._observe(), self._info()
 
     def step(self, action: np.int64 | int) -> tuple[Vector, float, bool, bool, Info]:

@@ -1,8 +1,9 @@
-"""One role of `DuoWizardEnv` as a Gymnasium environment; policies play the other two."""
+"""`Participant-v0`, `CoWizard-v0` and `AdWizard-v0`: one role for the agent, policies for the other two."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import deepcopy
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -12,44 +13,48 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.envs.session_view import RENDER_MODES, SessionView
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
 from dorothie_gym.policies.policy import policy_seed
-from dorothie_gym.spaces import ActionDict, Observation, noop
+from dorothie_gym.spaces import ActionDict, Observation, action_space, noop, observation_space
 from dorothie_gym.tasks import StoryboardTemplate
 
 
 class SingleRole(gym.Env[Observation, ActionDict]):
-    """One of the three roles, alone with two policies.
+    """One of the three roles for the agent; policies play the other two.
 
     ## Description
-    The session of `DuoWizardEnv`, seen and played by one role. The other two are played by policies, which act on
-    their own observations only.
+    The session of `DuoWizardEnv` from the view of one role. The policies of the other two act on their own
+    observations only. The `SessionEngine` is in `engine`.
+
+    ## Agents
+    One: the agent plays `role`.
 
     ## Observation Space
     The `Dict` of the role, see `dorothie_gym.spaces.observation_space`.
 
     ## Action Space
     The `Dict` of the role, see `ParticipantAction`, `CoWizardAction` and `AdWizardAction` in `dorothie_gym.spaces`.
-    `info["action_mask"]` mirrors it: `action_space.sample(mask=info["action_mask"])`. An illegal action is refused and
-    told in `info["refused"]`; a malformed one raises `ValueError` naming the field. `dorothie_gym.flatten` makes both
-    spaces flat.
+    `info["action_mask"]` has the same fields: `action_space.sample(mask=info["action_mask"])`. An action that cannot be
+    carried out is refused and reported in `info["refused"]`; a malformed one raises `ValueError` with the field.
+    `dorothie_gym.flatten` makes both spaces flat.
 
     ## Rewards
-    The weighted sum of the role's terms, which are in `info["reward_terms"]` (see `RewardWeights`).
+    The weighted sum of the role's terms in `info["reward_terms"]` (see `RewardWeights`).
 
     ## Episode End
-    Terminates when the destination is reached, truncates after `config.max_seconds` or `max_cycles` decisions;
-    then `info["is_success"]` tells whether all went well.
+    Terminates when the destination is reached; truncates after `config.max_seconds` or `max_cycles` decisions. The last
+    info has `is_success`: whether every live subgoal was reached without a collision caused by the ego.
 
     ## Arguments
-    - `role`: who is played, `"participant"`, `"co_wizard"` or `"ad_wizard"`.
+    - `role`: role of the agent, `"participant"`, `"co_wizard"` or `"ad_wizard"`.
     - `town`, `storyboard`, `config`, `render_mode`, `max_cycles`: as of `DuoWizardEnv`.
-    - `partners`: who plays the others, by role: `"scripted"` (default), `"silent"`, `"random"`, or a `Policy`.
+    - `partners`: policy of each other role: `"scripted"` (default), `"silent"`, `"random"`, or a `Policy`.
 
-    `reset(seed=...)` plays the session that `DuoWizardEnv` has for this seed; the partners' seeds follow from it.
+    `reset(seed=...)` plays the session that `DuoWizardEnv` has for this seed; the seeds of the partners follow from it.
     `reset(options={"scenario": Scenario})` plays a given scenario.
 
     ## Version History
@@ -57,8 +62,8 @@ class SingleRole(gym.Env[Observation, ActionDict]):
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        "render_modes": list(DuoWizardEnv.metadata["render_modes"]),
-        "render_fps": DuoWizardEnv.metadata["render_fps"],
+        "render_modes": list(RENDER_MODES),
+        "render_fps": 2,
     }
 
     def __init__(
@@ -74,18 +79,18 @@ class SingleRole(gym.Env[Observation, ActionDict]):
         if role not in AGENT_ROLES:
             raise ValueError(f"role is {str(role)!r}; it must be one of {', '.join(AGENT_ROLES)}")
         self.role = Role(role)
-        self.duo = DuoWizardEnv(town, storyboard, config=config, render_mode=render_mode, max_cycles=max_cycles)
-        self.render_mode = render_mode
-        self.observation_space = self.duo.observation_space(self.role)
-        self.action_space = self.duo.action_space(self.role)
+        self.engine = SessionEngine(town, storyboard, config=config, max_cycles=max_cycles)
+        self.render_mode, self._view = render_mode, SessionView(render_mode)
+        limits = self.engine.limits
+        self.observation_space = deepcopy(observation_space(self.role, limits, self.engine.config.observe_acts))
+        self.action_space = deepcopy(action_space(self.role, limits))
         self.partners = self._cast(partners or {})
         self._states: dict[Role, Any] = {}
-        self._observations: dict[str, Observation] = {}
 
     @property
     def noop_action(self) -> ActionDict:
-        """The action that does nothing."""
-        return noop(self.role, self.duo.limits)
+        """The action without effect."""
+        return noop(self.role, self.engine.limits)
 
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -93,43 +98,53 @@ class SingleRole(gym.Env[Observation, ActionDict]):
         """Begins a session.
 
         Args:
-            seed: of the session; without one it is drawn.
-            options: as of `DuoWizardEnv.reset`.
+            seed: seed of the session; without one it is drawn.
+            options: `scenario` plays a given `Scenario`; other options are ignored.
         """
         super().reset(seed=seed)
         session = seed if seed is not None else int(self.np_random.integers(2**31))
-        self._observations, infos = self.duo.reset(seed=session, options=options)
+        observations = self.engine.reset(session, scenario=(options or {}).get("scenario"))
+        scenario = self.engine.scenario
         self._states = {
-            role: policy.initial_state(policy_seed(self.duo.scenario.seed, role), self.duo.town)
+            role: policy.initial_state(policy_seed(scenario.seed, role), self.engine.town)
             for role, policy in self.partners.items()
         }
-        return self._observations[self.role], infos[self.role]
+        self._render_window()
+        return observations[self.role], self.engine.info(self.role)
 
     def step(self, action: Mapping[str, Any]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Plays one decision of all roles.
 
         Raises:
             ValueError: the action is malformed; the message names the field.
-            gymnasium.error.ResetNeeded: no session is being played.
+            gymnasium.error.ResetNeeded: no session is in progress.
         """
-        if not self.duo.agents:
+        if not self._states or self.engine.over:
             raise ResetNeeded("no session is being played: call reset() first")
+        observations = self.engine.observations.of()
         actions: dict[str, Mapping[str, Any]] = {self.role: action}
         for role, policy in self.partners.items():
-            actions[role], self._states[role] = policy.step(self._observations[role], self._states[role])
-        self._observations, rewards, terminations, truncations, infos = self.duo.step(actions)
-        terminated, truncated, info = terminations[self.role], truncations[self.role], infos[self.role]
-        if terminated or truncated:
-            info["is_success"] = bool(self.duo.summary()["success"])
-        return self._observations[self.role], rewards[self.role], terminated, truncated, info
+            actions[role], self._states[role] = policy.step(observations[role], self._states[role])
+        outcome = self.engine.step(actions)
+        terms = outcome.reward_terms[self.role]
+        info = self.engine.info(self.role, terms)
+        if self.engine.over:
+            info["is_success"] = self.engine.session.success
+        self._render_window()
+        reward = float(sum(terms.values()))
+        return self.engine.observations[self.role], reward, outcome.terminated, outcome.truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draws the aerial view, see `DuoWizardEnv.render`."""
-        return self.duo.render()
+        return self._view.render(self.engine.session)
+
+    def _render_window(self) -> None:
+        if self.render_mode == "human":
+            self.render()
 
     def close(self) -> None:
         """Closes the window, if there is one."""
-        self.duo.close()
+        self._view.close()
 
     def _cast(self, wanted: Mapping[str, str | Policy[Any]]) -> dict[Role, Policy[Any]]:
         others = [role for role in AGENT_ROLES if role is not self.role]
@@ -139,9 +154,9 @@ class SingleRole(gym.Env[Observation, ActionDict]):
         cast: dict[Role, Policy[Any]] = {}
         for role in others:
             policy = wanted.get(role, "scripted")
-            cast[role] = make_policy(policy, role, self.duo.limits) if isinstance(policy, str) else policy
+            cast[role] = make_policy(policy, role, self.engine.limits) if isinstance(policy, str) else policy
             if cast[role].role is not role:
                 raise ValueError(f"partners has a policy of {cast[role].role} for {role}")
-            if cast[role].limits != self.duo.limits:
-                raise ValueError(f"the policy of {role} has other SpaceLimits than the town's: {self.duo.limits}")
+            if cast[role].limits != self.engine.limits:
+                raise ValueError(f"the policy of {role} has other SpaceLimits than the town's: {self.engine.limits}")
         return cast

@@ -1,4 +1,4 @@
-"""Playing a recorded session again from its seed and what the roles decided."""
+"""Replay of a recorded session from its seed and the recorded actions of the roles."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 from dorothie_gym.engine.config import EnvConfig, RewardWeights
 from dorothie_gym.engine.recorder import SessionRecorder, expand, idle_actions
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
-from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import Town
 from dorothie_gym.recording import Session, SessionHeader, SessionWriter
@@ -19,88 +19,92 @@ from dorothie_gym.spaces import ActionDict, Observation
 from dorothie_gym.tasks import StoryboardTemplate, load_template, template_names
 
 Observations: TypeAlias = Mapping[str, Observation]
-"""What each role observes."""
+"""Observation of each agent."""
 
 Actions: TypeAlias = Mapping[str, ActionDict]
-"""What each role does."""
+"""Action of each agent."""
 
 
 def resimulate(session: Session, town: Town, *, storyboard: StoryboardTemplate | None = None) -> Session:
-    """Plays a session again: the world from its seed, the roles as they decided then.
+    """Simulates a session again: the world from its seed, the roles from their recorded actions.
 
     Args:
-        session: one that this package has recorded, whole or cut off; it is played as far as it was recorded.
-        town: the town that it was played in.
-        storyboard: its storyboard's template, where that is none of those that are shipped.
+        session: session that this package has recorded, complete or interrupted; it is simulated to its last frame.
+        town: town of the session.
+        storyboard: template of the storyboard, if it is not shipped.
 
     Returns:
-        What is recorded now; `first_difference` compares the two.
+        The new record; `first_difference` compares the two.
 
     Raises:
-        SessionError: what the roles decided is not known, or the seed gives another session in this town, or an action
-            cannot be taken.
+        SessionError: the session has no recorded actions, the seed gives another session in this town, or an action is
+            malformed.
     """
-    env, observations = _begin(session, town, storyboard)
+    engine = _begin(session, town, storyboard)
     with tempfile.TemporaryDirectory(prefix="dorothie_gym-") as folder:
-        with SessionWriter(Path(folder) / "again", env.session_header()) as writer:
-            recorder = SessionRecorder(env, writer)
-            for _, actions in _play(env, session, observations):
+        with SessionWriter(Path(folder) / "again", engine.session_header()) as writer:
+            recorder = SessionRecorder(engine, writer)
+            for actions in _decided_actions(engine, session):
+                _step(engine, session, actions)
                 recorder.record(actions)
-            if not env.agents:
-                writer.finish(env.summary())
+            if engine.over:
+                writer.finish(engine.summary())
         return Session.load(Path(folder) / "again")
 
 
 def watch_session(
     session: Session, town: Town, *, storyboard: StoryboardTemplate | None = None
 ) -> Iterator[tuple[Observations, Actions]]:
-    """Plays a session again, and yields what the roles observed at each decision with what they did.
+    """Simulates a session again, and yields the observations and the actions of the roles at each decision.
 
     Args:
-        session: one that this package has recorded.
-        town: the town that it was played in.
-        storyboard: its storyboard's template, where that is none of those that are shipped.
+        session: session that this package has recorded.
+        town: town of the session.
+        storyboard: template of the storyboard, if it is not shipped.
 
     Raises:
         SessionError: see `resimulate`.
     """
-    env, observations = _begin(session, town, storyboard)
-    yield from _play(env, session, observations)
+    engine = _begin(session, town, storyboard)
+    for actions in _decided_actions(engine, session):
+        observations = engine.observations.of()
+        _step(engine, session, actions)
+        yield observations, actions
 
 
-def _begin(
-    session: Session, town: Town, storyboard: StoryboardTemplate | None
-) -> tuple[DuoWizardEnv, Observations]:  # fmt: skip
-    """The environment as the session began, and what was observed then."""
+def _begin(session: Session, town: Town, storyboard: StoryboardTemplate | None) -> SessionEngine:
+    """Returns an engine in the state in which the session began."""
     if session.decisions is None:
         raise SessionError(f"{session.name}: what the roles decided was not recorded; it cannot be played again")
     if session.header.seed is None:
         raise SessionError(f"{session.name}: has no seed; it cannot be played again")
     config = _config(session.header)
-    env = DuoWizardEnv(town, config=config, max_cycles=_cycles(session, config))
-    observations, _ = env.reset(options={"scenario": _scenario(session, town, storyboard)})
-    return env, observations
+    engine = SessionEngine(town, config=config, max_cycles=_cycles(session, config))
+    engine.reset(scenario=_scenario(session, town, storyboard))
+    return engine
 
 
-def _play(env: DuoWizardEnv, session: Session, observations: Observations) -> Iterator[tuple[Observations, Actions]]:
-    """Yields, after each decision, what was observed before it and what was done."""
+def _decided_actions(engine: SessionEngine, session: Session) -> Iterator[Actions]:
+    """Yields the recorded actions at each decision, as long as there is a recorded frame after it."""
     decided = {decision.frame: decision for decision in session.decisions or ()}
-    idle = idle_actions(env.limits)
+    idle = idle_actions(engine.limits)
     last = int(session.trajectory["frame"][-1]) if len(session.trajectory) else 0
-    world = env.stage.world
-    while env.agents and world.frame < last:
+    world = engine.session.world
+    while not engine.over and world.frame < last:
         decision = decided.get(world.frame)
-        actions = idle if decision is None else expand(decision, env.limits)
-        before = observations
-        try:
-            observations, *_ = env.step(actions)
-        except ValueError as error:
-            raise SessionError(f"{session.name}: decision at frame {world.frame}: {error}") from None
-        yield before, actions
+        yield idle if decision is None else expand(decision, engine.limits)
+
+
+def _step(engine: SessionEngine, session: Session, actions: Actions) -> None:
+    frame = engine.session.world.frame
+    try:
+        engine.step(actions)
+    except ValueError as error:
+        raise SessionError(f"{session.name}: decision at frame {frame}: {error}") from None
 
 
 def _cycles(session: Session, config: EnvConfig) -> int | None:
-    """After how many decisions the session was cut off, where its configuration does not tell."""
+    """Returns the number of decisions after which the session was truncated, where its configuration does not say."""
     summary = session.summary or {}
     if not session.complete or summary.get("reason") != "out of time" or not len(session.trajectory):
         return None
@@ -108,7 +112,7 @@ def _cycles(session: Session, config: EnvConfig) -> int | None:
 
 
 def _scenario(session: Session, town: Town, storyboard: StoryboardTemplate | None) -> Scenario:
-    """What the session began with, drawn again; with the storyboard drawn too, or given as it may have been."""
+    """Returns the scenario of the session, drawn again with a drawn storyboard or with a given one."""
     header = session.header
     assert header.seed is not None
     templates: list[StoryboardTemplate | None] = [storyboard]
@@ -120,7 +124,7 @@ def _scenario(session: Session, town: Town, storyboard: StoryboardTemplate | Non
             return scenario
     if storyboard is None and header.storyboard not in template_names():
         raise SessionError(f"{session.name}: the storyboard {header.storyboard!r} is not shipped; give its file")
-    return drawn[-1]  # its header differs, and the comparison tells where
+    return drawn[-1]  # the comparison reports the difference of the headers
 
 
 def _fits(scenario: Scenario, header: SessionHeader) -> bool:
@@ -136,7 +140,7 @@ def _fits(scenario: Scenario, header: SessionHeader) -> bool:
 
 
 def _config(header: SessionHeader) -> EnvConfig:
-    """The environment's configuration that a header tells of."""
+    """Returns the configuration in a header."""
     values: dict[str, Any] = dict(header.config)
     try:
         world, rewards = values.pop("world", {}), values.pop("rewards", {})

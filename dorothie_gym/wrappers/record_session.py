@@ -91,7 +91,7 @@ class RecordSession(BaseParallelWrapper):
         self._session_folder = self.folder / self._name(header)
         self._writer = SessionWriter(self._session_folder, header, overwrite=self._overwrite)
         if isinstance(self.env.unwrapped, DuoWizardEnv):
-            self._recorder = SessionRecorder(self.env.unwrapped, self._writer)
+            self._recorder = SessionRecorder(self.env.unwrapped.engine, self._writer)
         else:
             self._append()
         return result

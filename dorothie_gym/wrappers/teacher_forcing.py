@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.engine.recorder import LightStates, actors_around
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.envs.point_env import PointEnv
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
@@ -20,7 +21,6 @@ from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.recording import Event, Point, Scene, SceneTable, Session, Task, task_points, trajectory_of
 from dorothie_gym.recording.surroundings import Rows, light_rows, weather_rows
 from dorothie_gym.spaces import SpaceLimits, StepInfo
-from dorothie_gym.wrappers.point_env import PointEnv
 
 AnyPolicy: TypeAlias = Policy[Any]
 """Policy whose state type is not known statically."""
@@ -48,7 +48,7 @@ class TeacherForcing(PointEnv):
     start=-180) [degrees, positive left].
 
     ## Rewards
-    The mean of `info["reward_terms"]`, see `dorothie_gym.wrappers.point_env`.
+    The mean of `info["reward_terms"]`, see `dorothie_gym.envs.point_env`.
 
     ## Episode End
     Terminates at the end of the session; one episode is one session. Sessions without a point are skipped.
@@ -147,7 +147,7 @@ class _Record:
 
     def append(self) -> bool:
         """Adds the last decision; returns whether it may contain a point."""
-        events, rows, world = self._env.last_events, self._env.last_frames, self._env.stage.world
+        events, rows, world = self._env.last_events, self._env.last_frames, self._env.session.world
         self._events += events
         self._rows.append(rows.copy())
         if len(rows) and rows[-1, 0] == world.frame:

@@ -53,7 +53,7 @@ def test_a_session_goes_on_after_its_end() -> None:
     session = Session("brookside", 0, 0, 0)
     session.env.agents = []
     assert session.seconds(3, time.perf_counter) > 0.0
-    assert session.env.agents and session.env.stage.world.time == 1.5
+    assert session.env.agents and session.env.session.world.time == 1.5
 
 
 def test_the_stock_intersection_begins_anew_after_an_episode() -> None:

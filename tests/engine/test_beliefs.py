@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dorothie_gym.engine.beliefs import Beliefs
+from dorothie_gym.engine.beliefs import BeliefTracker
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
@@ -64,19 +64,19 @@ LANDMARKS = SCENARIO.storyboard.landmarks
 STREET = SCENARIO.street_names[HIDDEN.street]
 
 
-def beliefs() -> Beliefs:
-    return Beliefs(TOWN, SCENARIO)
+def beliefs() -> BeliefTracker:
+    return BeliefTracker(TOWN, SCENARIO)
 
 
-def told(held: Beliefs, move: DialogueMove, *values: SlotValue, by: Role = Role.PARTICIPANT) -> None:
+def told(held: BeliefTracker, move: DialogueMove, *values: SlotValue, by: Role = Role.PARTICIPANT) -> None:
     held.hear(by, [DialogueAct.of(move, *values)])
 
 
-def mark(held: Beliefs, lane: int, station: float, pose: np.ndarray = FAR, sight: float = 80.0) -> None:
+def mark(held: BeliefTracker, lane: int, station: float, pose: np.ndarray = FAR, sight: float = 80.0) -> None:
     held.guess(HIDDEN.name, lane, station, pose=pose, covariance=SURE, sight=sight)
 
 
-def spread(held: Beliefs) -> float:
+def spread(held: BeliefTracker) -> float:
     return float(np.trace(np.array(held.places[HIDDEN.name].covariance)))
 
 
@@ -167,7 +167,7 @@ def test_hidden_places_do_not_show_in_what_is_believed() -> None:
     other = replace(SCENARIO, storyboard=replace(SCENARIO.storyboard, landmarks=moved))
     found = []
     for scenario in (SCENARIO, other):
-        held = Beliefs(TOWN, scenario)
+        held = BeliefTracker(TOWN, scenario)
         told(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET, KNOWN.name)
         found.append(held.places)
     assert found[0] == found[1]

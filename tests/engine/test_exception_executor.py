@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dorothie_gym.engine.exception_executor import FROM_CAR, Adversary
+from dorothie_gym.engine.exception_executor import FROM_CAR, ExceptionExecutor
 from dorothie_gym.engine.scenario import draw_scenario
 from dorothie_gym.maps import LinkType, Town
 from dorothie_gym.maps.lane_neighbours import oncoming_lanes
@@ -21,11 +21,11 @@ from dorothie_gym.tasks import TaskState
 from tests.sim.driving import network, run, world_at
 
 
-def adversary_in(name: str = "brookside", props: int = 16, vehicles: int = 0) -> tuple[World, Adversary]:
+def adversary_in(name: str = "brookside", props: int = 16, vehicles: int = 0) -> tuple[World, ExceptionExecutor]:
     town = network(name).town
     scenario = draw_scenario(town, None, 3)
     world = world_at(name, *scenario.departure, WorldConfig(vehicles=vehicles, pedestrians=0))
-    return world, Adversary(world, TaskState(scenario.storyboard), props)
+    return world, ExceptionExecutor(world, TaskState(scenario.storyboard), props)
 
 
 def place(lane: int, metres: float, kind: ExceptionKind = ExceptionKind.PLACE_PROP, **fields: Any) -> AdWizardAction:
@@ -37,7 +37,7 @@ def crowd_of(world: World, kind: ExceptionKind) -> list[Any]:
     return list(world.actors.vehicles if kind is ExceptionKind.SPAWN_VEHICLES else world.actors.pedestrians)
 
 
-def free_place(world: World, adversary: Adversary) -> AdWizardAction:
+def free_place(world: World, adversary: ExceptionExecutor) -> AdWizardAction:
     for lane in world.town.lanes:
         for metres in range(30, int(lane.length) - 8, 5):
             action = place(lane.id, metres)
@@ -49,16 +49,16 @@ def free_place(world: World, adversary: Adversary) -> AdWizardAction:
 def test_prop_is_placed_moved_and_deleted() -> None:
     world, adversary = adversary_in()
     action = free_place(world, adversary)
-    outcome = adversary.carry_out(action)
+    outcome = adversary.execute(action)
     assert isinstance(outcome, dict)
     assert (outcome["lane"], outcome["station"]) == (action.place.lane, action.place.metres)
     further = place(action.place.lane, action.place.metres + 1, ExceptionKind.MOVE_PROP, item=0)
-    assert isinstance(adversary.carry_out(further), dict)
+    assert isinstance(adversary.execute(further), dict)
     assert [prop.station for prop in world.actors.props] == [action.place.metres + 1]
-    assert isinstance(adversary.carry_out(AdWizardAction(exception=ExceptionKind.DELETE_PROP, item=0)), dict)
+    assert isinstance(adversary.execute(AdWizardAction(exception=ExceptionKind.DELETE_PROP, item=0)), dict)
     assert world.actors.props == []
     for kind in (ExceptionKind.DELETE_PROP, ExceptionKind.MOVE_PROP):
-        assert adversary.carry_out(AdWizardAction(exception=kind, item=0)) == "there is no prop 0"
+        assert adversary.execute(AdWizardAction(exception=kind, item=0)) == "there is no prop 0"
 
 
 def test_prop_is_refused_with_the_reason() -> None:
@@ -78,7 +78,7 @@ def test_prop_is_refused_with_the_reason() -> None:
     if 30 < ahead < town.lanes[lane].length - 8:
         cases[place(lane, ahead)] = "it would appear inside the car's stopping distance"
     for action, reason in cases.items():
-        outcome = adversary.carry_out(action)
+        outcome = adversary.execute(action)
         assert isinstance(outcome, str)
         assert reason in outcome
     assert world.actors.props == []
@@ -86,8 +86,8 @@ def test_prop_is_refused_with_the_reason() -> None:
 
 def test_no_more_props_than_fit() -> None:
     world, adversary = adversary_in(props=1)
-    assert isinstance(adversary.carry_out(free_place(world, adversary)), dict)
-    assert adversary.carry_out(place(0, 50)) == "there are 1 props already"
+    assert isinstance(adversary.execute(free_place(world, adversary)), dict)
+    assert adversary.execute(place(0, 50)) == "there are 1 props already"
 
 
 def search_sites(town: Town, start: tuple[int, float], blocks: dict[int, list[float]]) -> set[int]:
@@ -133,7 +133,7 @@ def test_no_place_is_ever_cut_off(name: str) -> None:
     assert before == {site.id for site in town.sites}
     for _ in range(400):
         lane = int(rng.integers(len(town.lanes)))
-        adversary.carry_out(place(lane, rng.uniform(0, town.lanes[lane].length)))
+        adversary.execute(place(lane, rng.uniform(0, town.lanes[lane].length)))
     assert len(world.actors.props) >= 2
     blocks: dict[int, list[float]] = {}
     for prop in world.actors.props:
@@ -146,16 +146,16 @@ def test_no_place_is_ever_cut_off(name: str) -> None:
 def test_weather_changes_once() -> None:
     world, adversary = adversary_in()
     action = AdWizardAction(exception=ExceptionKind.WEATHER, weather=WeatherParameter.FOG_DENSITY, share=0.5)
-    assert adversary.carry_out(action) == {"parameter": str(WeatherParameter.FOG_DENSITY), "value": 50.0}
-    assert adversary.carry_out(action) == f"{WeatherParameter.FOG_DENSITY} is 50 already"
+    assert adversary.execute(action) == {"parameter": str(WeatherParameter.FOG_DENSITY), "value": 50.0}
+    assert adversary.execute(action) == f"{WeatherParameter.FOG_DENSITY} is 50 already"
     assert world.weather.values[WeatherParameter.FOG_DENSITY] == 50.0
 
 
 def test_fault_ends_by_itself_after_half_a_minute() -> None:
     world, adversary = adversary_in()
     action = AdWizardAction(exception=ExceptionKind.SENSOR_FAULT, sensor=Sensor.GPS, on=True)
-    assert adversary.carry_out(action) == {"sensor": str(Sensor.GPS), "on": True}
-    assert isinstance(adversary.carry_out(action), str)
+    assert adversary.execute(action) == {"sensor": str(Sensor.GPS), "on": True}
+    assert isinstance(adversary.execute(action), str)
     run(world, 29.5)
     assert Sensor.GPS in world.faults
     run(world, 1.0)
@@ -166,8 +166,8 @@ def test_fault_ends_by_itself_after_half_a_minute() -> None:
 def test_spawning_tells_how_many_came_and_keeps_away_from_the_car(kind: ExceptionKind) -> None:
     world, adversary = adversary_in()
     lane = max((lane for lane in world.town.lanes if not lane.in_junction), key=lambda lane: lane.length)
-    assert adversary.carry_out(place(lane.id, 20, kind)) == "nobody was to come: count is 0"
-    outcome = adversary.carry_out(place(lane.id, lane.length / 2, kind, count=8, extent=80))
+    assert adversary.execute(place(lane.id, 20, kind)) == "nobody was to come: count is 0"
+    outcome = adversary.execute(place(lane.id, lane.length / 2, kind, count=8, extent=80))
     assert isinstance(outcome, dict)
     assert outcome["asked"] == 8
     crowd = crowd_of(world, kind)
@@ -185,10 +185,10 @@ def test_as_many_are_spawned_as_fit_and_then_nobody(kind: ExceptionKind, extent:
     world, adversary = adversary_in("midtown")
     far = [lane for lane in world.town.lanes if np.hypot(*(lane.position(40.0) - world.car.position)) > 120.0]
     lane = max((lane for lane in far if not lane.in_junction), key=lambda lane: lane.length)
-    counts, outcome = [], adversary.carry_out(place(lane.id, lane.length / 2, kind, count=16, extent=extent))
+    counts, outcome = [], adversary.execute(place(lane.id, lane.length / 2, kind, count=16, extent=extent))
     while isinstance(outcome, dict):
         counts.append(outcome["count"])
-        outcome = adversary.carry_out(place(lane.id, lane.length / 2, kind, count=16, extent=extent))
+        outcome = adversary.execute(place(lane.id, lane.length / 2, kind, count=16, extent=extent))
     assert outcome in ("there is no room for anybody in the rectangle", "there are 30 of them in the town already")
     crowd = crowd_of(world, kind)
     assert sum(counts) == len(crowd)
@@ -201,7 +201,7 @@ def test_no_vehicle_is_spawned_on_a_waypoint() -> None:
     world, adversary = adversary_in()
     site = max(world.town.sites, key=lambda site: np.hypot(*(np.array(site.waypoint) - world.car.position)))
     action = place(site.lane, site.station, ExceptionKind.SPAWN_VEHICLES, count=16, extent=60)
-    assert isinstance(adversary.carry_out(action), dict)
+    assert isinstance(adversary.execute(action), dict)
     for vehicle in world.actors.vehicles:
         for site in world.town.sites:
             assert vehicle.lane_id != site.lane or np.hypot(*(vehicle.position - np.array(site.waypoint))) >= 7.5
@@ -227,12 +227,12 @@ def test_two_props_block_all_lanes_of_a_direction_where_there_is_room_to_turn_ro
         if lane.in_junction or beside is None or lane.length < 90.0:
             continue
         # the car comes to the one, changes lanes, and comes to the other
-        if not isinstance(adversary.carry_out(place(lane.id, 40.0)), dict):
+        if not isinstance(adversary.execute(place(lane.id, 40.0)), dict):
             continue
         across = town.lanes[beside].project(lane.position(40.0))[0]
         for staggered in (-18.0, 12.0):
-            assert isinstance(adversary.carry_out(place(beside, across + staggered)), str)
-        put += isinstance(adversary.carry_out(place(beside, across + 28.0)), dict)
+            assert isinstance(adversary.execute(place(beside, across + staggered)), str)
+        put += isinstance(adversary.execute(place(beside, across + 28.0)), dict)
     assert put >= 1
 
 
@@ -240,12 +240,12 @@ def test_prop_kinds_stand_as_they_are() -> None:
     world, adversary = adversary_in()
     for kind in PropKind:
         action = free_place(world, adversary)
-        outcome = adversary.carry_out(place(action.place.lane, action.place.metres, prop=kind))
+        outcome = adversary.execute(place(action.place.lane, action.place.metres, prop=kind))
         assert isinstance(outcome, dict)
         assert outcome["prop"] == str(kind)
 
 
 def test_empty_message_is_refused() -> None:
     _, adversary = adversary_in()
-    assert adversary.carry_out(AdWizardAction(exception=ExceptionKind.MESSAGE)) == "the message is empty"
-    assert adversary.carry_out(AdWizardAction(exception=ExceptionKind.MESSAGE, message="Hurry")) == {}
+    assert adversary.execute(AdWizardAction(exception=ExceptionKind.MESSAGE)) == "the message is empty"
+    assert adversary.execute(AdWizardAction(exception=ExceptionKind.MESSAGE, message="Hurry")) == {}

@@ -5,8 +5,9 @@ import copy
 import numpy as np
 import pytest
 
-from dorothie_gym.engine.masks import Masks
+from dorothie_gym.engine.masks import ActionMasks
 from dorothie_gym.engine.scenario import draw_scenario
+from dorothie_gym.engine.upcoming_junction import UpcomingJunction
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, ExceptionKind, PhysicalAction, PropKind, Role
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.world import World
@@ -15,12 +16,12 @@ from dorothie_gym.tasks import TaskState
 from tests.sim.driving import network, world_at
 
 
-def in_town(name: str) -> tuple[World, Masks, SpaceLimits]:
+def in_town(name: str) -> tuple[World, ActionMasks, SpaceLimits]:
     town = network(name).town
     scenario = draw_scenario(town, None, 4)
     world = world_at(name, *scenario.departure, WorldConfig(vehicles=4, pedestrians=0))
     limits = SpaceLimits()
-    return world, Masks(world, TaskState(scenario.storyboard), limits), limits
+    return world, ActionMasks(world, TaskState(scenario.storyboard), limits, UpcomingJunction(world)), limits
 
 
 def fitting_angles(world: World, action: PhysicalAction, angles: list[int]) -> list[int]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.path_measurements import Bearings
+from dorothie_gym.engine.path_measurements import EgoMeasurements
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import Role, Sensor
 from dorothie_gym.sim.config import WorldConfig
@@ -24,7 +24,7 @@ def drifted_env(shift: tuple[float, float, float] = (0.0, 0.0, 0.0), vehicles: i
     env.reset(seed=0)  # which begins more than 100 m before a junction
     for _ in range(6):
         env.step({agent: noop(Role(agent), env.limits) for agent in env.agents})
-    world = env.stage.world
+    world = env.session.world
     world.set_fault(Sensor.GPS, True)
     x, y, heading = (float(v) for v in (*world.car.position, world.car.heading))
     ahead, right, turn = shift
@@ -34,17 +34,17 @@ def drifted_env(shift: tuple[float, float, float] = (0.0, 0.0, 0.0), vehicles: i
 
 
 def seen(env: DuoWizardEnv) -> dict[str, Any]:
-    return env.stage.observe(Role.CO_WIZARD)
+    return env.session.observe(Role.CO_WIZARD)
 
 
 def test_with_an_exact_estimate_everything_is_where_it_is() -> None:
     env = drifted_env()
-    view, truth = seen(env), env.stage.observe(Role.AD_WIZARD)
+    view, truth = seen(env), env.session.observe(Role.AD_WIZARD)
     # the planner's own place is that of a frame ago
     np.testing.assert_allclose(view["waypoints"], truth["waypoints"], atol=0.35)
-    watched = env.stage.observe(Role.PARTICIPANT)
+    watched = env.session.observe(Role.PARTICIPANT)
     np.testing.assert_allclose(view["objects"], watched["objects"], atol=1e-6)
-    _, distance = env.stage.world.planner.exits()
+    _, distance = env.session.world.planner.exits()
     assert view["exits"][0, ExitColumn.DISTANCE] == pytest.approx(distance, abs=0.35)
 
 
@@ -62,7 +62,7 @@ def test_waypoints_and_exits_follow_the_estimate_along_the_road(ahead: float) ->
 def test_objects_are_seen_around_the_estimated_pose() -> None:
     shift = (3.0, -2.0, 0.1)
     env = drifted_env(shift, vehicles=40)
-    view, world = seen(env), env.stage.world
+    view, world = seen(env), env.session.world
     rows = view["objects"][view["objects"][:, KINDS] > 0]
     assert len(rows)
     for row, body in zip(rows, world.perceived(), strict=False):
@@ -81,7 +81,7 @@ def test_objects_are_seen_around_the_estimated_pose() -> None:
 def test_nothing_in_the_observation_is_at_its_true_place(shift: tuple[float, float, float]) -> None:
     """No point shown lies where the true pose would put it."""
     env = drifted_env(shift)
-    view, truth = seen(env), env.stage.observe(Role.AD_WIZARD)
+    view, truth = seen(env), env.session.observe(Role.AD_WIZARD)
     assert np.hypot(*(view["waypoints"] - truth["waypoints"]).T).max() > 1.0
     assert np.hypot(*(view["waypoints"][:5] - truth["waypoints"][:5]).T).min() > 1.0
     assert abs(view["station"][0] - truth["station"][0]) > 1.0
@@ -89,11 +89,11 @@ def test_nothing_in_the_observation_is_at_its_true_place(shift: tuple[float, flo
 
 def test_waypoints_go_on_straight_before_the_start_of_the_path() -> None:
     env = drifted_env()
-    world = env.stage.world
+    world = env.session.world
     start = world.planner.path.position_at(0.0)
     heading = world.planner.path.heading_at(0.0)
     world.localizer._mean[:2] = start[0] - 20 * math.cos(heading), start[1] - 20 * math.sin(heading)
-    bearings = Bearings(world)
+    bearings = EgoMeasurements(world)
     believed = np.zeros((3, 2))
     bearings.write_path(5.0, np.zeros((3, 2)), np.zeros(3, dtype=np.int64), believed)
     assert bearings.progress == pytest.approx(-20.0, abs=0.2)
@@ -104,7 +104,7 @@ def test_waypoints_go_on_straight_before_the_start_of_the_path() -> None:
 def test_half_a_minute_without_gps_drifts_and_gps_brings_it_back() -> None:
     env = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=0, pedestrians=0)))
     env.reset(seed=8)
-    world = env.stage.world
+    world = env.session.world
     world.set_fault(Sensor.GPS, True)
     for _ in range(60):
         world.step(15)
@@ -120,7 +120,7 @@ def test_half_a_minute_without_gps_drifts_and_gps_brings_it_back() -> None:
 def test_a_fault_ends_within_half_a_minute_however_long_decisions_are(frames: int) -> None:
     env = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=0, pedestrians=0)))
     env.reset(seed=8)
-    world = env.stage.world
+    world = env.session.world
     world.set_fault(Sensor.GPS, True)
     while world.frame < 900:
         assert Sensor.GPS in world.faults

@@ -33,9 +33,9 @@ def test_idle_actions_leave_nothing_to_write() -> None:
 def test_everybody_around_the_car_is_recorded_once() -> None:
     env = DuoWizardEnv("brookside")
     env.reset(seed=3)
-    actors = env.stage.world.actors
+    actors = env.session.world.actors
     actors.add_prop(next(iter(PropKind)), 3, 20.0)
-    rows = actors_around(env.stage.world)
+    rows = actors_around(env.session.world)
     expected = {
         (body.key, body.position[0], body.position[1], body.heading, body.speed, body.LENGTH, body.WIDTH)
         for body in (*actors.vehicles, *actors.pedestrians, *actors.props)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.exception_executor import Adversary
+from dorothie_gym.engine.exception_executor import ExceptionExecutor
 from dorothie_gym.engine.scenario import draw_scenario
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind, PropKind, Role, Sensor
@@ -71,11 +71,11 @@ def play_standing(name: str, seed: int, actions: int) -> int:
     """A car stands at a random place while the Ad-Wizard does what it can; returns how many props were put."""
     rng = np.random.default_rng([seed, TOWNS.index(name)])
     world = car_anywhere(name, rng)
-    adversary = Adversary(world, TaskState(draw_scenario(world.town, None, seed).storyboard), 16)
+    adversary = ExceptionExecutor(world, TaskState(draw_scenario(world.town, None, seed).storyboard), 16)
     put = 0
     for _ in range(actions):
         action = random_action(world, rng)
-        outcome = adversary.carry_out(action)
+        outcome = adversary.execute(action)
         if isinstance(outcome, dict) and action.exception.is_plan_level:
             put += 1
             assert unreachable(world) == set(), f"{name}, seed {seed}: {action}"
@@ -101,13 +101,13 @@ def play_driving(name: str, seed: int, seconds: float) -> tuple[int, int]:
         actions: dict[str, Any] = {}
         for role, policy in policies.items():
             actions[str(role)], states[role] = policy.step(observations[str(role)], states[role])
-        action = random_action(env.stage.world, rng)
+        action = random_action(env.session.world, rng)
         actions[str(Role.AD_WIZARD)] = action.encode(env.limits)
         observations, *_ = env.step(actions)
         done = any(event.type.value == "Exception" for event in env.last_events)
         put += done and action.exception.is_plan_level
-        if env.stage.world.actors.props:
-            assert unreachable(env.stage.world) == set(), f"{name}, seed {seed}, {env.stage.world.time} s: {action}"
+        if env.session.world.actors.props:
+            assert unreachable(env.session.world) == set(), f"{name}, seed {seed}, {env.session.world.time} s: {action}"
     return put, env.summary()["exceptions"]
 
 
@@ -132,9 +132,9 @@ def play_session_at_random(seed: int, seconds: float) -> tuple[int, int]:
         for role, policy in scripted.items():
             actions[str(role)], states[role] = policy.step(observations[str(role)], states[role])
         if rng.random() < 0.5:
-            actions[str(Role.AD_WIZARD)] = random_action(env.stage.world, rng).encode(env.limits)
+            actions[str(Role.AD_WIZARD)] = random_action(env.session.world, rng).encode(env.limits)
         observations, _, _, _, infos = env.step(actions)
-        world = env.stage.world
+        world = env.session.world
         assert np.isfinite(world.frames).all()
         if world.actors.props:
             blocked += 1

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dorothie_gym.engine.path_measurements import Bearings
-from dorothie_gym.engine.upcoming_junction import Prospect
+from dorothie_gym.engine.path_measurements import EgoMeasurements
+from dorothie_gym.engine.upcoming_junction import UpcomingJunction
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.spaces import ExitColumn
 from tests.sim.driving import network, world_at
@@ -17,7 +17,7 @@ def test_options_and_lanes_ahead_are_those_of_the_planner(name: str) -> None:
         lane for lane in town.lanes if not lane.in_junction and lane.length > 60.0 and len(town.exits(lane.id)) > 1
     )
     world = world_at(name, start.id, 5.0)
-    prospect, rng = Prospect(world), np.random.default_rng(4)
+    prospect, rng = UpcomingJunction(world), np.random.default_rng(4)
     counts = set()
     for _ in range(60):
         exits, distance = world.planner.exits()
@@ -27,7 +27,7 @@ def test_options_and_lanes_ahead_are_those_of_the_planner(name: str) -> None:
         assert options.rows[:, ExitColumn.ANGLE].tolist() == [way.angle for way in exits]
         lanes = np.zeros(12, dtype=np.int64)
         waypoints = np.zeros((20, 2))
-        Bearings(world).write_path(5.0, waypoints, lanes, np.zeros((20, 2)))
+        EgoMeasurements(world).write_path(5.0, waypoints, lanes, np.zeros((20, 2)))
         ahead = world.planner.lanes_ahead[:12]
         assert lanes[: len(ahead)].tolist() == [lane + 1 for lane in ahead]
         assert not lanes[len(ahead) :].any()

@@ -135,7 +135,7 @@ def test_participant_does_not_see_subgoals_that_are_not_triggered_yet(env: DuoWi
     checked = 0
     for seed in range(12):
         observations = play_in_silence(env, seed, decisions=1)[-1]
-        task, participant = env.stage.task, observations["participant"]
+        task, participant = env.session.task, observations["participant"]
         for i, subgoal in enumerate(env.scenario.storyboard.subgoals):
             if i in task.live:
                 assert participant["subgoals"][i, SubgoalColumn.LIVE]

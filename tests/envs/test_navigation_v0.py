@@ -53,7 +53,7 @@ def test_episode_is_truncated_at_time_limit() -> None:
     env = NavigationEnv(max_seconds=12.0)
     info = drive(env, follow_lane, 1)
     assert info["reason"] == "out of time"
-    assert env.drive.stage.world.time == pytest.approx(12.0)
+    assert env.drive.session.world.time == pytest.approx(12.0)
     assert env.drive.truncated and not env.drive.terminated
 
 
@@ -94,7 +94,7 @@ def test_masked_actions_are_not_refused(settings: dict[str, Any]) -> None:
 
 def test_planned_turn_may_be_repeated(env: NavigationEnv) -> None:
     env.reset(seed=0)
-    planner, again = env.drive.stage.world.planner, 0
+    planner, again = env.drive.session.world.planner, 0
     for _ in range(60):
         turns = np.flatnonzero(env.action_masks()[NavigationAction.turn(0) :])
         planned = planner.turn_ahead
@@ -125,7 +125,7 @@ def test_progress_adds_up_to_decrease_of_cost_to_go(env: NavigationEnv) -> None:
     """Progress is a difference of potentials, so detours do not earn more."""
     env.reset(seed=0)
     left, rng, total = env.drive.instructor.cost_to_go, np.random.default_rng(1), 0.0
-    planner = env.drive.stage.world.planner
+    planner = env.drive.session.world.planner
     before = left.from_place(planner.lane, planner.station)
     for _ in range(40):
         _, _, _, _, info = env.step(rng.choice(np.flatnonzero(env.action_masks())))
@@ -144,10 +144,10 @@ def test_sparse_reward_is_given_for_subgoals_only() -> None:
 
 def test_scenario_of_seed_is_that_of_all_environments(env: NavigationEnv) -> None:
     env.reset(seed=17)
-    assert env.drive.stage.scenario == draw_scenario(env.town, None, 17)
+    assert env.drive.session.scenario == draw_scenario(env.town, None, 17)
     scenario = draw_scenario(env.town, None, 18)
     env.reset(seed=17, options={"scenario": scenario})
-    assert env.drive.stage.scenario == scenario
+    assert env.drive.session.scenario == scenario
     with pytest.raises(ValueError, match="scenario"):
         env.reset(options={"scenario": 3})
 
@@ -183,8 +183,8 @@ def test_named_places_off_the_map_are_not_revealed() -> None:
         observation, info = env.reset(seed=seed)
         for _ in range(150):
             goal = env.drive.instructor.goal
-            hidden = {mark.site for mark in env.drive.stage.scenario.storyboard.landmarks if mark.hidden}
-            place = {(mark.lane, mark.station): mark.site for mark in env.drive.stage.scenario.storyboard.landmarks}
+            hidden = {mark.site for mark in env.drive.session.scenario.storyboard.landmarks if mark.hidden}
+            place = {(mark.lane, mark.station): mark.site for mark in env.drive.session.scenario.storyboard.landmarks}
             if goal is not None:
                 is_hidden = place[goal.place] in hidden
                 seen[is_hidden] += 1
@@ -198,7 +198,7 @@ def test_named_places_off_the_map_are_not_revealed() -> None:
 def test_exceptions_happen_when_enabled() -> None:
     env = NavigationEnv(exceptions=4.0)
     drive(env, obey, 1)
-    assert env.drive.stage.counts["exceptions"] > 0
+    assert env.drive.session.counts["exceptions"] > 0
 
 
 def test_returned_objects_may_be_changed(env: NavigationEnv) -> None:

@@ -13,7 +13,10 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-from dorothie_gym.benchmark import NfDEnv, RfNEnv, TeacherForcedEnv, UfNEnv
+from dorothie_gym.envs.nfd_v0 import NfDEnv
+from dorothie_gym.envs.rfn_v0 import RfNEnv
+from dorothie_gym.envs.teacher_forced import TeacherForcedEnv
+from dorothie_gym.envs.ufn_v0 import UfNEnv
 from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import DialogueMove, PhysicalAction, Role
 from dorothie_gym.recording import Corpus

@@ -45,6 +45,6 @@ def test_lane_follow_drives_through_town_without_talking() -> None:
     policies = {role: make_policy("silent", role, env.limits) for role in AGENT_ROLES}
     lanes: set[int] = set()
     policies[Role.CO_WIZARD] = LaneFollowPolicy(env.limits)
-    play_session(env, policies, seed=3, on_step=lambda env: lanes.add(env.stage.world.planner.lane))
-    assert env.stage.counts["utterances"] == 0 and env.stage.counts["refusals"] == 0
+    play_session(env, policies, seed=3, on_step=lambda env: lanes.add(env.session.world.planner.lane))
+    assert env.session.counts["utterances"] == 0 and env.session.counts["refusals"] == 0
     assert len(lanes) >= 5

@@ -26,7 +26,7 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> tuple[Session, dict[int, S
     folder, scenes = tmp_path_factory.mktemp("seen") / "one", {}
 
     def look(env: DuoWizardEnv) -> None:
-        scenes[env.stage.world.frame] = scene_of(env.stage)
+        scenes[env.session.world.frame] = scene_of(env.session)
 
     env = DuoWizardEnv("brookside", config=EnvConfig(max_seconds=60.0))
     policies = {role: make_policy("scripted", role, env.limits) for role in AGENT_ROLES}

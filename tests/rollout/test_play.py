@@ -28,7 +28,7 @@ def players(env: DuoWizardEnv, name: str = "scripted") -> dict[Role, Policy[Any]
 
 def test_a_session_is_played_to_its_end(env: DuoWizardEnv) -> None:
     times: list[float] = []
-    summary = play_session(env, players(env), seed=1, on_step=lambda env: times.append(env.stage.world.time))
+    summary = play_session(env, players(env), seed=1, on_step=lambda env: times.append(env.session.world.time))
     assert times == pytest.approx([k / 2 for k in range(round(SECONDS * 2) + 1)])
     assert summary == env.summary()
     assert summary["seconds"] == SECONDS and summary["reason"] == "out of time"
@@ -52,7 +52,7 @@ def test_equal_seeds_play_equal_sessions(env: DuoWizardEnv, tmp_path: Path, name
 
 def test_an_interrupted_session_is_kept_up_to_its_last_decision(env: DuoWizardEnv, tmp_path: Path) -> None:
     def interrupt(env: DuoWizardEnv) -> None:
-        if env.stage.world.time >= 4.0:
+        if env.session.world.time >= 4.0:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

@@ -28,7 +28,7 @@ def test_nineteen_of_twenty_sessions_succeed_exceptions_included(town: str) -> N
     failures = []
     for seed in range(20):
         summary = play_session(env, policies, seed=seed)
-        assert len(env.stage.world.actors.vehicles) >= 8
+        assert len(env.session.world.actors.vehicles) >= 8
         if not summary["success"]:
             failures.append((seed, summary))
     assert len(failures) <= 1, failures

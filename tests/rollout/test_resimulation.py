@@ -55,7 +55,7 @@ def test_wrapper_records_what_is_needed_to_play_it_again(tmp_path: Path) -> None
 
 def test_session_that_was_cut_off_is_checked_as_far_as_it_goes(tmp_path: Path) -> None:
     def stop(env: DuoWizardEnv) -> None:
-        if env.stage.world.frame == 300:
+        if env.session.world.frame == 300:
             raise KeyboardInterrupt
 
     env = DuoWizardEnv("brookside")

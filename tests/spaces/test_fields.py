@@ -1,6 +1,15 @@
 import pytest
 from gymnasium import spaces
 
+from dorothie_gym.envs.history_space import (
+    HistoryObjectColumn,
+    act_fields,
+    act_space,
+    decision_fields,
+    decision_space,
+    history_fields,
+    history_space,
+)
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.recording import OBJECT_VALUES, Task
 from dorothie_gym.spaces import (
@@ -12,15 +21,6 @@ from dorothie_gym.spaces import (
     dict_space,
     observation_fields,
     observation_space,
-)
-from dorothie_gym.wrappers.history_space import (
-    HistoryObjectColumn,
-    act_fields,
-    act_space,
-    decision_fields,
-    decision_space,
-    history_fields,
-    history_space,
 )
 
 LIMITS = SpaceLimits()

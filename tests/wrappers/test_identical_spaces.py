@@ -45,7 +45,7 @@ def test_flat_actions_decode_to_the_actions_of_the_role() -> None:
     assert env.unflatten("participant", np.array([DialogueMove.ALIGN, 7]))["move"] == DialogueMove.ALIGN
     assert env.unflatten("participant", np.array([300, 0]))["move"] == 0  # it has no such value
     env.step({agent: stop if agent == "co_wizard" else np.array([0, 0]) for agent in env.agents})
-    assert env.unwrapped.stage.world.planner.held
+    assert env.unwrapped.session.world.planner.held
     assert ActionValue.STOP.value == PhysicalAction.STOP
 
 

@@ -13,7 +13,7 @@ from dorothie_gym.envs.single_role_v0 import SingleRole
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, RandomPolicy, SilentPolicy, make_policy
 from dorothie_gym.policies.policy import policy_seed
-from dorothie_gym.spaces import SpaceLimits, noop
+from dorothie_gym.spaces import SpaceLimits, noop, observation_space
 
 
 class Note(SilentPolicy):
@@ -45,7 +45,7 @@ def test_a_role_plays_in_its_own_spaces(role: Role) -> None:
         assert not terminated
     assert info["is_success"] is False
     with pytest.raises(ResetNeeded, match="reset"):
-        env.step(noop(role, env.duo.limits))
+        env.step(noop(role, env.engine.limits))
 
 
 def test_session_equals_one_played_by_three_policies() -> None:
@@ -74,7 +74,7 @@ def test_partners_see_their_own_observations_and_get_seeds_of_the_session() -> N
     for role, partner in partners.items():
         one, two, again = partner.seeds
         assert one == again != two
-        assert env.duo.observation_space(role).contains(partner.seen[-1])
+        assert observation_space(Role(role), env.engine.limits).contains(partner.seen[-1])
     assert partners["participant"].seeds[0] != partners["ad_wizard"].seeds[0]
 
 
@@ -82,19 +82,19 @@ def test_seeds_are_gymnasiums() -> None:
     env = SingleRole("co_wizard", partners={"participant": "silent", "ad_wizard": "silent"})
     env.reset(seed=5)
     assert env.np_random_seed == 5
-    assert env.duo.scenario.seed == 5
+    assert env.engine.scenario.seed == 5
     env.reset()
-    drawn = env.duo.scenario.seed
+    drawn = env.engine.scenario.seed
     env.reset(seed=5)
     env.reset()
-    assert env.duo.scenario.seed == drawn != 5
+    assert env.engine.scenario.seed == drawn != 5
 
 
 def test_a_given_scenario_is_played() -> None:
     env = SingleRole("participant", partners={"co_wizard": "silent", "ad_wizard": "silent"})
-    scenario = dorothie_gym.draw_scenario(env.duo.town, None, 77)
+    scenario = dorothie_gym.draw_scenario(env.engine.town, None, 77)
     env.reset(seed=1, options={"scenario": scenario})
-    assert env.duo.scenario is scenario
+    assert env.engine.scenario is scenario
 
 
 def test_arguments_come_through_gymnasium() -> None:
@@ -111,7 +111,7 @@ def test_arguments_come_through_gymnasium() -> None:
     role = env.unwrapped
     assert isinstance(role, SingleRole)
     assert role.partners[Role.AD_WIZARD] is policy
-    assert role.duo.scenario.storyboard.name == "fetch_priya"
+    assert role.engine.scenario.storyboard.name == "fetch_priya"
     for expected in (False, False, False, True):
         assert env.step(role.noop_action)[3] is expected
     picture: Any = env.render()
@@ -132,7 +132,7 @@ def test_arguments_come_through_gymnasium() -> None:
             {"role": "co_wizard", "partners": {"ad_wizard": SilentPolicy(Role.AD_WIZARD, SpaceLimits(lanes=9))}},
             "other SpaceLimits",
         ),
-        ({"role": "co_wizard", "render_mode": "ascii"}, "render_mode 'ascii'"),
+        ({"role": "co_wizard", "render_mode": "ascii"}, "render_mode is 'ascii'"),
     ],
 )
 def test_wrong_arguments_are_named(arguments: dict[str, Any], message: str) -> None:

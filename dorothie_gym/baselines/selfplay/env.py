@@ -145,5 +145,5 @@ class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
         return self._left - left if math.isfinite(left) and math.isfinite(self._left) else 0.0
 
     def _measured(self) -> float:
-        planner = self.duo.stage.world.planner
+        planner = self.duo.session.world.planner
         return self._way_left.from_place(planner.lane, planner.station)

@@ -255,7 +255,7 @@ class _Player:
             raise  # of the folder, not of the session
         except Exception as error:  # whatever a policy does wrong: it is counted, and told in the row
             return _with_error(row, error), time.process_time() - begun
-        record = measure(session, self._maker.env(plan.town).town)
+        record = measure(session, self._maker.engine(plan.town).town)
         return Row(number=row.number, town=row.town, seed=row.seed, record=record), time.process_time() - begun
 
 

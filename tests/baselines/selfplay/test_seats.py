@@ -35,7 +35,7 @@ def test_rows_have_what_is_at_the_three_seats(env: SelfPlayEnv) -> None:
         masks = [env.table.masks(row[None], role, padded=False)[0] for role in range(3)]
         assert all(mask[0] for mask in masks)  # nothing can always be done
         row, team, *_, info = env.step(np.array([rng.choice(np.flatnonzero(mask)) for mask in masks]))
-        refused += [reason for reasons in env.duo.stage.refused.values() for reason in reasons]
+        refused += [reason for reasons in env.duo.session.refused.values() for reason in reasons]
         assert info["rewards"][0] == info["rewards"][1] == pytest.approx(team)
     assert len(refused) <= 2  # fields are masked one by one; how they combine may still not do
 
@@ -66,7 +66,7 @@ def test_the_co_wizard_notes_the_goal_that_was_named(env: SelfPlayEnv) -> None:
         row, *_ = env.step(NOTHING)
     assert env.table.masks(row[None], 1, padded=False)[0][OtherAction.NOTE_GOAL]
     row, *_ = env.step(np.array([0, OtherAction.NOTE_GOAL, 0]))
-    assert env.duo.stage.beliefs.goals == (env._memories[0].errand.name,)
+    assert env.duo.session.beliefs.goals == (env._memories[0].errand.name,)
     assert not env.table.masks(row[None], 1, padded=False)[0][OtherAction.NOTE_GOAL]
 
 

@@ -121,7 +121,7 @@ def test_nobody_does_what_is_masked(shared: bool, tmp_path: Path, monkeypatch: p
 
     def watched(self: SelfPlayEnv, action: Any) -> Any:
         for k, (role, seat) in enumerate(zip(AGENT_ROLES, self._seats, strict=True)):
-            observation, masks = self._seen[role], self.duo.stage.masks.mask(role)
+            observation, masks = self._seen[role], self.duo.session.masks.mask(role)
             allowed = seat.mask(observation, self._memories[k]) & seat.allowed(observation, masks)
             seen.append(bool(allowed[action[k]]))
         return step(self, action)

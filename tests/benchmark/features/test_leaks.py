@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dorothie_gym.benchmark import NfDEnv, RfNEnv, TeacherForcedEnv, UfNEnv
 from dorothie_gym.benchmark.features import BatchSpec, columns_of, gather, points
+from dorothie_gym.envs.nfd_v0 import NfDEnv
+from dorothie_gym.envs.rfn_v0 import RfNEnv
+from dorothie_gym.envs.teacher_forced import TeacherForcedEnv
+from dorothie_gym.envs.ufn_v0 import UfNEnv
 from dorothie_gym.recording import Corpus, Session, Task
 from dorothie_gym.rollout import default_corpus
 from tests.benchmark.features.played import seen, with_another_future

@@ -40,12 +40,12 @@ def test_observation_equals_that_of_training(guidance: str) -> None:
     learning = NavigationEnv(guidance=guidance, exceptions=4.0)
     observation, info = learning.reset(seed=3)
     drive = learning.drive
-    playing = DuoWizardEnv(learning.town, config=learning.config.session)
+    playing = DuoWizardEnv(learning.town, config=learning.config.session_config)
     observations, _ = playing.reset(seed=3)
     viewpoint = NavigationEncoder(learning.town, JunctionExits(learning.town), learning.config.max_seconds)
     done: dict[Role, Any] = {}
-    play = drive.stage.play
-    drive.stage.play = lambda actions: (done.update(actions), play(actions))  # type: ignore[assignment,func-returns-value]
+    play = drive.session.step
+    drive.session.step = lambda actions: (done.update(actions), play(actions))  # type: ignore[assignment,func-returns-value]
     for _ in range(160):
         seen = viewpoint.observe(observations["co_wizard"], drive.heard, drive.instructor.blocked)
         np.testing.assert_array_equal(seen, observation)
@@ -101,7 +101,7 @@ def test_named_place_becomes_goal_with_route() -> None:
     ride.go(4, instruct(mark.name), f"go to the {mark.name.label}")
     assert ride.field("said")[0] == 1.0 and ride.field("said_landmark").argmax() == mark.name.value
     assert ride.field("goal")[0] == 1.0 and ride.field("goal_distance")[0] > 0.0
-    assert ride.env.stage.beliefs.goals == (mark.name,)
+    assert ride.env.session.beliefs.goals == (mark.name,)
 
 
 def test_instructed_turn_has_sector_of_its_exit() -> None:

@@ -123,7 +123,7 @@ def test_observations_fit_their_spaces_throughout(env: DuoWizardEnv) -> None:
 def test_infractions_are_events_and_counted_in_info_and_summary(env: DuoWizardEnv) -> None:
     *_, infos = step(env)
     assert set(infos["participant"]["infractions"].values()) == {0}
-    world = env.stage.world
+    world = env.session.world
     lane = world.town.lanes[world.planner.lane]
     prop = world.actors.add_prop(PropKind.STREET_BARRIER, lane.id, min(world.planner.station + 8.0, lane.length - 1.0))
     blind(world)

@@ -18,6 +18,7 @@ from dorothie_gym.benchmark.metrics import (
     SlotScorePaper,
 )
 from dorothie_gym.benchmark.predictions import ActionPredictions, ActPredictions, act_labels, action_labels
+from dorothie_gym.envs.point_env import PointEnv
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import Town
 from dorothie_gym.recording import (
@@ -33,7 +34,6 @@ from dorothie_gym.recording import (
 )
 from dorothie_gym.recording.towns import find_town
 from dorothie_gym.spaces import SpaceLimits
-from dorothie_gym.wrappers.point_env import PointEnv
 
 DEFAULT: Final = "default"
 """The corpus that is played once and kept in the user's cache folder."""
@@ -153,57 +153,6 @@ class TeacherForcedEnv(PointEnv):
         }
 
 
-class UfNEnv(TeacherForcedEnv):
-    """Understanding from navigation: what does the participant mean?
-
-    ## Action Space
-    `move` Discrete(15), `slots` MultiBinary(69).
-
-    ## Rewards
-    The mean of two terms: `move`, 1 if the move is right; `slots`, F1 over the point's (slot, value) pairs, 1 where
-    there is none and none is predicted.
-
-    ## Version History
-    v0. The rest as in `TeacherForcedEnv`.
-    """
-
-    of_task = Task.UFN
-
-
-class RfNEnv(TeacherForcedEnv):
-    """Response from navigation: what does the Co-Wizard say next?
-
-    ## Action Space
-    `move` Discrete(15), `slots` MultiBinary(69).
-
-    ## Rewards
-    As of `UfNEnv`.
-
-    ## Version History
-    v0. The rest as in `TeacherForcedEnv`.
-    """
-
-    of_task = Task.RFN
-
-
-class NfDEnv(TeacherForcedEnv):
-    """Navigation from dialogue: where does the Co-Wizard drive next?
-
-    ## Action Space
-    `action` Discrete(6), a class of `PhysicalAction.nfd_class`; `angle` Discrete(360, start=-180), its argument
-    [degrees, positive left], 0 for actions that take none.
-
-    ## Rewards
-    The mean of two terms: `action`, 1 if the action is right; `joint`, 1 if the angle is within 15 degrees on the
-    circle as well. Where the recording does not know the angle there is no `joint`, and the reward is `action`.
-
-    ## Version History
-    v0. The rest as in `TeacherForcedEnv`.
-    """
-
-    of_task = Task.NFD
-
-
 class _Library:
     """The sessions of a split, read when they are asked for.
 
@@ -243,7 +192,7 @@ class _Library:
 def _sessions(corpus: Corpus | Path | str | Sequence[Session], split: str) -> Sequence[CorpusEntry | Session]:
     """Sessions, or entries that load them."""
     if isinstance(corpus, str) and corpus == DEFAULT:
-        # Playing sessions needs the environments, which are slow to import: only where it is asked for.
+        # Imported here: the simulation is slow to import, and only the default corpus needs it.
         from dorothie_gym.rollout.default_corpus import default_corpus
 
         corpus = default_corpus()

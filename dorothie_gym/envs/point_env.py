@@ -12,6 +12,14 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
+from dorothie_gym.envs.history_space import (
+    act_space,
+    check_action,
+    decision_space,
+    encode_objects,
+    encode_view,
+    history_space,
+)
 from dorothie_gym.maps import Town
 from dorothie_gym.recording import (
     ANGLE_TOLERANCE,
@@ -25,14 +33,6 @@ from dorothie_gym.recording import (
     final_view,
 )
 from dorothie_gym.spaces import ActionDict, ActionMapping, Observation, SpaceLimits, StepInfo
-from dorothie_gym.wrappers.history_space import (
-    act_space,
-    check_action,
-    decision_space,
-    encode_objects,
-    encode_view,
-    history_space,
-)
 
 Label: TypeAlias = dict[str, int | NDArray[np.int8]]
 """Correct prediction of a point, in the action space of the task."""
