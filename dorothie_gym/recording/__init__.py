@@ -1,4 +1,4 @@
-"""Sessions: what happened, written as it happens, read by everything else."""
+"""Recorded sessions: format, writer, readers, prediction points, corpora and comparison."""
 
 from dorothie_gym.errors import SessionError
 from dorothie_gym.recording.action_log import Decision

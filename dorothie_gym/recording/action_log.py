@@ -1,4 +1,4 @@
-"""`actions.jsonl`: what the roles decided, from which a session can be played again."""
+"""Log of the roles' actions (`actions.jsonl`), from which a session can be simulated again."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _ROLES: Final = {role.value: role for role in AGENT_ROLES}
 
 @dataclass(frozen=True, kw_only=True)
 class Decision:
-    """What the roles decided at a frame.
+    """Actions of the roles at a decision.
 
     Attributes:
-        frame: the frame at which they decided; what comes of it begins with the next one.
-        actions: by role, the fields of its action that differ from those of an action that does nothing (JSON types).
-            Of an array of 0 and 1 the places that hold 1, of another array its numbers, zeros at the end left out.
-            Roles that did nothing are left out.
+        frame: frame of the decision; the actions take effect from the next frame on.
+        actions: by role, the fields of its action that differ from those of the no-op action (JSON types).
+            Arrays of 0 and 1 are stored as the indices of the ones, other arrays as numbers without trailing zeros.
+            Roles with a no-op action are left out.
     """
 
     frame: int
@@ -31,7 +31,7 @@ class Decision:
 
 
 def encode_decision(decision: Decision) -> str:
-    """Returns the decision as JSON on one line; raises `SessionError` where an action holds more than JSON."""
+    """Returns the decision as JSON on one line; raises `SessionError` if an action holds other types than JSON's."""
     where = f"decision at frame {decision.frame}"
     if not 0 <= decision.frame < MAX_FRAME:
         raise SessionError(f"{where}: frames are in 0..{MAX_FRAME - 1}")
@@ -44,7 +44,7 @@ def encode_decision(decision: Decision) -> str:
 
 
 def decode_decision(line: str, where: str) -> Decision:
-    """Reads what `encode_decision` returned; raises `SessionError`, beginning with `where`, naming the field."""
+    """Returns the decision of a line; raises `SessionError` with `where` and the field if it is malformed."""
     fields = Fields(from_line(line, where), where)
     frame = fields.integer("frame", 0)
     if frame >= MAX_FRAME:
@@ -58,10 +58,10 @@ def decode_decision(line: str, where: str) -> Decision:
 
 
 def read_decisions(folder: Path) -> tuple[tuple[Decision, ...] | None, bool]:
-    """Reads the decisions of a session, and tells whether the last line is torn.
+    """Returns the decisions of a session, and whether the last line is torn.
 
     Returns:
-        The decisions, frames rising; None where they were not recorded.
+        The decisions, in order of frames; None if they were not recorded.
 
     Raises:
         SessionError: a line is damaged, or the frames do not rise.
@@ -76,7 +76,7 @@ def read_decisions(folder: Path) -> tuple[tuple[Decision, ...] | None, bool]:
 
 
 def check_order(decisions: Sequence[Decision], where: str) -> None:
-    """Does nothing if the frames of decisions rise; raises `SessionError`, beginning with `where`, if they do not."""
+    """Raises `SessionError`, beginning with `where`, if the frames of decisions do not rise."""
     for number, (before, after) in enumerate(zip(decisions, decisions[1:], strict=False), start=2):
         if after.frame <= before.frame:
             raise SessionError(f"{where}, line {number}: frame {after.frame} after {before.frame}; frames must rise")

@@ -28,11 +28,11 @@ MANIFEST_VERSION: Final = "1.0"
 
 
 def manifest_row(session: Session, folder: Path, root: Path) -> dict[str, Any]:
-    """Returns the row of a session: path within the corpus, fold, town, counts, hash of its content.
+    """Returns the manifest row of a session: path within the corpus, fold, town, counts, hash of its content.
 
     Args:
         session: the session.
-        folder: where it lies.
+        folder: its folder.
         root: folder of the corpus.
     """
     fold = fold_of_folder(folder)
@@ -49,7 +49,7 @@ def manifest_row(session: Session, folder: Path, root: Path) -> dict[str, Any]:
 
 
 def write_manifest(root: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
-    """Writes the manifest of a corpus, rows by path, with a hash of them all; whole or not at all.
+    """Writes the manifest of a corpus, rows sorted by path, with a hash of all rows.
 
     Returns:
         Its path.
@@ -67,7 +67,7 @@ def read_manifest(root: Path) -> dict[str, str]:
     """Returns the hash of each session by its path within the corpus.
 
     Raises:
-        SessionError: there is no manifest, it is damaged, or of a newer version.
+        SessionError: there is no manifest, it is damaged, or of another major version.
     """
     path = root / MANIFEST_FILE
     if not path.is_file():
@@ -76,16 +76,16 @@ def read_manifest(root: Path) -> dict[str, str]:
     parse_version(fields.text("version"), str(path), MANIFEST_VERSION)
     rows = [{"path": row.text("path"), "sha256": row.text("sha256")} for row in fields.objects("sessions")]
     if _digest(rows) != fields.text("sha256"):
-        raise SessionError(f"{path}: its rows do not fit its own hash; it was changed or is damaged")
+        raise SessionError(f"{path}: its rows do not match its hash; it was changed or is damaged")
     return {row["path"]: row["sha256"] for row in rows}
 
 
 def verify_manifest(root: Path, sessions: Mapping[Path, Callable[[], Session]]) -> tuple[str, ...]:
-    """Returns how a corpus differs from its manifest, a sentence each.
+    """Returns the differences between a corpus and its manifest, one sentence each.
 
     Args:
         root: folder of the corpus.
-        sessions: the sessions that were found, by folder, and what reads each. No path of the manifest is opened.
+        sessions: reader of each session found, by folder. No path of the manifest is opened.
 
     Raises:
         SessionError: there is no manifest, or it is damaged.
@@ -118,17 +118,17 @@ def _digest(rows: Sequence[Mapping[str, Any]]) -> str:
     return hashlib.sha256("".join(lines).encode("utf-8", "surrogateescape")).hexdigest()
 
 
-# --- A corpus: a folder of sessions, divided into folds --------------------------------------------------------------
+# --- Corpora ---------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class CorpusEntry:
-    """A session of a corpus, not read yet.
+    """Session of a corpus that has not been read yet.
 
     Attributes:
         path: its folder.
         maps: folder with the maps of SDN's towns.
-        sign: what settles the sign of angles of SDN's sessions.
+        sign: vote on the sign of angles in SDN sessions.
     """
 
     path: Path
@@ -142,11 +142,11 @@ class CorpusEntry:
 
     @property
     def fold(self) -> Fold | None:
-        """The fold that the session lies in; None outside of folds."""
+        """Fold of the session; None outside of folds."""
         return fold_of_folder(self.path)
 
     def load(self) -> Session:
-        """Reads the session; raises `SessionError` where it cannot be read."""
+        """Returns the session; raises `SessionError` if it cannot be read."""
         return read_session(self.path, maps=self.maps, sign=self.sign)
 
     @cached_property
@@ -168,7 +168,7 @@ class CorpusEntry:
 
 
 class Corpus:
-    """Sessions, read one at a time.
+    """Sessions of a folder, read one at a time.
 
     Args:
         root: folder of the corpus.
@@ -181,7 +181,7 @@ class Corpus:
 
     @classmethod
     def load(cls, path: Path | str, *, maps: Path | str | None = None) -> Self:
-        """Finds the sessions in a folder and in its folds (`train`, `val/seen`, `val/unseen`, ...), of any layout.
+        """Returns the sessions of any layout in a folder and in its folds (`train`, `val/seen`, `val/unseen`, ...).
 
         Args:
             path: the folder.
@@ -200,7 +200,7 @@ class Corpus:
         return len(self.entries)
 
     def __iter__(self) -> Iterator[Session]:
-        """Yields the sessions, each read when it is its turn; raises `SessionError` for one that cannot be read."""
+        """Yields the sessions, reading one at a time; raises `SessionError` for one that cannot be read."""
         return (entry.load() for entry in self.entries)
 
     @property
@@ -216,10 +216,10 @@ class Corpus:
         town: str | None = None,
         exception: ExceptionKind | str | None = None,
     ) -> Self:
-        """Returns the corpus of the sessions that fit everything given.
+        """Returns the corpus of the sessions that match all given criteria.
 
         Args:
-            fold: a fold, or several at once: "val", "test", "seen", "unseen".
+            fold: a fold, or a group of folds: "val", "test", "seen", "unseen".
             town: name of the town.
             exception: a kind that occurs, "environmental" or "task" for any of them, "none" for sessions without.
 
@@ -237,7 +237,7 @@ class Corpus:
         return type(self)(self.root, entries)
 
     def write_manifest(self) -> Path:
-        """Writes `manifest.json` into the corpus: every session with the hash of its content.
+        """Writes `manifest.json` into the corpus, with the hash of each session's content.
 
         Returns:
             Its path.
@@ -249,7 +249,7 @@ class Corpus:
         return write_manifest(self.root, [manifest_row(entry.load(), entry.path, self.root) for entry in self.entries])
 
     def verify(self) -> tuple[str, ...]:
-        """Returns how the corpus differs from its `manifest.json`, a sentence each; none: it is what it was.
+        """Returns the differences between the corpus and its `manifest.json`, one sentence each; empty if unchanged.
 
         Raises:
             SessionError: there is no manifest, or it is damaged.
@@ -283,7 +283,7 @@ def _fits(kinds: frozenset[ExceptionKind], wanted: ExceptionKind | str) -> bool:
 
 
 def _kinds(events: Iterator[Event] | Sequence[Event]) -> frozenset[ExceptionKind]:
-    """Kinds of exceptions among events; what is none that we know is passed over."""
+    """Returns the kinds of exceptions among events; unknown kinds are skipped."""
     kinds = set()
     for event in events:
         if event.type is EventType.EXCEPTION:

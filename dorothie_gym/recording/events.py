@@ -1,4 +1,4 @@
-"""What happens in a session, one event at a time."""
+"""Events of a session: types, encoding, and typed records of moves, utterances, actions and infractions."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from dorothie_gym.sim.config import FRAME_RATE
 
 
 class EventType(enum.StrEnum):
-    """Kinds of events and what their `data` holds (JSON types only)."""
+    """Types of events, with the fields of their `data` (JSON types only)."""
 
     DIALOGUE_MOVE = "DialogueMove"
-    """One act: utterance (number), text (of the whole utterance), span (this act's words), move, slots
-    ({slot label: [value labels]}), exchange (number or null), start and end [s]; where they are known, transaction
-    (number) and recognised (what a speech recogniser heard of the whole utterance)."""
+    """One dialogue act: utterance (number), text (of the whole utterance), span (words of this act), move, slots
+    ({slot label: [value labels]}), exchange (number or null), start and end [s]; if known, transaction
+    (number) and recognised (words that a speech recogniser returned for the whole utterance)."""
     PHYSICAL_ACTION = "PhysicalAction"
-    """Of the Co-Wizard, that changed something: action (label), angle (degrees, positive left, or null), up (or
+    """Effective action of the Co-Wizard: action (label), angle (degrees, positive left, or null), up (or
     null)."""
     BELIEF_UPDATE = "BeliefUpdate"
     """Mental action: action (label) and its arguments (junctions, landmarks, landmark, status, x, y)."""
     EXCEPTION = "Exception"
-    """Of the Ad-Wizard, that took effect: kind (lower-case name) and its arguments; of a task exception the subgoal and
+    """Effective exception: kind (lower-case name) and its arguments; for a task exception, the subgoal and
     its landmark, by label and by row of the header's landmarks (row)."""
     MESSAGE = "Message"
-    """From the Ad-Wizard to the participant: text."""
+    """Message of the Ad-Wizard to the participant: text."""
     REFUSAL = "Refusal"
-    """A well-formed action that was not carried out: action, reason."""
+    """Well-formed action that was not carried out: action, reason."""
     HAZARD_STOP = "HazardStop"
-    """The car begins to brake for something ahead: reason (object class label), distance [m]."""
+    """The car begins to brake for an object ahead: reason (object class label), distance [m]."""
     HAZARD_END = "HazardEnd"
-    """The car goes on: reason, seconds."""
+    """The car drives on: reason, seconds."""
     SUBGOAL = "Subgoal"
-    """A subgoal changes: subgoal (number), landmark (label), status (label), and cause (arrival, trigger, ...)."""
+    """Status change of a subgoal: subgoal (number), landmark (label), status (label), cause (arrival, trigger, ...)."""
     COLLISION = "Collision"
-    """The car touches something: other (class label), key (number of what is touched; a thing keeps it while it is
+    """The car hits an object: other (class label), key (number of the object, constant while it is
     there), lane, station [m], x, y [m] (where the car is), own_fault (bool), speed [m/s]. Older recordings lack place
     and key."""
     RED_LIGHT = "RedLight"
@@ -53,29 +53,29 @@ class EventType(enum.StrEnum):
     WRONG_WAY = "WrongWay"
     """The car drives against the traffic: lane (that it is on), station, x, y [m]; key and other are null."""
     END = "End"
-    """The session is over: success (bool), reason."""
+    """End of the session: success (bool), reason."""
     OTHER = "Other"
-    """Of a type that this version has no name for: the type's name is in `Event.extra`, the data is kept as it is."""
+    """Type unknown to this version: its name is in `Event.extra`, and the data is kept unchanged."""
 
 
 INFRACTIONS = (
     EventType.COLLISION, EventType.RED_LIGHT, EventType.STOP_SIGN, EventType.OFF_ROAD, EventType.WRONG_WAY,
 )  # fmt: skip
-"""Events that tell of a breach of the rules of the road."""
+"""Events that report an infraction of the traffic rules."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Event:
-    """Something that happened.
+    """Event of a session.
 
     Attributes:
-        frame: physics frame at 30 Hz at which it happened (a dialogue move: at which its utterance was over).
-        type: kind of event.
-        source: who did it; the car itself is `Role.AGENT`.
-        flagged: whether it is a point of the benchmark (dialogue moves of the participant and the Co-Wizard,
+        frame: physics frame at 30 Hz (of a dialogue move: the frame in which its utterance ended).
+        type: type of the event.
+        source: role that caused it; the car itself is `Role.AGENT`.
+        flagged: whether it is a prediction point (dialogue moves of the participant and the Co-Wizard,
             navigation actions of the Co-Wizard).
         data: JSON-able details, see `EventType`.
-        extra: further fields of the event, kept as they are (JSON types).
+        extra: further fields of the event (JSON types).
     """
 
     frame: int
@@ -87,7 +87,7 @@ class Event:
 
     @property
     def type_name(self) -> str:
-        """Name of the type in a file; of an event of another version or corpus, the name that it has there."""
+        """Name of the type in the file; for an event of another version or corpus, its original name."""
         return str(self.extra.get("type", self.type.value)) if self.type is EventType.OTHER else self.type.value
 
     @property
@@ -96,7 +96,7 @@ class Event:
         return self.frame / FRAME_RATE
 
 
-# --- Events read as what they are: moves, utterances, physical actions -----------------------------------------------
+# --- Typed records ---------------------------------------------------------------------------------------------------
 
 _OBJECT_CLASSES = {kind.label: kind for kind in ObjectClass}
 _PLACE_FIELDS = ("lane", "station", "x", "y", "key", "other")
@@ -104,21 +104,21 @@ _PLACE_FIELDS = ("lane", "station", "x", "y", "key", "other")
 
 @dataclass(frozen=True, kw_only=True)
 class MoveRecord:
-    """One dialogue move.
+    """Dialogue move.
 
     Attributes:
         index: number of its event in the session.
-        frame: frame at which its utterance was over.
-        speaker: who spoke.
+        frame: frame in which its utterance ended.
+        speaker: role that spoke.
         utterance: number of its utterance.
         text: words of the whole utterance.
         span: words of this move.
         act: move and slots.
-        exchange: number of the exchange, None where unknown.
-        start, end: when the utterance began and was over [s].
-        flagged: whether it is a point of the benchmark.
-        transaction: number of the transaction, None where unknown.
-        recognised: what a speech recogniser heard of the whole utterance, None where there was none.
+        exchange: number of the exchange; None if unknown.
+        start, end: start and end of the utterance [s].
+        flagged: whether it is a prediction point.
+        transaction: number of the transaction; None if unknown.
+        recognised: words that a speech recogniser returned for the whole utterance; None without a recogniser.
     """
 
     index: int
@@ -138,16 +138,16 @@ class MoveRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class ActionRecord:
-    """One physical action.
+    """Physical action.
 
     Attributes:
         index: number of its event in the session.
-        frame: when it was done.
-        source: who did it.
+        frame: frame of the action.
+        source: role that acted.
         action: the action.
-        angle: its argument [degrees, positive left]; None where it has none or the recording does not know it.
-        up: direction of a change of speed or light, None for other actions.
-        flagged: whether it is a point of the benchmark.
+        angle: its argument [degrees, positive left]; None if it has none or it was not recorded.
+        up: direction of a change of speed or light; None for other actions.
+        flagged: whether it is a prediction point.
     """
 
     index: int
@@ -161,18 +161,18 @@ class ActionRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class InfractionRecord:
-    """One breach of the rules of the road.
+    """Infraction of the traffic rules.
 
     Attributes:
         index: number of its event in the session.
-        frame: when it happened.
-        type: which rule: one of `events.INFRACTIONS`.
-        lane: where it happened, None where the recording does not know it; `station` likewise.
+        frame: frame of the infraction.
+        type: the rule: one of `events.INFRACTIONS`.
+        lane: lane of the car; None if not recorded, like `station`.
         station: distance along the lane [m].
         x: of the car [m], or None; `y` likewise.
-        key: number of the counterpart (of a body, or of a light or sign), None where there is none.
-        other: class of the counterpart, None where there is none.
-        own_fault: of a collision: whether the car ran into it; True for the others.
+        key: number of the counterpart (of a body, or of a light or sign); None without one.
+        other: class of the counterpart; None without one.
+        own_fault: whether the car ran into the counterpart of a collision; True for the other types.
     """
 
     index: int
@@ -189,7 +189,7 @@ class InfractionRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class UtteranceRecord:
-    """The moves of one utterance, in order of their spans."""
+    """Utterance with its moves, in order of their spans."""
 
     number: int
     speaker: Role
@@ -205,7 +205,7 @@ class UtteranceRecord:
 
 
 def move_record(event: Event, index: int, where: str = "event") -> MoveRecord:
-    """Returns the move that an event of type `DIALOGUE_MOVE` holds; raises `SessionError` naming the field."""
+    """Returns the move of an event of type `DIALOGUE_MOVE`; raises `SessionError` naming the field."""
     data = Fields(event.data, f"{where}, data")
     return MoveRecord(
         index=index,
@@ -225,7 +225,7 @@ def move_record(event: Event, index: int, where: str = "event") -> MoveRecord:
 
 
 def action_record(event: Event, index: int, where: str = "event") -> ActionRecord:
-    """Returns the action that an event of type `PHYSICAL_ACTION` holds; raises `SessionError` naming the field."""
+    """Returns the action of an event of type `PHYSICAL_ACTION`; raises `SessionError` naming the field."""
     data = Fields(event.data, f"{where}, data")
     try:
         action = parse_physical_action(data.text("action"))
@@ -243,7 +243,7 @@ def action_record(event: Event, index: int, where: str = "event") -> ActionRecor
 
 
 def infraction_record(event: Event, index: int, where: str = "event") -> InfractionRecord:
-    """Returns the breach that an event of `INFRACTIONS` tells of; raises `SessionError` naming the field."""
+    """Returns the infraction of an event of `INFRACTIONS`; raises `SessionError` naming the field."""
     data = Fields({**dict.fromkeys(_PLACE_FIELDS), **event.data}, f"{where}, data")
     other = data.optional("other", data.text)
     if other is not None and other not in _OBJECT_CLASSES:
@@ -284,7 +284,7 @@ def utterance_records(moves: Iterable[MoveRecord]) -> tuple[UtteranceRecord, ...
 
 
 def check_event(event: Event, where: str = "event") -> None:
-    """Does nothing if the event holds what its type says; raises `SessionError` naming the field otherwise."""
+    """Raises `SessionError` naming the field if the data of an event does not match its type."""
     if event.type is EventType.DIALOGUE_MOVE:
         move_record(event, 0, where)
     elif event.type is EventType.PHYSICAL_ACTION:
@@ -310,7 +310,7 @@ def _parse(move: str, slots: Mapping[str, Any], where: str) -> DialogueAct:
         raise SessionError(f"{where}: fields 'move' and 'slots': {error}") from None
 
 
-# --- An event as one line of `events.jsonl` --------------------------------------------------------------------------
+# --- Encoding as one line of `events.jsonl` ---------------------------------------------------------------------------
 
 EVENT_FIELDS: Final = ("frame", "type", "source", "flagged", "data")
 """Fields of a line that are not the event's `extra`."""
@@ -324,10 +324,10 @@ def encode_event(event: Event, *, check: bool = True) -> str:
 
     Args:
         event: the event.
-        check: whether its data is checked; what was read was checked then.
+        check: whether its data is checked; events that were read are already checked.
 
     Raises:
-        SessionError: its data is not what its type says, or cannot be written; the message names the field.
+        SessionError: its data does not match its type or cannot be written; the message names the field.
     """
     where = f"event {event.type.value} at frame {event.frame}"
     extra = canonical(event.extra, f"{where}: extra")
@@ -343,22 +343,22 @@ def encode_event(event: Event, *, check: bool = True) -> str:
     if clash:
         raise SessionError(f"{where}: extra has {clash[0]!r}, which is a field of its own")
     if check:
-        event_of(values, where)  # what cannot be read back must not be written
+        event_of(values, where)  # data that cannot be read back must not be written
     return to_line({**values, **{name: value for name, value in extra.items() if name not in known}})
 
 
 def decode_event(line: str, where: str) -> Event:
-    """Reads what `encode_event` returned; raises `SessionError`, beginning with `where`, naming the field."""
+    """Returns the event of a line; raises `SessionError` with `where` and the field if it is malformed."""
     return event_of(from_line(line, where), where)
 
 
 def event_of(values: Mapping[str, Any], where: str) -> Event:
     """Returns the event of a line's fields.
 
-    A type that this version does not know gives an event of type `OTHER`, and fields that it does not know its `extra`.
+    A type unknown to this version gives an event of type `OTHER`; unknown fields become its `extra`.
 
     Raises:
-        SessionError: a field is missing or wrong; the message begins with `where` and names it.
+        SessionError: a field is missing or wrong; the message holds `where` and the field.
     """
     fields = Fields(values, where)
     frame = fields.integer("frame", 0)

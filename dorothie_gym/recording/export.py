@@ -1,4 +1,4 @@
-"""Two tables of a corpus, for pandas and `datasets`: what was said, and where the car was told where to go."""
+"""Export of a corpus as two tables for pandas and `datasets`: utterances and navigation decisions."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ UTTERANCES_FILE: Final = "utterances.parquet"
 DECISIONS_FILE: Final = "decision_points.parquet"
 
 HISTORY: Final = 10
-"""Past actions that a row of the decision points has."""
+"""Past actions in a row of the decision points."""
 
 
 def export_tables(sessions: Iterable[tuple[Fold | None, Session]], folder: Path) -> tuple[Path, Path]:
-    """Writes both tables, a session at a time; each appears when it is whole.
+    """Writes both tables, reading one session at a time; each file appears when it is complete.
 
     Args:
         sessions: the sessions with their folds.
-        folder: where the tables are written, made if need be; older ones are replaced.
+        folder: folder of the tables, created if it is missing; older tables are replaced.
 
     Returns:
         Paths of the utterances and of the decision points.

@@ -1,4 +1,4 @@
-"""Names of the files in the folder of a session, and how far a folder has come."""
+"""File names and size limits of a session folder."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ import re
 from typing import Final
 
 HEADER_FILE: Final = "session.json"
-"""Header, outcome, counts and version: written whole when the session begins, and again when it is over."""
+"""Header, outcome, counts and version; written when the session begins, and again when it ends."""
 
 EVENTS_FILE: Final = "events.jsonl"
-"""One event a line, appended as they happen."""
+"""One event per line, appended during the session."""
 
 ACTIONS_FILE: Final = "actions.jsonl"
-"""What the roles decided, one decision a line, those left out in which nobody did anything."""
+"""One decision of the roles per line; decisions without an action are left out."""
 
 FRAMES_FILE: Final = "frames.parquet"
-"""One row a frame, written whole when the session is over."""
+"""One row per frame, written when the session ends."""
 
 JOURNAL_FILE: Final = "frames.journal"
-"""What `FRAMES_FILE` is made of, appended as it happens; gone when the session is over."""
+"""Binary log of the frames, appended during the session; converted into `FRAMES_FILE` when it ends."""
 
 PICTURES_FOLDER: Final = "pictures"
 """Optional pictures, `<frame>.png`."""
@@ -27,34 +27,34 @@ PICTURES_FOLDER: Final = "pictures"
 SESSION_FILES: Final = (HEADER_FILE, EVENTS_FILE, ACTIONS_FILE, FRAMES_FILE, JOURNAL_FILE)
 
 MAX_EVENTS: Final = 200_000
-"""Events that a session may have; 15 minutes of three roles that act at 2 Hz give some 5,000."""
+"""Most events of a session; 15 minutes of three roles acting at 2 Hz give some 5,000."""
 
 MAX_FRAMES: Final = 1_000_000
-"""Frames that a session may have: 9 hours at 30 Hz."""
+"""Most frames of a session: 9 hours at 30 Hz."""
 
 MAX_FRAME: Final = 2**31
-"""Numbers of frames are below this."""
+"""Bound of frame numbers."""
 
 MAX_TEXT_FILE: Final = 128 * 2**20
-"""Bytes of the largest JSON or CSV file that is read."""
+"""Largest JSON or CSV file that is read [bytes]."""
 
 MAX_FRAMES_FILE: Final = 2**30
-"""Bytes of the largest frames file, unpacked, and of the largest journal, that is read."""
+"""Largest uncompressed frames file, and largest journal, that is read [bytes]."""
 
 _NAME: Final = re.compile(r"[^\w.+-]+")
 
 
 class SessionState(enum.StrEnum):
-    """How far the folder of a session has come."""
+    """State of a session folder."""
 
     ABSENT = "absent"
-    """No session, or one that died before its header was written."""
+    """No session, or one whose process died before the header was written."""
     PARTIAL = "partial"
-    """Begun and not finished: it loads up to what was complete when it was cut off."""
+    """Interrupted session, which loads up to the last complete event and frame."""
     FINISHED = "finished"
-    """Written to its end."""
+    """Complete session."""
 
 
 def safe_name(text: str) -> str:
-    """Returns `text` as the name of one file or folder: no separators, no leading dot, at most 100 characters."""
+    """Returns `text` as the name of a file or folder: no separators, no leading dot, at most 100 characters."""
     return _NAME.sub("_", text).lstrip(".")[:100] or "session"

@@ -1,4 +1,4 @@
-"""Reading the folder of a session, whatever version it has and at whatever moment it was cut off."""
+"""Session folders: reading complete and interrupted sessions, saving, and hashing."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class SessionFile:
-    """What the file says.
+    """Content of `session.json`.
 
     Attributes:
-        header: what was known before the session began.
-        outcome: how it ended; None where it did not.
-        events: number of events of a session that is over.
-        frames: number of its frames.
+        header: header of the session.
+        outcome: outcome of the session; None if it was interrupted.
+        events: number of events of a complete session.
+        frames: number of frames of a complete session.
     """
 
     header: SessionHeader
@@ -66,7 +66,7 @@ class SessionFile:
     frames: int = 0
 
     def write(self, folder: Path) -> None:
-        """Writes the file whole or not at all; raises `SessionError` where the outcome is more than JSON."""
+        """Writes the file atomically; raises `SessionError` if the outcome holds other types than JSON's."""
         over = self.outcome is not None
         page = {
             **self.header.to_json(),
@@ -77,7 +77,7 @@ class SessionFile:
 
 
 def read_session_file(folder: Path) -> SessionFile:
-    """Reads the file; raises `SessionError` naming file and field, and where there is none."""
+    """Returns the content of the file; raises `SessionError` naming file and field if it is missing or malformed."""
     path = folder / HEADER_FILE
     if not path.is_file():
         raise SessionError(f"{folder}: no session here (there is no {HEADER_FILE})")
@@ -93,7 +93,7 @@ def read_session_file(folder: Path) -> SessionFile:
 
 
 def session_state(folder: Path | str) -> SessionState:
-    """Returns how far a folder has come; a session that is finished was written whole.
+    """Returns the state of a session folder.
 
     Raises:
         SessionError: the header is damaged.
@@ -106,12 +106,12 @@ def session_state(folder: Path | str) -> SessionState:
     return SessionState.FINISHED if whole and over else SessionState.PARTIAL
 
 
-# --- Reading the folder of a session, whatever version it has and at whatever moment it was cut off ------------------
+# --- Reading ---------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, kw_only=True)
 class FolderContent:
-    """What the folder of a session holds; attributes as those of `Session`."""
+    """Content of a session folder; attributes as of `Session`."""
 
     header: SessionHeader
     events: tuple[Event, ...]
@@ -125,7 +125,7 @@ class FolderContent:
 
 
 def read_folder(folder: Path) -> FolderContent:
-    """Reads a folder; raises `SessionError` naming file, line and field where there is no session or a damaged one."""
+    """Returns the content of a folder; raises `SessionError` naming file, line and field if it cannot be read."""
     file = read_session_file(folder)
     report = ReadReport()
     events, events_torn = _read_events(folder / EVENTS_FILE)
@@ -152,7 +152,7 @@ def _read_events(path: Path) -> tuple[tuple[Event, ...], bool]:
 
 
 def _read_frames(folder: Path, over: bool, report: ReadReport) -> tuple[Trajectory, Scene, bool]:
-    """Returns the frames and whether they were written whole."""
+    """Returns the frames, and whether they are complete."""
     journal = folder / JOURNAL_FILE
     if journal.exists() and not over:
         trajectory, scene = read_journal(journal)
@@ -177,14 +177,14 @@ def _note_unknown(header: SessionHeader, events: tuple[Event, ...], report: Read
 
 
 def _pictures(folder: Path) -> Mapping[int, Path]:
-    """Pictures by frame."""
+    """Returns the pictures by frame."""
     if not folder.is_dir():
         return MappingProxyType({})
     found = {int(path.stem): path for path in folder.glob("*.png") if path.stem.isdecimal() and len(path.stem) <= 10}
     return MappingProxyType(dict(sorted(found.items())))
 
 
-# --- Writing a whole session at once ---------------------------------------------------------------------------------
+# --- Saving ----------------------------------------------------------------------------------------------------------
 
 
 @contextmanager
@@ -226,13 +226,13 @@ def picture_name(frame: int) -> str:
     return f"{frame:06d}.png"
 
 
-# --- A hash of what a session holds, whatever the libraries that packed its files ------------------------------------
+# --- Hashing ---------------------------------------------------------------------------------------------------------
 
 
 def digest_of(session: Session) -> str:
-    """Returns the SHA-256 of a session's content: header, outcome, events, decisions and every number of its frames.
+    """Returns the SHA-256 of a session's content: header, outcome, events, decisions and all numbers of its frames.
 
-    Its name, its pictures and the report of its reader do not count.
+    It does not depend on name, pictures, reader's report, or on the libraries that compressed the files.
     """
     content = hashlib.sha256()
 
@@ -262,5 +262,5 @@ def _bytes(values: NDArray[Any]) -> bytes:
     if values.dtype.kind not in "biuf":
         return to_line(canonical(values.tolist(), "column")).encode()
     if values.dtype.kind == "f":
-        values = np.where(np.isnan(values), np.nan, values)  # one pattern of bits for what is not known
+        values = np.where(np.isnan(values), np.nan, values)  # one bit pattern for unknown values
     return np.ascontiguousarray(values.astype(values.dtype.newbyteorder("<"))).tobytes()

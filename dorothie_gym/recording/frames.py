@@ -1,4 +1,4 @@
-"""`frames.parquet`: one row a frame, with what was around the car at the frames where it was recorded."""
+"""Frames file (`frames.parquet`) and frames journal: state of the car and of its surroundings, frame by frame."""
 
 from __future__ import annotations
 
@@ -48,22 +48,22 @@ _WORDS: Final = {
     "kind": tuple(kind.name.lower() for kind in ActorKind),
     "state": tuple(str(colour) for colour in LIGHT_STATES),
 }
-"""Columns that hold words, which the arrays hold as numbers."""
+"""Columns that are words in the file and numbers in the arrays."""
 
 _FALLBACK: Final = {"kind": int(ActorKind.OTHER)}
-"""Numbers of words that this version does not know."""
+"""Numbers of unknown words."""
 
 _SMOOTH: Final = (
     "x", "y", "heading", "speed", "steer", *(f"actors.list.element.{n}" for n in ("x", "y", "heading", "speed")),
 )  # fmt: skip
-"""Columns whose numbers change a little from row to row: their bytes are stored apart, which packs better."""
+"""Columns that change little from row to row: splitting their bytes compresses better."""
 
 
 def write_frames(path: Path, trajectory: Trajectory, scene: Scene) -> None:
-    """Writes the file whole or not at all.
+    """Writes the file atomically.
 
     Raises:
-        SessionError: the scene has a frame, or a column of a length, that the trajectory has not.
+        SessionError: the scene has a frame that the trajectory lacks, or a column of another length.
         OSError: it cannot be written.
     """
     import pyarrow as pa
@@ -95,11 +95,11 @@ def write_frames(path: Path, trajectory: Trajectory, scene: Scene) -> None:
 
 
 def read_frames(path: Path, report: ReadReport) -> tuple[Trajectory, Scene]:
-    """Reads the file.
+    """Returns trajectory and scene of the file.
 
     Args:
         path: the file.
-        report: is told what is not understood.
+        report: receives the unknown fields and columns.
 
     Raises:
         SessionError: it is missing or damaged, lacks a column, is larger than a session's, or its frames do not rise.
@@ -107,7 +107,7 @@ def read_frames(path: Path, report: ReadReport) -> tuple[Trajectory, Scene]:
     """
     if not path.is_file():
         raise SessionError(f"{path}: is missing")
-    with _told(path):
+    with _parquet_errors(path):
         arrow = _read_arrow(path)
         trajectory = _trajectory(arrow, path)
         tables = {
@@ -125,7 +125,7 @@ def read_frames(path: Path, report: ReadReport) -> tuple[Trajectory, Scene]:
 
 
 @contextmanager
-def _told(path: Path) -> Iterator[None]:
+def _parquet_errors(path: Path) -> Iterator[None]:
     import pyarrow as pa
 
     try:
@@ -175,7 +175,7 @@ def _trajectory(arrow: pa.Table, path: Path) -> Trajectory:
     return trajectory
 
 
-# --- columns that hold rows of their own ----------------------------------------------------------------------------
+# --- Nested columns --------------------------------------------------------------------------------------------------
 
 
 def _nested(name: str, table: SceneTable, frames: NDArray[np.int64]) -> pa.Array:
@@ -256,7 +256,7 @@ def _rows(values: pa.StructArray, name: str, dtype: np.dtype[Any], path: Path, r
 
 
 def _numbers(column: pa.Array, field: str, path: Path) -> NDArray[np.int64]:
-    """Numbers of the words of a column."""
+    """Returns the numbers of the words of a column."""
     import pyarrow as pa
 
     if not pa.types.is_dictionary(column.type):
@@ -273,7 +273,7 @@ def _numbers(column: pa.Array, field: str, path: Path) -> NDArray[np.int64]:
 
 
 def _further(column: pa.ChunkedArray) -> NDArray[Any]:
-    """A column that this version does not know, as an array."""
+    """Returns an unknown column as an array."""
     import pyarrow as pa
 
     if column.null_count == 0 and pa.types.is_primitive(column.type):
@@ -285,7 +285,7 @@ def _further(column: pa.ChunkedArray) -> NDArray[Any]:
 
 
 def _leaves(schema: pa.Schema) -> list[str]:
-    """Paths of the columns inside the file."""
+    """Returns the paths of the leaf columns in the file."""
     import pyarrow as pa
 
     def below(path: str, kind: pa.DataType) -> list[str]:
@@ -298,7 +298,7 @@ def _leaves(schema: pa.Schema) -> list[str]:
     return [leaf for field in schema for leaf in below(field.name, field.type)]
 
 
-# --- The journal of frames: blocks of numbers, appended as they happen, each readable or not there at all ------------
+# --- Journal: checksummed blocks, appended during the session --------------------------------------------------------
 
 CAR: Final = b"CARS"
 ACTORS: Final = b"ACTR"
@@ -313,7 +313,7 @@ DTYPES: Final[Mapping[bytes, np.dtype[Any]]] = MappingProxyType(
         WEATHER: WEATHER_DTYPE.newbyteorder("<"),
     }
 )
-"""What the content is made of; the car's is rows of nine numbers, as in `TRAJECTORY_COLUMNS`."""
+"""Element type of each block; rows of the car are nine numbers, as in `TRAJECTORY_COLUMNS`."""
 
 _SIZES: Final = {
     kind: dtype.itemsize * (len(TRAJECTORY_COLUMNS) if kind == CAR else 1) for kind, dtype in DTYPES.items()
@@ -324,13 +324,13 @@ _FRAME: Final = struct.Struct("<q")
 
 
 def encode_block(kind: bytes, frame: int, rows: NDArray[Any]) -> bytes:
-    """Returns a block: the rows (contiguous) that were recorded at a frame; for the car: of which it is the first."""
+    """Returns the block of contiguous rows that were recorded at a frame, or, for the car, from that frame on."""
     content = _FRAME.pack(frame) + (rows if sys.byteorder == "little" else rows.astype(DTYPES[kind])).tobytes()
     return _HEAD.pack(kind, len(content), zlib.crc32(content)) + content
 
 
 def read_journal(path: Path) -> tuple[Trajectory, Scene]:
-    """Reads a journal up to its last complete block.
+    """Returns trajectory and scene of a journal up to its last complete block.
 
     Raises:
         SessionError: it is too large to be that of a session.
@@ -354,7 +354,7 @@ def _blocks(content: bytes) -> Iterator[tuple[bytes, int, bytes]]:
         if kind not in DTYPES or length < _FRAME.size or (length - _FRAME.size) % _SIZES[kind]:
             return
         if zlib.crc32(body) != checksum:
-            return  # torn here, or damaged: nothing after it can be trusted
+            return  # torn or damaged: later blocks cannot be trusted
         yield kind, _FRAME.unpack_from(body)[0], bytes(body[_FRAME.size :])
 
 

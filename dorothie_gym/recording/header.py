@@ -1,4 +1,4 @@
-"""What is known of a session before it begins."""
+"""Session header: town, storyboard, seed and configuration, and the version of the format."""
 
 from __future__ import annotations
 
@@ -55,11 +55,11 @@ def is_newer(version: str) -> bool:
 
 
 class LandmarkRow(TypedDict):
-    """A landmark of the town.
+    """Landmark of the town.
 
-    `name` is its label; `lane` (-1: unknown) and `station` [m] are of its waypoint; `x` and `y` [m] where it stands;
-    `street` the number of its street (-1: none); `hidden` whether the Co-Wizard does not know where it is; `extra`
-    further fields, kept as they are (JSON types).
+    `name` is its label; `lane` (-1: unknown) and `station` [m] are its waypoint; `x` and `y` [m] its position;
+    `street` the number of its street (-1: none); `hidden` whether the Co-Wizard does not know its position; `extra`
+    further fields (JSON types).
     """
 
     name: str
@@ -73,9 +73,9 @@ class LandmarkRow(TypedDict):
 
 
 class SubgoalRow(TypedDict):
-    """A subgoal of the storyboard: `landmark` is a row of the landmarks, `after` holds numbers of subgoals.
+    """Subgoal of the storyboard: `landmark` is a row of the landmarks, `after` holds numbers of subgoals.
 
-    `extra` holds further fields, kept as they are (JSON types).
+    `extra` holds further fields (JSON types).
     """
 
     description: str
@@ -89,23 +89,23 @@ class SubgoalRow(TypedDict):
 
 @dataclass(frozen=True, kw_only=True)
 class SessionHeader:
-    """Town, storyboard, seed and configuration of a session. It holds no wall-clock time: equal runs, equal bytes.
+    """Town, storyboard, seed and configuration of a session. Without a wall-clock time, equal runs give equal bytes.
 
     Attributes:
         town: name of the town.
-        storyboard: name of the storyboard's template; empty where it is not known.
-        seed: seed of the session; None where there was none (a session of another corpus).
-        decision_frequency: decisions of the agents a second [Hz].
+        storyboard: name of the storyboard's template; empty if unknown.
+        seed: seed of the session; None for a session of another corpus.
+        decision_frequency: decisions of the agents per second [Hz].
         street_names: label of the name of each street of the town.
-        landmarks: everything that stands in the town.
-        subgoals: the tasks, those to be triggered included.
-        story: what the participant reads.
-        departure: lane (-1: unknown) and station [m] where the car starts.
+        landmarks: landmarks of the town.
+        subgoals: the tasks, including those that an exception may trigger.
+        story: instructions that the participant reads.
+        departure: lane (-1: unknown) and station [m] of the car's start.
         config: configuration of the environment (JSON types).
         format_version: version of the layout, "major.minor".
-        package_version: version of the package that wrote it.
-        source: where the session comes from: this package, or "sdn" and its layout ("sdn-release").
-        extra: further fields, kept as they are (JSON types): those of a newer minor version, or of another corpus.
+        package_version: version of the package that wrote the session.
+        source: origin of the session: this package, or "sdn" and its layout ("sdn-release").
+        extra: further fields (JSON types) of a newer minor version or of another corpus.
 
     Raises:
         SessionError: a field is not as described; the message names it.
@@ -127,7 +127,7 @@ class SessionHeader:
     extra: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Checks the fields, and turns sequences into tuples so that a header equals what is read back."""
+        """Checks the fields and turns sequences into tuples, so that a header equals the one read back."""
         plain = Fields(canonical({name: getattr(self, name) for name in (*_NAMES, "extra")}, "header"), "header")
         parse_version(plain.text("format_version"), plain.where)
         for name in ("town", "storyboard", "story", "package_version", "source"):
@@ -147,7 +147,7 @@ class SessionHeader:
             raise SessionError(f"{plain.where}: extra has {clash[0]!r}, which is a field of its own")
 
     def to_json(self) -> dict[str, Any]:
-        """Returns the header in JSON types, fields always in the same order."""
+        """Returns the header in JSON types, fields in a fixed order."""
         fields: dict[str, Any] = {name: canonical(getattr(self, name), f"header.{name}") for name in _NAMES}
         lane, station = self.departure
         extra = canonical(self.extra, "header.extra")
@@ -155,7 +155,7 @@ class SessionHeader:
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any], where: str = "header") -> SessionHeader:
-        """Reads what `to_json` returned; fields that this version does not know become `extra`.
+        """Returns the header of a JSON object; unknown fields become `extra`.
 
         Args:
             values: the JSON object.
@@ -177,7 +177,7 @@ class SessionHeader:
 
 
 RESERVED_NAMES: Final = ("outcome", "counts")
-"""Fields of `session.json` that are not the header's."""
+"""Fields of `session.json` that are not part of the header."""
 
 _NAMES: Final = (
     "format_version",
@@ -235,7 +235,7 @@ def _landmark(row: Fields) -> LandmarkRow:
 
 
 def _extra(row: Fields, known: frozenset[str]) -> dict[str, Any]:
-    """What a row holds beside the fields that are known, those that were put into `extra` among it."""
+    """Returns the unknown fields of a row, merged with its field `extra`."""
     return {**(row.if_given("extra", row.mapping) or {}), **row.others({*known, "extra"})}
 
 

@@ -1,4 +1,4 @@
-"""JSON that comes out byte for byte the same for the same content, and JSON of others that is read with care."""
+"""JSON with one byte representation for equal content, and checked reading of JSON fields and of lines."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from dorothie_gym.errors import SessionError, short_repr
 from dorothie_gym.recording.file_names import MAX_TEXT_FILE
 
 MAX_DEPTH: Final = 40
-"""Levels of nesting that a session may hold."""
+"""Deepest nesting of a session's values."""
 
 
 def canonical(value: Any, where: str, depth: int = MAX_DEPTH) -> Any:
     """Returns `value` in plain JSON types: mappings as dicts with sorted keys, tuples as lists, numpy as Python.
 
     Args:
-        value: what is to be written.
+        value: the value.
         where: name of the field, for the message of an error.
-        depth: levels of nesting that are still allowed.
+        depth: allowed levels of nesting.
 
     Raises:
-        SessionError: something in it has no place in JSON (a number that is not finite, a key that is not a text), or
-            it is nested too deeply.
+        SessionError: it holds a value without a JSON equivalent (a number that is not finite, a key that is not a
+            text), or it is nested too deeply.
     """
     if isinstance(value, np.generic):
         value = value.item()
@@ -70,20 +70,20 @@ def _canonical_mapping(value: Mapping[Any, Any], where: str, depth: int) -> dict
 
 
 def to_line(value: Any) -> str:
-    """Returns canonical JSON on one line, without its end."""
+    """Returns canonical JSON on one line, without a line break at the end."""
     return json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
 
 
 def to_page(value: Any) -> str:
-    """Returns canonical JSON on several lines, for people, with its end."""
+    """Returns canonical JSON on several lines, with a line break at the end."""
     return json.dumps(value, ensure_ascii=False, allow_nan=False, indent=1) + "\n"
 
 
 def from_line(text: str, where: str) -> dict[str, Any]:
-    """Returns the JSON object that `text` holds.
+    """Returns the JSON object of a text.
 
     Raises:
-        SessionError: it holds none, or a number that is not finite; the message begins with `where`.
+        SessionError: it is no JSON object, or holds a number that is not finite; the message begins with `where`.
     """
     try:
         value = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
@@ -108,10 +108,10 @@ def _finite(text: str) -> float:
 
 
 def read_bytes(path: Path, limit: int = MAX_TEXT_FILE) -> bytes:
-    """Returns what a regular file, or a link to one, holds.
+    """Returns the content of a regular file, or of a link to one.
 
     Raises:
-        SessionError: it is no regular file (a pipe would block for ever), or larger than `limit`.
+        SessionError: it is no regular file (a pipe would block forever), or larger than `limit`.
         OSError: it cannot be read.
     """
     if not path.is_file():
@@ -125,29 +125,29 @@ def read_bytes(path: Path, limit: int = MAX_TEXT_FILE) -> bytes:
 
 
 def decode_text(content: bytes, where: str) -> str:
-    """Returns the text of bytes in UTF-8; raises `SessionError` beginning with `where` for others."""
+    """Returns the text of bytes in UTF-8; raises `SessionError`, beginning with `where`, for other bytes."""
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError as error:
         raise SessionError(f"{where}: not UTF-8 at byte {error.start}") from None
 
 
-# --- Reading named fields of a JSON object with one clear message for each that is wrong -----------------------------
+# --- Checked fields --------------------------------------------------------------------------------------------------
 
 _T = TypeVar("_T")
 
 _LARGEST = sys.float_info.max
-"""A whole number of JSON may be larger, and is no float then."""
+"""Largest float; a whole number of JSON may be larger."""
 
 
 class Fields:
-    """The fields of one JSON object.
+    """Fields of a JSON object.
 
-    Each method returns a field in its type and raises `SessionError` where it is missing or of another type.
+    Each method returns a field in its type, and raises `SessionError` if it is missing or of another type.
 
     Args:
         values: the object.
-        where: file and line, the beginning of every message.
+        where: file and line, which every message begins with.
     """
 
     def __init__(self, values: Mapping[str, Any], where: str) -> None:
@@ -155,89 +155,89 @@ class Fields:
         self.where = where
 
     def integer(self, name: str, minimum: int | None = None) -> int:
-        """A whole number, at least `minimum`."""
+        """Returns a whole number of at least `minimum`."""
         value = self.anything(name)
         if isinstance(value, bool) or not isinstance(value, int) or (minimum is not None and value < minimum):
             raise self.error(name, "a whole number" + ("" if minimum is None else f" of at least {minimum}"))
         return value
 
     def number(self, name: str) -> float:
-        """A finite number."""
+        """Returns a finite number."""
         value = self.anything(name)
         if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _LARGEST:
             raise self.error(name, "a finite number")
         return float(value)
 
     def text(self, name: str) -> str:
-        """A text."""
+        """Returns a text."""
         value = self.anything(name)
         if not isinstance(value, str):
             raise self.error(name, "a text")
         return value
 
     def flag(self, name: str) -> bool:
-        """True or false."""
+        """Returns a bool."""
         value = self.anything(name)
         if not isinstance(value, bool):
             raise self.error(name, "true or false")
         return value
 
     def mapping(self, name: str) -> Mapping[str, Any]:
-        """An object."""
+        """Returns an object."""
         value = self.anything(name)
         if not isinstance(value, Mapping):
             raise self.error(name, "an object")
         return value
 
     def texts(self, name: str) -> tuple[str, ...]:
-        """A list of texts."""
+        """Returns a list of texts."""
         value = self.anything(name)
         if not isinstance(value, list | tuple) or not all(isinstance(item, str) for item in value):
             raise self.error(name, "a list of texts")
         return tuple(value)
 
     def integers(self, name: str) -> tuple[int, ...]:
-        """A list of whole numbers."""
+        """Returns a list of whole numbers."""
         value = self.anything(name)
         if not isinstance(value, list | tuple) or not all(type(item) is int for item in value):
             raise self.error(name, "a list of whole numbers")
         return tuple(value)
 
     def objects(self, name: str) -> tuple[Fields, ...]:
-        """A list of objects."""
+        """Returns a list of objects."""
         value = self.anything(name)
         if not isinstance(value, list | tuple) or not all(isinstance(item, Mapping) for item in value):
             raise self.error(name, "a list of objects")
         return tuple(Fields(item, f"{self.where}, {name}[{index}]") for index, item in enumerate(value))
 
     def optional(self, name: str, read: Callable[[str], _T]) -> _T | None:
-        """None where the field is null, else what `read` (one of the methods above) makes of it."""
+        """Returns None if the field is null, else the result of `read`, one of the methods above."""
         return None if self.anything(name) is None else read(name)
 
     def error(self, name: str, expected: str) -> SessionError:
-        """The error for a field that is not what is expected."""
+        """Returns the error for a field with an unexpected value."""
         return SessionError(f"{self.where}: field {name!r} is {short_repr(self._values[name])}; it must be {expected}")
 
     def if_given(self, name: str, read: Callable[[str], _T]) -> _T | None:
-        """None where the field is missing or null, else what `read` makes of it."""
+        """Returns None if the field is missing or null, else the result of `read`."""
         return read(name) if self._values.get(name) is not None else None
 
     def others(self, known: Collection[str]) -> dict[str, Any]:
-        """The fields whose names are not known."""
+        """Returns the fields with other names."""
         return {name: value for name, value in self._values.items() if name not in known}
 
     def anything(self, name: str) -> Any:
-        """Whatever the field holds."""
+        """Returns the unchecked value of a field."""
         if name not in self._values:
             raise SessionError(f"{self.where}: field {name!r} is missing")
         return self._values[name]
 
 
-# --- Files of lines, of which the last may be torn -------------------------------------------------------------------
+# --- Lines -----------------------------------------------------------------------------------------------------------
 
 
 def read_lines(path: Path, limit: int) -> tuple[list[str], bool]:
-    """Returns the complete lines of a file, and whether anything is missing: a torn last line, or the file.
+    """Returns the complete lines of a file, and whether it is missing or its last line is torn.
 
     Raises:
         SessionError: more than `limit` lines, a line that is not UTF-8, or no regular file.

@@ -1,11 +1,11 @@
-"""Prediction points of the three tasks, and the rule of what is visible at a point (teacher forcing).
+"""Prediction points of the three tasks, and the rule for visibility at a point (teacher forcing).
 
 This module alone states the rule; environments read it as a `PointView`, batches as the row ranges of `visible_rows`:
 
 * Frames of the car and physical actions are visible if they were recorded strictly before the point.
 * An utterance, with its words and all of its moves, is visible if its last move was recorded strictly before the point.
-  At an NfD point, utterances of the point's own time that stand before it in the record are visible as well: an action
-  may obey an utterance at once.
+  At an NfD point, utterances of the point's own time that precede it in the record are visible as well: an action may
+  obey an utterance at once.
 * At a UfN point, the words of the current utterance and the moves of its earlier spans are visible. At an RfN point
   nothing of the current utterance is, since its words give its moves away.
 * Hidden landmarks, which the car does not know, are never visible.
@@ -76,7 +76,7 @@ class Moments:
 
     @classmethod
     def of_one_session(cls, times: ArrayLike) -> Moments:
-        """Returns moments (n,) of a single session, whose index is 0."""
+        """Returns moments (n,) of a single session with index 0."""
         time = np.asarray(times, dtype=np.int64).reshape(-1)
         return cls(np.zeros(len(time), dtype=np.int64), time)
 
@@ -102,7 +102,7 @@ class RowRange:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RecordTimes:
-    """Times that decide what is visible in a record of one or several sessions, all in the same unit.
+    """Times that determine visibility in a record of one or several sessions, all in the same unit.
 
     Attributes:
         utterances: moments of the last move of u utterances of `SPEAKERS`; of one moment by their first event.
@@ -130,7 +130,7 @@ class VisibleRows:
 
 
 def visible_rows(times: RecordTimes, task: Task, points: Moments, events: ArrayLike) -> VisibleRows:
-    """Returns what is visible at points of a task; for UfN see also `earlier_spans`.
+    """Returns the rows that are visible at points of a task; for UfN see also `earlier_spans`.
 
     Args:
         times: times of the record.
@@ -151,7 +151,7 @@ def visible_rows(times: RecordTimes, task: Task, points: Moments, events: ArrayL
 
 
 def _with_just_heard(times: RecordTimes, said: RowRange, points: Moments, events: NDArray[np.integer]) -> RowRange:
-    """Adds utterances of the points' own time up to the first that does not stand before its point in the record."""
+    """Adds the utterances of each point's own time up to the first that does not precede the point in the record."""
     through = times.utterances.rows_before(Moments(points.session, points.time + 1)).stop
     stop = said.stop.copy()
     for point in np.flatnonzero(through > stop).tolist():
@@ -255,12 +255,12 @@ class SessionHistory:
         )
 
     def view(self, task: Task, frame: int, event: int = -1) -> PointView:
-        """Returns what is visible at a point.
+        """Returns the view at a point.
 
         Args:
             task: the task.
             frame: frame of the point.
-            event: number of the point's event; -1 where nothing is predicted.
+            event: number of the point's event; -1 if nothing is predicted.
         """
         seen = visible_rows(self.times, task, Moments.of_one_session(frame), [event])
         moves, utterance = self.moves[: int(seen.moves.stop[0])], ""
@@ -307,7 +307,7 @@ _STATE: Final = ("frame", "x", "y", "heading", "speed")
 
 
 def final_view(session: Session, task: Task) -> PointView:
-    """Returns what is visible after the end of a session: everything, and no current utterance."""
+    """Returns the view after the end of a session: the whole record, and no current utterance."""
     last_frame = round(session.duration * FRAME_RATE)
     return SessionHistory(session).view(task, last_frame + 1)
 
@@ -326,7 +326,7 @@ class _TaskPoint:
 
     @cached_property
     def view(self) -> PointView:
-        """What is visible at the point."""
+        """View at the point."""
         return self.history.view(self.task, self.frame, self.index)
 
 

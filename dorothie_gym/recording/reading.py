@@ -1,4 +1,4 @@
-"""Reading sessions of whatever layout, one or a folder of them."""
+"""Readers for sessions of any layout, alone or in folders."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dorothie_gym.recording.splits import SPLITS, TOWNS
 
 
 def layout_of(folder: Path) -> str | None:
-    """Returns "native", or the SDN layout of the session in a folder; None where it holds none."""
+    """Returns "native", or the SDN layout of the session in a folder; None without a session."""
     if (folder / HEADER_FILE).is_file():
         return "native"
     found = detect_layout(folder)
@@ -21,12 +21,12 @@ def layout_of(folder: Path) -> str | None:
 
 
 def read_session(path: Path | str, *, maps: Path | str | None = None, sign: SignVote | None = None) -> Session:
-    """Reads the session in a folder, whatever its layout.
+    """Returns the session in a folder, of any layout.
 
     Args:
         path: the folder.
         maps: folder with the maps of SDN's towns.
-        sign: what settles the sign of angles in an SDN session; see `read_sdn`.
+        sign: vote on the sign of angles in an SDN session; see `read_sdn`.
 
     Raises:
         SessionError: there is no session, or it cannot be read.
@@ -38,7 +38,7 @@ def read_session(path: Path | str, *, maps: Path | str | None = None, sign: Sign
 
 
 def session_folders(path: Path | str) -> tuple[Path, ...]:
-    """Returns the folders of the sessions in a folder and in its folds, by name; a session is its own only one.
+    """Returns the session folders in a folder and in its folds, by name; for a session, the folder itself.
 
     Raises:
         SessionError: there is no such folder, or it holds no session.
@@ -65,6 +65,6 @@ def _within(folder: Path, depth: int) -> Iterator[Path]:
 
 
 def sign_of(folders: Sequence[Path]) -> SignVote | None:
-    """Returns what the SDN sessions among the folders say about the sign of angles; None where there is none."""
+    """Returns the vote of the SDN sessions among the folders on the sign of angles; None without SDN sessions."""
     read = [folder for folder in folders if layout_of(folder) not in ("native", None)]
     return settle_sign(read) if read else None

@@ -1,9 +1,10 @@
-"""What of the recorded surroundings could be perceived from the car.
+"""Perception of the recorded surroundings from the car.
 
-As the environment shows it to the roles: everything within sight all around, which is 80 m on a clear day and less in
-fog, rain and darkness (`dorothie_gym.sim.sensing.visibility`; headlights count where they are recorded as on).
-What the environment adds by chance is left out: glimpses beyond the sight, and errors of place. A traffic light can be
-read within sight by whoever comes towards it. Relative to the car as it was when the surroundings were recorded.
+As in the environment, everything within the sight distance is perceived in all directions: 80 m on a clear day, less in
+fog, rain and darkness (`dorothie_gym.sim.sensing.visibility`; recorded headlights count). The random parts of the
+environment's perception are left out: glimpses beyond the sight distance and position errors. The state of a traffic
+light is perceived within the sight distance when the car drives towards it. Positions are relative to the car's pose at
+the frame of the record.
 """
 
 from __future__ import annotations
@@ -27,11 +28,11 @@ from dorothie_gym.sim.weather import Weather
 
 Array: TypeAlias = NDArray[np.float64]
 Switches: TypeAlias = Sequence[tuple[int, bool]]
-"""Frames at which the head lights were switched, and whether on."""
+"""Frames at which the headlights were switched, and whether on."""
 
 
 class ObjectKind(enum.IntEnum):
-    """What an object is: the first five as `ActorKind`, the others a traffic light by what it shows."""
+    """Kind of a perceived object: the first five as `ActorKind`, the others traffic lights by state."""
 
     OTHER = 0
     VEHICLE = 1
@@ -44,28 +45,28 @@ class ObjectKind(enum.IntEnum):
 
 
 OBJECT_VALUES: Final = ("distance", "bearing", "ahead", "aside", "heading", "speed", "length", "width")
-"""Columns of `Objects.values`: distance [m], bearing [degrees, positive left of where the car looks], the same place in
-metres ahead and to the left, heading relative to the car's [degrees, positive left], speed [m/s], length and width
-[m]; of a light distance, bearing and place are those of its stop line, and the rest is 0."""
+"""Columns of `Objects.values`: distance [m], bearing [degrees, positive left of the car's heading], the same position
+in metres ahead and to the left, heading relative to the car's [degrees, positive left], speed [m/s], length and width
+[m]; for a light, distance, bearing and position are those of its stop line, and the rest is 0."""
 
 MOST_OBJECTS: Final = 64
-"""Objects of a look that are kept, the nearest: more than any batch takes."""
+"""Most objects of a look, the nearest ones: more than any batch takes."""
 
 FACING: Final = 90.0
-"""A light is seen by whoever drives in the direction of the lane that it rules, up to this much aslant [degrees]."""
+"""Largest angle between the car's heading and the lane of a visible light [degrees]."""
 
 
 def perceived(
     scene: Scene, pose: Array, frames: NDArray[np.int64], switches: Switches, town: Town | None
 ) -> Iterator[tuple[int, NDArray[np.int64], Array]]:
-    """Yields for each look the frame (int), kinds (k,) and values (k, 8) of what was perceived, the nearest first.
+    """Yields for each look the frame (int), kinds (k,) and values (k, 8) of the perceived objects, the nearest first.
 
     Args:
-        scene: what was recorded around the car.
-        pose: (n, 3) x, y [m], heading [degrees, clockwise] of the car.
-        frames: (n,) frames of the poses, rising; those of the scene are among them.
-        switches: of the head lights, which are off at first.
-        town: the town, if it is known: it tells where the lights are.
+        scene: recorded surroundings of the car.
+        pose: (n, 3) x, y [m] and heading [degrees, clockwise] of the car.
+        frames: (n,) frames of the poses, rising, including those of the scene.
+        switches: switches of the headlights, which are off at first.
+        town: the town, if known, for the positions of the traffic lights.
     """
     looks = scene.actors.frames
     at = pose[np.searchsorted(frames, looks)].reshape(-1, 3)
@@ -86,10 +87,10 @@ def perceived(
 
 
 def last_perceived(session: Session, frame: int, town: Town | None) -> tuple[NDArray[np.int64], Array]:
-    """Returns kinds (k,) and values (k, 8) of the last look before a frame; nothing (k = 0) where there was none.
+    """Returns kinds (k,) and values (k, 8) of the last look before a frame; k is 0 without a look.
 
     Args:
-        session: the session, as far as it has come.
+        session: the session so far.
         frame: looks of this frame and later ones do not count.
         town: as of `perceived`.
     """
@@ -107,13 +108,13 @@ def last_perceived(session: Session, frame: int, town: Town | None) -> tuple[NDA
 
 
 def light_switches(session: Session) -> Switches:
-    """Returns the frames at which the head lights were switched, and whether on."""
+    """Returns the frames at which the headlights were switched, and whether on."""
     switched = [act for act in session.physical_actions if act.action is PhysicalAction.LIGHT_CHANGE]
     return [(act.frame, bool(act.up)) for act in switched]
 
 
 def _last(table: SceneTable, frame: int) -> SceneTable:
-    """The last record at a frame or before, alone."""
+    """Returns a table of the last record at or before a frame."""
     k = int(np.searchsorted(table.frames, frame, side="right")) - 1
     if k < 0:
         return SceneTable(table.frames[:0], table.offsets[:1], table.rows[:0])
@@ -122,7 +123,7 @@ def _last(table: SceneTable, frame: int) -> SceneTable:
 
 
 def _actors(table: SceneTable, at: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-    """Look, kind and values of every recorded actor."""
+    """Returns look, kind and values of every recorded actor."""
     owner = np.repeat(np.arange(len(table)), np.diff(table.offsets))
     rows = table.rows
     values = np.zeros((len(rows), len(OBJECT_VALUES)))
@@ -136,7 +137,7 @@ def _actors(table: SceneTable, at: Array) -> tuple[NDArray[np.int64], NDArray[np
 def _lights(
     scene: Scene, looks: NDArray[np.int64], at: Array, town: Town | None
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-    """Look, kind and values of the lights that the car comes towards."""
+    """Returns look, kind and values of the lights that the car drives towards."""
     table, lines = scene.lights, {} if town is None else stop_lines(town)
     record = np.searchsorted(table.frames, looks, side="right") - 1  # the last before each look
     sizes = np.where(record >= 0, np.diff(table.offsets, append=table.offsets[-1:])[record], 0) if len(table) else None
@@ -157,7 +158,7 @@ def _lights(
 
 @functools.lru_cache(maxsize=16)
 def stop_lines(town: Town) -> Mapping[int, tuple[float, float, float]]:
-    """Returns where each light's first lane ends, by the light's id: x, y [m], heading [degrees, clockwise]."""
+    """Returns the end of each light's first lane, by id of the light: x, y [m], heading [degrees, clockwise]."""
     lit = {signal for programme in town.programmes for signal in programme.signals}
     lines = {}
     for signal in town.signals:
@@ -168,7 +169,7 @@ def stop_lines(town: Town) -> Mapping[int, tuple[float, float, float]]:
 
 
 def _relative(places: Array, at: Array) -> Array:
-    """Distance [m], bearing [degrees, positive left], metres ahead and to the left (m, 4) of places from poses."""
+    """Returns distance [m], bearing [degrees, positive left], metres ahead and to the left of positions (m, 4)."""
     dx, dy = (places - at[:, :2]).T
     heading = np.radians(at[:, 2])
     ahead = np.cos(heading) * dx + np.sin(heading) * dy
@@ -181,7 +182,7 @@ def _wrap(degrees: Array) -> Array:
 
 
 def _sights(weather: SceneTable, switches: Switches, looks: NDArray[np.int64]) -> Array:
-    """How far things were seen at each look [m]."""
+    """Returns the sight distance at each look [m]."""
     record = np.searchsorted(weather.frames, looks, side="right") - 1
     lamps = np.zeros(len(looks), dtype=np.bool_)
     for frame, on in switches:
@@ -197,7 +198,7 @@ def _sights(weather: SceneTable, switches: Switches, looks: NDArray[np.int64]) -
 
 @functools.lru_cache(maxsize=4096)
 def _sight(values: tuple[float, ...], lamps: bool) -> float:
-    """Sight in a weather [m]; parameters beyond their range, which other corpora may have, count as a clear day's."""
+    """Returns the sight distance in a weather [m]; parameters out of range (other corpora) count as on a clear day."""
     weather = Weather()
     for parameter, value in zip(WeatherParameter, values, strict=True):
         try:

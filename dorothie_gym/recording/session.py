@@ -1,4 +1,4 @@
-"""A session: what happened, as everything else reads it."""
+"""Session: header, events and frames, as analyses and models read it."""
 
 from __future__ import annotations
 
@@ -38,16 +38,16 @@ class Session:
     """Header, events and trajectory of a session.
 
     Attributes:
-        header: what was known before it began.
-        events: what happened, in order of frames (events of one frame in the order they were recorded in).
-        trajectory: structured array (n,), 30 rows a second; see `TRAJECTORY_COLUMNS`.
-        summary: how it ended; None where it did not.
-        complete: whether it was recorded to its end.
+        header: town, storyboard, seed and configuration.
+        events: events in order of frames (those of one frame in the order of their recording).
+        trajectory: structured array (n,), 30 rows per second; see `TRAJECTORY_COLUMNS`.
+        summary: outcome; None if the session was interrupted.
+        complete: whether the session was recorded to its end.
         name: name of its folder, or of its town, storyboard and seed.
-        scene: what was around the car, as far as it was recorded.
+        scene: recorded surroundings of the car.
         pictures: paths of the pictures by frame.
-        decisions: what the roles decided, from which the session can be played again; None where it is not known.
-        report: what the reader noticed.
+        decisions: actions of the roles, from which the session can be simulated again; None if not recorded.
+        report: findings of the reader.
     """
 
     header: SessionHeader
@@ -62,7 +62,7 @@ class Session:
     report: ReadReport = field(default_factory=ReadReport)
 
     def __post_init__(self) -> None:
-        """Puts the events in order, checks the trajectory's columns and gives a name to what has none."""
+        """Sorts the events, checks the trajectory's columns, and names a session without a name."""
         if self.trajectory.dtype != TRAJECTORY_DTYPE:
             raise SessionError(f"session: trajectory has type {self.trajectory.dtype}; it must be {TRAJECTORY_DTYPE}")
         object.__setattr__(self, "events", tuple(sorted(self.events, key=lambda event: event.frame)))
@@ -72,11 +72,11 @@ class Session:
 
     @classmethod
     def load(cls, path: Path | str) -> Session:
-        """Reads the folder of a session (`docs/session-format.md`); other layouts are read by `read_session`.
+        """Returns the session of a folder in the native layout (`docs/session-format.md`); see also `read_session`.
 
-        A session that was cut off, at whatever byte, is read up to its last complete event and frame, and its
-        `complete` is False. Events that are out of order are put in order. What a newer minor version of the format
-        added is kept, and named in `report`.
+        An interrupted session is read up to its last complete event and frame, and its `complete` is False. Events
+        that are out of order are sorted. Additions of a newer minor version of the format are kept and named in
+        `report`.
 
         Raises:
             SessionError: there is no session, or it is damaged otherwise, or of a newer major version; the message
@@ -98,26 +98,26 @@ class Session:
         )
 
     def save(self, path: Path | str) -> Path:
-        """Writes the session into a new folder, whole or not at all; pictures are copied.
+        """Writes the session into a new folder, which appears when it is complete; pictures are copied.
 
-        A session without an outcome is written as one that was cut off.
+        A session without an outcome is written as an interrupted one.
 
         Returns:
             The folder.
 
         Raises:
-            SessionError: there is something of that name already, or the session cannot be written.
+            SessionError: a file or folder of that name exists, or the session cannot be written.
             OSError: the folder cannot be written.
         """
         return save_folder(self, Path(path))
 
     def check(self) -> tuple[str, ...]:
-        """Returns what is wrong with the session, a sentence each, that reading it did not refuse; none is sound."""
+        """Returns the faults of the session that its reader accepted, one sentence each; empty for a sound session."""
         return faults_of(self)
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 of the content in hexadecimal digits: the same however, and by whatever version, it was packed."""
+        """SHA-256 of the content in hexadecimal digits; it does not depend on compression or package version."""
         return digest_of(self)
 
     @property
@@ -129,7 +129,7 @@ class Session:
 
     @cached_property
     def all_moves(self) -> tuple[MoveRecord, ...]:
-        """The dialogue moves of all speakers."""
+        """Dialogue moves of all speakers."""
         return tuple(
             move_record(event, index, f"session {self.name}, event {index}")
             for index, event in enumerate(self.events)
@@ -137,16 +137,16 @@ class Session:
         )
 
     def moves(self, role: Role | None = None) -> tuple[MoveRecord, ...]:
-        """Returns the dialogue moves of `role`, or of everybody."""
+        """Returns the dialogue moves of `role`, or of all speakers."""
         return tuple(move for move in self.all_moves if role is None or move.speaker is role)
 
     def utterances(self, role: Role | None = None) -> tuple[UtteranceRecord, ...]:
-        """Returns the utterances of `role`, or of everybody."""
+        """Returns the utterances of `role`, or of all speakers."""
         return utterance_records(self.moves(role))
 
     @cached_property
     def physical_actions(self) -> tuple[ActionRecord, ...]:
-        """The physical actions, of whatever source."""
+        """Physical actions of all sources."""
         return tuple(
             action_record(event, index, f"session {self.name}, event {index}")
             for index, event in enumerate(self.events)
@@ -155,7 +155,7 @@ class Session:
 
     @cached_property
     def infractions(self) -> tuple[InfractionRecord, ...]:
-        """Breaches of the rules of the road, collisions among them."""
+        """Infractions of the traffic rules, including collisions."""
         return tuple(
             infraction_record(event, index, f"session {self.name}, event {index}")
             for index, event in enumerate(self.events)

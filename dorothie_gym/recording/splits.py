@@ -1,4 +1,4 @@
-"""Folds of a corpus, by the folders that its sessions lie in."""
+"""Folds of a corpus, named by the folders of its sessions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dorothie_gym.errors import SessionError
 
 
 class Fold(enum.StrEnum):
-    """A fold; its value is the folder (paper: towns of the unseen folds do not occur in training)."""
+    """Fold of a corpus; its value is the folder. Towns of the unseen folds do not occur in training (paper)."""
 
     TRAIN = "train"
     VAL_SEEN = "val/seen"
@@ -21,7 +21,7 @@ class Fold(enum.StrEnum):
     TEST = "test"
 
     def matches(self, wanted: str) -> bool:
-        """Whether the fold is `wanted`, or a part of it: "val" has two, so has "seen"."""
+        """Returns whether the fold is `wanted` or one of its parts: "val" and "seen" have two each."""
         return wanted == self.value or wanted in self.value.split("/")
 
 
@@ -33,7 +33,7 @@ FOLDS: Final = (Fold.TRAIN, Fold.VAL_SEEN, Fold.VAL_UNSEEN, Fold.TEST_SEEN, Fold
 
 
 def fold_of_folder(folder: Path) -> Fold | None:
-    """Returns the fold that the folder of a session lies in; None where it lies in none."""
+    """Returns the fold of a session's folder; None outside of folds."""
     parts = folder.absolute().parts[-3:-1]
     if len(parts) == 2 and parts[0] in SPLITS and parts[1] in TOWNS:
         name = "/".join(parts)
@@ -43,7 +43,7 @@ def fold_of_folder(folder: Path) -> Fold | None:
 
 
 def check_fold(wanted: str) -> str:
-    """Returns the name of a fold or of several ("val", "seen"); raises `SessionError` for others."""
+    """Returns the name of a fold or of a group of folds ("val", "seen"); raises `SessionError` for other names."""
     known = sorted({part for fold in Fold for part in (fold.value, *fold.value.split("/"))})
     if str(wanted) not in known:
         raise SessionError(f"fold: {str(wanted)!r} is unknown; choose from {', '.join(known)}")

@@ -1,4 +1,4 @@
-"""What was around the car: other road users, traffic lights, weather, decision by decision."""
+"""Recorded surroundings of the car: other road users, traffic lights and weather."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Rows: TypeAlias = NDArray[np.void]
 
 
 class ActorKind(enum.IntEnum):
-    """What moves, or stands, around the car. Files have the names in lower case."""
+    """Kind of an actor around the car. Files hold the names in lower case."""
 
     OTHER = 0
     VEHICLE = 1
@@ -30,7 +30,7 @@ class ActorKind(enum.IntEnum):
 
 
 LIGHT_STATES: Final = (LightColour.GREEN, LightColour.YELLOW, LightColour.RED)
-"""What the numbers in the column `state` of lights mean."""
+"""States of lights, in the order of the numbers in the column `state`."""
 
 _STATE_NUMBERS: Final[dict[str, int]] = {str(colour): number for number, colour in enumerate(LIGHT_STATES)}
 
@@ -41,7 +41,7 @@ ACTOR_DTYPE: Final = np.dtype(
         *((name, np.float64) for name in ("x", "y", "heading", "speed", "length", "width")),
     ]
 )
-"""Number that the actor keeps while it is there, `ActorKind`, middle [m], heading [rad], speed [m/s], size [m]."""
+"""Persistent number of the actor, `ActorKind`, centre [m], heading [rad], speed [m/s], size [m]."""
 
 _ACTOR_COLUMNS: Final = ACTOR_DTYPE.names or ()
 
@@ -56,10 +56,10 @@ _WEATHER_NAMES: Final = frozenset(WEATHER_DTYPE.names or ())
 
 @dataclass(frozen=True, eq=False)
 class SceneTable:
-    """Rows that were recorded at some frames: none, one or several a frame.
+    """Rows that were recorded at some frames, any number per frame.
 
     Attributes:
-        frames: the frames (k,) int64 at which something was recorded, rising.
+        frames: the recorded frames (k,) int64, rising.
         offsets: (k + 1,) int64: the rows of frame `frames[i]` are `rows[offsets[i]:offsets[i + 1]]`.
         rows: structured array (m,).
     """
@@ -70,15 +70,15 @@ class SceneTable:
 
     @classmethod
     def empty(cls, dtype: np.dtype[Any]) -> Self:
-        """Returns a table of what was never recorded."""
+        """Returns a table without records."""
         return cls(np.empty(0, dtype=np.int64), np.zeros(1, dtype=np.int64), np.empty(0, dtype=dtype))
 
     def __len__(self) -> int:
-        """Number of frames at which something was recorded."""
+        """Number of recorded frames."""
         return len(self.frames)
 
     def at(self, frame: int) -> Rows | None:
-        """Returns the rows of the last record at `frame` or before it; None before the first."""
+        """Returns the rows of the last record at or before `frame`; None before the first."""
         k = int(np.searchsorted(self.frames, frame, side="right")) - 1
         return None if k < 0 else self.rows[self.offsets[k] : self.offsets[k + 1]]
 
@@ -90,7 +90,7 @@ class SceneTable:
         return SceneTable(self.frames[kept], offsets, self.rows[np.repeat(kept, sizes)])
 
     def equals(self, other: SceneTable) -> bool:
-        """Whether two tables hold the same."""
+        """Returns whether two tables hold the same rows."""
         return (
             np.array_equal(self.frames, other.frames)
             and np.array_equal(self.offsets, other.offsets)
@@ -105,13 +105,13 @@ def _nothing(dtype: np.dtype[Any]) -> Any:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scene:
-    """What was around the car; everything may be missing.
+    """Surroundings of the car; each table may be empty.
 
     Attributes:
         actors: rows of `ACTOR_DTYPE`.
         lights: rows of `LIGHT_DTYPE`.
-        weather: one row of `WEATHER_DTYPE` a record.
-        columns: further columns of the frames, each (n,) beside the trajectory: those of a newer minor version, or of
+        weather: one row of `WEATHER_DTYPE` per record.
+        columns: further columns of the frames, each (n,) like the trajectory: those of a newer minor version, or of
             another corpus (`road_id`, `lane_id`, `junction_id`).
     """
 
@@ -129,7 +129,7 @@ class Scene:
         )
 
     def equals(self, other: Scene) -> bool:
-        """Whether two scenes hold the same."""
+        """Returns whether two scenes hold the same records."""
         return (
             self.actors.equals(other.actors)
             and self.lights.equals(other.lights)
@@ -146,7 +146,7 @@ def actor_rows(actors: Rows | Mapping[str, Any]) -> Rows:
         actors: such rows, or a mapping of the eight columns; `kind` as `ActorKind`, its number or its name.
 
     Raises:
-        SessionError: a column is missing, or of another length or type, or holds what is not finite.
+        SessionError: a column is missing, of another length or type, or not finite.
     """
     if isinstance(actors, Mapping):
         actors = _from_columns(actors)
@@ -186,10 +186,10 @@ def _kind(kind: ActorKind | int | str) -> int:
 
 
 def light_rows(lights: Mapping[int, LightColour | str]) -> Rows:
-    """Returns the states of lights by id of their signal as rows of `LIGHT_DTYPE`, by id.
+    """Returns states of lights as rows of `LIGHT_DTYPE`, in order of the ids of their signals.
 
     Raises:
-        SessionError: an id is no whole number, or a state no colour of a light.
+        SessionError: an id is no whole number, or a state is no colour of a light.
     """
     rows = np.empty(len(lights), dtype=LIGHT_DTYPE)
     try:
@@ -206,7 +206,7 @@ def weather_rows(weather: Mapping[Any, float]) -> Rows:
     """Returns the ten parameters as one row of `WEATHER_DTYPE`.
 
     Raises:
-        SessionError: there are others than the ten, or a value is not finite.
+        SessionError: the parameters are not the ten of the ontology, or a value is not finite.
     """
     values = {str(name): value for name, value in weather.items()}
     if values.keys() != _WEATHER_NAMES:

@@ -1,4 +1,4 @@
-"""Town that a session names."""
+"""Lookup of the town of a session."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ _SUFFIXES: Final = (".xodr", ".yaml", ".yml")
 
 
 def find_town(name: str, maps: Path | None) -> Town | None:
-    """Returns the town of that name: one that is shipped, or the file `<name>.xodr` or `.yaml` in a folder of maps.
+    """Returns the town of a name: a shipped one, or the file `<name>.xodr` or `.yaml` in a folder of maps; or None.
 
     Raises:
-        TownError: the file is at fault.
+        TownError: the file is malformed.
     """
-    if not _NAME.fullmatch(name):  # what a file says is no path
+    if not _NAME.fullmatch(name):  # a name from a file must not be a path
         return None
     if name in town_names():
         return load_town(name)

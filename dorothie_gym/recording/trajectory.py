@@ -1,4 +1,4 @@
-"""Where the car was, frame by frame."""
+"""State of the car, frame by frame."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ Trajectory: TypeAlias = NDArray[np.void]
 """Structured array (n,) of `TRAJECTORY_DTYPE`, in order of frames."""
 
 TRAJECTORY_COLUMNS: Final = FRAME_COLUMNS
-"""Frame (30 Hz), place [m], heading [rad, clockwise], speed [m/s], controls in [0, 1], [-1, 1], [0, 1], lane id."""
+"""Frame (30 Hz), position [m], heading [rad, clockwise], speed [m/s], controls in [0, 1], [-1, 1], [0, 1], lane id."""
 
 WHOLE_COLUMNS: Final = ("frame", "lane")
 """Columns of whole numbers."""
 
 OPEN_COLUMNS: Final = ("speed", "throttle", "steer", "brake")
-"""Columns that may hold NaN: what the recording does not know."""
+"""Columns that may hold NaN for unknown values."""
 
 TENTHS: Final = 10
 """Frames a second of the benchmark and of SDN [Hz] (paper, section 4)."""
@@ -29,7 +29,7 @@ FRAMES_PER_TENTH: Final = FRAME_RATE // TENTHS
 """Frames of a native recording in one frame of the benchmark."""
 
 NO_LANE: Final = -1
-"""Lane of a car whose lane the recording does not know."""
+"""Lane number for an unknown lane."""
 
 TRAJECTORY_DTYPE: Final = np.dtype(
     [(name, np.int64 if name in WHOLE_COLUMNS else np.float64) for name in TRAJECTORY_COLUMNS]
@@ -55,7 +55,7 @@ def trajectory_of(rows: NDArray[np.float64]) -> Trajectory:
 
 
 def checked_rows(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns the rows (n, 9) if they can be those of a trajectory.
+    """Returns the rows (n, 9) if they are those of a trajectory.
 
     Raises:
         SessionError: another shape, a frame, place or lane that is not finite, a control that is infinite, or a frame
@@ -81,10 +81,10 @@ def rows_of(trajectory: Trajectory) -> NDArray[np.float64]:
 
 
 def check_rising(frames: NDArray[np.int64] | NDArray[np.float64], last: int, where: str) -> None:
-    """Does nothing if the frames rise, each above the one before, the first above `last`.
+    """Checks that the frames rise, each above the one before, the first above `last`.
 
     Raises:
-        SessionError: they do not; the message begins with `where` and names the first that does not.
+        SessionError: they do not; the message begins with `where` and names the first wrong frame.
     """
     if len(frames) == 0 or (frames[0] > last and (frames[1:] > frames[:-1]).all()):
         return

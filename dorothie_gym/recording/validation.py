@@ -1,4 +1,4 @@
-"""What can be wrong with a session that could be read."""
+"""Checks of a session beyond those of its reader, and the report of a reader."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def faults_of(session: Session) -> tuple[str, ...]:
-    """Returns a sentence for each fault, beginning with its place."""
+    """Returns one sentence for each fault, beginning with its place."""
     return (*_header(session), *_events(session), *_actions(session), *_utterances(session), *_frames(session))
 
 
@@ -42,7 +42,7 @@ def _events(session: Session) -> Iterator[str]:
         where = f"events[{k}] ({event.type_name}, frame {event.frame})"
         if over:
             yield f"{where}: comes after the end of the session"
-            over = False  # told once
+            over = False  # reported once
         if event.type is EventType.OTHER and session.header.source == NATIVE and not newer:
             yield f"{where}: no type of event of version {session.header.format_version}"
         if event.type is EventType.END:
@@ -93,24 +93,24 @@ def _frames(session: Session) -> Iterator[str]:
             yield f"{name}: are recorded at frames that the trajectory lacks"
 
 
-# --- What the reader of a session noticed: what it kept without understanding it, missed, or put right ---------------
+# --- Report of a reader ----------------------------------------------------------------------------------------------
 
 MOST_NAMES: Final = 100
-"""Different names that a report counts of one kind; the rest is counted together."""
+"""Most names of one kind that a report counts separately."""
 
 OTHERS: Final = "(others)"
 
 
 @dataclass
 class ReadReport:
-    """Findings of one reading.
+    """Findings of a reader.
 
     Attributes:
-        layout: which layout was read: "native", "release", "sample" or "hub".
-        unknown: names (file, field or type) that were kept though the reader does not know them, and how often.
-        missing: files and fields that are expected and are not there, and how often.
-        repaired: faults that were put right, or rows that were left out, and how often.
-        facts: figures of the reading, in JSON types.
+        layout: layout of the session: "native", "release", "sample" or "hub".
+        unknown: counts of unknown names (file, field or type), which were kept.
+        missing: counts of expected files and fields that are missing.
+        repaired: counts of repaired faults and of rows that were left out.
+        facts: further figures, in JSON types.
     """
 
     layout: str = "native"
@@ -120,15 +120,15 @@ class ReadReport:
     facts: dict[str, Any] = field(default_factory=dict)
 
     def keep(self, name: str, count: int = 1) -> None:
-        """Notes something unknown that was kept."""
+        """Counts an unknown name that was kept."""
         _count(self.unknown, name, count)
 
     def miss(self, name: str, count: int = 1) -> None:
-        """Notes something expected that is not there."""
+        """Counts an expected name that is missing."""
         _count(self.missing, name, count)
 
     def repair(self, what: str, count: int = 1) -> None:
-        """Notes a repair; with a count of 0 nothing."""
+        """Counts a repair, unless `count` is 0."""
         if count:
             _count(self.repaired, what, count)
 
@@ -143,12 +143,12 @@ class ReadReport:
         }
 
     def lines(self) -> list[str]:
-        """Returns the report in words, a line each."""
+        """Returns the report as lines of text."""
         return report_lines(self.to_json())
 
 
 def report_lines(report: Mapping[str, Any]) -> list[str]:
-    """Returns a report, in JSON types, in words, a line each."""
+    """Returns a report, given in JSON types, as lines of text."""
     kinds = (("kept, not understood", "unknown"), ("missing", "missing"), ("repaired", "repaired"))
     lines = [f"{title}: {name}{_times(count)}" for title, kind in kinds for name, count in report[kind].items()]
     return lines + [f"{name.replace('_', ' ')}: {_in_words(value)}" for name, value in report["facts"].items()]

@@ -1,4 +1,4 @@
-"""Writing a session while it happens."""
+"""Writer of a session in progress."""
 
 from __future__ import annotations
 
@@ -36,19 +36,18 @@ from dorothie_gym.recording.trajectory import check_rising, checked_rows
 
 
 class SessionWriter:
-    """Appends what happens to the folder of a session; what was appended survives the death of the process.
+    """Appends events and frames to the folder of a session; appended data survives the death of the process.
 
-    Whatever moment the process dies at, the folder is a session that is finished, or one that is not and that loads up
-    to what was appended last (`session_state` tells which), or, before the header was written, none. Actors, lights
-    and weather may be missing altogether, or be handed over at some frames only.
+    At any moment, the folder holds a finished session, an interrupted one that loads up to the last append, or, before
+    the header was written, none (`session_state`). Actors, lights and weather are optional, at each frame.
 
     Args:
-        folder: folder of the session, made if need be.
-        header: what is known of the session before it begins.
-        overwrite: whether a session that the folder holds already is deleted.
+        folder: folder of the session, created if it is missing.
+        header: header of the session.
+        overwrite: whether an existing session in the folder is deleted.
 
     Raises:
-        SessionError: the folder holds a session already and `overwrite` is False.
+        SessionError: the folder holds a session and `overwrite` is False.
         OSError: the folder cannot be written.
     """
 
@@ -69,14 +68,14 @@ class SessionWriter:
         self._last_decision = -1
 
     def append(self, events: Iterable[Event] = (), frames: NDArray[np.float64] | None = None) -> None:
-        """Appends a batch of events and frames and hands it to the operating system.
+        """Appends a batch of events and frames and flushes it to the operating system.
 
         Args:
-            events: what happened.
+            events: events, in order.
             frames: (n, 9) float64, see `TRAJECTORY_COLUMNS`; frames must rise.
 
         Raises:
-            SessionError: an event or a row cannot be written; nothing of the batch is then.
+            SessionError: an event or a row cannot be written; nothing of the batch is written then.
         """
         self._check_open("nothing can be appended")
         lines = [encode_event(event) for event in events]
@@ -95,9 +94,9 @@ class SessionWriter:
         self.append((), frames)
 
     def add_decision(self, frame: int, actions: Mapping[Role, Mapping[str, Any]]) -> None:
-        """Appends what the roles decided at a frame, see `Decision`; nothing is written where nobody did anything.
+        """Appends the actions of the roles at a frame, see `Decision`; nothing is written without an action.
 
-        From the first call on the session is one whose decisions are recorded.
+        From the first call on, the session counts as one with recorded decisions.
 
         Raises:
             SessionError: an action cannot be written, or the frame is not above that of the decision before.
@@ -114,21 +113,21 @@ class SessionWriter:
         self._last_decision = frame
 
     def add_actors(self, frame: int, actors: Rows | Mapping[str, Any]) -> None:
-        """Appends the actors around the car at a frame: rows of `ACTOR_DTYPE`, or a mapping of its columns.
+        """Appends the actors around the car at a frame, as rows of `ACTOR_DTYPE` or as a mapping of its columns.
 
         Raises:
-            SessionError: they are of another form, or the frame was not appended before, or has actors already.
+            SessionError: they have another form, or the frame was not appended before or already has actors.
         """
         self._add(ACTORS, frame, actor_rows(actors))
 
     def add_lights(self, frame: int, lights: Mapping[int, LightColour | str]) -> None:
-        """Appends what each traffic light shows at a frame, by id of its signal; raises `SessionError` as above."""
+        """Appends the state of each light at a frame, by id of its signal; raises `SessionError` as `add_actors`."""
         if self._lights is None or self._lights[0] != lights:  # they seldom change
             self._lights = dict(lights), light_rows(lights)
         self._add(LIGHTS, frame, self._lights[1])
 
     def add_weather(self, frame: int, weather: Mapping[Any, float]) -> None:
-        """Appends the ten weather parameters at a frame; raises `SessionError` as above."""
+        """Appends the ten weather parameters at a frame; raises `SessionError` as `add_actors`."""
         if self._weather is None or self._weather[0] != weather:
             self._weather = dict(weather), weather_rows(weather)
         self._add(WEATHER, frame, self._weather[1])
@@ -137,7 +136,7 @@ class SessionWriter:
         """Writes a picture (PNG) of a frame.
 
         Raises:
-            SessionError: it is no PNG, or the frame is none.
+            SessionError: it is no PNG, or the frame number is out of range.
         """
         self._check_open("no picture can be added")
         if not png.startswith(b"\x89PNG\r\n\x1a\n"):
@@ -149,12 +148,12 @@ class SessionWriter:
         write_atomically(pictures / picture_name(frame), png)
 
     def finish(self, outcome: Mapping[str, Any]) -> None:
-        """Writes how the session ended, which makes it complete, and closes it.
+        """Writes the outcome, which completes the session, and closes it.
 
-        The journal is folded into `frames.parquet`, and goes; last of all the outcome enters `session.json`, at once.
+        The journal is converted into `frames.parquet` and removed; last, `session.json` is replaced atomically.
 
         Raises:
-            SessionError: the outcome holds what JSON cannot, or the session is closed already.
+            SessionError: the outcome holds other types than JSON's, or the session is closed.
         """
         self._check_open("it cannot be finished")
         outcome = canonical(outcome, "outcome")
@@ -166,7 +165,7 @@ class SessionWriter:
         file.write(self.folder)
 
     def close(self) -> None:
-        """Closes the files; a session that was not finished stays incomplete. May be called again."""
+        """Closes the files; an unfinished session stays incomplete. May be called again."""
         self._events.close()
         self._journal.close()
         if self._decisions is not None:
@@ -220,5 +219,5 @@ class SessionWriter:
 
 
 def _stands(path: Path) -> bool:
-    """Whether there is something of that name, a link to nowhere included."""
+    """Returns whether a file or link of that name exists, including a broken link."""
     return path.exists() or path.is_symlink()

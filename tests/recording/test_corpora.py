@@ -111,7 +111,7 @@ def test_manifest_that_was_changed_itself_is_noticed(corpus: Corpus) -> None:
     path = corpus.write_manifest()
     whole = path.read_text()
     path.write_text(whole.replace("train/a", "../../a"))
-    with pytest.raises(SessionError, match="do not fit its own hash"):
+    with pytest.raises(SessionError, match="do not match its hash"):
         corpus.verify()
     path.write_text(whole.replace('"version": "1.0"', '"version": "9.0"'))
     with pytest.raises(SessionError, match="version"):

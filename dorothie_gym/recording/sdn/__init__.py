@@ -1,4 +1,4 @@
-"""Sessions of the Situated Dialogue Navigation corpus (SDN): read into `Session`, and written in its release layout."""
+"""Situated Dialogue Navigation corpus (SDN): reader into `Session`, and writer of its release layout."""
 
 from dorothie_gym.recording.sdn.files import SdnLayout, detect_layout
 from dorothie_gym.recording.sdn.reader import read_sdn, settle_sign

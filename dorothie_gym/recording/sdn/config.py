@@ -1,4 +1,4 @@
-"""`config.json` and `task.json` of SDN as the header of a session."""
+"""Session header from `config.json` and `task.json` of SDN."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _UNKNOWN: Final = "Unknown"
 
 
 def town_of(config: Row) -> str:
-    """Returns the name of the town; empty where the configuration has none."""
+    """Returns the name of the town; empty if the configuration has none."""
     name = _environment(config).get("map", config.get("map"))
     return name.rpartition("/")[2] if isinstance(name, str) else ""
 
@@ -32,12 +32,12 @@ def header_of(
     """Returns the header of a session.
 
     Args:
-        config: what `config.json` holds; empty where there is none.
-        task: what `task.json` holds; empty where there is none.
+        config: content of `config.json`; empty without the file.
+        task: content of `task.json`; empty without the file.
         layout: the session's layout.
-        place: the town, as far as it can be loaded.
+        place: map of the town.
         first_frame: frame (10 Hz) at which the session begins.
-        report: is told what is missing or unknown.
+        report: receives missing and unknown fields.
     """
     if isinstance(config.get(OURS), Mapping):
         return SessionHeader.from_json(config[OURS], f"config.json, {OURS}")
@@ -97,7 +97,7 @@ def _streets(names: Any, report: ReadReport) -> list[str]:
 
 
 def _dig(row: Row, *path: str) -> Row:
-    """The object at a path of fields, each of which may be missing."""
+    """Returns the object at a path of fields, each of which may be missing."""
     for name in path:
         below = row.get(name)
         row = below if isinstance(below, Mapping) else {}
@@ -105,7 +105,7 @@ def _dig(row: Row, *path: str) -> Row:
 
 
 def _landmark(row: Row, place: SdnMap, hidden: frozenset[str], report: ReadReport) -> LandmarkRow:
-    """A landmark of the release layout (`wp`) or of the sample layout (`location`)."""
+    """Returns a landmark of the release layout (`wp`) or of the sample layout (`location`)."""
     name = _landmark_name(row, report)
     location = _dig(row, "wp", "Transform", "Location")
     ids = _dig(row, "wp", "OpenDriveID") or row
@@ -145,7 +145,7 @@ def _hidden(task: Row) -> frozenset[str]:
 
 
 def _resolve(destination: Any, task: Row) -> str | None:
-    """The landmark that a destination of a storyboard means: a name, or a variable that is assigned to one."""
+    """Returns the landmark of a storyboard's destination: a name, or a variable that is assigned to one."""
     if not isinstance(destination, str):
         return None
     assignments = _dig(task, "assignments")

@@ -1,4 +1,4 @@
-"""SDN's log of events as events of a session."""
+"""Session events from SDN's event log."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ RIGHT: Final = 2
 """Value of a LaneSwitch to the right; 1 and 3 are left (spec: sdn-format)."""
 
 LEFT: Final = 3
-"""Value of a LaneSwitch to the left that we write: the published code makes +90 degrees of it."""
+"""Value written for a LaneSwitch to the left; the published code reads it as +90 degrees."""
 
 _ON: Final = {"on": True, "off": False, "true": True, "false": False, "1": True, "0": False}
 
@@ -42,9 +42,9 @@ class DeedReader:
     """Turns the values of rows into the data of actions and beliefs.
 
     Attributes:
-        report: is told what is unknown.
-        lane_switches: which values of LaneSwitch occurred, and how often.
-        roads: of JTurns that name a road: number of the JTurn, counted from 0, and the road.
+        report: receives unknown values.
+        lane_switches: counts of the values of LaneSwitch.
+        roads: road of each JTurn that names one, by number of the JTurn, counted from 0.
         turns: number of JTurns read so far.
     """
 
@@ -54,7 +54,7 @@ class DeedReader:
     turns: int = 0
 
     def physical(self, val: Row) -> dict[str, Any]:
-        """Returns the data of a physical action, a JTurn's angle as the file has it.
+        """Returns the data of a physical action, with the angle of a JTurn as in the file.
 
         Raises:
             OntologyError: the action is unknown.
@@ -82,7 +82,7 @@ class DeedReader:
         return {"action": action.label, "angle": angle, "up": up}
 
     def belief(self, val: Row) -> dict[str, Any]:
-        """Returns the data of a belief update; arguments that are not understood are kept beside it.
+        """Returns the data of a belief update; unknown arguments are kept.
 
         Raises:
             OntologyError: the update is unknown.
@@ -124,14 +124,14 @@ class DeedReader:
 
 
 def plan_of(value: Any) -> dict[str, Any] | None:
-    """Returns the junctions of a plan; None where the value holds none."""
+    """Returns the junctions of a plan; None if the value is no plan."""
     items = value if isinstance(value, list) else [value]
     junctions = [whole_of(item) for item in items]
     return None if None in junctions else {"junctions": junctions}
 
 
 def goals_of(value: Any) -> dict[str, Any] | None:
-    """Returns the landmarks of goals; None where the value holds none."""
+    """Returns the landmarks of goals; None if the value holds none."""
     items = value if isinstance(value, list) else [value]
     try:
         return {"landmarks": [parse_landmark(item).label for item in items]}
@@ -168,7 +168,7 @@ def _guess_of(value: Any) -> dict[str, Any] | None:
     return guess
 
 
-# --- SDN's log of events as events of a session ----------------------------------------------------------------------
+# --- Rows of the log -------------------------------------------------------------------------------------------------
 
 _KINDS: Final = {
     "dialoguemove": EventType.DIALOGUE_MOVE,
@@ -187,11 +187,11 @@ _FIELDS: Final = {
 SPEECH: Final = "speech"
 
 FOREIGN: Final = "sdn:"
-"""Before the type of a row that is kept as it is."""
+"""Prefix of the type of a row that is kept unchanged."""
 
 
 def sorted_rows(rows: Sequence[Row], name: str, report: ReadReport) -> list[Row]:
-    """Returns the rows that have a frame and a type, in the order of their frames; the others are left out."""
+    """Returns the rows with a frame and a type, in order of their frames."""
     usable = [row for row in rows if frame_of(row) is not None and isinstance(row.get("type"), str)]
     report.repair(f"{name}: rows without a frame or a type were left out", len(rows) - len(usable))
     frames = [frame_of(row) or 0 for row in usable]
@@ -209,8 +209,8 @@ class LogReader:
         rows: the rows, sorted.
         first_frame: frame (10 Hz) at which the session begins.
         name: name of the file, for the report.
-        report: is told what is missing, unknown or put right.
-        audio: whether the files of speech are named in the events; ours, which do not exist, are not.
+        report: receives missing, unknown and repaired values.
+        audio: whether events name the audio files; sessions of this package have none.
     """
 
     def __init__(
@@ -249,7 +249,7 @@ class LogReader:
         return event
 
     def _read(self, kind: EventType, row: Row, frame: int, source: Role) -> tuple[dict[str, Any], bool]:
-        """Data of a row, and whether it is a point of the benchmark."""
+        """Returns the data of a row, and whether it is a prediction point."""
         val = row.get("val")
         val = val if isinstance(val, Mapping) else {}
         if kind is EventType.DIALOGUE_MOVE:
@@ -269,14 +269,14 @@ class LogReader:
         return str(row["flag"]).strip().casefold() in ("true", "1", "1.0")
 
     def _rest(self, row: Row, kind: str) -> dict[str, Any]:
-        """What a row has beside the known fields."""
+        """Returns the unknown fields of a row."""
         rest = {name: value for name, value in row.items() if name not in _FIELDS}
         for name in rest:
             self._report.keep(f"{self._name}: field {str(name)!r} of {kind}")
         return {"sdn": plain(rest)} if rest else {}
 
     def _ours(self, row: Row, frame: int) -> Event:
-        """An event of our own that the layout has no form for."""
+        """Returns an event of this package that the layout cannot represent."""
         ours = row[OURS]
         name = str(plain(row["type"])).strip()
         kind = _NATIVE.get(name.casefold(), EventType.OTHER)
@@ -309,7 +309,7 @@ class LogReader:
 
 
 def role_of(row: Row) -> Role | None:
-    """Returns who a row comes from; None where the name is unknown."""
+    """Returns the role that is the source of a row; None for an unknown name."""
     try:
         return parse_role(row["from"].strip())
     except (KeyError, AttributeError, OntologyError):

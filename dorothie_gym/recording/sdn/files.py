@@ -1,4 +1,4 @@
-"""Reading files of others: rows of JSON and CSV, whatever they hold, in bounded memory."""
+"""SDN layouts, and tolerant readers of their JSON and CSV files in bounded memory."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ GAMELOG_FILE: Final = "gamelog.json"
 TASK_FILE: Final = "task.json"
 DIALOG_FILE: Final = "dialog_log.json"
 SCENE_FILE: Final = "dorothie_gym_scene.parquet"
-"""What was around the car, which the layout has no place for: a file of ours, laid out as `frames.parquet`."""
+"""Surroundings of the car, an addition of this package to the layout, in the form of `frames.parquet`."""
 
 OURS: Final = "dorothie_gym"
-"""Field of `config.json`, and of rows of the log, that holds what only our sessions have."""
+"""Field of `config.json` and of log rows with the additions of this package."""
 
 
 MORE: Final = "more"
-"""Field of a row, of its act or of its value that holds further fields of our events."""
+"""Field of a row, of its act or of its value with further fields of this package's events."""
 
 
 class SdnLayout(enum.StrEnum):
-    """A layout."""
+    """Layout of an SDN session."""
 
     RELEASE = "release"
     SAMPLE = "sample"
@@ -54,7 +54,7 @@ _FILES: Final = {
 
 
 def detect_layout(folder: Path) -> SdnLayout | None:
-    """Returns the layout of a folder; None where it holds no SDN session."""
+    """Returns the layout of a folder; None without an SDN session."""
     return next((layout for layout, name in _LOGS.items() if (folder / name).is_file()), None)
 
 
@@ -68,20 +68,20 @@ def expected_files(layout: SdnLayout) -> tuple[str, ...]:
     return _FILES[layout]
 
 
-# --- Reading files of others: rows of JSON and CSV, whatever they hold, in bounded memory ----------------------------
+# --- JSON and CSV ----------------------------------------------------------------------------------------------------
 
 Row: TypeAlias = Mapping[str, Any]
 
 _SPACE: Final = re.compile(r"[ \t\n\r]*")
 
 APOSTROPHE: Final = "\u2019"
-"""Stands for an apostrophe in SDN's transcripts."""
+"""Apostrophe in SDN's transcripts."""
 
 
 def read_json(path: Path, report: ReadReport) -> Any:
-    """Returns what a JSON file holds; NaN and infinite numbers become null, which is noted.
+    """Returns the content of a JSON file; NaN and infinite numbers become null, which is reported.
 
-    Of a file with an object on each line it returns the list of them.
+    For a file with an object on each line, it returns the list of objects.
 
     Raises:
         SessionError: it is not JSON, or too large, or nested too deeply; the message names the file and the place.
@@ -106,7 +106,7 @@ def read_json(path: Path, report: ReadReport) -> Any:
 
 
 def read_list(path: Path, report: ReadReport, text: str | None = None) -> list[Any]:
-    """Returns the items of the JSON list that a file holds, read one by one so that a huge one is refused early.
+    """Returns the items of a JSON list in a file, read one by one so that a huge list is rejected early.
 
     Raises:
         SessionError: as `read_json`, or it holds no list, or more than `MAX_EVENTS` items.
@@ -138,12 +138,12 @@ def _check_count(count: int, path: Path) -> None:
 
 
 def read_rows(path: Path, report: ReadReport) -> list[Row]:
-    """Returns the objects of the JSON list that a file holds; other items are left out, which is noted."""
+    """Returns the objects of a JSON list in a file; other items are left out, which is reported."""
     return objects(read_list(path, report), path.name, report)
 
 
 def objects(items: list[Any], name: str, report: ReadReport) -> list[Row]:
-    """Returns the objects among the items; others are left out, which is noted."""
+    """Returns the objects among the items; others are left out, which is reported."""
     rows = [item for item in items if isinstance(item, Mapping)]
     report.repair(f"{name}: items that are no objects were left out", len(items) - len(rows))
     return rows
@@ -162,7 +162,7 @@ def read_csv(path: Path, limit: int) -> list[list[str]]:
 
 
 def number_of(value: Any) -> float | None:
-    """Returns the finite number that a field holds, as a number or as text; None where it holds none."""
+    """Returns the finite number of a field, given as a number or as text; None without one."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         return None
     try:
@@ -173,19 +173,19 @@ def number_of(value: Any) -> float | None:
 
 
 def whole_of(value: Any) -> int | None:
-    """Returns the whole number, below 2^53 either way, that a field holds; None where it holds none."""
+    """Returns the whole number of a field, of a magnitude below 2^53; None without one."""
     number = number_of(value)
     return int(number) if number is not None and number == int(number) and abs(number) < 2**53 else None
 
 
 def frame_of(row: Row) -> int | None:
-    """Returns the frame (10 Hz) of a row; None where it has none that could be one."""
+    """Returns the frame (10 Hz) of a row; None without a valid one."""
     frame = whole_of(row.get("frame"))
     return frame if frame is not None and 0 <= frame < MAX_FRAME else None
 
 
 def transcript_of(value: Any, report: ReadReport) -> str | None:
-    """Returns a transcript with plain apostrophes, or None where there is none."""
+    """Returns a transcript with plain apostrophes; None without one."""
     if not isinstance(value, str):
         return None
     if APOSTROPHE in value:
@@ -194,7 +194,7 @@ def transcript_of(value: Any, report: ReadReport) -> str | None:
 
 
 def plain(value: Any, depth: int = MAX_DEPTH - 8) -> Any:
-    """Returns what a session can keep of a JSON value: texts in UTF-8, no infinite numbers, no endless nesting."""
+    """Returns a JSON value that a session can hold: texts in UTF-8, finite numbers, bounded nesting."""
     if isinstance(value, str):
         return value.encode("utf-8", "replace").decode("utf-8")
     if isinstance(value, float) and not math.isfinite(value):
@@ -207,7 +207,7 @@ def plain(value: Any, depth: int = MAX_DEPTH - 8) -> Any:
 
 
 def more_of(values: Row) -> dict[str, Any]:
-    """Returns the further fields of our events that our writer put beside those of the layout."""
+    """Returns the fields of events that this package's writer adds to those of the layout."""
     more = values.get(MORE)
     return dict(plain(more)) if isinstance(more, Mapping) else {}
 

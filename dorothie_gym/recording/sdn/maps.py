@@ -1,4 +1,4 @@
-"""The town of an SDN session, where it can be loaded: lanes by OpenDRIVE's numbers, and angles of turns by road."""
+"""Map of an SDN session, if available: lanes by OpenDRIVE numbers, and angles of turns by road."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from dorothie_gym.maps import NO_STREET, Town
 from dorothie_gym.recording.trajectory import NO_LANE
 
 FAR: Final = 10.0
-"""A place farther from every lane than this is on none [m]."""
+"""Largest distance of a position from the lane that it is assigned to [m]."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """A place in the town: lane (-1: none), distance along it [m], street (-1: none)."""
+    """Position in the town: lane (-1: none), distance along it [m], street (-1: none)."""
 
     lane: int = NO_LANE
     station: float = 0.0
@@ -25,10 +25,10 @@ class Place:
 
 
 class SdnMap:
-    """Looks places up in a town, which may not be known.
+    """Lookup of positions in a town that may be unknown.
 
     Args:
-        town: the town, or None: then nothing is found.
+        town: the town, or None: lookups then find nothing.
     """
 
     def __init__(self, town: Town | None) -> None:
@@ -38,7 +38,7 @@ class SdnMap:
             self._by_ids[lane.road_id, lane.lane_id].append(lane.id)
 
     def locate(self, x: float, y: float, road: int | None = None, lane: int | None = None) -> Place:
-        """Returns the place closest to (x, y) [m], on the lanes of the given numbers where the town has them."""
+        """Returns the position closest to (x, y) [m], on lanes with the given numbers if the town has them."""
         if self.town is None:
             return Place()
         known = self._by_ids.get((road, lane)) if road is not None and lane is not None else None
@@ -50,18 +50,18 @@ class SdnMap:
         return Place(number, station, self.town.lanes[number].street)
 
     def lane_of(self, x: float, y: float, road: int, lane: int) -> int:
-        """Returns the lane of the given numbers at (x, y), or -1; quick, for every frame."""
+        """Returns the lane with the given numbers at (x, y), or -1; fast enough for every frame."""
         known = self._by_ids.get((road, lane), ())
         if len(known) == 1:
             return known[0]
         return self.locate(x, y, road, lane).lane if known else NO_LANE
 
     def turn_angle(self, lane: int, road: int) -> float | None:
-        """Returns the angle [degrees, positive left] of the way from a lane into a road, through one junction.
+        """Returns the angle [degrees, positive left] of the turn from a lane into a road, through one junction.
 
         Args:
-            lane: where the car is.
-            road: number of the road that it is to turn into, or of the connecting road that leads there.
+            lane: lane of the car.
+            road: number of the target road, or of the connecting road to it.
         """
         town = self.town
         if town is None or lane < 0:

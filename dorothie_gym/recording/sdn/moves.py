@@ -1,4 +1,4 @@
-"""What is said in SDN's logs, as dialogue moves: several moves of one utterance come as several rows."""
+"""Dialogue moves from SDN's logs, with one row for each move of an utterance."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from dorothie_gym.recording.trajectory import TENTHS
 from dorothie_gym.recording.validation import ReadReport
 
 WORDS_A_SECOND: Final = 2.5
-"""Pace of speech where the log does not say how long an utterance took (spec: design, Time)."""
+"""Speech rate for utterances without a recorded duration (spec: design, Time)."""
 
 NEAR: Final = 20
 """Frames (10 Hz) between a stretch of speech and a move that belongs to it."""
 
 AT_ONCE: Final = 50
-"""Stretches of one speaker that are looked at for a move, those that began last."""
+"""Latest stretches of one speaker that are candidates for a move."""
 
 _ACT_FIELDS: Final = {"move", "slots", "exchange", "transaction", "span", "utterance", "start", "end", MORE}
 
 
 @dataclass(frozen=True)
 class Speech:
-    """A stretch of speech: who, the audio's file name, first and last frame (10 Hz)."""
+    """Stretch of speech: speaker, name of the audio file, first and last frame (10 Hz)."""
 
     speaker: Role
     file: str
@@ -52,8 +52,8 @@ class MoveReader:
     Args:
         speech: the stretches of speech of the session.
         first_frame: frame (10 Hz) at which the session begins.
-        report: is told what is missing, unknown or guessed.
-        audio: whether the files of speech are named in the data.
+        report: receives missing, unknown and guessed values.
+        audio: whether the data name the audio files.
     """
 
     def __init__(self, speech: Iterable[Speech], first_frame: int, report: ReadReport, *, audio: bool = True) -> None:
@@ -71,7 +71,7 @@ class MoveReader:
         self._open = {"exchange": False, "transaction": False}
 
     def release(self, row: Row, frame: int, speaker: Role) -> dict[str, Any]:
-        """Returns the data of a row of the release layout; raises `OntologyError` where its move is unknown."""
+        """Returns the data of a row of the release layout; raises `OntologyError` for an unknown move."""
         given = row.get("act")
         act: Row = given if isinstance(given, Mapping) else {"move": given}
         text = transcript_of(row.get("utterance_gt"), self._report)
@@ -94,7 +94,7 @@ class MoveReader:
         return data
 
     def sample(self, row: Row, val: Row, frame: int, speaker: Role) -> dict[str, Any]:
-        """Returns the data of a row of the sample layout, whose exchanges and transactions are marked by their ends."""
+        """Returns the data of a row of the sample layout, which marks the ends of exchanges and transactions."""
         for name, mark in (("exchange", "g"), ("transaction", "t")):
             if val.get(f"is_so{mark}") is True:
                 self._open[name] = True

@@ -1,4 +1,4 @@
-"""`plan.json`, `detailed_plan.json` and `ad_wizardlog.csv`: what the log of events may lack."""
+"""Events of `plan.json`, `detailed_plan.json` and `ad_wizardlog.csv` that the event log may lack."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ MESSAGE_TYPES: Final = ("message", "messages", "msg", "send_message")
 
 
 class ViewReader:
-    """Reads the three files into the events that are not among those of the log.
+    """Reader of the three files, which yields the events that the event log lacks.
 
     Args:
         folder: folder of the session.
         first_frame: frame (10 Hz) at which the session begins.
-        report: is told what is unknown or left out.
+        report: receives unknown and left-out values.
     """
 
     def __init__(self, folder: Path, first_frame: int, report: ReadReport) -> None:
@@ -56,7 +56,7 @@ class ViewReader:
         self._report = report
 
     def events(self, known: Sequence[Event], header: SessionHeader) -> tuple[list[Event], SessionHeader]:
-        """Returns the events that `known` lacks, and the header with subgoals where only the plan tells them."""
+        """Returns the events that `known` lacks, and the header with subgoals that only the plan holds."""
         plan, header = self._plan(header)
         found = [*plan, *self._detailed_plan(), *self._ad_wizard()]
         left = Counter(_key(event) for event in known)
@@ -64,7 +64,7 @@ class ViewReader:
         for event in found:
             key = _key(event)
             if left[key]:
-                left[key] -= 1  # each event of the log stands for one row
+                left[key] -= 1  # each event of the log accounts for one row
             else:
                 new.append(event)
         return new, header
@@ -88,7 +88,7 @@ class ViewReader:
         return events, replace(header, subgoals=subgoals)
 
     def _subgoal(self, landmark: str, subgoals: list[SubgoalRow], header: SessionHeader) -> int | None:
-        """Number of the subgoal at a landmark, which is added where only the plan tells it."""
+        """Returns the number of the subgoal at a landmark, which is added if only the plan holds it."""
         for k, subgoal in enumerate(subgoals):
             if header.landmarks[subgoal["landmark"]]["name"] == landmark:
                 return k
@@ -164,7 +164,7 @@ class ViewReader:
 
 
 def _arguments(kind: ExceptionKind, values: list[str]) -> dict[str, Any] | None:
-    """Data of an exception of the Ad-Wizard; None where it is none that the layout's description names."""
+    """Returns the data of an exception of the Ad-Wizard; None if the layout's description does not name it."""
     numbers = [number_of(value) for value in values]
     if kind is ExceptionKind.WEATHER and len(values) == 2 and numbers[1] is not None:
         return {"parameter": values[0], "value": numbers[1]}
@@ -183,7 +183,7 @@ def _arguments(kind: ExceptionKind, values: list[str]) -> dict[str, Any] | None:
 
 
 def _key(event: Event) -> str:
-    """What two records of one event have in common."""
+    """Returns a key that is equal for two records of one event."""
     return repr(_common(event))
 
 

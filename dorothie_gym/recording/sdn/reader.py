@@ -1,4 +1,4 @@
-"""Reading an SDN session, whatever its layout, into a `Session`."""
+"""Reader of SDN sessions of any layout."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ from dorothie_gym.recording.towns import find_town
 from dorothie_gym.recording.validation import ReadReport
 
 FROM_START: Final = 600
-"""A `start_frame` farther before the first row than this is of another clock [frames at 10 Hz]."""
+"""Largest distance of `start_frame` from the first row; a larger one belongs to another clock [frames at 10 Hz]."""
 
 
 @dataclass(frozen=True)
 class RawSession:
-    """What the files hold, angles of JTurns with the sign that they have there."""
+    """Content of the files; angles of JTurns have the sign of the file."""
 
     layout: SdnLayout
     config: Row
@@ -57,24 +57,23 @@ class RawSession:
 
     @property
     def is_ours(self) -> bool:
-        """Whether this package wrote it."""
+        """Whether this package wrote the session."""
         return isinstance(self.config.get(OURS), Mapping)
 
 
 def read_sdn(path: Path | str, *, maps: Path | str | None = None, sign: SignVote | None = None) -> Session:
-    """Reads the folder of an SDN session: release, sample or hub layout (`docs/session-format.md`).
+    """Returns the SDN session of a folder in release, sample or hub layout (`docs/session-format.md`).
 
-    Nothing but JSON and CSV is opened; `.pkl` files never are. `Session.report` names what was not understood, is
-    missing or was put right.
+    Only JSON and CSV files are opened, never `.pkl` files. `Session.report` names unknown, missing and repaired values.
 
     Args:
         path: the folder.
         maps: folder with the towns' maps (`Town01.xodr`, ...), for lanes and for angles of turns into a road.
-        sign: what settles the sign of angles; from the session alone where it is None (see `settle_sign`).
+        sign: vote on the sign of angles; None takes the vote of the session alone (see `settle_sign`).
 
     Raises:
         SessionError: there is no SDN session, or a file of it cannot be read; the message names file and place.
-        TownError: the town's map is at fault.
+        TownError: the town's map is malformed.
         OSError: a file cannot be read.
     """
     folder = Path(path)
@@ -83,7 +82,7 @@ def read_sdn(path: Path | str, *, maps: Path | str | None = None, sign: SignVote
     own = vote(raw.events, raw.places, raw.first_frame)
     settled = own if sign is None else sign
     if raw.is_ours:
-        settled = SignVote()  # which is positive left
+        settled = SignVote()  # positive left
     else:
         report.facts["turn_angles"] = settled.to_json()
     trajectory, scene = trajectory_of_places(raw.places, raw.first_frame, raw.place)
@@ -108,7 +107,7 @@ def read_sdn(path: Path | str, *, maps: Path | str | None = None, sign: SignVote
 
 
 def raw_session(folder: Path, maps: Path | None) -> RawSession:
-    """Reads the files of a session; see `read_sdn`."""
+    """Returns the content of the files of a session; see `read_sdn`."""
     layout = detect_layout(folder)
     if layout is None:
         raise SessionError(f"{folder}: no SDN session here (none of its logs is there)")
@@ -134,7 +133,7 @@ def raw_session(folder: Path, maps: Path | None) -> RawSession:
         report.facts["turns_into_a_road"] = {"found": len(log.deeds.roads) - unknown, "unknown": unknown}
     if log.deeds.lane_switches:
         report.facts["lane_switch_values"] = dict(sorted(log.deeds.lane_switches.items()))
-    if layout is SdnLayout.RELEASE and not ours:  # our log holds all that the other files show
+    if layout is SdnLayout.RELEASE and not ours:  # the log of this package is complete
         more, header = ViewReader(folder, first, report).events(events, header)
         events = sorted([*events, *more], key=lambda event: event.frame)
     _note_files(folder, layout, report)
@@ -159,7 +158,7 @@ def settle_sign(folders: Iterable[Path | str]) -> SignVote:
 
 
 def _object(folder: Path, name: str, report: ReadReport) -> Row:
-    """What a file with one JSON object holds; empty where it is missing."""
+    """Returns the JSON object of a file; empty if the file is missing."""
     if not (folder / name).is_file():
         report.miss(name)
         return {}
@@ -170,10 +169,10 @@ def _object(folder: Path, name: str, report: ReadReport) -> Row:
 
 
 def _log_rows(path: Path, report: ReadReport) -> tuple[list[Row], Row]:
-    """Returns the rows of a log, and what stands around them where it is no plain list (as the hub's may be).
+    """Returns the rows of a log, and the fields around them if the log is no plain list (as in the hub layout).
 
-    Rows are the objects that have a field 'frame', or that stand in a list with such: of the list, if the file holds
-    one, else in the fields of its object.
+    Rows are the objects with a field 'frame', or in a list with such objects: of the list, if the file holds one, else
+    in the fields of its object.
     """
     value = read_json(path, report)
     if isinstance(value, list):
@@ -195,7 +194,7 @@ def _log_rows(path: Path, report: ReadReport) -> tuple[list[Row], Row]:
 
 
 def _first_frame(config: Row, rows: list[Row], places: Places) -> int:
-    """The frame (10 Hz) that a session begins at."""
+    """Returns the first frame (10 Hz) of a session."""
     seen = [frame_of(row) or 0 for row in rows[:1]] + places.frames[:1].tolist()
     first = min(seen, default=0)
     given = whole_of(config.get("start_frame"))
@@ -205,7 +204,7 @@ def _first_frame(config: Row, rows: list[Row], places: Places) -> int:
 
 
 def _note_files(folder: Path, layout: SdnLayout, report: ReadReport) -> None:
-    """Notes what lies in the folder and is not read."""
+    """Reports the files of the folder that are not read."""
     left = sorted(path.name for path in folder.iterdir() if path.name not in expected_files(layout))
     if left:
         report.facts["files_not_read"] = ", ".join(name[:60] for name in left[:20]) + ("..." if len(left) > 20 else "")

@@ -1,4 +1,4 @@
-"""`trajectory.csv` of SDN: where the car was, ten times a second."""
+"""SDN's `trajectory.csv`: pose of the car at 10 Hz."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH, NO_LANE, TENTHS,
 from dorothie_gym.recording.validation import ReadReport
 
 COLUMNS: Final = ("frame", "x", "y", "yaw", "junction_id", "road_id", "lane_id")
-"""The columns of the layout; those after `yaw` may be missing."""
+"""Columns of the layout; those after `yaw` are optional."""
 
 _NEEDED: Final = COLUMNS[:4]
 _IDS: Final = COLUMNS[4:]
 
 FARTHEST: Final = 1e9
-"""A number of a place or a yaw beyond this is none [m, degrees]."""
+"""Largest magnitude of a valid coordinate or yaw [m, degrees]."""
 
 MOVED: Final = 0.2
-"""A car that got this far from one frame to the next [m] drove where it looked."""
+"""Distance between two frames from which on the motion gives the heading [m]."""
 
 
 @dataclass(frozen=True)
 class Places:
-    """Where the car was.
+    """Poses of the car.
 
     Attributes:
         frames: (n,) int64, 10 Hz, rising.
@@ -55,13 +55,13 @@ class Places:
 
 
 def read_places(path: Path, report: ReadReport) -> Places:
-    """Reads the file.
+    """Returns the poses of the file.
 
-    It ends at a second header line; rows with a number missing are left out, rows out of order put in order, of several
-    rows of a frame the first is taken.
+    The file ends at a second header line. Rows with a missing number are left out, rows out of order are sorted, and
+    the first of several rows of a frame is taken.
 
     Raises:
-        SessionError: it has no header line, or not the first four columns, or is too large, or not UTF-8.
+        SessionError: it lacks a header line or one of the first four columns, is too large, or is not UTF-8.
     """
     if not path.is_file():
         report.miss(path.name)
@@ -131,7 +131,7 @@ def _places(table: NDArray[np.float64], names: list[str]) -> Places:
 
 
 def _is_radians(x: NDArray[np.float64], y: NDArray[np.float64], yaw: NDArray[np.float64]) -> bool:
-    """Whether yaw is in radians and not in degrees: what fits the way that the car went."""
+    """Returns whether yaw is in radians, not degrees: the unit that agrees with the motion of the car."""
     dx, dy = np.diff(x), np.diff(y)
     moved = np.hypot(dx, dy) > MOVED
     if not np.any(moved) or np.any(np.abs(yaw) > 2 * np.pi):
@@ -141,12 +141,12 @@ def _is_radians(x: NDArray[np.float64], y: NDArray[np.float64], yaw: NDArray[np.
 
 
 def trajectory_of_places(places: Places, first_frame: int, place: SdnMap) -> tuple[Trajectory, Scene]:
-    """Returns places as a trajectory in frames of 30 Hz, speed from the way, controls unknown, ids as further columns.
+    """Returns a trajectory in frames of 30 Hz: speed from the motion, unknown controls, ids as further columns.
 
     Args:
-        places: where the car was.
+        places: poses of the car.
         first_frame: frame (10 Hz) at which the session begins.
-        place: the town: it knows the lanes.
+        place: map of the town.
     """
     count = len(places.frames)
     trajectory = np.zeros(count, dtype=TRAJECTORY_DTYPE)
@@ -155,7 +155,7 @@ def trajectory_of_places(places: Places, first_frame: int, place: SdnMap) -> tup
     for name in ("throttle", "steer", "brake"):
         trajectory[name] = np.nan
     if count > 1:
-        # Over the time before, never after: a state must not tell where the car goes next.
+        # Over the time before, never after: a state must not reveal the car's next motion.
         way = np.hypot(np.diff(places.x), np.diff(places.y))
         trajectory["speed"][1:] = way / (np.diff(places.frames) / TENTHS)
     roads, lanes = places.ids["road_id"].tolist(), places.ids["lane_id"].tolist()
@@ -167,11 +167,11 @@ def trajectory_of_places(places: Places, first_frame: int, place: SdnMap) -> tup
     return trajectory, Scene(columns={**places.ids, **places.further})
 
 
-# --- What was around the car, kept in a file of ours beside those of SDN's release layout ----------------------------
+# --- Surroundings, an addition of this package to the release layout -------------------------------------------------
 
 
 def write_scene(path: Path, session: Session) -> None:
-    """Writes what was recorded around the car at frames of 10 Hz; no file where nothing was.
+    """Writes the surroundings of the car at frames of 10 Hz, if there are any.
 
     Raises:
         OSError: it cannot be written.
@@ -183,13 +183,13 @@ def write_scene(path: Path, session: Session) -> None:
 
 
 def read_scene(path: Path, scene: Scene, trajectory: Trajectory, report: ReadReport) -> Scene:
-    """Returns a scene with what the file holds of the frames of a trajectory.
+    """Returns a scene with the surroundings from the file, at the frames of a trajectory.
 
     Args:
-        path: the file, which may be missing.
-        scene: what the layout's own files tell.
-        trajectory: the frames that there are.
-        report: is told what is not understood.
+        path: the file, which is optional.
+        scene: scene of the layout's own files.
+        trajectory: trajectory of the session.
+        report: receives unknown fields.
 
     Raises:
         SessionError: the file is damaged; the message names it.

@@ -16,37 +16,37 @@ from dorothie_gym.recording.sdn.trajectory import Places
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 
 SHARP: Final = 30.0
-"""Angles and turns from here to `BLUNT` tell left from right [degrees]."""
+"""Angles and turns from here to `BLUNT` distinguish left from right [degrees]."""
 
 BLUNT: Final = 150.0
 
 SOON: Final = 600
-"""Frames (10 Hz) within which the junction that a JTurn is meant for comes."""
+"""Longest time from a JTurn to its junction [frames at 10 Hz]."""
 
 
 @dataclass(frozen=True)
 class SignVote:
-    """How many JTurns speak for either sign: the car then turned to the side that the sign says.
+    """Votes of JTurns on the sign of angles: the car turned to the side of the sign.
 
     Attributes:
-        left: for "positive is left", our convention.
-        right: for "positive is right".
+        left: votes for "positive is left", the convention of this package.
+        right: votes for "positive is right".
     """
 
     left: int = 0
     right: int = 0
 
     def __add__(self, other: SignVote) -> SignVote:
-        """Returns both votes together."""
+        """Returns the sum of both votes."""
         return SignVote(self.left + other.left, self.right + other.right)
 
     @property
     def positive_left(self) -> bool:
-        """Whether positive angles point to the left; so it is taken where nothing speaks for either side."""
+        """Whether positive angles point to the left; True for a tie."""
         return self.left >= self.right
 
     def to_json(self) -> dict[str, Any]:
-        """Returns sign, agreement (share of the turns that speak for it, or null) and number of turns."""
+        """Returns sign, agreement (share of the turns that vote for it, or null) and number of turns."""
         total = self.left + self.right
         return {
             "positive": "left" if self.positive_left else "right",
@@ -56,7 +56,7 @@ class SignVote:
 
 
 def vote(events: Sequence[Event], places: Places, first_frame: int) -> SignVote:
-    """Returns what the JTurns of a session, angles as in the file, say about the sign."""
+    """Returns the vote of a session's JTurns, with angles as in the file."""
     result = SignVote()
     for event in events:
         if not _is_turn(event) or event.data["angle"] is None or not SHARP <= abs(event.data["angle"]) <= BLUNT:
@@ -69,7 +69,7 @@ def vote(events: Sequence[Event], places: Places, first_frame: int) -> SignVote:
 
 
 def _turn_after(places: Places, frame: int) -> float | None:
-    """Angle of the car's way through the next junction [degrees, positive left]; None where there is none."""
+    """Returns the angle of the car's turn at the next junction [degrees, positive left]; None without one."""
     start = int(np.searchsorted(places.frames, frame))
     end = int(np.searchsorted(places.frames, frame + SOON))
     inside = places.ids["junction_id"][start:] >= 0
@@ -84,7 +84,7 @@ def _turn_after(places: Places, frame: int) -> float | None:
 
 
 def with_sign(events: Sequence[Event], sign: SignVote) -> list[Event]:
-    """Returns the events with the angles of JTurns in our convention, positive left."""
+    """Returns the events with positive-left angles of JTurns."""
     if sign.positive_left:
         return list(events)
     return [_turned(event, wrap_degrees(-event.data["angle"])) if _has_angle(event) else event for event in events]
@@ -93,17 +93,17 @@ def with_sign(events: Sequence[Event], sign: SignVote) -> list[Event]:
 def with_roads(
     events: Sequence[Event], roads: dict[int, int], places: Places, first_frame: int, place: SdnMap
 ) -> tuple[list[Event], int]:
-    """Gives the JTurns that name a road their angles.
+    """Computes the angles of the JTurns that name a road.
 
     Args:
         events: the events.
         roads: number of the JTurn among the JTurns, and the road.
-        places: where the car was.
+        places: poses of the car.
         first_frame: frame (10 Hz) at which the session begins.
         place: the town.
 
     Returns:
-        The events, and the number of JTurns whose angle stays unknown.
+        The events, and the number of JTurns with an unknown angle.
     """
     result, number, unknown = [], -1, 0
     for event in events:

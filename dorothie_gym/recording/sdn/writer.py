@@ -1,4 +1,4 @@
-"""Writing a session in SDN's release layout."""
+"""Writer of SDN's release layout."""
 
 from __future__ import annotations
 
@@ -58,11 +58,11 @@ _PLAN_CLOSED: Final = ("Complete", "Abandoned")
 
 
 def log_rows(session: Session, first: int) -> list[dict[str, Any]]:
-    """Returns the rows of `annotated_log.json`: every event, and a row for each frame of speech, by frame.
+    """Returns the rows of `annotated_log.json`: every event, and a row for each frame of speech, in order of frames.
 
     Args:
         session: the session.
-        first: frame (10 Hz) that it begins at.
+        first: first frame (10 Hz) of the session.
     """
     rows = [_row(event, first) for event in session.events]
     return sorted([*_speech(session, first), *rows], key=lambda row: int(row["frame"]))
@@ -84,7 +84,7 @@ def plan_rows(session: Session, first: int) -> Iterator[dict[str, Any]]:
 
 
 def detailed_plan_rows(session: Session, first: int) -> Iterator[dict[str, Any]]:
-    """Yields the rows of `detailed_plan.json`: plans and goals as the Co-Wizard said that it believes in them."""
+    """Yields the rows of `detailed_plan.json`: plans and goals of the Co-Wizard's belief updates."""
     for event in session.of_type(EventType.BELIEF_UPDATE):
         junctions, landmarks = event.data.get("junctions"), event.data.get("landmarks")
         if junctions is not None or landmarks is not None:
@@ -92,7 +92,7 @@ def detailed_plan_rows(session: Session, first: int) -> Iterator[dict[str, Any]]
 
 
 def ad_wizard_lines(session: Session, first: int) -> Iterator[str]:
-    """Yields the lines of `ad_wizardlog.csv`; its time is that of the session, no clock's."""
+    """Yields the lines of `ad_wizardlog.csv`; times are those of the session, not of a clock."""
     props = 0
     for event in session.of_type(EventType.EXCEPTION, EventType.MESSAGE):
         data = event.data
@@ -166,7 +166,7 @@ def _physical(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _is_belief(data: Mapping[str, Any]) -> bool:
-    """Whether the layout has a form for a belief update."""
+    """Returns whether the layout can represent a belief update."""
     try:
         action = parse_mental_action(str(data.get("action")))
     except OntologyError:
@@ -221,28 +221,28 @@ def _frame(event: Event, first: int) -> int:
     return event.frame // FRAMES_PER_TENTH + first
 
 
-# --- Writing a session in SDN's release layout -----------------------------------------------------------------------
+# --- Session folder --------------------------------------------------------------------------------------------------
 
 _NONE: Final = -1
 
 
 def write_sdn(session: Session, path: Path | str, *, maps: Path | str | None = None) -> Path:
-    """Writes a session into a new folder in the release layout, whole or not at all.
+    """Writes a session into a new folder in the release layout; the folder appears when it is complete.
 
-    What the layout has no place for (`docs/session-format.md`) is lost: frames between those of 10 Hz, the controls,
-    pictures. Events keep a tenth of a second as their time. Actors, lights and the weather of the frames that are left
-    are kept in a file of ours beside the layout's.
+    Data that the layout cannot represent (`docs/session-format.md`) is lost: frames between those of 10 Hz, controls
+    and pictures. Times of events are rounded to a tenth of a second. Actors, lights and weather of the remaining frames are
+    kept in an additional file.
 
     Args:
         session: the session.
-        path: the folder; its name should be `log_<number>`, which the original scripts look for.
-        maps: folder with maps of towns that are not shipped, for OpenDRIVE's numbers of lanes.
+        path: the folder; the original scripts look for the name `log_<number>`.
+        maps: folder with maps of towns that are not shipped, for OpenDRIVE numbers of lanes.
 
     Returns:
         The folder.
 
     Raises:
-        SessionError: there is something of that name already, or the session holds what JSON cannot.
+        SessionError: a file or folder of that name exists, or the session holds other types than JSON's.
         OSError: the folder cannot be written.
     """
     town = find_town(session.header.town, None if maps is None else Path(maps))
@@ -259,7 +259,7 @@ def write_sdn(session: Session, path: Path | str, *, maps: Path | str | None = N
 
 
 def first_frame_of(header: SessionHeader) -> int:
-    """Returns the frame (10 Hz) that a session began at in the corpus that it was read from; 0 for ours."""
+    """Returns the first frame (10 Hz) of a session in its original corpus; 0 for sessions of this package."""
     read = header.config.get("sdn")
     first = read.get("first_frame") if isinstance(read, Mapping) else None
     return first if isinstance(first, int) and first >= 0 else 0
@@ -270,7 +270,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _lines(rows: Iterable[Mapping[str, Any]]) -> str:
-    """A JSON list with a row a line."""
+    """Returns a JSON list with one row per line."""
     lines = (json.dumps(canonical(row, EVENTS_FILE), ensure_ascii=False, allow_nan=False) for row in rows)
     return "[\n" + ",\n".join(lines) + "\n]"
 
@@ -320,7 +320,7 @@ def _landmark(row: LandmarkRow, town: Town | None) -> dict[str, Any]:
 
 
 def _waypoint(lane: int, station: float, x: float, y: float, town: Town | None) -> dict[str, Any]:
-    """A place on a lane, with OpenDRIVE's numbers where the town is known; else (x, y) and no numbers."""
+    """Returns a position on a lane, with OpenDRIVE numbers if the town is known; else (x, y) without numbers."""
     z = yaw = 0.0
     ids = {"lane_id": _NONE, "road_id": _NONE, "junction_id": _NONE}
     if town is not None and 0 <= lane < len(town.lanes):
