@@ -1,4 +1,4 @@
-"""What a corpus is like: counts, profiles, phenomena, consistency and agreement, all found anew from the events."""
+"""Corpus analysis: counts, profiles, phenomena, consistency and agreement, all derived from the events."""
 
 from dorothie_gym.analysis.agreement import Agreement, agreement, inconsistencies
 from dorothie_gym.analysis.behaviour import CLAIMS, Claim, Verdict, verdicts_of

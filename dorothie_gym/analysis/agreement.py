@@ -1,4 +1,4 @@
-"""How far two annotations of one session agree (Cohen 1960; the paper, appendix B.3)."""
+"""Agreement of two annotations of one session (Cohen 1960; the paper, appendix B.3), and consistency of one."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class Agreement:
     """Agreement of two annotators.
 
     Attributes:
-        moves: Cohen's kappa of the moves; None where both know one move only, and chance explains all.
+        moves: Cohen's kappa of the moves; None if both use a single move, so that chance explains the agreement.
         slots: Cohen's kappa of the values of each of the five slots in each piece; None likewise.
-        pieces: stretches of words that are compared.
+        pieces: compared stretches of words.
         utterances: number of utterances.
     """
 
@@ -34,15 +34,15 @@ class Agreement:
 
 
 def agreement(first: Session, second: Session) -> Agreement:
-    """Compares two annotations of one session.
+    """Returns the agreement of two annotations of one session.
 
-    Utterances are aligned by their numbers. Where annotators split an utterance differently, each stretch of words that
-    lies in one span of both is a piece of its own. For slots, a piece counts once for each of the five slots, its label
-    being the values that the slot has there, or none.
+    Utterances are aligned by their numbers. If annotators split an utterance differently, each stretch of words within
+    one span of both is a piece. For slots, a piece counts once for each of the five slots; its label is the set of the
+    slot's values there.
 
     Raises:
-        SessionError: they are not of the same session, or a span is none of the words of its utterance; the message
-            names where they differ.
+        SessionError: they are not of the same session, or a span does not match the words of its utterance; the
+            message names the place.
     """
     pairs = _aligned(first, second)
     pieces = [piece for one, other in pairs for piece in _pieces(one, other, first.name, second.name)]
@@ -52,7 +52,7 @@ def agreement(first: Session, second: Session) -> Agreement:
 
 
 def kappa(pairs: Sequence[tuple[str, str]]) -> float | None:
-    """Returns Cohen's kappa of two annotators' labels, pair by pair; None where only one label occurs, or none."""
+    """Returns Cohen's kappa of pairs of labels of two annotators; None with fewer than two different labels."""
     from sklearn.metrics import cohen_kappa_score
 
     if len({label for pair in pairs for label in pair}) < 2:
@@ -88,7 +88,7 @@ def _aligned(first: Session, second: Session) -> list[tuple[UtteranceRecord, Utt
 
 
 def _pieces(one: UtteranceRecord, other: UtteranceRecord, *names: str) -> Iterator[tuple[DialogueAct, DialogueAct]]:
-    """The acts of both annotators for each stretch of words that neither of them splits."""
+    """Returns the acts of both annotators for each stretch of words that neither of them splits."""
     a, b = _by_word(one, names[0]), _by_word(other, names[1])
     before: tuple[int, int] | None = None
     for span, span_there in zip(a, b, strict=True):
@@ -98,7 +98,7 @@ def _pieces(one: UtteranceRecord, other: UtteranceRecord, *names: str) -> Iterat
 
 
 def _by_word(utterance: UtteranceRecord, name: str) -> list[int]:
-    """For each word of an utterance the number of the span that it is in; a text without words counts as one."""
+    """Returns the number of the span of each word of an utterance; a text without words counts as one word."""
     if len(utterance.moves) == 1:
         return [0] * max(1, len(words_of(utterance.text)))
     spans = [words_of(move.span) for move in utterance.moves]
@@ -113,19 +113,19 @@ def _label(act: DialogueAct, slot: Slot) -> str:
     return "+".join(value.label for value in act.values(slot))
 
 
-# --- Whether the annotation of a session holds together --------------------------------------------------------------
+# --- Consistency -----------------------------------------------------------------------------------------------------
 
 
 def inconsistencies(session: Session, units: Units | None = None) -> tuple[str, ...]:
-    """Returns a sentence for each fault of the annotation, beginning with its place; none is consistent.
+    """Returns one sentence for each fault of the annotation, beginning with its place; empty if it is consistent.
 
-    An exchange starts with an initiating move, every response has an exchange, and exchanges and transactions are, in
-    number and act by act, those that the rules find anew. The last is asked of our own sessions only: people annotate
-    by other rules.
+    An exchange starts with an initiating move, every response has an exchange, and exchanges and transactions equal, in
+    number and act by act, those that the rules derive. The last holds for sessions of this package only: people
+    annotate by other rules.
 
     Args:
         session: any.
-        units: what the rules find anew, if it is known already.
+        units: the units that the rules derive, if already known.
     """
     again = Units(session) if units is None else units
     moves = [move for utterance in again.utterances for move in utterance.moves]
@@ -171,7 +171,7 @@ def _differences(
     for move in moves:
         if stored[move.index] != found[move.index]:
             yield f"{_place(move)}: is stored in {name} {stored[move.index]}, found anew in {found[move.index]}"
-            return  # what follows is mostly shifted by the same
+            return  # later numbers are mostly shifted by the same amount
 
 
 def _outcome(session: Session, units: Units) -> Iterator[str]:

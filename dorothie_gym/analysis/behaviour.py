@@ -1,8 +1,8 @@
-"""The behaviour that the paper reports (sections 4.2 and 4.3), each claim as a figure with a bootstrap interval.
+"""Behaviour reported in the paper (sections 4.2 and 4.3): each claim as a figure with a bootstrap interval.
 
-Every claim is a difference that the paper says is positive, so that it holds where the interval lies above zero. Claims
-about exceptions compare exchanges that handle an exception with those that handle none: means over exchanges, as in the
-paper's figure of them.
+Every claim is a difference that is positive according to the paper, so a claim holds if its interval is above zero.
+Claims about exceptions compare exchanges that handle an exception with those that handle none: means over exchanges, as
+in the paper's figure.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from dorothie_gym.ontology import DialogueMove, MoveGroup, Role, Slot
 from dorothie_gym.recording.session import Session
 
 RESAMPLES: Final = 2000
-"""Corpora that are drawn, with replacement, from the sessions."""
+"""Bootstrap samples of the sessions."""
 
 LEVEL: Final = 0.95
-"""Share of the drawn corpora whose figure lies within the interval (percentiles; Efron 1979)."""
+"""Confidence level of the interval (percentile bootstrap; Efron 1979)."""
 
 MOST: Final = 0.5
-"""Share of the drawn corpora from which on there is too little to compare."""
+"""Share of undefined bootstrap samples from which on the interval is undefined."""
 
 _HUMAN, _CAR = Role.PARTICIPANT, Role.CO_WIZARD
 _ENV, _TASK, _NONE = Handled.ENVIRONMENTAL, Handled.TASK, Handled.NONE
@@ -37,7 +37,7 @@ Key: TypeAlias = tuple[Any, ...]
 
 
 class Tally:
-    """Exchanges, acts and slot values of each session, counted by kind of exchange, speaker and move or slot.
+    """Counts of exchanges, acts and slot values of each session, by kind of exchange, speaker and move or slot.
 
     A column is a key: ("exchanges", kind), ("move", kind, speaker, move), ("slot", kind, speaker, slot), and
     ("instruct", kind, slot) for the participant's Instructs that carry the slot.
@@ -70,7 +70,7 @@ class Tally:
         """Returns the sums over sessions.
 
         Args:
-            weights: (n, sessions), how often each session counts; a row for each sum.
+            weights: (n, sessions), weight of each session; a row for each sum.
         """
         keys = sorted({key for row in self._rows for key in row}, key=repr)
         table = np.array([[row[key] for key in keys] for row in self._rows], dtype=np.float64)
@@ -85,16 +85,16 @@ class Totals:
         self._sums, self._nothing = sums, np.zeros(count)
 
     def of(self, *keys: Key) -> NDArray[np.float64]:
-        """Sum of the keys, (n,)."""
+        """Returns the sum of the keys, (n,)."""
         return sum((self._sums.get(key, self._nothing) for key in keys), self._nothing)
 
     def mean(self, kind: Handled, *keys: Key) -> NDArray[np.float64]:
-        """Sum of the keys in an exchange of a kind on average, (n,); NaN where there is no such exchange."""
+        """Returns the mean sum of the keys over exchanges of a kind, (n,); NaN without such an exchange."""
         exchanges = self.of(("exchanges", kind))
         return np.divide(self.of(*keys), exchanges, out=np.full_like(exchanges, np.nan), where=exchanges > 0)
 
     def share(self, speaker: Role, *moves: DialogueMove) -> NDArray[np.float64]:
-        """Share of the moves among all acts of a speaker, (n,); NaN where they say nothing."""
+        """Returns the share of the moves among all acts of a speaker, (n,); NaN without acts."""
         every = self.of(*(("move", kind, speaker, move) for kind in Handled for move in DialogueMove))
         found = self.of(*(("move", kind, speaker, move) for kind in Handled for move in moves))
         return np.divide(found, every, out=np.full_like(every, np.nan), where=every > 0)
@@ -105,12 +105,12 @@ Figure: TypeAlias = Callable[[Totals], NDArray[np.float64]]
 
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """Something that the paper reports of how people and cars talk.
+    """Claim of the paper about the dialogue of people and cars.
 
     Attributes:
         name: short, for JSON.
         title: in words.
-        figure: what is positive if the claim is true.
+        figure: a number that is positive if the claim is true.
     """
 
     name: str
@@ -120,11 +120,11 @@ class Claim:
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """What a corpus says of a claim.
+    """Evidence of a corpus for a claim.
 
     Attributes:
         claim: the claim.
-        difference: its figure over all sessions; None where there is nothing to compare.
+        difference: its figure over all sessions; None if it is undefined.
         low, high: ends of its interval; None likewise.
     """
 
@@ -135,7 +135,7 @@ class Verdict:
 
     @property
     def holds(self) -> bool:
-        """Whether the interval lies above zero."""
+        """Whether the interval is above zero."""
         return self.low is not None and self.low > 0.0
 
     def to_json(self) -> dict[str, Any]:
@@ -145,16 +145,15 @@ class Verdict:
 
 
 def verdicts_of(sessions: Iterable[Session], *, resamples: int = RESAMPLES, seed: int = 0) -> tuple[Verdict, ...]:
-    """Returns what sessions say of each of the `CLAIMS`.
+    """Returns the evidence of sessions for each of the `CLAIMS`.
 
-    The interval holds the middle 95 % of the figure over corpora that are drawn from the sessions with replacement,
-    those left out that have nothing to compare. It is None where there are fewer than two sessions, or where half of
-    the drawn corpora, or more, have nothing to compare.
+    The interval is that of the percentile bootstrap over sessions; samples with an undefined figure are left out. It is
+    None with fewer than two sessions, or if half of the samples, or more, are undefined.
 
     Args:
         sessions: of a corpus.
-        resamples: corpora that are drawn, at least 1.
-        seed: of the draws.
+        resamples: number of bootstrap samples, at least 1.
+        seed: seed of the samples.
     """
     tally = Tally()
     for session in sessions:
@@ -179,18 +178,18 @@ def _verdict(claim: Claim, whole: Totals, drawn: Totals | None) -> Verdict:
     return Verdict(claim=claim, difference=difference, low=float(low), high=float(high))
 
 
-# --- the claims -----------------------------------------------------------------------------------------------------
+# --- Claims ----------------------------------------------------------------------------------------------------------
 
 
 def _mostly(speaker: Role, moves: Sequence[DialogueMove], totals: Totals) -> NDArray[np.float64]:
-    """Share of the moves among a speaker's acts, less that of the commonest other move."""
+    """Returns the share of the moves among a speaker's acts, less that of the most frequent other move."""
     others = np.array([totals.share(speaker, move) for move in DialogueMove if move not in moves])
     above: NDArray[np.float64] = totals.share(speaker, *moves) - others.max(axis=0)
     return above
 
 
 def _more(kind: Handled, keys: Callable[[Handled], Iterable[Key]], sign: float, totals: Totals) -> NDArray[np.float64]:
-    """Mean number in an exchange that handles an exception of a kind, less that in one that handles none."""
+    """Returns the mean number in exchanges that handle an exception of a kind, less that in those that handle none."""
     return sign * (totals.mean(kind, *keys(kind)) - totals.mean(_NONE, *keys(_NONE)))
 
 
@@ -244,5 +243,5 @@ CLAIMS: Final[tuple[Claim, ...]] = (
            partial(_instructs, Slot.STATUS)),
     _claim("task_car_informs", "task: car, more informing moves", _TASK, partial(_moves, _CAR, _INFORM)),
 )  # fmt: skip
-"""In the order of the paper. Asking are Align, Check, QueryYN and QueryW, informing Clarify, Confirm and the replies
-(spec of the ontology, decision tree)."""
+"""Claims in the order of the paper. Questions are Align, Check, QueryYN and QueryW; informing moves are Clarify,
+Confirm and the replies (spec of the ontology, decision tree)."""

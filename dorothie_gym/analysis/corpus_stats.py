@@ -1,4 +1,4 @@
-"""Everything that is counted over a corpus, in one pass over its sessions."""
+"""Statistics of a corpus, gathered in one pass over its sessions."""
 
 from __future__ import annotations
 
@@ -22,14 +22,15 @@ from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.splits import FOLDS, Fold
 
 _STEADY = (PhysicalAction.STOP, PhysicalAction.LANE_FOLLOW)
-"""Done twice in a row among the navigation actions, the second changes nothing."""
+"""Navigation actions without an effect when repeated."""
 
 
 def effective_actions(session: Session) -> Iterator[ActionRecord]:
-    """Yields the Co-Wizard's actions that changed something.
+    """Yields the effective actions of the Co-Wizard.
 
-    What was refused is no action. Lights that are switched to what they are, a stop after a stop and following the lane
-    while it is followed change nothing. Hazard stops, and going on after them, are the car's own.
+    Refused actions are not recorded as actions. Switching lights to their present state, a stop after a stop, and a
+    lane follow after a lane follow have no effect. Hazard stops, and driving on after them, are
+    actions of the car itself.
     """
     lights: bool | None = None
     last: PhysicalAction | None = None
@@ -47,7 +48,7 @@ def effective_actions(session: Session) -> Iterator[ActionRecord]:
         yield action
 
 
-# --- Table 2 of the paper for any sessions ---------------------------------------------------------------------------
+# --- Counts (table 2 of the paper) -----------------------------------------------------------------------------------
 
 PAPER: Final[Mapping[str, float]] = MappingProxyType(
     {
@@ -74,20 +75,20 @@ PAPER_FOLDS: Final[Mapping[Fold, int]] = MappingProxyType(
 
 @dataclass
 class Counts:
-    """What is counted over sessions, one added after the other.
+    """Counts over sessions.
 
     Attributes:
         sessions: number of sessions.
-        control_seconds: their length [s].
-        audio_seconds: how long the participants spoke [s].
-        transactions: units found by the rule of `dialogue.transactions`.
-        exchanges: units found by the rule of `dialogue.exchanges`.
+        control_seconds: their duration [s].
+        audio_seconds: speaking time of the participants [s].
+        transactions: transactions by the rule of `dialogue.transactions`.
+        exchanges: exchanges by the rule of `dialogue.exchanges`.
         moves: dialogue moves of participants and Co-Wizards.
-        slot_values: values that these moves carry.
-        physical_actions: of the Co-Wizards, that changed something.
-        words: how often each word occurs.
-        texts: how often each utterance occurs, without case and punctuation.
-        folds: sessions by fold; those outside of folds are not in it.
+        slot_values: slot values of these moves.
+        physical_actions: effective actions of the Co-Wizards.
+        words: counts of words.
+        texts: counts of utterances, ignoring case and punctuation.
+        folds: sessions by fold, without those outside of folds.
     """
 
     sessions: int = 0
@@ -126,7 +127,7 @@ class Counts:
         return self.texts.total()
 
     def to_json(self) -> dict[str, Any]:
-        """Returns the figures of the table; the ratio is None where nobody spoke."""
+        """Returns the figures of the table; the ratio is None without utterances."""
         return {
             "sessions": self.sessions,
             "control_hours": self.control_seconds / 3600,
@@ -145,7 +146,7 @@ class Counts:
 
 
 def _spoken_seconds(stretches: Iterable[tuple[float, float]]) -> float:
-    """Seconds in which somebody spoke: what overlaps counts once."""
+    """Returns the total length of stretches [s]; overlaps count once."""
     total, until = 0.0, 0.0
     for start, end in sorted(stretches):
         total += max(0.0, end - max(start, until))
@@ -153,19 +154,19 @@ def _spoken_seconds(stretches: Iterable[tuple[float, float]]) -> float:
     return total
 
 
-# --- Everything that is counted over a corpus, in one pass over its sessions -----------------------------------------
+# --- Statistics of a corpus ------------------------------------------------------------------------------------------
 
 
 @dataclass
 class Census:
-    """What a corpus is like.
+    """Statistics of a corpus.
 
     Attributes:
         counts: table 2 of the paper.
-        anchors: how easy the tasks are for who knows nothing.
+        anchors: shares of the most frequent labels.
         profiles: moves and slots per transaction and exchange.
-        texts: the utterances of the folds that train and of those that test.
-        incomplete: names of sessions that were cut off; they count as far as they go.
+        texts: utterances of the training and the test folds.
+        incomplete: names of interrupted sessions, which count as far as they were recorded.
     """
 
     counts: Counts = field(default_factory=Counts)
@@ -187,11 +188,11 @@ class Census:
             self.incomplete.append(session.name)
 
     def diversity(self) -> dict[str, Any]:
-        """How varied the talk is.
+        """Returns measures of lexical diversity.
 
         Returns:
-            What `diversity.repetition` tells, and `perplexity` of the utterances of the folds that test under a trigram
-            of those that train; None where there are no such folds, nltk is not installed, or it is infinite.
+            The figures of `diversity.repetition`, and `perplexity` of the test folds under a trigram model of the
+            training folds; None without such folds or nltk, or if it is infinite.
         """
         train, test = self.texts["train"], self.texts["test"]
         perplexity = trigram_perplexity(train, test) if has_language_models() else None
@@ -205,7 +206,7 @@ class Census:
 
 
 def census_of(corpus: Corpus) -> Census:
-    """Counts a corpus; raises `SessionError` where a session cannot be read."""
+    """Returns the statistics of a corpus; raises `SessionError` if a session cannot be read."""
     census = Census()
     for entry in corpus.entries:
         census.add(entry.load(), entry.fold)
@@ -213,12 +214,12 @@ def census_of(corpus: Corpus) -> Census:
 
 
 def phenomena_of(sessions: Iterable[Session]) -> list[dict[str, Any]]:
-    """Counts the 24 phenomena.
+    """Returns counts of the 24 phenomena.
 
     Returns:
-        For each `number`, `title`, `cause`, in how many `sessions` its cause occurs, in how many of them it `occurs`,
-        their `share` (None without a cause), `findings` in all, `forms` ({form: findings}), and `example`: session,
-        time [s] and text of the first finding, None if there is none.
+        For each phenomenon `number`, `title`, `cause`, the number of `sessions` with its cause, the number of those in
+        which it `occurs`, their `share` (None without a cause), the total of `findings`, `forms` ({form: findings}),
+        and `example`: session, time [s] and text of the first finding, or None.
     """
     rows = [_Row(phenomenon) for phenomenon in PHENOMENA]
     for session in sessions:
@@ -229,7 +230,7 @@ def phenomena_of(sessions: Iterable[Session]) -> list[dict[str, Any]]:
 
 
 def faults_of_corpus(corpus: Corpus) -> dict[str, tuple[str, ...]]:
-    """Returns the faults of annotation of each session by the name of its folder within the corpus."""
+    """Returns the annotation faults of each session, by the path of its folder within the corpus."""
     return {_name(corpus, entry.path): inconsistencies(entry.load()) for entry in corpus.entries}
 
 

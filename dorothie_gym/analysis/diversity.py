@@ -1,4 +1,4 @@
-"""How varied the talk of a corpus is: neither the same sentences again and again nor noise."""
+"""Lexical diversity of a corpus: repetition of utterances and trigram perplexity."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ def words_of(text: str) -> tuple[str, ...]:
 
 
 def plain(text: str) -> str:
-    """Returns a text as its words alone: two that differ in case or punctuation only are the same."""
+    """Returns the words of a text, which are equal for texts that differ in case or punctuation only."""
     return " ".join(words_of(text))
 
 
-# --- How varied the talk of a corpus is: neither the same sentences again and again nor noise ------------------------
+# --- Diversity -------------------------------------------------------------------------------------------------------
 
 ORDER = 3
 UNKNOWN = "<unk>"
 
 
 def repetition(texts: Counter[str]) -> dict[str, Any]:
-    """Tells how often utterances repeat.
+    """Returns measures of the repetition of utterances.
 
     Args:
-        texts: how often each text occurs.
+        texts: counts of texts.
 
     Returns:
-        `distinct_utterance_ratio`, `commonest_utterance` and its share `commonest_utterance_share`; None if there is
-        none.
+        `distinct_utterance_ratio`, `commonest_utterance` and its share `commonest_utterance_share`; None without
+        utterances.
     """
     if not texts:
         return dict.fromkeys(("distinct_utterance_ratio", "commonest_utterance", "commonest_utterance_share"))
@@ -50,24 +50,22 @@ def repetition(texts: Counter[str]) -> dict[str, Any]:
 
 
 def has_language_models() -> bool:
-    """Whether nltk is installed, which `trigram_perplexity` needs."""
+    """Returns whether nltk is installed, which `trigram_perplexity` needs."""
     return find_spec("nltk") is not None
 
 
 def trigram_perplexity(train: Iterable[str], test: Iterable[str]) -> float | None:
-    """Returns how surprised an interpolated Kneser-Ney trigram is by texts, a number of equally likely next words.
+    """Returns the perplexity of texts under an interpolated Kneser-Ney trigram model.
 
-    Words are lower-cased; those that occur once in training are unknown, and so is what does not occur at all. The end
-    of an utterance is predicted as a word is. Discount 0.1, as nltk has it (Kneser and Ney 1995; Chen and Goodman 1998
-    for the interpolation).
+    Words are lower-cased; those that occur at most once in training are unknown. The end of an utterance counts as a
+    word. The discount is 0.1, the default of nltk (Kneser and Ney 1995; Chen and Goodman 1998 for the interpolation).
 
     Args:
-        train: utterances to learn from.
-        test: utterances to predict.
+        train: training utterances.
+        test: test utterances.
 
     Returns:
-        The perplexity; None where there is nothing to learn from or to predict; infinity where something was not
-        foreseen at all.
+        The perplexity; None if one of the sets has no words; infinity if a word has probability 0.
 
     Raises:
         ModuleNotFoundError: nltk is not installed.
@@ -103,13 +101,13 @@ def _padded(words: Sequence[str]) -> list[str]:
 
 
 def _fitted(sentences: Sequence[Sequence[str]]) -> Any:
-    """Nltk's model over the sentences, whose estimator counts continuations once instead of for every score."""
+    """Returns nltk's model of the sentences with an estimator that counts continuations once, not for every score."""
     from nltk.lm.models import InterpolatedLanguageModel
     from nltk.lm.smoothing import KneserNey
     from nltk.util import everygrams
 
     class Remembering(KneserNey):  # type: ignore[misc]
-        """Kneser-Ney whose sums over all contexts are taken once: nltk's own takes seconds for a hundred scores."""
+        """Kneser-Ney with precomputed sums over contexts; nltk's own takes seconds for a hundred scores."""
 
         tables: dict[tuple[str, ...], tuple[Counter[str], int]]
 

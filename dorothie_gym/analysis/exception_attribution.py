@@ -1,19 +1,19 @@
-"""Which exchange handles which exception: a rule over events and references, so that it can be found anew.
+"""Attribution of exchanges to the exceptions that they handle, by a rule over events and references.
 
-An exchange handles an exception if it begins after it, within `WINDOW`, and one of its acts refers to it:
+An exchange handles an exception if it begins within `WINDOW` after it, and one of its acts refers to it:
 
-- weather: to what it covers (sky, ground, water), or in words to fog, rain, night, ...; within `PROMPT` to speed or
-  lights too;
-- vehicles or pedestrians that appear: to such;
-- something on the road: to an obstacle, in words to a way that is blocked or free again; the time counts anew from when
-  the car comes near, and from then on, within `PROMPT`, to a U-turn or another lane too;
-- a sensor fault: in words, to a sensor or to what it shows; or begun by the car within `FAULT` with a question what to
-  do, which it cannot see for itself;
-- a task: to the landmark of the task, or to what is given up or put off.
+- weather: to the object classes it covers (sky, ground, water), or in words to fog, rain, night, ...; within `PROMPT`
+  also to speed or lights;
+- appearing vehicles or pedestrians: to their object class;
+- an object on the road: to an obstacle, or in words to a blocked or cleared way; the window starts again when the car
+  comes near, and within `PROMPT` from then on, references to a U-turn or another lane count as well;
+- a sensor fault: in words to a sensor or its picture; or the car begins the exchange within `FAULT` with a question
+  for an action;
+- a task exception: to the landmark of the task, or to an abandoned or postponed goal.
 
-A question that begins within `PATIENCE` after an exchange that handles something on the road, and names no place,
-belongs to it; so does, after one that handles a task, a question of status or where to go. Where several fit, the
-latest counts.
+A question within `PATIENCE` after an exchange that handles an object on the road belongs to it if it names no landmark;
+after an exchange that handles a task exception, a question for status or destination does. If several exceptions fit,
+the latest counts.
 """
 
 from __future__ import annotations
@@ -47,27 +47,26 @@ from dorothie_gym.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE
 
 WINDOW: Final = 60.0
-"""An exception is handled within this time [s]."""
+"""Time within which an exception is handled [s]."""
 
 PROMPT: Final = 20.0
-"""An act that names nothing but what the car is to do, which may have other reasons, is about what happened within this
-time before [s]."""
+"""Longest time between an exception and an act that refers to it only by an action of the car [s]."""
 
 FAULT: Final = 30.0
-"""A sensor fault ends by itself within this time [s] (spec: design)."""
+"""Longest duration of a sensor fault [s] (spec: design)."""
 
 NEAR: Final = 60.0
-"""The car has met something on the road when it comes this close to it [m]: it is seen from there by day."""
+"""Distance at which the car meets an object on the road [m]: the object is visible from there by day."""
 
 OBSTACLES: Final = (
     ObjectClass.STATIC, ObjectClass.DYNAMIC, ObjectClass.OTHER, ObjectClass.FENCE, ObjectClass.VEGETATION,
     ObjectClass.TRAFFIC_SIGN, ObjectClass.GUARD_RAIL, ObjectClass.WALL, ObjectClass.UNLABELED,
 )  # fmt: skip
-"""What lies across a road may be called."""
+"""Object classes by which speakers refer to an obstacle on the road."""
 
 
 class Handled(StrEnum):
-    """What an exchange handles."""
+    """Kind of exception that an exchange handles."""
 
     ENVIRONMENTAL = "environmental"
     TASK = "task"
@@ -75,10 +74,10 @@ class Handled(StrEnum):
 
 
 _AROUND: Final[frozenset[SlotValue]] = frozenset({ActionValue.U_TURN, ActionValue.LANE_SWITCH})
-"""How one gets around what is on the road: means it once the car is near."""
+"""Actions that refer to an obstacle once the car is near."""
 
 _CAUTION: Final[frozenset[SlotValue]] = frozenset({ActionValue.SPEED_CHANGE, ActionValue.LIGHT_CHANGE})
-"""What one does about the weather."""
+"""Actions that refer to the weather."""
 
 _REFERENCES: Final[Mapping[ExceptionKind, frozenset[SlotValue]]] = MappingProxyType(
     {
@@ -118,20 +117,20 @@ _WORDS: Final[Mapping[ExceptionKind, re.Pattern[str]]] = MappingProxyType(
         ),
     }
 )
-"""Words that refer to an exception of a kind, in a text whose case is folded."""
+"""Words that refer to an exception of a kind, in case-folded text."""
 
 _PUT_OFF: Final = frozenset({GoalStatus.ABANDONED, GoalStatus.PENDING})
 _ASKING: Final = frozenset(MoveGroup.ASK.moves)
 
 
 def kind_of(event: Event) -> ExceptionKind | None:
-    """Returns the kind of an exception; None for other events and for kinds that are unknown."""
+    """Returns the kind of an exception; None for other events and for unknown kinds."""
     name = str(event.data.get("kind")).upper() if event.type is EventType.EXCEPTION else ""
     return ExceptionKind[name] if name in ExceptionKind.__members__ else None
 
 
 def time_met(session: Session, event: Event) -> float:
-    """Returns when the car first came near what an exception put on the road [s]; infinity if never, or unknown."""
+    """Returns the time at which the car first came near an exception's object on the road [s]; infinity if never."""
     x, y = event.data.get("x"), event.data.get("y")
     if not isinstance(x, int | float) or not isinstance(y, int | float):
         return math.inf
@@ -141,7 +140,7 @@ def time_met(session: Session, event: Event) -> float:
 
 
 def handled_by(units: Units) -> dict[int, Event]:
-    """Returns for each exchange that handles an exception its number and the exception."""
+    """Returns the exception that each exchange handles, by number of the exchange."""
     session = units.session
     happened = [
         _Happened(event, kind, time_met(session, event) if kind.is_plan_level else math.inf)
@@ -170,7 +169,7 @@ def handled_by(units: Units) -> dict[int, Event]:
 
 
 def handling(units: Units) -> dict[int, Handled]:
-    """Returns for the number of each exchange whether it handles an environmental or a task exception, or none."""
+    """Returns the kind of exception that each exchange handles, by number of the exchange."""
     events = handled_by(units)
     kinds = {number: kind_of(event) for number, event in events.items()}
     return {
@@ -182,10 +181,10 @@ def handling(units: Units) -> dict[int, Handled]:
 
 
 def handling_of_events(units: Units) -> dict[int, Handled]:
-    """Returns what each dialogue move and physical action of a session handles, by the number of its event.
+    """Returns the kind of exception that each dialogue move and physical action handles, by number of its event.
 
-    A move handles what its exchange does. A physical action belongs to the exchange of the last move that was over
-    before it, if that is at most `PATIENCE` ago: an exchange is open that long.
+    A move counts as its exchange does. A physical action belongs to the exchange of the last move that ended before it,
+    if that was at most `PATIENCE` ago, the time for which an exchange stays open.
     """
     kinds = handling(units)
     found = {
@@ -203,14 +202,14 @@ def handling_of_events(units: Units) -> dict[int, Handled]:
 
 @dataclass(frozen=True)
 class _Happened:
-    """An exception, its kind, and when the car came near what it put on the road [s]."""
+    """Exception with its kind, and the time at which the car came near its object on the road [s]."""
 
     event: Event
     kind: ExceptionKind
     met: float
 
     def is_handled_in(self, exchange: SaidUnit) -> bool:
-        """Whether an exchange is in time, and one of its acts refers to the exception."""
+        """Returns whether an exchange is within the window and one of its acts refers to the exception."""
         is_near = 0.0 <= exchange.start - self.met <= WINDOW
         since = exchange.start - self.event.time
         if not is_near and not 0.0 <= since <= WINDOW:
@@ -226,13 +225,13 @@ class _Happened:
         return self.kind is ExceptionKind.SENSOR_FAULT and since <= FAULT and _asks_what_to_do(exchange)
 
     def _is_met_by(self, values: set[SlotValue], time: float) -> bool:
-        """Whether what the car is to do at a time [s] is what one does about such a thing, soon enough after it."""
+        """Returns whether an action named at a time [s] responds to the exception, within `PROMPT` after it."""
         if self.kind is ExceptionKind.WEATHER:
             return time - self.event.time <= PROMPT and bool(values & _CAUTION)
         return 0.0 <= time - self.met <= PROMPT and bool(values & _AROUND)
 
     def is_asked_on(self, exchange: SaidUnit) -> bool:
-        """Whether an exchange, right after one that handles the exception, goes on with it by a question."""
+        """Returns whether an exchange, right after one that handles the exception, continues it by a question."""
         first = exchange.moves[0].act
         if first.move not in _ASKING:
             return False

@@ -1,7 +1,7 @@
-"""How easy the three tasks are for who knows nothing but the commonest class, beside what the paper lets infer.
+"""Shares of the most frequent labels of the three tasks, compared with those inferred from the paper.
 
-A model that sees only detector features can do no better than the commonest class, so the paper's complete table, read
-backwards, tells the share of that class; read the same way it tells how many moves carry no slot.
+A model that sees only detector features does no better than the most frequent class, so the paper's full table gives
+the share of that class, and in the same way the share of moves without a slot.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ UNSEEN: Final[Mapping[str, float]] = MappingProxyType(
         "car_moves_without_slot": 0.548,
     }
 )
-"""The same in its unseen town."""
+"""Shares in the paper's unseen town."""
 
 TOLERANCE = 0.08
-"""How far from the seen figures a corpus may be."""
+"""Accepted difference from the shares in seen towns."""
 
 
 @dataclass
 class Anchors:
-    """Labels of the points of the three tasks, counted: flagged moves of both speakers, flagged navigation actions."""
+    """Counts of the labels of the three tasks: flagged moves of both speakers, flagged navigation actions."""
 
     moves: dict[Role, Counter[str]] = field(
         default_factory=lambda: {Role.PARTICIPANT: Counter(), Role.CO_WIZARD: Counter()}
@@ -62,10 +62,10 @@ class Anchors:
                 self.actions[action.action.label] += 1
 
     def to_json(self) -> dict[str, Any]:
-        """Returns for each anchor `share` and `points` (and `label` of the commonest class), `paper`, `within`.
+        """Returns for each anchor `share` and `points` (and `label` of the most frequent class), `paper`, `within`.
 
-        `paper` is the share in seen towns, `within` whether ours is at most `TOLERANCE` from it. Share and `within` are
-        None where there is no point.
+        `paper` is the share in seen towns, `within` whether the corpus differs by at most `TOLERANCE`. Share and
+        `within` are None without a point.
         """
         human, car = self.moves[Role.PARTICIPANT], self.moves[Role.CO_WIZARD]
         rows = {
@@ -83,7 +83,7 @@ class Anchors:
 
 
 def anchors_of(sessions: Iterable[Session]) -> dict[str, Any]:
-    """Returns the anchors of sessions, as `Anchors.to_json` has them."""
+    """Returns the anchors of sessions in the form of `Anchors.to_json`."""
     anchors = Anchors()
     for session in sessions:
         anchors.add(session)

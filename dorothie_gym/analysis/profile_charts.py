@@ -1,4 +1,4 @@
-"""The paper's figures 3 to 5 of a corpus as one picture."""
+"""Charts of a corpus's profiles (figures 3 to 5 of the paper)."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ SIZE: Final = (12.0, 9.2)
 """Width and height of the picture [inches]."""
 
 LETTERS: Final = 17
-"""Letters in a line below a bar."""
+"""Characters in a line below a bar."""
 
 _COLOURS: Final = {
     Handled.ENVIRONMENTAL: ("#9bd0b5", "#2f8f62"),
     Handled.TASK: ("#f3cb8d", "#cf7f1d"),
     Handled.NONE: ("#a9c4f2", "#2f62c4"),
 }
-"""For people (light) and the car (dark)."""
+"""Colours of people (light) and the car (dark)."""
 
 _NAMES: Final = {
     Handled.ENVIRONMENTAL: "environmental",
@@ -37,8 +37,8 @@ def draw_profiles(profiles: Profiles, counts: Counts, title: str, path: Path) ->
     """Draws moves and slots per transaction by speaker, and per exchange by the kind of exception that it handles.
 
     Args:
-        profiles: what to draw.
-        counts: of the same sessions, for the words above the figures.
+        profiles: profiles of the corpus.
+        counts: counts of the same sessions, for the heading.
         title: name of the corpus.
         path: PNG file to write.
 
@@ -103,7 +103,7 @@ def _per_exchange(moves: Any, slots: Any, profiles: Profiles) -> None:
 
 
 def _class_label(name: str) -> str:
-    """Name of a class of moves, and below it the moves that are in it."""
+    """Returns the name of a class of moves, and the names of its moves below it."""
     moves = [move.label for move in CLASSES[name]]
     if moves == [name]:
         return name
@@ -111,7 +111,7 @@ def _class_label(name: str) -> str:
 
 
 def _give_room(axes: Any, times: float = 1.22) -> None:
-    """Leaves room above the bars, for the legend where there is one."""
+    """Leaves room above the bars, for the legend if there is one."""
     axes.set_ylim(0.0, axes.get_ylim()[1] * times)
 
 

@@ -1,4 +1,4 @@
-"""Figures 3 to 5 of the paper: moves and slots per transaction by speaker, and per exchange by kind of exception."""
+"""Profiles of moves and slots per transaction and per exchange (figures 3 to 5 of the paper)."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ CLASSES: Final = {
     "Communicate": MoveGroup.COMMUNICATE.moves,
     "Inform": MoveGroup.INFORM.moves,
 }
-"""Classes of moves that exchanges are told apart by (spec of the ontology, decision tree)."""
+"""Classes of moves by which exchanges are compared (spec of the ontology, decision tree)."""
 
 
 @dataclass
 class Profile:
-    """How much of each move and slot units have.
+    """Counts of moves and slots in units.
 
     Attributes:
         units: number of units.
@@ -45,17 +45,17 @@ class Profile:
                 self.slots[move.speaker, value.slot] += 1
 
     def mean_move(self, speaker: Role, *moves: DialogueMove) -> float:
-        """Mean number of acts of a speaker with one of the moves in a unit; 0 without units."""
+        """Returns the mean number of a speaker's acts with one of the moves in a unit; 0 without units."""
         return sum(self.moves[speaker, move] for move in moves) / max(self.units, 1)
 
     def mean_slot(self, speaker: Role, slot: Slot) -> float:
-        """Mean number of values of a slot that a speaker mentions in a unit; 0 without units."""
+        """Returns the mean number of a slot's values that a speaker mentions in a unit; 0 without units."""
         return self.slots[speaker, slot] / max(self.units, 1)
 
 
 @dataclass
 class Profiles:
-    """The profiles of a corpus: of its transactions, and of its exchanges by what they handle."""
+    """Profiles of a corpus: of its transactions, and of its exchanges by the kind of exception that they handle."""
 
     transactions: Profile = field(default_factory=Profile)
     exchanges: dict[Handled, Profile] = field(default_factory=lambda: {kind: Profile() for kind in Handled})

@@ -1,4 +1,4 @@
-"""A session as a page that people read: who said what, with its annotation, and what happened in between."""
+"""Transcript of a session: utterances with their annotation, and the events between them."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ _HEAD: Final = ("time", "speaker", "words [acts] or event", "exchange", "transac
 
 @dataclass(frozen=True, kw_only=True)
 class TranscriptLine:
-    """A line of a transcript.
+    """Line of a transcript.
 
     Attributes:
-        time: when it began [s].
-        speaker: whose line it is.
-        text: words with the act of each span behind it; of what is not said, what happens.
+        time: start of the line [s].
+        speaker: role of the line.
+        text: words with the act of each span after it; for other events, a description.
         said: whether it is an utterance.
-        exchanges: number of each exchange that it is part of, and what kind of exception that handles, if any.
-        transaction: number of its transaction; empty where it has none.
+        exchanges: number of each of its exchanges, and the kind of exception that the exchange handles, if any.
+        transaction: number of its transaction; empty without one.
     """
 
     time: float
@@ -47,9 +47,9 @@ class TranscriptLine:
 
 
 def transcript_lines(session: Session) -> tuple[TranscriptLine, ...]:
-    """Returns the lines of a session in the order in which they began.
+    """Returns the lines of a session in order of their starts.
 
-    Exchanges and transactions are those that the rules find. Actions of the car between two utterances share a line.
+    Exchanges and transactions are those that the rules derive. Actions of the car between two utterances share a line.
     """
     units = Units(session)
     kinds = handling(units)
@@ -64,7 +64,7 @@ def markdown(session: Session, title: str | None = None) -> str:
 
     Args:
         session: any.
-        title: of the section; the session's name where it is None.
+        title: heading of the section; None for the session's name.
     """
     head = [f"## {title or session.name}", "", *_facts(session), ""]
     rows = [" | ".join(_HEAD), " | ".join("---" for _ in _HEAD)]
@@ -74,7 +74,7 @@ def markdown(session: Session, title: str | None = None) -> str:
     return "\n".join([*head, *(f"| {row} |" for row in rows)]) + "\n"
 
 
-# --- the head -------------------------------------------------------------------------------------------------------
+# --- Head ------------------------------------------------------------------------------------------------------------
 
 
 def _facts(session: Session) -> Iterator[str]:
@@ -95,7 +95,7 @@ def _facts(session: Session) -> Iterator[str]:
     yield f"- Phenomena (count): {shown or '-'}."
 
 
-# --- the lines ------------------------------------------------------------------------------------------------------
+# --- Lines -----------------------------------------------------------------------------------------------------------
 
 
 def _said(utterance: UtteranceRecord, units: Units, kinds: Mapping[int, Handled]) -> TranscriptLine:
@@ -123,7 +123,7 @@ def _happened(event: Event, session: Session) -> Iterator[TranscriptLine]:
 
 
 def _told(event: Event, session: Session) -> str:
-    """What an event is called; empty for what a reader would not miss."""
+    """Returns the description of an event; empty for events that are left out."""
     data = event.data
     if event.type is EventType.PHYSICAL_ACTION:
         return _deed(event)
@@ -157,7 +157,7 @@ def _deed(event: Event) -> str:
 
 
 def _together(lines: Iterable[TranscriptLine]) -> Iterator[TranscriptLine]:
-    """Joins neighbouring lines of one role that are not said; what is repeated is counted."""
+    """Joins neighbouring lines of one role that are no utterances; repetitions are counted."""
     for (said, speaker), group in groupby(lines, key=lambda line: (line.said, line.speaker)):
         same = list(group)
         if said:
@@ -169,7 +169,7 @@ def _together(lines: Iterable[TranscriptLine]) -> Iterator[TranscriptLine]:
 
 
 def _escaped(text: Any) -> str:
-    """A text as Markdown shows it in a table."""
+    """Returns a text escaped for a Markdown table."""
     clean = " ".join(str(text).split())
     for letter in "\\|*_<>`":
         clean = clean.replace(letter, f"\\{letter}")

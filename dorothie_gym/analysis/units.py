@@ -1,6 +1,6 @@
-"""Exchanges and transactions of a recording, found anew from its utterances and arrivals.
+"""Exchanges and transactions of a recording, derived from its utterances and arrivals.
 
-The numbers that are stored with the acts are not used, but for sessions of other corpora, which people annotated.
+Numbers stored with the acts are used for sessions of other corpora only, which people annotated.
 """
 
 from __future__ import annotations
@@ -24,33 +24,33 @@ SPEAKERS = (Role.PARTICIPANT, Role.CO_WIZARD)
 
 @dataclass(frozen=True, kw_only=True)
 class SaidUnit:
-    """An exchange or a transaction: its number and its acts, in order."""
+    """Exchange or transaction: its number and its acts, in order."""
 
     id: int
     moves: tuple[MoveRecord, ...]
 
     @property
     def start(self) -> float:
-        """When its first utterance began [s]."""
+        """Start of its first utterance [s]."""
         return min(move.start for move in self.moves)
 
     @property
     def end(self) -> float:
-        """When its last utterance was over [s]."""
+        """End of its last utterance [s]."""
         return max(move.end for move in self.moves)
 
 
 class Units:
-    """The units of a session.
+    """Exchanges and transactions of a session.
 
     Attributes:
         session: the session.
-        utterances: what participant and Co-Wizard said, in the order in which it was heard to its end.
-        states: each exchange as the rule left it, by its number; empty for annotated sessions of other corpora.
+        utterances: utterances of participant and Co-Wizard, in the order of their ends.
+        states: final state of each exchange, by number; empty for annotated sessions of other corpora.
     """
 
     def __init__(self, session: Session) -> None:
-        """Finds them.
+        """Derives the units.
 
         Args:
             session: any.
@@ -65,11 +65,11 @@ class Units:
         self._place()
 
     def exchange_of(self, move: MoveRecord) -> int | None:
-        """Number of the exchange that an act is in; None where people annotated none."""
+        """Returns the number of an act's exchange; None if people annotated none."""
         return self._exchange.get(move.index)
 
     def transaction_of(self, move: MoveRecord) -> int | None:
-        """Number of the transaction that an act is in; None where people annotated none."""
+        """Returns the number of an act's transaction; None if people annotated none."""
         return self._transaction.get(move.index)
 
     @cached_property
@@ -99,7 +99,7 @@ class Units:
                     annotator.note(*changed)
                 continue
             utterance = _spoken(item)
-            # As in a session: exchanges were given up at the decisions before the one at which this was heard.
+            # As in a session: exchanges expire at the decisions before the one at which this utterance is heard.
             annotator.tick(item.moves[0].frame / FRAME_RATE - period)
             ids, transaction = annotator.update(utterance)
             for move, exchange in zip(item.moves, ids, strict=True):
@@ -113,12 +113,12 @@ class Units:
 
 
 def is_initiating(move: MoveRecord) -> bool:
-    """Whether an act opens an exchange of its own accord."""
+    """Returns whether an act is an initiating move."""
     return move.act.move in EXPECTATIONS
 
 
 def goals_of(session: Session) -> tuple[LandmarkName, ...]:
-    """Landmarks of the subgoals in a session's header; names that are not the ontology's are passed over."""
+    """Returns the landmarks of the subgoals in a session's header; names outside of the ontology are skipped."""
     rows = session.header.landmarks
     names = [
         rows[subgoal["landmark"]]["name"] for subgoal in session.header.subgoals if subgoal["landmark"] < len(rows)
@@ -127,7 +127,7 @@ def goals_of(session: Session) -> tuple[LandmarkName, ...]:
 
 
 def subgoal_of(event: Event) -> tuple[LandmarkName, GoalStatus] | None:
-    """Landmark and status that an event of a subgoal tells; None for other events and for names that are unknown."""
+    """Returns landmark and status of a subgoal event; None for other events and for unknown names."""
     if event.type is not EventType.SUBGOAL:
         return None
     landmark = _landmark(str(event.data.get("landmark")))
@@ -146,7 +146,7 @@ def _landmark(name: str) -> LandmarkName | None:
 
 
 def _in_order(session: Session, utterances: tuple[UtteranceRecord, ...]) -> Iterator[Event | UtteranceRecord]:
-    """Utterances as they are over, and between them the changes of subgoals."""
+    """Yields utterances in the order of their ends, and the changes of subgoals between them."""
     first = {utterance.moves[0].index: utterance for utterance in utterances}
     for index, event in enumerate(session.events):
         if index in first:

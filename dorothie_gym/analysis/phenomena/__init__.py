@@ -1,4 +1,4 @@
-"""The 24 phenomena that talk between people and cars has, each found by a query over acts, texts and events."""
+"""The 24 phenomena of dialogue between people and cars, each found by a query over acts, texts and events."""
 
 from dorothie_gym.analysis.phenomena.catalogue import PHENOMENA
 from dorothie_gym.analysis.phenomena.dialogue_view import Finding, Phenomenon, Talk, Turn

@@ -1,4 +1,4 @@
-"""The 24 phenomena of the dialogue, each with its cause and its query."""
+"""Catalogue of the 24 phenomena, each with its cause and its query."""
 
 from __future__ import annotations
 
@@ -124,4 +124,4 @@ PHENOMENA: Final[tuple[Phenomenon, ...]] = (
         forms=("not understood", "misunderstood"),
     ),
 )  # fmt: skip
-"""In the order of the spec; their numbers are 1 to 24."""
+"""Phenomena 1 to 24 in the order of the spec."""

@@ -1,4 +1,4 @@
-"""Phenomena 8 to 14, 23: places that are not on the map, and what the Ad-Wizard changes in the world and the task."""
+"""Queries of phenomena 8 to 14 and 23: places that are not on the map, and exceptions of the Ad-Wizard."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ M = DialogueMove
 DIM: Mapping[WeatherParameter, float] = MappingProxyType(
     {WeatherParameter.FOG_DENSITY: 30.0, WeatherParameter.PRECIPITATION: 30.0, WeatherParameter.SUN_ALTITUDE_ANGLE: 5.0}
 )
-"""Weather that takes sight: fog and rain from these values on [%], the sun at most so high [degrees]."""
+"""Weather that reduces sight: fog and rain from these values on [%], the sun at most at this height [degrees]."""
 
 SLOWER = re.compile(r"\bslow\w*|\beasy\b|\bcareful\w*|\bnot so fast\b|\btoo fast\b|\bdown to\b|\bbrake\b")
 LIGHTS = re.compile(r"\blights?\b|\bheadlights?\b|\bbeams?\b")
@@ -38,14 +38,14 @@ _COMPARES = re.compile(
 )
 
 BEFORE = 10.0
-"""What is on the road may be seen this long before the car is near it [s]."""
+"""Longest time between sight of an object on the road and the car's coming near [s]."""
 
 SOON = 60.0
-"""What comes of a roadblock, or of a place that is not known, is settled within this time [s]."""
+"""Time within which a roadblock, or an unknown place, is settled [s]."""
 
 
 def hidden_place(talk: Talk) -> Iterator[Finding]:
-    """8: the car says that it does not know a place, the participant describes it, the car marks a guess."""
+    """Finds 8: the car says that it does not know a place, the participant describes it, the car marks a guess."""
     for turn in talk.by(CAR, M.EXPLAIN, M.QUERY_W, M.QUERY_YN, M.CHECK, M.CONFUSE, M.REPLY_N):
         unknown = turn.mentions(GoalStatus.UNKNOWN) and labels(turn.names(Slot.LANDMARK)) & talk.hidden_goals
         described = (
@@ -61,18 +61,18 @@ def hidden_place(talk: Talk) -> Iterator[Finding]:
 
 
 def _describes(turn: Turn, places: Collection[str]) -> bool:
-    """Whether a turn tells where it is: on a street, or by another place than those."""
+    """Returns whether a turn describes a position: by a street, or by a place other than the given ones."""
     tells = turn.does(M.REPLY_W, M.EXPLAIN, M.CLARIFY, M.INSTRUCT)
     return tells and bool(turn.names(Slot.STREET) or labels(turn.names(Slot.LANDMARK)) - frozenset(places))
 
 
 def has_hidden_goal(talk: Talk) -> bool:
-    """Whether a subgoal's landmark is hidden from the car."""
+    """Returns whether a subgoal's landmark is hidden from the car."""
     return bool(talk.hidden_goals)
 
 
 def roadblock(talk: Talk) -> Iterator[Finding]:
-    """9: the car tells of something across the road, another way is talked over, and taken."""
+    """Finds 9: the car reports an object across the road, another way is discussed and taken."""
     for turn in talk.by(CAR, M.EXPLAIN):
         if not any(set(act.slots) & set(OBSTACLES) for act in turn.doing(M.EXPLAIN)):
             continue
@@ -93,12 +93,12 @@ def _goes_another_way(talk: Talk, *, since: float, until: float) -> bool:
 
 
 def meets_roadblock(talk: Talk) -> bool:
-    """Whether the car comes near something that the Ad-Wizard put on the road."""
+    """Returns whether the car comes near an object that the Ad-Wizard put on the road."""
     return bool(talk.met_roadblocks)
 
 
 def dim_weather(talk: Talk) -> Iterator[Finding]:
-    """10: in fog, rain or at night the participant wants less speed or more light, and gets it or an answer."""
+    """Finds 10: in fog, rain or at night the participant asks for less speed or more light, and the car responds."""
     stretches = tuple(_dim(talk))
     wishes = (
         (ActionValue.SPEED_CHANGE, SLOWER, PhysicalAction.SPEED_CHANGE, False, "slower"),
@@ -114,12 +114,12 @@ def dim_weather(talk: Talk) -> Iterator[Finding]:
 
 
 def has_dim_weather(talk: Talk) -> bool:
-    """Whether the Ad-Wizard brings fog, rain or night, and time is left to talk about it."""
+    """Returns whether the Ad-Wizard causes fog, rain or night, with time left for the dialogue."""
     return any(talk.session.duration - since > 10.0 for since, _ in _dim(talk))
 
 
 def _dim(talk: Talk) -> Iterator[tuple[float, float]]:
-    """Stretches of time [s] in which fog, rain or night takes sight, each from an exception until it is taken back."""
+    """Returns the stretches of time [s] with fog, rain or night, each from an exception until its end."""
     since: dict[WeatherParameter, float] = {}
     for event in talk.exceptions(ExceptionKind.WEATHER):
         parameter = next((each for each in DIM if str(each) == event.data.get("parameter")), None)
@@ -135,7 +135,7 @@ def _dim(talk: Talk) -> Iterator[tuple[float, float]]:
 
 
 def task_added(talk: Talk) -> Iterator[Finding]:
-    """11: the participant tells of a new errand; the car takes it up, or asks when."""
+    """Finds 11: the participant names a new task; the car takes it up, or asks when."""
     for _, turn in _told(talk, ExceptionKind.TASK_TRIGGER, M.INSTRUCT, M.EXPLAIN):
         question = next(talk.answers(turn, M.QUERY_W, M.QUERY_YN, M.CHECK), None)
         if question is not None and talk.answered(question):
@@ -145,7 +145,7 @@ def task_added(talk: Talk) -> Iterator[Finding]:
 
 
 def task_changed(talk: Talk) -> Iterator[Finding]:
-    """12: the participant takes one place back for another, and the car takes it up."""
+    """Finds 12: the participant replaces one place by another, and the car takes it up."""
     for event in talk.exceptions(ExceptionKind.TASK_CHANGE):
         for turn in talk.by(HUMAN, M.INSTRUCT, M.EXPLAIN):
             if turn.start < event.time or not talk.answered(turn):
@@ -160,13 +160,13 @@ def task_changed(talk: Talk) -> Iterator[Finding]:
 
 
 def _gave_up(talk: Talk, turn: Turn) -> bool:
-    """Whether a place is given up right before or after the new one is named."""
+    """Returns whether a place is given up right before or after the new one is named."""
     around = [*talk.before(turn, within=20.0), *talk.later(turn, within=20.0)]
     return any(other.speaker is HUMAN and other.mentions(GoalStatus.ABANDONED) for other in around)
 
 
 def task_deleted(talk: Talk) -> Iterator[Finding]:
-    """13: the participant gives up an errand; perhaps comes back to it later."""
+    """Finds 13: the participant gives up a task, and may resume it later."""
     for _, turn in _told(talk, ExceptionKind.TASK_DELETE):
         if not turn.mentions(GoalStatus.ABANDONED):
             continue
@@ -178,7 +178,7 @@ def task_deleted(talk: Talk) -> Iterator[Finding]:
 
 
 def _told(talk: Talk, kind: ExceptionKind, *moves: DialogueMove) -> Iterator[tuple[Event, Turn]]:
-    """The participant's turns, that do one of the moves, which name the landmark of a task's exception after it."""
+    """Yields the participant's turns with one of the moves that name the landmark of an earlier task exception."""
     for event in talk.exceptions(kind):
         for turn in talk.by(HUMAN, *moves):
             if turn.start >= event.time and str(event.data.get("landmark")) in labels(turn.names(Slot.LANDMARK)):
@@ -186,12 +186,12 @@ def _told(talk: Talk, kind: ExceptionKind, *moves: DialogueMove) -> Iterator[tup
 
 
 def task_exception(talk: Talk, kind: ExceptionKind) -> bool:
-    """Whether the Ad-Wizard changes the task so, and time is left to talk about it."""
+    """Returns whether the Ad-Wizard changes the task in this way, with time left for the dialogue."""
     return any(talk.session.duration - event.time > 10.0 for event in talk.exceptions(kind))
 
 
 def completion(talk: Talk) -> Iterator[Finding]:
-    """14: the participant says that an errand is done, or the car asks where to go next."""
+    """Finds 14: the participant says that a task is done, or the car asks for the next destination."""
     for event in _completed(talk):
         for turn in talk.turns:
             if not 0.0 <= turn.start - event.time <= SOON:
@@ -205,7 +205,7 @@ def completion(talk: Talk) -> Iterator[Finding]:
 
 
 def completes(talk: Talk) -> bool:
-    """Whether a subgoal is reached and the drive goes on."""
+    """Returns whether a subgoal is reached before the end of the drive."""
     return any(True for _ in _completed(talk))
 
 
@@ -216,7 +216,7 @@ def _completed(talk: Talk) -> Iterator[Event]:
 
 
 def negotiation(talk: Talk) -> Iterator[Finding]:
-    """23: the car proposes something and says what for; the participant agrees, or insists on something else."""
+    """Finds 23: the car makes a proposal with a reason; the participant agrees, or insists on another action."""
     for turn in talk.by(CAR, M.QUERY_YN, M.CHECK):
         proposes = any(
             act.values(Slot.ACTION) or act.values(Slot.STREET) or act.values(Slot.LANDMARK)
@@ -230,7 +230,7 @@ def negotiation(talk: Talk) -> Iterator[Finding]:
 
 
 def _has_grounds(talk: Talk, turn: Turn) -> bool:
-    """Whether the car says what a proposal is for: soon after what changed, or by comparing."""
+    """Returns whether the car gives the reason of a proposal: soon after a change, or by a comparison."""
     grounds = [turn, *(other for other in talk.before(turn, within=10.0) if other.speaker is CAR)]
     grounds = [other for other in grounds if other.does(M.EXPLAIN)]
     changed = [event.time for event in talk.exceptions(ExceptionKind.TASK_TRIGGER, ExceptionKind.TASK_CHANGE)]
@@ -239,6 +239,6 @@ def _has_grounds(talk: Talk, turn: Turn) -> bool:
 
 
 def gives_cause_to_negotiate(talk: Talk) -> bool:
-    """Whether a roadblock is met or the task changes."""
+    """Returns whether a roadblock is met or the task changes."""
     kinds = (ExceptionKind.TASK_TRIGGER, ExceptionKind.TASK_CHANGE)
     return meets_roadblock(talk) or any(task_exception(talk, kind) for kind in kinds)

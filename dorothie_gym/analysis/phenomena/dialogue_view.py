@@ -1,4 +1,4 @@
-"""A session as talk: turns with their acts, and what happened in the world between them."""
+"""Session as dialogue turns with their acts, and as events between them; base of the phenomenon queries."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ from dorothie_gym.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE
 
 ANSWER = 15.0
-"""Within this time of a turn's end its answer begins [s]: an exchange's patience, and the answer's own time."""
+"""Time after a turn within which its answer begins [s]: patience of an exchange, and duration of the answer."""
 
 _LONGEST = 60.0
-"""No utterance is longer than this [s]: turns that began earlier are over."""
+"""Longest utterance [s]: turns that began earlier are over."""
 
 _UNKNOWN = (ActionValue.UNKNOWN, StreetName.UNKNOWN, LandmarkName.UNKNOWN, GoalStatus.UNKNOWN)
 _QUERIED = (
@@ -45,17 +45,17 @@ _QUERIED = (
 
 @dataclass(frozen=True, kw_only=True)
 class Turn:
-    """An utterance.
+    """Dialogue turn: one utterance.
 
     Attributes:
-        number: its place in the talk.
-        speaker: who spoke.
+        number: its number in the dialogue.
+        speaker: role that spoke.
         text: its words.
-        recognised: what a recogniser heard, None where there was none.
+        recognised: words that a recogniser returned; None without a recogniser.
         acts: its acts, in order.
         spans: the words of each act.
         exchanges: number of the exchange of each act.
-        start, end: when it was said [s].
+        start, end: start and end [s].
     """
 
     number: int
@@ -69,25 +69,25 @@ class Turn:
     end: float
 
     def does(self, *moves: DialogueMove) -> bool:
-        """Whether one of its acts is one of the moves."""
+        """Returns whether one of its acts has one of the moves."""
         return any(act.move in moves for act in self.acts)
 
     def doing(self, *moves: DialogueMove) -> Iterator[DialogueAct]:
-        """Yields its acts that are one of the moves."""
+        """Yields its acts with one of the moves."""
         return (act for act in self.acts if act.move in moves)
 
     def names(self, slot: Slot) -> frozenset[SlotValue]:
-        """The values of a slot in all its acts, those that are unknown or asked for left out."""
+        """Returns the values of a slot in all its acts, without unknown and queried ones."""
         return frozenset(value for act in self.acts for value in named(act, slot))
 
     def mentions(self, *values: SlotValue) -> bool:
-        """Whether one of its acts carries one of the values."""
+        """Returns whether one of its acts has one of the values."""
         return any(value in act.slots for act in self.acts for value in values)
 
     def says(self, pattern: re.Pattern[str], *moves: DialogueMove) -> bool:
-        """Whether the words of one of its acts, of those that do one of the moves if any is given, have the pattern.
+        """Returns whether the words of one of its acts (with one of the moves, if given) match the pattern.
 
-        Talk that is not about the drive has no say.
+        Irrelevant acts do not count.
         """
         return any(
             pattern.search(span.casefold().replace("’", "'"))
@@ -97,21 +97,21 @@ class Turn:
 
 
 class Talk:
-    """The turns of participant and Co-Wizard in a session, and what happened.
+    """Turns of participant and Co-Wizard in a session, and its events.
 
     Attributes:
         session: the session.
         units: its exchanges and transactions.
-        turns: utterances in the order in which they began.
+        turns: utterances in the order of their starts.
         goals: landmarks of the subgoals.
     """
 
     def __init__(self, session: Session, units: Units | None = None) -> None:
-        """Reads a session.
+        """Gathers the turns of a session.
 
         Args:
             session: any.
-            units: of the session, if they are known already.
+            units: units of the session, if already known.
         """
         self.session = session
         self.units = Units(session) if units is None else units
@@ -122,23 +122,23 @@ class Talk:
         }
 
     def by(self, speaker: Role, *moves: DialogueMove) -> Iterator[Turn]:
-        """Yields the turns of a speaker that do one of the moves; all of them if none is given."""
+        """Yields the turns of a speaker with one of the moves, or all of them if none is given."""
         return (turn for turn in self.turns if turn.speaker is speaker and (not moves or turn.does(*moves)))
 
     def answers(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER) -> Iterator[Turn]:
-        """Yields the other speaker's turns that begin during a turn or soon after it and do one of the moves."""
+        """Yields the other speaker's turns that begin during or soon after a turn and have one of the moves."""
         for other in self.later(turn, within=within):
             if other.speaker is not turn.speaker and (not moves or other.does(*moves)):
                 yield other
 
     def answered(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER) -> bool:
-        """Whether there is such an answer."""
+        """Returns whether there is such an answer."""
         return any(True for _ in self.answers(turn, *moves, within=within))
 
     def replies(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER) -> Iterator[Turn]:
-        """Yields the answers that do one of the moves within an exchange that the turn is in.
+        """Yields the answers with one of the moves within an exchange of the turn.
 
-        Where the exchange is not known, any answer will do.
+        If the exchange is unknown, any answer counts.
         """
         own = set(turn.exchanges)
         for other in self.answers(turn, *moves, within=within):
@@ -147,7 +147,7 @@ class Talk:
                 yield other
 
     def replied(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER) -> bool:
-        """Whether there is such a reply."""
+        """Returns whether there is such a reply."""
         return any(True for _ in self.replies(turn, *moves, within=within))
 
     def later(self, turn: Turn, *, within: float) -> Iterator[Turn]:
@@ -167,7 +167,7 @@ class Talk:
             if turn.start - other.end <= within:
                 yield other
 
-    # --- what happened ----------------------------------------------------------------------------------------------
+    # --- Events -----------------------------------------------------------------------------------------------------
 
     def exceptions(self, *kinds: ExceptionKind) -> Iterator[Event]:
         """Yields the exceptions of the kinds."""
@@ -175,27 +175,27 @@ class Talk:
         return (e for e in self.session.of_type(EventType.EXCEPTION) if str(e.data.get("kind")).upper() in names)
 
     def did(self, *actions: PhysicalAction, since: float = 0.0, until: float = math.inf) -> bool:
-        """Whether the Co-Wizard did one of the actions in a stretch of time [s]."""
+        """Returns whether the Co-Wizard did one of the actions in a stretch of time [s]."""
         return any(_falls(self._action_times.get(action, ()), since, until) for action in actions)
 
     def switched(self, action: PhysicalAction, up: bool, *, since: float, until: float) -> bool:
-        """Whether the Co-Wizard did an action up (or on), or down (or off), in a stretch of time [s]."""
+        """Returns whether the Co-Wizard did an action up (or on), or down (or off), in a stretch of time [s]."""
         done = (each for each in self.session.physical_actions if each.source is Role.CO_WIZARD)
         return any(
             each.action is action and each.up is up and since <= each.frame / FRAME_RATE <= until for each in done
         )
 
     def believed(self, *actions: MentalAction, since: float = 0.0, until: float = math.inf) -> bool:
-        """Whether the Co-Wizard did one of the mental actions in a stretch of time [s]."""
+        """Returns whether the Co-Wizard did one of the mental actions in a stretch of time [s]."""
         return any(_falls(self._belief_times.get(action.label, ()), since, until) for action in actions)
 
     def happened(self, *types: EventType) -> bool:
-        """Whether there is an event of one of the types."""
+        """Returns whether there is an event of one of the types."""
         return bool(self.session.of_type(*types))
 
     @cached_property
     def met_roadblocks(self) -> tuple[float, ...]:
-        """When the car came near each thing that the Ad-Wizard had put on the road and that it met [s]."""
+        """Times at which the car came near the objects that the Ad-Wizard put on the road [s]."""
         props = self.exceptions(ExceptionKind.PLACE_PROP, ExceptionKind.MOVE_PROP)
         return tuple(met for met in (time_met(self.session, event) for event in props) if math.isfinite(met))
 
@@ -216,7 +216,7 @@ class Talk:
 
     @cached_property
     def hidden_goals(self) -> frozenset[str]:
-        """Labels of the subgoals' landmarks that the Co-Wizard does not have on its map."""
+        """Labels of the subgoals' landmarks that are not on the Co-Wizard's map."""
         rows = self.session.header.landmarks
         goals = {subgoal["landmark"] for subgoal in self.session.header.subgoals}
         return frozenset(rows[k]["name"] for k in goals if 0 <= k < len(rows) and rows[k]["hidden"])
@@ -236,17 +236,17 @@ class Talk:
 
 
 def named(act: DialogueAct, slot: Slot) -> frozenset[SlotValue]:
-    """Returns the values of a slot in an act, those that are unknown or asked for left out."""
+    """Returns the values of a slot in an act, without unknown and queried ones."""
     return frozenset(value for value in act.values(slot) if value not in _UNKNOWN and value not in _QUERIED)
 
 
 def asks_for(act: DialogueAct, *slots: Slot) -> bool:
-    """Whether an act leaves a value of one of the slots open, as a question does."""
+    """Returns whether an act leaves a value of one of the slots open, as a question does."""
     return any(value in _QUERIED and value.slot in slots for value in act.slots)
 
 
 def _falls(times: Sequence[float], since: float, until: float) -> bool:
-    """Whether one of the times, which rise, lies in a stretch."""
+    """Returns whether one of the rising times is within a stretch."""
     k = bisect.bisect_left(times, since)
     return k < len(times) and times[k] <= until
 
@@ -261,14 +261,14 @@ def _landmark(event: Event) -> LandmarkName | None:
     return next((name for name in LandmarkName if name.label == label), None)
 
 
-# --- What a query of a phenomenon is ---------------------------------------------------------------------------------
+# --- Phenomena -------------------------------------------------------------------------------------------------------
 
 HUMAN, CAR = Role.PARTICIPANT, Role.CO_WIZARD
 
 
 @dataclass(frozen=True)
 class Finding:
-    """An occurrence: the turn that it begins with, and which of the phenomenon's forms it has."""
+    """Occurrence of a phenomenon: its first turn, and its form."""
 
     turn: Turn
     form: str
@@ -279,15 +279,15 @@ Query: TypeAlias = Callable[[Talk], Iterator[Finding]]
 
 @dataclass(frozen=True, kw_only=True)
 class Phenomenon:
-    """Something that talk between people and cars has (spec of the dialogue).
+    """Phenomenon of dialogue between people and cars (spec of the dialogue).
 
     Attributes:
         number: 1 to 24, as in the spec.
         title: a few words.
-        cause: what has to happen for it to be possible, in words.
-        has_cause: whether it happened, read from acts, texts and events of the world.
-        find: its occurrences, each with its form.
-        forms: the forms that `find` tells apart.
+        cause: its necessary condition, in words.
+        has_cause: returns whether the condition holds, from acts, texts and events.
+        find: yields its occurrences, each with its form.
+        forms: the forms that `find` distinguishes.
     """
 
     number: int
@@ -299,5 +299,5 @@ class Phenomenon:
 
 
 def both_speak(talk: Talk) -> bool:
-    """Whether both sides say something."""
+    """Returns whether both sides speak."""
     return {HUMAN, CAR} <= {turn.speaker for turn in talk.turns}

@@ -1,4 +1,4 @@
-"""Phenomena 5 to 7, 15, 16, 19 to 21, 24: questions, answers, and how understanding is kept up."""
+"""Queries of phenomena 5 to 7, 15, 16, 19 to 21 and 24: questions, answers and grounding."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ M = DialogueMove
 
 QUESTIONS = (M.QUERY_YN, M.QUERY_W, M.CHECK, M.ALIGN)
 AGAIN = 30.0
-"""A question that is put again is put within this time [s]."""
+"""Time within which a question is repeated [s]."""
 
 LATELY = 45.0
-"""Who names a place that was named within this time [s] has not made it up."""
+"""Time within which a named place counts as mentioned before [s]."""
 
 _YES_NO: Mapping[DialogueMove, str] = MappingProxyType(
     {M.REPLY_Y: "yes", M.REPLY_N: "no", M.REPLY_U: "unsure"},
@@ -28,7 +28,7 @@ _YES_NO: Mapping[DialogueMove, str] = MappingProxyType(
 
 
 def yes_no(talk: Talk) -> Iterator[Finding]:
-    """5: the car asks a yes/no question; the participant says yes, no, or is not sure."""
+    """Finds 5: the car asks a yes/no question; the participant says yes, no, or is not sure."""
     for turn in talk.by(CAR, M.QUERY_YN):
         answer = next(talk.replies(turn, *_YES_NO), None)
         if answer is not None:
@@ -36,7 +36,7 @@ def yes_no(talk: Talk) -> Iterator[Finding]:
 
 
 def check(talk: Talk) -> Iterator[Finding]:
-    """6: the car checks what it takes to be so, and the participant verifies or denies it."""
+    """Finds 6: the car checks an assumption, and the participant confirms or denies it."""
     for turn in talk.by(CAR, M.CHECK):
         answer = next(talk.replies(turn, M.CONFIRM, M.REPLY_Y, M.REPLY_N, M.CLARIFY), None)
         if answer is not None:
@@ -44,7 +44,7 @@ def check(talk: Talk) -> Iterator[Finding]:
 
 
 def align(talk: Talk) -> Iterator[Finding]:
-    """7: somebody asks whether it came across: it did, or it did not and is said in other words."""
+    """Finds 7: a speaker asks for understanding: it is confirmed, or the utterance is rephrased."""
     for turn in talk.turns:
         if not turn.does(M.ALIGN):
             continue
@@ -57,7 +57,7 @@ def align(talk: Talk) -> Iterator[Finding]:
 
 
 def perception(talk: Talk) -> Iterator[Finding]:
-    """15: the participant asks whether the car sees something, and it says so."""
+    """Finds 15: the participant asks whether the car sees an object, and the car answers."""
     for turn in talk.by(HUMAN, M.QUERY_YN):
         if not any(act.values(Slot.OBJECT) for act in turn.doing(M.QUERY_YN)):
             continue
@@ -67,19 +67,19 @@ def perception(talk: Talk) -> Iterator[Finding]:
 
 
 def reason(talk: Talk) -> Iterator[Finding]:
-    """16: the participant asks why the car does what it does, and it gives a reason."""
+    """Finds 16: the participant asks for the reason of an action, and the car gives it."""
     for turn in talk.by(HUMAN, M.QUERY_W, M.QUERY_YN):
         if asks_why(turn) and talk.replied(turn, M.REPLY_W, M.EXPLAIN):
             yield Finding(turn, "explained")
 
 
 def acts_by_itself(talk: Talk) -> bool:
-    """Whether the car does something that wants a reason: stops for a hazard, or turns round."""
+    """Returns whether the car acts in a way that calls for a reason: stops for a hazard, or turns round."""
     return talk.happened(EventType.HAZARD_STOP) or talk.did(PhysicalAction.U_TURN)
 
 
 def overlap(talk: Talk) -> Iterator[Finding]:
-    """19: both begin an exchange while the other is still speaking, and both are answered."""
+    """Finds 19: both speakers begin an exchange while the other is speaking, and both are answered."""
     begun = sorted(_answered_exchanges(talk), key=lambda turn: turn.number)
     for k, first in enumerate(begun):
         for other in itertools.islice(begun, k + 1, None):
@@ -91,7 +91,7 @@ def overlap(talk: Talk) -> Iterator[Finding]:
 
 
 def _answered_exchanges(talk: Talk) -> Iterator[Turn]:
-    """The turns that open an exchange of which the other speaker is a part."""
+    """Returns the turns that open an exchange in which the other speaker takes part."""
     opened: dict[int | None, Turn] = {}
     answered: dict[int | None, Turn] = {}
     for turn in talk.turns:
@@ -106,14 +106,14 @@ def _answered_exchanges(talk: Talk) -> Iterator[Turn]:
 
 
 def irrelevant(talk: Talk) -> Iterator[Finding]:
-    """20: talk that is not about the drive."""
+    """Finds 20: talk unrelated to the drive."""
     for turn in talk.turns:
         if turn.does(M.IRRELEVANT):
             yield Finding(turn, "human" if turn.speaker is HUMAN else "car")
 
 
 def abandoned(talk: Talk) -> Iterator[Finding]:
-    """21: a question gets no answer for ten seconds, and is put in other words, or dropped."""
+    """Finds 21: a question gets no answer for ten seconds, and is rephrased or dropped."""
     said_by_both: dict[int | None, set[object]] = {}
     for turn in talk.turns:
         for exchange in turn.exchanges:
@@ -139,15 +139,15 @@ def _asked_again(talk: Talk, turn: Turn) -> bool:
 
 
 def somebody_asks(talk: Talk) -> bool:
-    """Whether there is a question."""
+    """Returns whether there is a question."""
     return any(turn.does(*QUESTIONS) for turn in talk.turns)
 
 
 def speech_trouble(talk: Talk) -> Iterator[Finding]:
-    """24: the participant was misheard, which shows in what the car says, and puts it right.
+    """Finds 24: the recogniser misheard the participant, the car's answer shows it, and the participant corrects it.
 
-    What the car makes of it shows as confusion, or as a name that was not said; the participant then clarifies, denies,
-    or says what was meant once more.
+    The car's answer shows confusion, or a name that was not said; the participant then clarifies, denies, or repeats
+    the intended content.
     """
     for turn in talk.by(HUMAN):
         if not misheard(turn):
@@ -162,7 +162,7 @@ def speech_trouble(talk: Talk) -> Iterator[Finding]:
 
 
 def _said_lately(talk: Talk, turn: Turn) -> frozenset[SlotValue]:
-    """Places that were named in a turn, or by anybody shortly before it."""
+    """Returns the places that were named in a turn, or by any speaker shortly before it."""
     turns = [turn, *talk.before(turn, within=LATELY)]
     return frozenset(value for each in turns for slot in (Slot.LANDMARK, Slot.STREET) for value in each.names(slot))
 
@@ -178,10 +178,10 @@ def _put_right(talk: Talk, turn: Turn, answer: Turn) -> bool:
 
 
 def misheard(turn: Turn) -> bool:
-    """Whether a recogniser heard other words than were said."""
+    """Returns whether a recogniser returned other words than were said."""
     return turn.recognised is not None and words_of(turn.recognised) != words_of(turn.text)
 
 
 def somebody_misheard(talk: Talk) -> bool:
-    """Whether the participant was misheard."""
+    """Returns whether the participant was misheard."""
     return any(misheard(turn) for turn in talk.by(HUMAN))

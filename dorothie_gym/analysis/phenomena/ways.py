@@ -1,4 +1,4 @@
-"""Phenomena 1 to 4, 17, 18, 22: where to go and how."""
+"""Queries of phenomena 1 to 4, 17, 18 and 22: destinations and routes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ STEPS = (
 
 _TAKEN_UP = (M.ACKNOWLEDGE, M.CONFIRM, M.REPLY_Y)
 _WAYS = frozenset({ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH, ActionValue.U_TURN, ActionValue.J_TURN})
-"""Steps that choose a way."""
+"""Actions that choose a route."""
 
 _NOT_TO_BE = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE})
 
@@ -44,7 +44,7 @@ _NOT_A_PLACE = re.compile(
 
 
 def goal_level(talk: Talk) -> Iterator[Finding]:
-    """1: the participant instructs by naming a place, and the car takes it up."""
+    """Finds 1: the participant instructs by naming a place, and the car takes it up."""
     for turn in talk.by(HUMAN, M.INSTRUCT):
         goals = [act for act in turn.doing(M.INSTRUCT) if named(act, Slot.LANDMARK) and not act.slots & _NOT_TO_BE]
         if goals and talk.replied(turn, *_TAKEN_UP):
@@ -52,7 +52,7 @@ def goal_level(talk: Talk) -> Iterator[Finding]:
 
 
 def step_level(talk: Talk) -> Iterator[Finding]:
-    """2: the participant instructs the next step without naming a place, and the car takes it up."""
+    """Finds 2: the participant instructs the next step without naming a place, and the car takes it up."""
     for turn in talk.by(HUMAN, M.INSTRUCT):
         steps = [act for act in turn.doing(M.INSTRUCT) if named(act, Slot.ACTION) & set(STEPS)]
         if steps and not turn.names(Slot.LANDMARK) and talk.replied(turn, *_TAKEN_UP):
@@ -60,14 +60,14 @@ def step_level(talk: Talk) -> Iterator[Finding]:
 
 
 def two_acts(talk: Talk) -> Iterator[Finding]:
-    """3: an utterance of the participant does two different things."""
+    """Finds 3: an utterance of the participant holds two different acts."""
     for turn in talk.by(HUMAN):
         if len({act.move for act in turn.acts} - {M.IRRELEVANT}) > 1:
             yield Finding(turn, "two acts")
 
 
 def asked_at_junction(talk: Talk) -> Iterator[Finding]:
-    """4: the car asks which way, and the participant says it."""
+    """Finds 4: the car asks for the direction, and the participant gives it."""
     for turn in talk.by(CAR, M.QUERY_W):
         if not any(asks_for(act, Slot.ACTION, Slot.STREET) for act in turn.doing(M.QUERY_W)):
             continue
@@ -78,7 +78,7 @@ def asked_at_junction(talk: Talk) -> Iterator[Finding]:
 
 
 def plan_on_request(talk: Talk) -> Iterator[Finding]:
-    """17: the participant asks how the car will go, and it names turns or streets."""
+    """Finds 17: the participant asks for the route, and the car names turns or streets."""
     for turn in talk.by(HUMAN, M.QUERY_W):
         asks = any(asks_for(act, Slot.ACTION, Slot.STREET) for act in turn.doing(M.QUERY_W))
         if turn.says(_WHY, M.QUERY_W) or not (asks or turn.says(_WAY, M.QUERY_W)):
@@ -91,7 +91,7 @@ def plan_on_request(talk: Talk) -> Iterator[Finding]:
 
 
 def wrong_turn(talk: Talk) -> Iterator[Finding]:
-    """18: the participant says that the car went wrong, and it says or does something about it."""
+    """Finds 18: the participant reports a wrong turn, and the car answers or corrects it."""
     for turn in talk.by(HUMAN, *_OBJECTS):
         turned = talk.did(*_TURNS, since=turn.start - 45.0, until=turn.end)
         if not turn.says(_WRONG, *_OBJECTS) or not turned:
@@ -107,12 +107,12 @@ _TURNS = (PhysicalAction.J_TURN, PhysicalAction.U_TURN, PhysicalAction.LANE_SWIT
 
 
 def turns_at_junctions(talk: Talk) -> bool:
-    """Whether the car turned at a junction."""
+    """Returns whether the car turned at a junction."""
     return talk.did(PhysicalAction.J_TURN)
 
 
 def references(talk: Talk) -> Iterator[Finding]:
-    """22: a place is pointed at, by where or when, instead of being named."""
+    """Finds 22: a place is referred to by position or time instead of its name."""
     for turn in talk.turns:
         spans = (span for act, span in zip(turn.acts, turn.spans, strict=True) if act.move is not M.IRRELEVANT)
         if any(_REFERENCE.search(_NOT_A_PLACE.sub(" ", span.casefold().replace("’", "'"))) for span in spans):
@@ -120,10 +120,10 @@ def references(talk: Talk) -> Iterator[Finding]:
 
 
 def asks_where_next(talk: Talk, number: int) -> bool:
-    """Whether the turn of a number is the question where to go next."""
+    """Returns whether the turn of a number asks for the next destination."""
     return any(LandmarkName.QUERIED in act.slots for act in talk.turns[number].doing(M.QUERY_W))
 
 
 def asks_why(turn: Turn) -> bool:
-    """Whether a turn asks for a reason."""
+    """Returns whether a turn asks for a reason."""
     return turn.says(_WHY, M.QUERY_W, M.QUERY_YN)

@@ -230,8 +230,8 @@ def write_sdn(session: Session, path: Path | str, *, maps: Path | str | None = N
     """Writes a session into a new folder in the release layout; the folder appears when it is complete.
 
     Data that the layout cannot represent (`docs/session-format.md`) is lost: frames between those of 10 Hz, controls
-    and pictures. Times of events are rounded to a tenth of a second. Actors, lights and weather of the remaining frames are
-    kept in an additional file.
+    and pictures. Times of events are rounded to a tenth of a second. Actors, lights and weather of the remaining frames
+    are kept in an additional file.
 
     Args:
         session: the session.
