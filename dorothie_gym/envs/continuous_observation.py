@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from types import MappingProxyType
 
 import numpy as np
 
@@ -13,6 +11,7 @@ from dorothie_gym.policies.navigation.observation_vector import CLOSE, FAR, FAST
 from dorothie_gym.sim.state.records import plain
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import ObjectColumn, Observation
+from dorothie_gym.spaces.fields import share, signal, sizes
 
 AHEAD = (2.0, 4.0, 7.0, 10.0, 14.0, 19.0, 25.0, 32.0, 40.0, 50.0)
 """Distances ahead of the path points in the vector [m]."""
@@ -28,23 +27,36 @@ NEAREST = 4
 
 _WET = tuple(WeatherParameter).index(WeatherParameter.WETNESS)
 
-CONTINUOUS_FIELDS: Mapping[str, int] = MappingProxyType(
-    {
-        "speed": 1,  # of FAST
-        "controls": 3,  # throttle, steer and brake as they are
-        "offset": 1,  # distance of the car to the right of the path, of ASIDE
-        "course": 2,  # sine and cosine of the angle from the path to the car's heading, positive right
-        "path": 2 * len(AHEAD),  # points ahead in the car's frame: ahead and to the right, of REACH
-        "allowed": 1 + len(AHEAD),  # speed allowed by curves, limits and the path, here and at each point, of FAST
-        "room": 1,  # remaining path before a junction without instruction, of FAR; 1 if it goes on
-        "obstacle": 4,  # whether something is ahead, its distance, of FAR, its speed, of FAST; whether it is a line
-        "stop": 3,  # whether the car is to stop, the remaining distance, of FAR and of CLOSE
-        "objects": NEAREST * (4 + len(KINDS)),  # distance [50 m], sine and cosine of bearing, speed, one-hot class
-        "wetness": 1,  # of the road
-        "time": 1,  # share of the time limit
-    }
+CONTINUOUS_FIELD_SPECS = (
+    signal("speed", 1, unit="25 m/s", meaning="speed of the car"),
+    signal("controls", 3, meaning="throttle, steering angle (positive right) and brake in force"),
+    signal("offset", 1, unit="4 m", meaning="lateral distance from the path, positive right"),
+    signal("course", 2, meaning="sine and cosine of the angle from the path to the heading, positive right"),
+    signal("path", 2 * len(AHEAD), unit="50 m", meaning="points of the path at the distances `AHEAD`: ahead and right"),
+    share("allowed", 1 + len(AHEAD), unit="25 m/s", meaning="permitted speed here and at each point of the path"),
+    signal("room", 1, unit="100 m", meaning="remaining path before a junction without instruction; 1 for no such end"),
+    signal(
+        "obstacle",
+        4,
+        unit="1, 100 m, 25 m/s, 1",
+        meaning="1 if something is ahead; its distance; its speed; 1 if it is a stop line",
+    ),
+    signal("stop", 3, unit="1, 100 m, 10 m", meaning="1 if the car is to stop; remaining distance in two units"),
+    signal(
+        "objects",
+        NEAREST * (4 + len(KINDS)),
+        unit="50 m, 1, 1, 25 m/s, 1",
+        meaning="for each object: distance, sine and cosine of the bearing, speed, one-hot class "
+        "(vehicle, pedestrian, static)",
+    ),
+    share("wetness", 1, meaning="wetness of the road"),
+    share("time", 1, meaning="elapsed share of the time limit"),
 )
-"""Fields of the observation and their sizes, in order; values are clipped to -1..1."""
+"""Fields of the observation vector, in order. Values are clipped to their range; units are scales of normalised values.
+"""
+
+CONTINUOUS_FIELDS = sizes(CONTINUOUS_FIELD_SPECS)
+"""Sizes of the fields by name, in order."""
 
 
 def observe_continuous(world: World, seen: Observation, heard: HeardInstruction, max_seconds: float) -> Vector:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Self, TypeAlias
 
 import numpy as np
@@ -119,6 +120,16 @@ def real(
     )
 
 
+def signal(name: str, size: int, *, meaning: str, unit: str = "1", low: float = -1.0) -> FieldSpec:
+    """Returns the specification of a part of a vector with values in [low, 1]; `unit` is the scale of the values."""
+    return real(name, size, meaning=meaning, unit=unit, low=low, high=1.0)
+
+
+def share(name: str, size: int, *, meaning: str, unit: str = "1") -> FieldSpec:
+    """Returns the specification of a part of a vector with values in [0, 1]; `unit` is the scale of the values."""
+    return signal(name, size, meaning=meaning, unit=unit, low=0.0)
+
+
 def choice(name: str, count: int, *, meaning: str, unit: str = "1", start: int = 0) -> FieldSpec:
     """Returns the specification of an integer in [start, start + count)."""
     return FieldSpec(name=name, kind=FieldKind.CHOICE, low=start, high=start + count - 1, unit=unit, meaning=meaning)
@@ -137,6 +148,11 @@ def flags(name: str, *shape: int, meaning: str) -> FieldSpec:
 def text(name: str, length: int, *, meaning: str) -> FieldSpec:
     """Returns the specification of a text of 0 to `length` characters from `TEXT_CHARACTERS`."""
     return FieldSpec(name=name, kind=FieldKind.TEXT, low=0, high=length, meaning=meaning)
+
+
+def sizes(fields: Iterable[FieldSpec]) -> Mapping[str, int]:
+    """Returns the sizes of the parts of a vector by name, in order."""
+    return MappingProxyType({field.name: field.shape[0] for field in fields})
 
 
 def dict_space(fields: Iterable[FieldSpec]) -> spaces.Dict:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dorothie_gym.envs.continuous_observation import CONTINUOUS_FIELDS
+from dorothie_gym.envs.continuous_observation import CONTINUOUS_FIELD_SPECS, CONTINUOUS_FIELDS
 from dorothie_gym.envs.navigation_continuous_v0 import NavigationContinuousEnv
 from dorothie_gym.policies.navigation import layout
 from tests.envs.navigation_drivers import pursue
@@ -88,3 +88,17 @@ def test_malformed_actions_raise_error(env: NavigationContinuousEnv, action: obj
     env.reset(seed=0)
     with pytest.raises(ValueError, match="throttle, steer, brake"):
         env.step(action)  # type: ignore[arg-type]
+
+
+def test_values_lie_in_the_ranges_of_their_fields() -> None:
+    env = NavigationContinuousEnv(traffic="medium")
+    env.action_space.seed(1)
+    observation, _ = env.reset(seed=1)
+    least, greatest = observation.copy(), observation.copy()
+    for _ in range(200):
+        observation, _, terminated, truncated, _ = env.step(env.action_space.sample())
+        least, greatest = np.minimum(least, observation), np.maximum(greatest, observation)
+        if terminated or truncated:
+            observation, _ = env.reset()
+    for spec in CONTINUOUS_FIELD_SPECS:
+        assert spec.low <= least[FIELD[spec.name]].min() and greatest[FIELD[spec.name]].max() <= spec.high, spec.name

@@ -12,7 +12,7 @@ from dorothie_gym.envs.navigation_config import NavigationWeights
 from dorothie_gym.envs.navigation_continuous_v0 import NavigationContinuousEnv
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.ontology import DialogueMove
-from dorothie_gym.policies.navigation import FIELDS, NavigationAction, layout
+from dorothie_gym.policies.navigation import FIELD_SPECS, FIELDS, NavigationAction, layout
 from tests.envs.navigation_drivers import drive, follow_lane, obey
 
 FIELD = layout()
@@ -214,6 +214,20 @@ def test_returned_objects_may_be_changed(env: NavigationEnv) -> None:
 def test_fields_fill_the_observation() -> None:
     assert sum(FIELDS.values()) == NavigationEnv().observation_space.shape[0]  # type: ignore[index]
     assert [where.stop - where.start for where in FIELD.values()] == list(FIELDS.values())
+
+
+def test_values_lie_in_the_ranges_of_their_fields() -> None:
+    env = NavigationEnv(exceptions=4.0, traffic="medium")
+    env.action_space.seed(3)
+    observation, info = env.reset(seed=3)
+    least, greatest = observation.copy(), observation.copy()
+    for _ in range(200):
+        observation, _, terminated, truncated, info = env.step(env.action_space.sample(info["action_mask"]))
+        least, greatest = np.minimum(least, observation), np.maximum(greatest, observation)
+        if terminated or truncated:
+            observation, info = env.reset()
+    for spec in FIELD_SPECS:
+        assert spec.low <= least[FIELD[spec.name]].min() and greatest[FIELD[spec.name]].max() <= spec.high, spec.name
 
 
 @pytest.mark.parametrize(

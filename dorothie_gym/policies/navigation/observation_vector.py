@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -31,6 +30,7 @@ from dorothie_gym.policies.navigation.junction_exits import SECTORS, JunctionExi
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.sim.ego.ego_controller import MAX_CRUISE
 from dorothie_gym.spaces import ExitColumn, Motion, ObjectColumn
+from dorothie_gym.spaces.fields import share, signal, sizes
 
 Vector: TypeAlias = NDArray[np.float32]
 
@@ -68,34 +68,73 @@ _WEATHER = tuple((parameter.low, parameter.high - parameter.low) for parameter i
 _MANOEUVRES = (PhysicalAction.LANE_SWITCH, PhysicalAction.U_TURN, PhysicalAction.J_TURN)
 _COLOURS = tuple(LightColour)
 
-FIELDS: Mapping[str, int] = MappingProxyType(
-    {
-        "speed": 1,  # of FAST
-        "cruise": 1,  # cruise speed, share of 90 km/h
-        "motion": len(Motion),  # one-hot, see `Motion`
-        "manoeuvre": len(_MANOEUVRES),  # one-hot: lane switch, U-turn, turn that is planned or under way
-        "hazard": 2,  # whether the car brakes or stands for something, and its distance, of FAR
-        "lights": 1,  # whether the head lights are on
-        "lane": 4,  # whether it is in a junction, has a lane to the left, to the right; speed limit, of FAST
-        "uncertainty": 2,  # standard deviations of the estimated place [10 m] and heading [0.1 rad]
-        "junction": 2,  # whether there is a junction with a choice ahead, and its distance, of FAR
-        "exits": 3 * len(SECTORS),  # by sector: whether there is an exit; it is planned; its street was named
-        "traffic_light": 1 + len(_COLOURS),  # at the end of this lane: distance, of FAR; one-hot green, yellow, red
-        "said": 1 + len(DialogueMove),  # whether an instruction was heard, one-hot move
-        "said_action": len(ActionValue),  # one-hot: action asked for
-        "said_sector": len(SECTORS),  # one-hot: sector
-        "said_landmark": len(LandmarkName),  # one-hot: landmark named
-        "said_distance": 2,  # remaining distance, of FAR and of CLOSE; negative behind the place
-        "said_age": 1,  # age of the instruction, of RECENT
-        "goal": 3,  # whether its place is known; its position ahead and to the right, of ACROSS
-        "goal_distance": 3,  # cost to go, of ACROSS; on its own lane: distance ahead, of FAR and of CLOSE
-        "detours": 3 + len(SECTORS),  # added cost of U-turn, switch left, switch right, and each exit; of DETOUR
-        "objects": OBJECTS * (3 + len(KINDS)),  # distance [50 m], sine and cosine of bearing, one-hot class; 0: none
-        "weather": len(_WEATHER),  # each as a share of its range
-        "time": 1,  # share of the time limit
-    }
+FIELD_SPECS = (
+    signal("speed", 1, unit="25 m/s", meaning="speed of the car"),
+    share("cruise", 1, unit="90 km/h", meaning="cruise speed"),
+    share("motion", len(Motion), meaning="one-hot `Motion`"),
+    share("manoeuvre", len(_MANOEUVRES), meaning="one-hot manoeuvre, planned or under way: lane switch, U-turn, turn"),
+    share("hazard", 2, unit="1, 100 m", meaning="1 if the car brakes or stands for a hazard; distance to the hazard"),
+    share("lights", 1, meaning="1 if the headlights are on"),
+    share(
+        "lane",
+        4,
+        unit="1, 1, 1, 25 m/s",
+        meaning="1 in a junction; 1 if there is a lane to the left; 1 if there is a lane to the right; speed limit",
+    ),
+    share("uncertainty", 2, unit="10 m, 0.1 rad", meaning="standard deviations of the estimated position and heading"),
+    share("junction", 2, unit="1, 100 m", meaning="1 if a junction with a choice is ahead; distance to the junction"),
+    share(
+        "exits", 3 * len(SECTORS), meaning="for each sector: 1 if an exit exists, is planned, leads to the named street"
+    ),
+    signal(
+        "traffic_light",
+        1 + len(_COLOURS),
+        unit="100 m, 1",
+        meaning="distance to the light at the end of the lane; one-hot colour (green, yellow, red)",
+    ),
+    share("said", 1 + len(DialogueMove), meaning="1 if an instruction was heard; its one-hot `DialogueMove`"),
+    share("said_action", len(ActionValue), meaning="one-hot `ActionValue` of the instruction"),
+    share("said_sector", len(SECTORS), meaning="one-hot sector of the instruction"),
+    share("said_landmark", len(LandmarkName), meaning="one-hot `LandmarkName` of the instruction"),
+    signal(
+        "said_distance",
+        2,
+        unit="100 m, 10 m",
+        meaning="remaining part of the announced distance in two units; negative after the place",
+    ),
+    share("said_age", 1, unit="10 s", meaning="age of the instruction"),
+    signal(
+        "goal", 3, unit="1, 500 m, 500 m", meaning="1 if the place of the goal is known; its position ahead and right"
+    ),
+    signal(
+        "goal_distance",
+        3,
+        unit="500 m, 100 m, 10 m",
+        meaning="cost to go; distance ahead in two units, 1 if the goal is on another lane",
+    ),
+    signal(
+        "detours",
+        3 + len(SECTORS),
+        unit="200 m",
+        meaning="added route cost of a U-turn, of a switch to the left and right, and of the exit in each sector",
+    ),
+    signal(
+        "objects",
+        OBJECTS * (3 + len(KINDS)),
+        unit="50 m, 1, 1, 1",
+        meaning="for each object: distance, sine and cosine of the bearing, one-hot class "
+        "(vehicle, pedestrian, static)",
+    ),
+    share("weather", len(_WEATHER), meaning="each `WeatherParameter` as a share of its range"),
+    share("time", 1, meaning="elapsed share of the time limit"),
 )
-"""Fields of the observation and their sizes, in order. Values are clipped to -1..1; unknown values are 0."""
+"""Fields of the observation vector, in order. Values are clipped to their range; unknown values are 0.
+
+Units are the scales of normalised values: with the unit "25 m/s", 1 means 25 m/s.
+"""
+
+FIELDS = sizes(FIELD_SPECS)
+"""Sizes of the fields by name, in order."""
 
 
 def layout(fields: Mapping[str, int] = FIELDS) -> dict[str, slice]:
