@@ -31,8 +31,8 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
     ## Description
     The participant has errands to run (a storyboard) and knows the whole map, but cannot drive. The Co-Wizard drives
     by discrete actions and talks, but knows neither the errands nor the places of hidden landmarks. The Ad-Wizard
-    creates unexpected situations: weather, roadblocks, sensor faults, changes of the task. The environment is a view of
-    a `SessionEngine`, which is in `engine`.
+    creates unexpected situations: weather, roadblocks, sensor faults, changes of the task. `engine` is the
+    `SessionEngine` that runs the session.
 
     ## Agents
     `participant`, `co_wizard`, `ad_wizard`; all act at the same time, twice per simulated second.

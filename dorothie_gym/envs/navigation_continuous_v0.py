@@ -21,6 +21,7 @@ from dorothie_gym.policies.navigation.junction_exits import SECTORS
 from dorothie_gym.policies.navigation.observation_vector import Vector
 from dorothie_gym.sim.ego.limits import VehicleControl
 from dorothie_gym.spaces import CoWizardAction, Physical
+from dorothie_gym.spaces.fields import signal
 from dorothie_gym.tasks import StoryboardTemplate
 
 LOST = 4.0
@@ -31,6 +32,13 @@ END = 2.0
 
 LATE = 5.0
 """Distance behind its planned place from which on a manoeuvre is no longer prepared [m]."""
+
+CONTROL_SPECS = (
+    signal("throttle", 1, meaning="share of full throttle; negative values count as 0"),
+    signal("steer", 1, meaning="share of the greatest steering angle, positive right"),
+    signal("brake", 1, meaning="share of full braking; negative values count as 0"),
+)
+"""Fields of the action, in order."""
 
 _MANOEUVRES = {
     ActionValue.J_TURN: PhysicalAction.J_TURN,
@@ -84,7 +92,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
             patience=patience, decision_frequency=decision_frequency,
         )  # fmt: skip
         super().__init__(town, storyboard, config, render_mode)
-        self.action_space = spaces.Box(-1.0, 1.0, (3,), dtype=np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (len(CONTROL_SPECS),), dtype=np.float32)
         self.observation_space = spaces.Box(-1.0, 1.0, (sum(CONTINUOUS_FIELDS.values()),), dtype=np.float32)
         self._controls: NavigationMask | None = None
 

@@ -28,7 +28,7 @@ class SingleRole(gym.Env[Observation, ActionDict]):
 
     ## Description
     The session of `DuoWizardEnv` from the view of one role. The policies of the other two act on their own
-    observations only. The `SessionEngine` is in `engine`.
+    observations only. `engine` is the `SessionEngine` that runs the session.
 
     ## Agents
     One: the agent plays `role`.

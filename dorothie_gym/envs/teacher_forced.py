@@ -48,55 +48,41 @@ KEPT: Final = 16
 
 
 class TeacherForcedEnv(PointEnv):
-    """What the three tasks have in common.
+    """Base class of the three tasks on recorded sessions.
 
     ## Description
-    An episode walks through the points of one recorded session. What is predicted never changes what is observed next.
+    An episode walks through the prediction points of one recorded session. The observations follow the recording;
+    predictions do not affect them (teacher forcing).
 
     ## Observation Space
-    A dict of what was recorded before the point (see `dorothie_gym.recording.points`), newest first in the histories:
-
-    | field | shape | content |
-    |---|---|---|
-    | `utterance` | text | UfN only: the words whose act is to be inferred |
-    | `time` | (1,) | of the point [s] |
-    | `moves` | (16,) | last moves of both speakers, 15 where there is none |
-    | `move_speakers` | (16,) | who spoke: 0 nobody, 1 participant, 2 Co-Wizard |
-    | `move_slots`, `move_times` | (16, 69), (16,) | slots in the order of `LABELS`, when it was over [s] |
-    | `participant_text`, `co_wizard_text` | text | last utterance of each |
-    | `actions` | (16,) | last physical actions, 0 where there is none |
-    | `action_angles`, `action_times` | (16,) each | angles [degrees, positive left], when [s] |
-    | `pose`, `speed` | (3,), (1,) | car's x, y [m], heading [rad, clockwise]; speed [m/s] |
-    | `way`, `way_length` | (25, 4), a number | x, y, heading, speed every 0.4 s, and how many of them there are |
-    | `object_kinds` | (objects,) | what was perceived at the last look: 0 nothing, else 1 + `ObjectKind` |
-    | `objects` | (objects, 8) | the same, the nearest first, columns as in `OBJECT_VALUES` |
-    | `street_names` | (streets,) | id of each street's `StreetName` |
-    | `landmarks` | (landmarks, 6) | those that are not hidden, columns as in `LandmarkColumn` |
+    A `Dict` with the history recorded before the point, see `dorothie_gym.recording.points` for its extent and
+    `history_fields` for the fields. Moves and actions are sorted newest first.
 
     ## Rewards
-    The mean of `info["reward_terms"]`, the per-point form of the task's two metrics.
+    The mean of `info["reward_terms"]`, the two metrics of the task per point.
 
     ## Episode End
-    Terminated after the session's last point; the last observation is of the whole record. One episode is one session.
+    Terminates after the last point of the session; the last observation shows the whole recording. Episodes are never
+    truncated.
 
     ## Arguments
-    corpus: "default" (a small corpus that is played once and kept in the user's cache folder), a folder of sessions of
-        any layout, a `Corpus`, or sessions.
-    split: "all", or the fold that sessions are taken from: "train", "val", "val_seen", "val_unseen", "test",
-        "test_seen", "test_unseen".
-    limits: sizes of the observation's tables.
-    render_mode: None or "ansi".
+    - `corpus`: `"default"` (a small corpus that is generated once and kept in the user's cache folder), a folder of
+      sessions in any layout, a `Corpus`, or a sequence of sessions.
+    - `split`: `"all"`, or the fold of the sessions: `"train"`, `"val"`, `"val_seen"`, `"val_unseen"`, `"test"`,
+      `"test_seen"`, `"test_unseen"`.
+    - `limits`: sizes of the observation tables.
+    - `render_mode`: None or `"ansi"`.
 
-    `reset(options={"session": n or name})` chooses the session, which is drawn at random otherwise; those without a
-    point of the task are passed over. The infos hold `session` (name) and `points_left`; after a step `index` (number
-    of the event), `label` (in the form of an action), `reward_terms`, and `metrics` of the episode so far (None: not
-    defined yet).
+    `reset(options={"session": number or name})` selects the session, which is drawn at random otherwise; sessions
+    without a point of the task are skipped. The infos hold `session` (name) and `points_left`; after a step also
+    `index` (number of the event), `label` (the correct action), `reward_terms`, and `metrics` of the episode so far
+    (None: not defined yet).
 
     Raises:
-        SessionError: there are no sessions, one cannot be read, or none has a point of the task.
-        ValueError: `split`, `render_mode` or an action is not one of those above, or a session has more landmarks or
-            streets than `limits`; the message names the field.
-        CacheError: the default corpus cannot be kept.
+        SessionError: if there are no sessions, one cannot be read, or none has a point of the task.
+        ValueError: if `split`, `render_mode` or an action is invalid, or a session has more landmarks or streets than
+            `limits`; the message names the field.
+        CacheError: if the default corpus cannot be kept.
     """
 
     of_task: ClassVar[Task]

@@ -205,36 +205,36 @@ _QUICK: dict[type[ObservationType], type[ObservationType]] = {
 
 
 class TownEnv(AbstractEnv):
-    """Drives through a town among other vehicles.
+    """Driving through a town among other vehicles, as an environment of highway-env.
 
     ## Description
-    highway-env's own environment on a town's road network: its observation and action types, its viewer, and its
-    vehicle under the agent's control. Routes are drawn by chance at junctions. Traffic, cyclists among it, and
-    pedestrians live as in `DuoWizardEnv`: with lights, signs, priorities and crosswalks, in compiled loops
-    (`world.kernel`); `env.unwrapped.road.vehicles` and `.objects` show them as highway-env's objects.
+    highway-env's `AbstractEnv` on the road network of a town, with highway-env's observation and action types, viewer
+    and controlled vehicle. At junctions the route of the ego is random. Vehicles, cyclists and pedestrians behave as in
+    `DuoWizardEnv`, with traffic lights, signs, priorities and crosswalks, and are simulated in compiled loops;
+    `env.unwrapped.road.vehicles` and `.objects` represent them as objects of highway-env.
 
     ## Observation Space
-    As `config["observation"]` says (highway-env's `Kinematics` by default), with finite bounds. All types work but
-    `ExitObservation`, which is written for one road of highway-env's. `KinematicsGoal` is given a place in the town as
+    Set by `config["observation"]` (default: highway-env's `Kinematics`), with finite bounds. All types work except
+    `ExitObservation`, which requires one road of highway-env. `KinematicsGoal` receives a random place in the town as
     its goal, and `AttributesObservation` may read `ego`.
 
     ## Action Space
-    As `config["action"]` says (highway-env's `DiscreteMetaAction` by default); any type.
+    Set by `config["action"]` (default: highway-env's `DiscreteMetaAction`); all types work.
 
     ## Rewards
-    Progress on the road: speed along the lane as a share of `config["reward_speed"]`, in [0, 1], and 0 off the road,
-    plus `config["collision_reward"]` for a crash. The terms are in `info["rewards"]`.
+    The progress on the road plus `config["collision_reward"]` for a crash. The progress is the speed along the lane as
+    a share of `config["reward_speed"]`, in [0, 1], and 0 off the road. The terms are in `info["rewards"]`.
 
     ## Episode End
-    Terminates when the vehicle crashes, be it into a vehicle, a pedestrian or a prop; truncates after
-    `config["duration"]` seconds.
+    Terminates when the ego collides with a vehicle, a pedestrian or a prop; truncates after `config["duration"]`
+    seconds.
 
     ## Arguments
-    `config`: highway-env's settings, and
-    - `town`: name of a town, or path of an `.xodr` or `.yaml` file;
-    - `vehicles`: how many others, as many as fit, nobody within 25 m of the start;
-    - `pedestrians`: how many people on the pavements; none in a town without them. By default there are none:
-      highway-env's `Kinematics` cannot tell them from vehicles, and those who pass by would fill its rows;
+    `config`: settings of highway-env, and
+    - `town`: name of a town, or path of an `.xodr` or `.yaml` file.
+    - `vehicles`: number of other vehicles, at most as many as fit; none starts within 25 m of the ego.
+    - `pedestrians`: number of pedestrians; 0 in a town without pavements. The default is 0, because `Kinematics` does
+      not distinguish them from vehicles, so that passers-by would fill its rows.
     - `duration` [s], `reward_speed` [m/s], `collision_reward`: see above.
 
     ## Version History
