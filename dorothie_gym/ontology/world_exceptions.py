@@ -28,17 +28,17 @@ class ExceptionKind(LabelledInt):
 
     @property
     def is_environmental(self) -> bool:
-        """Whether the exception changes the world or the perception of the car."""
+        """Returns whether the exception changes the world or the perception of the car."""
         return ExceptionKind.WEATHER <= self <= ExceptionKind.SENSOR_FAULT
 
     @property
     def is_plan_level(self) -> bool:
-        """Whether the exception may force a new route: a prop is placed, moved or removed."""
+        """Returns whether the exception may force a new route: a prop is placed, moved or removed."""
         return self in (ExceptionKind.PLACE_PROP, ExceptionKind.MOVE_PROP, ExceptionKind.DELETE_PROP)
 
     @property
     def is_task(self) -> bool:
-        """Whether the exception changes the goals of the participant."""
+        """Returns whether the exception changes the goals of the participant."""
         return self in (ExceptionKind.TASK_TRIGGER, ExceptionKind.TASK_DELETE, ExceptionKind.TASK_CHANGE)
 
 

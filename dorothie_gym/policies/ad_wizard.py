@@ -133,7 +133,7 @@ class AdWizardState:
         return replace(self, count=self.count + 1)
 
     def is_due(self, now: float) -> bool:
-        """Whether enough time has passed since the last trick."""
+        """Returns whether enough time has passed since the last trick."""
         return now >= self.last_at + self.config.spacing
 
     def without_expired(self, now: float) -> AdWizardState:

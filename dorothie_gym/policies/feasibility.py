@@ -1,4 +1,4 @@
-"""Feasibility of manoeuvres as far as a role's observation tells.
+"""Feasibility of manoeuvres as far as a role's observation shows.
 
 The scripted Co-Wizard and the estimated action mask share these functions. The engine knows the planned path and
 decides exactly (`LocalPlanner`); its mask differs where the pose is inaccurate or a roadblock leaves too little room.
@@ -36,10 +36,10 @@ def u_turn_start(station: float, speed: float, target_squared: float = U_TURN_SP
 
 
 def can_turn_round(town: Town, lane: int, start: float) -> bool:
-    """Whether there is an oncoming lane beside a lane at the start of a U-turn [m], or at its end if that is nearer."""
+    """Returns whether a lane has an oncoming lane beside it at the start of a U-turn [m], or at its end if nearer."""
     return oncoming_lanes(town).at(lane, min(start, town.lanes[lane].length)) is not None
 
 
 def can_switch_lane(town: Town, lane: int, station: float, side: LinkType, room: float = SWITCH_ROOM) -> bool:
-    """Whether a lane has a neighbour on a side, and more than `room` metres are left to change to it."""
+    """Returns whether a lane has a neighbour on a side, and more than `room` metres are left to change to it."""
     return town.neighbour(lane, side) is not None and town.lanes[lane].length - station > room

@@ -72,7 +72,7 @@ class SeenSubgoal:
 
     @property
     def open(self) -> bool:
-        """Whether the subgoal counts and has not been reached."""
+        """Returns whether the subgoal counts and has not been reached."""
         return self.live and not self.reached
 
 
@@ -171,17 +171,17 @@ def weather(observation: Mapping[str, Any], parameter: WeatherParameter) -> floa
 
 
 def is_foggy(observation: Mapping[str, Any]) -> bool:
-    """Whether fog limits the view."""
+    """Returns whether fog limits the view."""
     return weather(observation, WeatherParameter.FOG_DENSITY) > FOG_LIMIT
 
 
 def is_rainy(observation: Mapping[str, Any]) -> bool:
-    """Whether it rains heavily."""
+    """Returns whether it rains heavily."""
     return weather(observation, WeatherParameter.PRECIPITATION) > RAIN_LIMIT
 
 
 def is_dark(observation: Mapping[str, Any]) -> bool:
-    """Whether the sun is below the horizon."""
+    """Returns whether the sun is below the horizon."""
     return weather(observation, WeatherParameter.SUN_ALTITUDE_ANGLE) < 0.0
 
 

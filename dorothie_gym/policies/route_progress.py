@@ -110,7 +110,7 @@ def direction_of(way: Exit) -> Direction:
 
 
 def is_choice(town: Town, lane: int) -> bool:
-    """Whether a lane ends at a junction with more than one exit."""
+    """Returns whether a lane ends at a junction with more than one exit."""
     exits = town.exits(lane)
     return len(exits) > 1 and any(way.junction_id >= 0 for way in exits)
 
@@ -254,7 +254,7 @@ class RouteProgress:
         return replace(self, astray=self.astray + 1)
 
     def lost(self, station: float) -> bool:
-        """Whether the route has been left or the goal passed, so that a new route is needed."""
+        """Returns whether the route has been left or the goal passed, so that a new route is needed."""
         return self.astray >= ASTRAY or self.left(station) < -PASSED
 
     def _overdue(self, town: Town, station: float) -> bool:
@@ -310,7 +310,7 @@ class RouteProgress:
         return None
 
     def turns_round_on(self, lane: int) -> bool:
-        """Whether the next U-turn of the route begins on a lane."""
+        """Returns whether the next U-turn of the route begins on a lane."""
         for before, leg in itertools.pairwise(self.legs):
             if leg.entry is LaneEntry.U_TURN:
                 return before.lane == lane
@@ -326,7 +326,7 @@ class RouteProgress:
         return None
 
     def needs_switch(self, town: Town, lane: int, station: float, crossing: RouteJunction) -> bool:
-        """Whether a lane change before a junction has to be commanded apart from the turn.
+        """Returns whether a lane change before a junction has to be commanded apart from the turn.
 
         Without it the car would reach another junction, run into what blocks its lane, or cross the junction in its
         own lane and come out beside a goal that is right behind it.
@@ -344,11 +344,11 @@ class RouteProgress:
         )
 
     def turns_round_first(self, town: Town, station: float) -> bool:
-        """Whether the route turns round before its next junction with a choice."""
+        """Returns whether the route turns round before its next junction with a choice."""
         return self.changes_before(self.next_crossing(town, station))
 
     def changes_before(self, crossing: RouteJunction | None) -> bool:
-        """Whether the route turns round before the given junction (or before the goal, where None)."""
+        """Returns whether the route turns round before the given junction (or before the goal, where None)."""
         for leg in self.legs[1:]:
             if leg.entry is LaneEntry.U_TURN:
                 return True
@@ -392,7 +392,7 @@ class RouteState:
         return replace(self, progress=self.progress.replanned(town, start, self.closed))
 
     def has_missed(self, before: float, station: float) -> bool:
-        """Whether the goal, `before` metres ahead on the former route, now needs a long way round."""
+        """Returns whether the goal, `before` metres ahead on the former route, now needs a long way round."""
         assert self.progress is not None
         return before < NEAR_MISS and self.progress.left(station) > before + WAY_ROUND
 
@@ -407,7 +407,7 @@ class RouteState:
         return replace(self, avoided=(*self.avoided, place)).replanned(town, start)
 
     def knows_roadblock(self, place: Place) -> bool:
-        """Whether a roadblock at a place is one of those known."""
+        """Returns whether a roadblock at a place is one of those known."""
         return any(lane == place[0] and abs(station - place[1]) < SAME_ROADBLOCK for lane, station in self.blocked)
 
     def with_roadblock(self, town: Town, place: Place) -> RouteState:

@@ -97,11 +97,11 @@ class SpeechState:
 
     @property
     def idle(self) -> bool:
-        """Whether no remark is queued."""
+        """Returns whether no remark is queued."""
         return not self.queue
 
     def has_just_spoken(self, now: float, within: float) -> bool:
-        """Whether the last utterance ended no longer than `within` ago [s], or has not ended yet."""
+        """Returns whether the last utterance ended no longer than `within` ago [s], or has not ended yet."""
         return now - self.last_end < within
 
     def plan(self, *remarks: Remark) -> SpeechState:
@@ -129,7 +129,7 @@ class SpeechState:
         return replace(self, quiet_until=max(self.quiet_until, until))
 
     def heard_other(self, now: float, acts: Sequence[DialogueAct] = ()) -> SpeechState:
-        """Notes an utterance of the other speaker, which ends the silence left for an answer."""
+        """Records an utterance of the other speaker, which ends the silence left for an answer."""
         values = frozenset(value for act in acts for value in act.slots)
         move = acts[-1].move if acts else self.other
         return replace(self, quiet_until=min(self.quiet_until, now), heard=values, other=move)
@@ -154,11 +154,11 @@ class SpeechState:
         if not queue:
             return None, replace(self, queue=())
         first = queue[0]
-        goes_on = first.joined and speaking > 0.0
-        if not goes_on and (speaking > 0.0 or (now < self.quiet_until and not first.urgent)):
+        continues = first.joined and speaking > 0.0
+        if not continues and (speaking > 0.0 or (now < self.quiet_until and not first.urgent)):
             return None, replace(self, queue=queue)
         if not first.text:
-            queue = self._worded(queue, rng, scene or WordingContext(), goes_on)
+            queue = self._worded(queue, rng, scene or WordingContext(), continues)
             first = queue[0]
         end = now + speaking + speech_seconds(first.text)
         pause = ANSWER_TIME if first.act.move in _WANTS_ANSWER else PAUSE
@@ -172,12 +172,12 @@ class SpeechState:
         )
 
     def _worded(
-        self, queue: tuple[Remark, ...], rng: np.random.Generator, scene: WordingContext, goes_on: bool
+        self, queue: tuple[Remark, ...], rng: np.random.Generator, scene: WordingContext, continues: bool
     ) -> tuple[Remark, ...]:
         """Chooses the words of the next remark and of those joined to it."""
         count = 1 + len(list(itertools.takewhile(lambda item: item.joined and not item.text, queue[1:])))
         breath = queue[: min(count, LONGEST_BREATH)]
-        joined = self.last.act.move if goes_on and self.last is not None else None
+        joined = self.last.act.move if continues and self.last is not None else None
         spans = word_acts(
             [item.act for item in breath],
             self.role,

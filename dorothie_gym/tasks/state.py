@@ -39,12 +39,12 @@ class TaskState:
 
     @property
     def done(self) -> bool:
-        """Whether the final destination has been reached, which ends the task."""
+        """Returns whether the final destination has been reached, which ends the task."""
         return self._reached[self.destination]
 
     @property
     def success(self) -> bool:
-        """Whether every live subgoal has been reached."""
+        """Returns whether every live subgoal has been reached."""
         return all(self._reached[i] for i in self.live)
 
     def reached(self, i: int) -> bool:

@@ -12,7 +12,7 @@ from dorothie_gym.policies.policy import policy_seed
 
 
 def state_of(**style: float) -> CoWizardState:
-    traits = {"echoes": 0.0, "checks": 0.0, "tells": 0.0, "silent": 0.0} | style
+    traits = {"echoes": 0.0, "checks": 0.0, "announces": 0.0, "silent": 0.0} | style
     env = DuoWizardEnv(town="brookside")
     env.reset(seed=0)
     return CoWizardState(

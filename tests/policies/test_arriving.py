@@ -23,19 +23,19 @@ class Guide(Human):
 
     def __init__(self, before: float, speed: float = 0.0) -> None:
         super().__init__()
-        assert self.state.errand.goal is not None
+        assert self.state.task.goal is not None
         self.state.set_guiding(True)
-        self.put(self.state.errand.goal.lane, self.state.errand.goal.station - before, speed)
+        self.put(self.state.task.goal.lane, self.state.task.goal.station - before, speed)
 
     def put(self, lane: int, station: float, speed: float) -> None:
-        assert self.state.errand.goal is not None
+        assert self.state.task.goal is not None
         where = self.env.town.lanes[lane]
         self.observation |= {
             "time": np.array([50.0]), "speed": np.array([speed]),
             "lane": np.int64(lane), "station": np.array([station]),
             "pose": np.array([*where.position(station), where.heading_at(station)]),
         }  # fmt: skip
-        progress = RouteProgress.plan(self.env.town, (lane, station), self.state.errand.goal.place)
+        progress = RouteProgress.plan(self.env.town, (lane, station), self.state.task.goal.place)
         self.state.route = self.state.route.with_progress(progress)
         self.state.motion = replace(self.state.motion, standing_since=None if speed else 40.0)
 
@@ -88,8 +88,8 @@ def test_acknowledged_instruction_is_not_acknowledged_again(uptake: bool) -> Non
 def test_u_turn_leaves_enough_road_to_stop() -> None:
     human = Guide(1.0)
     longest = max(human.env.town.lanes, key=lambda lane: lane.length)
-    goal = replace(human.state.errand.goal, lane=longest.id, station=longest.length / 2)
-    human.state.errand = replace(human.state.errand, goal=goal)
+    goal = replace(human.state.task.goal, lane=longest.id, station=longest.length / 2)
+    human.state.task = replace(human.state.task, goal=goal)
     run_up = human.state.config.run_up
     told: dict[bool, list[bool]] = {True: [], False: []}
     for lane in human.env.town.lanes:

@@ -15,25 +15,25 @@ def with_tasks(human: Human, **changes) -> ParticipantView:
     """Returns the view after a change of one subgoal, `index`."""
     index = changes.pop("index")
     tasks = tuple(
-        replace(task, **changes) if task.index == index else task for task in human.state.errand.subgoals if task.live
+        replace(task, **changes) if task.index == index else task for task in human.state.task.subgoals if task.live
     )
     keep_live_subgoals(human)
     return replace(human.view, subgoals=tasks)
 
 
 def keep_live_subgoals(human: Human) -> None:
-    live = tuple(task for task in human.state.errand.subgoals if task.live)
-    human.state.errand = human.state.errand.with_subgoals(live)
+    live = tuple(task for task in human.state.task.subgoals if task.live)
+    human.state.task = human.state.task.with_subgoals(live)
 
 
 def another_task(human: Human):
     """Returns an open subgoal other than the target, at a place of another name."""
-    assert human.state.errand.goal is not None
+    assert human.state.task.goal is not None
     view = human.view
     for task in view.subgoals:
         place = view.landmark(task.landmark)
-        if task.open and task.index != human.state.errand.target and place is not None:
-            if place.name is not human.state.errand.goal.name:
+        if task.open and task.index != human.state.task.target and place is not None:
+            if place.name is not human.state.task.goal.name:
                 return task, place
     raise AssertionError("there is no other task")
 
@@ -54,14 +54,14 @@ def test_dropped_task_is_reported(seed):
 
 def test_dropped_target_is_abandoned():
     human = Human()
-    note_tasks(human.state, with_tasks(human, index=human.state.errand.target, live=False), human.rng)
-    assert human.state.errand.goal is None
-    assert human.state.errand.goes_on
+    note_tasks(human.state, with_tasks(human, index=human.state.task.target, live=False), human.rng)
+    assert human.state.task.goal is None
+    assert human.state.task.same_breath
 
 
 def test_completion_is_reported_after_delay():
     human = Human()
-    view = with_tasks(human, index=human.state.errand.target, reached=True)
+    view = with_tasks(human, index=human.state.task.target, reached=True)
     note_tasks(human.state, view, human.rng)
     assert GoalStatus.COMPLETE in planned(human)[0][1]
     assert human.state.speech.speak(view.time, 0.0, human.rng)[0] is None
@@ -74,8 +74,8 @@ def interrupted(seed: int) -> tuple[Human, object]:
     task, place = another_task(human)
     progress = human.state.route.progress
     progress = replace(progress, goal=(progress.goal[0], 1e5))
-    subgoals = (replace(item, live=item.live and item.index != task.index) for item in human.state.errand.subgoals)
-    human.state.errand = human.state.errand.with_subgoals(tuple(subgoals))
+    subgoals = (replace(item, live=item.live and item.index != task.index) for item in human.state.task.subgoals)
+    human.state.task = human.state.task.with_subgoals(tuple(subgoals))
     left = progress.left(human.view.station)
     assert route_length(human.state, human.view, place) < max(left, 1e4)
     human.state.route = human.state.route.with_progress(Far(progress))
@@ -97,15 +97,15 @@ class Far:
 
 
 def test_new_task_on_the_way_interrupts_target_that_is_resumed_later():
-    human, place = next(found for seed in range(20) if (found := interrupted(seed))[0].state.errand.put_off)
+    human, place = next(found for seed in range(20) if (found := interrupted(seed))[0].state.task.put_off)
     told = planned(human)
-    assert human.state.errand.goal == place
+    assert human.state.task.goal == place
     assert GoalStatus.ONGOING in told[0][1] and place.name in told[0][1]
     assert GoalStatus.PENDING in told[1][1]
-    former = next(iter(human.state.errand.put_off))
+    former = next(iter(human.state.task.put_off))
     view = human.view
-    done = tuple(replace(task, reached=task.index == human.state.errand.target) for task in view.subgoals)
-    human.state.errand = replace(human.state.errand, target=None, goal=None)
+    done = tuple(replace(task, reached=task.index == human.state.task.target) for task in view.subgoals)
+    human.state.task = replace(human.state.task, target=None, goal=None)
     choose_target(human.state, replace(view, subgoals=tuple(t for t in done if t.index == former)), human.rng)
     again = announcement(human.state, view, human.rng)
     assert again.wording.topic == "resume" and GoalStatus.ONGOING in again.act.slots
@@ -114,13 +114,13 @@ def test_new_task_on_the_way_interrupts_target_that_is_resumed_later():
 def test_changed_later_task_is_reported_with_both_names():
     human = Human()
     task, place = another_task(human)
-    names = {place.name, human.state.errand.goal.name}
+    names = {place.name, human.state.task.goal.name}
     other = next(mark for mark in human.view.landmarks if mark.name not in names)
     view = with_tasks(human, index=task.index, landmark=other.row)
     told = []
     for seed in range(10):
         human.state.speech = human.state.speech.cleared()
-        human.state.errand = human.state.errand.with_subgoals(human.view.subgoals)
+        human.state.task = human.state.task.with_subgoals(human.view.subgoals)
         keep_live_subgoals(human)
         note_tasks(human.state, view, np.random.default_rng(seed))
         told += planned(human)

@@ -85,7 +85,7 @@ def test_unanswered_question_is_followed_by_confusion():
 
 def test_order_of_tasks_is_answered():
     human = Human()
-    human.hears(M.QUERY_W, human.state.errand.goal.name, wording=Wording(topic="order"))
+    human.hears(M.QUERY_W, human.state.task.goal.name, wording=Wording(topic="order"))
     first, *others = human.state.speech.queue
     assert first.act.move is M.REPLY_W
-    assert all(human.state.errand.goal.name in item.act.slots for item in others)
+    assert all(human.state.task.goal.name in item.act.slots for item in others)

@@ -28,7 +28,7 @@ class Human:
         policy = ScriptedParticipant(self.env.limits, style=CALM)
         self.state = policy.initial_state(seed, self.env.town)
         _, self.state = policy.step(self.observation, self.state)
-        assert self.state.errand.goal is not None and self.state.errand.told
+        assert self.state.task.goal is not None and self.state.task.announced
         self.state.speech = replace(self.state.speech.cleared(), last_end=-100.0)  # it has stopped speaking long ago
         self.rng = np.random.default_rng(0)
 
@@ -37,8 +37,8 @@ class Human:
         return ParticipantView.read(self.observation, self.env.town)
 
     def another_place(self) -> LandmarkName:
-        assert self.state.errand.goal is not None
-        return next(name for name in (LandmarkName.KFC, LandmarkName.IKEA) if name is not self.state.errand.goal.name)
+        assert self.state.task.goal is not None
+        return next(name for name in (LandmarkName.KFC, LandmarkName.IKEA) if name is not self.state.task.goal.name)
 
     def hears(self, move: DialogueMove, *values, wording: Wording | None = None) -> None:
         said = heard(self.observation, Role.CO_WIZARD, move, *values, wording=wording)
@@ -56,19 +56,19 @@ def test_wrong_place_is_corrected(move):
     human = Human()
     human.hears(move, human.another_place())
     clarified = [item.act for item in human.state.speech.queue if item.act.move is M.CLARIFY]
-    assert clarified and human.state.errand.goal.name in clarified[0].slots
+    assert clarified and human.state.task.goal.name in clarified[0].slots
 
 
 def test_right_place_is_not_corrected():
     human = Human()
-    human.hears(M.ACKNOWLEDGE, human.state.errand.goal.name)
+    human.hears(M.ACKNOWLEDGE, human.state.task.goal.name)
     assert M.CLARIFY not in human.moves()
 
 
 def test_repeated_abandoned_place_is_not_corrected():
     human = Human()
     other = human.another_place()
-    dropped = remark(M.INSTRUCT, human.state.errand.goal.name, wording=Wording(dropped=other))
+    dropped = remark(M.INSTRUCT, human.state.task.goal.name, wording=Wording(dropped=other))
     human.state.speech = replace(human.state.speech, said=(dropped,))
     said = heard(human.observation, Role.CO_WIZARD, M.CONFIRM, other)
     assert correction(human.state, human.view, said.acts[0], said.words) is None
@@ -90,7 +90,7 @@ def test_only_overlapping_speech_is_missed(ended, caught):
     human = Human()
     human.observation["time"] = np.array([40.0])
     human.state.speech = replace(human.state.speech, last_end=40.0 - ended)
-    question = heard(human.observation, Role.CO_WIZARD, M.CHECK, human.state.errand.goal.name)
+    question = heard(human.observation, Role.CO_WIZARD, M.CHECK, human.state.task.goal.name)
     assert has_missed(human.state, human.view, question, human.rng) is not caught
 
 
@@ -98,8 +98,8 @@ def test_missed_question_is_answered_after_clarification():
     human = Human()
     human.observation["time"] = np.array([40.0])
     human.state.speech = replace(human.state.speech, last_end=40.0)
-    human.hears(M.CHECK, human.state.errand.goal.name)
+    human.hears(M.CHECK, human.state.task.goal.name)
     assert human.moves() == [M.CONFUSE]
     human.state.speech = replace(human.state.speech.cleared(), last_end=0.0)
-    human.hears(M.CLARIFY, human.state.errand.goal.name)
+    human.hears(M.CLARIFY, human.state.task.goal.name)
     assert M.CONFIRM in human.moves()

@@ -124,7 +124,7 @@ def _explain_u_turn(state: CoWizardState) -> None:
     elif state.beliefs.goal is not None and state.beliefs.exact:
         state.say(remark(DialogueMove.REPLY_W, state.beliefs.goal, wording=Wording(topic="behind")))
     else:
-        state.say(remark(DialogueMove.REPLY_W, wording=Wording(topic="told")))
+        state.say(remark(DialogueMove.REPLY_W, wording=Wording(topic="instructed")))
 
 
 def _name_objects(state: CoWizardState, view: CoWizardView) -> None:

@@ -116,7 +116,7 @@ class CoWizardStyle:
     Attributes:
         echoes: probability that an acknowledgement repeats the instruction.
         checks: probability that a place named without a street is checked.
-        tells: probability that a manoeuvre of its own plan is announced.
+        announces: probability that a manoeuvre of its own plan is announced.
         silent: probability that a plain instruction is not acknowledged.
         asks: probability that the way is asked for where going straight on is possible.
         proposes: probability that a way is proposed at a junction instead of asked for.
@@ -133,7 +133,7 @@ class CoWizardStyle:
 
     echoes: float
     checks: float
-    tells: float
+    announces: float
     silent: float
     asks: float = 0.5
     proposes: float = 0.0
@@ -153,7 +153,7 @@ class CoWizardStyle:
         return cls(
             echoes=float(rng.uniform(0.1, 0.4)),
             checks=float(rng.uniform(0.1, 0.4)),
-            tells=float(rng.uniform(0.0, 0.18)),
+            announces=float(rng.uniform(0.0, 0.18)),
             silent=float(rng.uniform(0.3, 0.6)),
             asks=float(rng.uniform(0.5, 1.0)),
             proposes=float(rng.uniform(0.1, 0.6)),

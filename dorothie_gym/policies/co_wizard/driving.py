@@ -171,7 +171,7 @@ def _follow_route(state: CoWizardState, view: CoWizardView) -> Physical | None:
 
 
 def _needs_switch(state: CoWizardState, view: CoWizardView, crossing: RouteJunction | None) -> bool:
-    """Whether a lane change has to be commanded; a turn that the own lane does not offer includes its lane change."""
+    """Returns whether a lane change has to be commanded; a turn from another lane includes its own lane change."""
     progress = state.route.progress
     assert progress is not None
     if crossing is None or progress.changes_before(crossing) or view.choice is None:
@@ -296,7 +296,7 @@ def _go(state: CoWizardState, view: CoWizardView) -> Physical | None:
 
 
 def _turns_soon(state: CoWizardState, view: CoWizardView) -> bool:
-    """Whether a turn is near for which this style slows down."""
+    """Returns whether a turn is near for which this style slows down."""
     if not state.style.eases or view.choice is None or view.choice.distance > state.config.turn_ease_distance:
         return False
     way = wanted_exit(state, view)
@@ -304,7 +304,7 @@ def _turns_soon(state: CoWizardState, view: CoWizardView) -> bool:
 
 
 def _goal_is_close(state: CoWizardState, view: CoWizardView) -> bool:
-    """Whether the goal is so near that this style, or a car that has missed it before, approaches it slowly."""
+    """Returns whether the goal is so near that this style, or a car that has missed it before, approaches it slowly."""
     progress = state.route.progress
     if progress is None or not state.beliefs.exact:
         return False

@@ -145,7 +145,7 @@ def _set_unknown_goal(
 
 
 def postpone(state: CoWizardState, view: CoWizardView, name: LandmarkName, rng: np.random.Generator) -> None:
-    """Notes a place to visit later: acknowledges it, asks for the order, or offers to go there first."""
+    """Records a place to visit later: acknowledges it, asks for the order, or offers to go there first."""
     state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
     mark = known_landmark(state, view, name, ())
     goal, progress = state.beliefs.goal, state.route.progress

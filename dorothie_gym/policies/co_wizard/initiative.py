@@ -106,12 +106,12 @@ def _ask_way(state: CoWizardState, view: CoWizardView, rng: np.random.Generator)
 
 
 def _waits_for_way(state: CoWizardState, view: CoWizardView) -> bool:
-    """Whether the car stands before a junction because the way is unknown."""
+    """Returns whether the car stands before a junction because the way is unknown."""
     return view.motion is Motion.WAITING or (state.intentions.pausing and view.motion is Motion.STOPPED)
 
 
 def _may_ask_way(state: CoWizardState, view: CoWizardView, choice: Choice) -> bool:
-    """Whether the way at a junction is unknown and the junction is near."""
+    """Returns whether the way at a junction is unknown and the junction is near."""
     intentions, progress = state.intentions, state.route.progress
     busy = intentions.halted or intentions.creeping or intentions.nudge is not None
     if busy or view.time < state.config.first_word or intentions.wish is Wish.U_TURN or view.manoeuvring:
@@ -259,7 +259,7 @@ def announce_action(
     if physical is None or spoken or state.intentions.directive is not None:
         return
     action = ANNOUNCED.get(physical.action)
-    if action is None or state.intentions.wish is not None or rng.random() > state.style.tells:
+    if action is None or state.intentions.wish is not None or rng.random() > state.style.announces:
         return
     values: list[SlotValue] = [action]
     direction = Direction.LEFT if physical.angle > 0 else Direction.RIGHT

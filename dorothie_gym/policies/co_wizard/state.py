@@ -57,7 +57,7 @@ class Directive:
 
 @dataclass(frozen=True, kw_only=True)
 class DialogueState:
-    """Course of the dialogue: what is queued for speech, what was asked, and what was mentioned.
+    """Course of the dialogue: queued remarks, questions asked, and topics mentioned.
 
     Attributes:
         speech: remarks queued and said.
@@ -67,7 +67,7 @@ class DialogueState:
         considered_lane: lane before the junction for which asking has been decided on, -1 for none.
         idle_since: start of the period without any task or instruction [s].
         steered_at: time of the last navigation instruction [s].
-        told_to_stop_at: time of the last instruction to stop [s].
+        stop_instructed_at: time of the last instruction to stop [s].
         proposed: turn proposed to the participant and not answered yet.
         offer: place proposed as the first destination and not answered yet.
         proposes_slowing: whether a proposal to slow down has not been answered yet.
@@ -84,7 +84,7 @@ class DialogueState:
     considered_lane: int = -1
     idle_since: float = 0.0
     steered_at: float = -math.inf
-    told_to_stop_at: float = -math.inf
+    stop_instructed_at: float = -math.inf
     proposed: Directive | None = None
     offer: LandmarkName | None = None
     proposes_slowing: bool = False
@@ -98,28 +98,28 @@ class DialogueState:
         return replace(self, speech=speech)
 
     def after_hearing(self, now: float, acts: Sequence[DialogueAct]) -> DialogueState:
-        """Notes an utterance of the participant at `now` [s]."""
+        """Records an utterance of the participant at `now` [s]."""
         return replace(self, heard_at=now, idle_since=now, speech=self.speech.heard_other(now, acts))
 
     def after_asking(self, now: float) -> DialogueState:
-        """Notes a question of the Co-Wizard at `now` [s]."""
+        """Records a question of the Co-Wizard at `now` [s]."""
         return replace(self, asked_at=now)
 
     def after_considering(self, lane: int) -> DialogueState:
-        """Notes that asking for the way at the end of a lane has been decided on."""
+        """Records that asking for the way at the end of a lane has been decided on."""
         return replace(self, considered_lane=lane)
 
     def after_asking_way(self, lane: int, now: float) -> DialogueState:
-        """Notes a question about the way at the end of a lane."""
+        """Records a question about the way at the end of a lane."""
         return replace(self, asked_lane=lane, asked_at=now)
 
     def after_steering(self, now: float) -> DialogueState:
-        """Notes a navigation instruction at `now` [s]."""
+        """Records a navigation instruction at `now` [s]."""
         return replace(self, steered_at=now)
 
     def after_stop_instruction(self, now: float) -> DialogueState:
-        """Notes an instruction to stop at `now` [s]."""
-        return replace(self, told_to_stop_at=now)
+        """Records an instruction to stop at `now` [s]."""
+        return replace(self, stop_instructed_at=now)
 
     def busy(self, now: float) -> DialogueState:
         """Restarts the period without a task at `now` [s]."""
@@ -146,7 +146,7 @@ class DialogueState:
         return replace(self, detour_asked_at=asked_at)
 
     def after_explaining_hazard(self, now: float) -> DialogueState:
-        """Notes that a hazard was explained at `now` [s]."""
+        """Records that a hazard was explained at `now` [s]."""
         return replace(self, hazard_explained_at=now)
 
     def with_weather_mentioned(self, mentioned: bool) -> DialogueState:
@@ -229,7 +229,7 @@ class BeliefState:
         return replace(self, plan=junctions).with_update(Mental(action=MentalAction.PLAN_UPDATE, plan=junctions))
 
     def with_description(self) -> BeliefState:
-        """Notes that the participant has described where the goal lies."""
+        """Records that the participant has described where the goal lies."""
         return replace(self, described=True)
 
     def with_place_ruled_out(self) -> BeliefState:
@@ -294,7 +294,7 @@ class Intentions:
         return replace(self, halted=True, nudge=None, wish=None)
 
     def stopped_at_place(self, *, arrived: bool) -> Intentions:
-        """Lets the car stand at a place; `arrived` tells whether it has a goal."""
+        """Lets the car stand at a place; `arrived` is true at a goal."""
         return replace(self, halted=True, nudge=None, arrived=arrived)
 
     def blocked(self) -> Intentions:
@@ -419,15 +419,15 @@ class CommandState:
         return replace(self, standing_since=now) if self.standing_since is None else self
 
     def after_stop(self, now: float) -> CommandState:
-        """Notes a Stop command."""
+        """Records a Stop command."""
         return replace(self, stop_sent_at=now)
 
     def after_manoeuvre(self, now: float) -> CommandState:
-        """Notes a lane switch or U-turn command."""
+        """Records a lane switch or U-turn command."""
         return replace(self, manoeuvre_sent_at=now)
 
     def after_turn(self, turn: tuple[int, int], now: float) -> CommandState:
-        """Notes a turn command: lane and angle [degrees]."""
+        """Records a turn command: lane and angle [degrees]."""
         return replace(self, turn_sent=turn, turn_sent_at=now)
 
     def with_rest_decided(self, decided: bool) -> CommandState:

@@ -86,7 +86,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
 
 
 def _mishears(state: CoWizardState, heard: HeardUtterance, rng: np.random.Generator) -> bool:
-    """Whether an instruction is not understood; never an urgent one, nor one that would not be repeated."""
+    """Returns whether an instruction is not understood; never an urgent one, nor one that would not be repeated."""
     act = heard.acts[0]
     if len(heard.acts) > 1 or act.move is not DialogueMove.INSTRUCT or act.values(Slot.STATUS):
         return False
@@ -215,7 +215,7 @@ def _do_follow(state: CoWizardState, view: CoWizardView, act: DialogueAct, words
 def _do_u_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
     # a car that was stopped for a place off the map and now is to turn round has gone past it
     guided = state.beliefs.goal is not None and not state.beliefs.exact
-    creeping = guided and view.time - state.dialogue.told_to_stop_at < state.config.recent_stop
+    creeping = guided and view.time - state.dialogue.stop_instructed_at < state.config.recent_stop
     state.intentions = state.intentions.turning_round(view.time + state.config.wish_time, creeping=creeping)
     state.dialogue = state.dialogue.with_detour_question(None)
 

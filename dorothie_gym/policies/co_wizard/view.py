@@ -99,7 +99,7 @@ class CoWizardView:
 
     @property
     def standing(self) -> bool:
-        """Whether the car stands."""
+        """Returns whether the car stands."""
         return self.speed < STANDING_SPEED
 
     @property
@@ -109,7 +109,7 @@ class CoWizardView:
 
     @property
     def manoeuvring(self) -> bool:
-        """Whether the car is switching lanes or turning round."""
+        """Returns whether the car is switching lanes or turning round."""
         return self.manoeuvre in (PhysicalAction.LANE_SWITCH, PhysicalAction.U_TURN)
 
 

@@ -66,7 +66,7 @@ class EstimatedActionMask:
         return mask
 
     def _is_committed(self, observation: Mapping[str, Any], speed: float) -> bool:
-        """Whether the car can no longer stop before the junction at which it is about to turn."""
+        """Returns whether the car can no longer stop before the junction at which it is about to turn."""
         first = observation["exits"][0]
         if int(observation["manoeuvre"]) != PhysicalAction.J_TURN or not first[ExitColumn.PRESENT]:
             return False

@@ -97,7 +97,7 @@ def physical_of(action: NavigationAction, observation: Mapping[str, Any], exits:
 
 
 def prepares(action: NavigationAction, observation: Mapping[str, Any], exits: JunctionExits) -> bool:
-    """Whether the car prepares or carries out an action already."""
+    """Returns whether the car prepares or carries out an action already."""
     if int(observation["motion"]) == Motion.STOPPED:
         return False
     manoeuvre = UNDER_WAY.get(action)

@@ -87,7 +87,7 @@ class DemonstrationRecorder:
 
 
 def _has_to_stop(state: CoWizardState, view: CoWizardView) -> bool:
-    """Whether the car was told to stop, or is close to its destination."""
+    """Returns whether the car was instructed to stop, or is close to its destination."""
     place = state.intentions.nudge or state.beliefs.stop_place
     left = distance_ahead(state, view, place) if place is not None else None
     return state.intentions.halted or (left is not None and left < STOP_FOR_GOAL)

@@ -135,7 +135,7 @@ class Instructor:
         Args:
             observation: observation of the participant.
             known: places of the landmarks on the Co-Wizard's map.
-            waits: whether the car was told to stop, and stands.
+            waits: whether the car was instructed to stop, and stands.
             turning: remaining length of the lane switch or U-turn under way [m]; 0 where there is none.
 
         Returns:

@@ -30,7 +30,7 @@ from dorothie_gym.spaces import ActionDict, Motion, Physical, SpaceLimits
 Choose: TypeAlias = Callable[[Vector, NDArray[np.bool_]], int]
 """Driver: chooses one of the 18 actions from an observation of `Navigation-v0` (161,) and a mask (18,)."""
 
-PLAIN_STYLE = CoWizardStyle(echoes=0.0, checks=0.0, tells=0.0, silent=0.0, asks=1.0)
+PLAIN_STYLE = CoWizardStyle(echoes=0.0, checks=0.0, announces=0.0, silent=0.0, asks=1.0)
 """Traits of the Co-Wizard that talks for a driver: acknowledges instructions, asks for unknown ways, and answers."""
 
 _EPSILON = 1e-6
@@ -94,7 +94,7 @@ class DriverInputs:
 
 
 def has_nothing_to_do(state: NavigationPolicyState) -> bool:
-    """Whether no instruction has been given yet, or the car stands because it was told to; the driver is not asked."""
+    """Returns whether the policy is not queried: no instruction was given yet, or the car stands as instructed."""
     assert state.observation is not None
     stopped = int(state.observation["motion"]) == Motion.STOPPED
     return state.instructions.heard.instruction is None or (state.co_wizard.intentions.halted and stopped)

@@ -24,17 +24,17 @@ SHOUTS = 3
 """Number of short wordings that are compared when there is only time for a shout."""
 
 STANDING_RANGE = 45.0
-"""Distance to the place within which a standing car is told how to go on [m]."""
+"""Distance to the place within which a standing car gets its next instruction [m]."""
 
 PATIENT_TIME = 6.0
-"""Standstill after which a car at the place, or one that is not guided, is told how to go on [s]."""
+"""Standstill after which a car at the place, or one that is not guided, gets its next instruction [s]."""
 
 _STOP = DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.STOP)
 _SHOUTING = SpeakerStyle(register=Register.BLUNT, chattiness=0.0, indirectness=0.0)
 
 
 def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> bool:
-    """Guides the car on the last stretch; returns whether it is on it."""
+    """Guides the car on the last stretch; returns whether the car is on the last stretch."""
     progress, config = state.route.progress, state.config
     assert progress is not None
     if (
@@ -47,7 +47,7 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
         return _guide_standing(state, view, left)
     close = left < config.stop_distance
     if not state.guidance.guiding or view.time - state.guidance.nudged_at < config.nudge_time:
-        return close  # a car that is told to go on a little stops by itself
+        return close  # a car that was sent on a little stops by itself
     if not state.guidance.stop_text:
         text = word_act(_STOP, Role.PARTICIPANT, rng, Wording(here=True), style=state.speech.style)
         state.guidance = state.guidance.with_stop_text(text)
@@ -61,14 +61,14 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
             state.guidance = state.guidance.after_stopping(view.time)
             state.say(Remark(act=_STOP, text=state.guidance.stop_text, urgent=True))
         return True
-    if close and not state.guidance.announced and view.speed > config.slow_speed:
+    if close and not state.guidance.approach_announced and view.speed > config.slow_speed:
         _announce_place(state, view, left)
     return close
 
 
 def _announce_place(state: ParticipantState, view: ParticipantView, left: float) -> None:
     """Announces the place with its distance [m], or asks the car to slow down where the time is too short for that."""
-    goal, speed = state.errand.goal, max(view.speed, state.config.soon_speed)
+    goal, speed = state.task.goal, max(view.speed, state.config.soon_speed)
     if goal is None:
         return
     if left > 3.5 * speed + 20.0:
@@ -78,12 +78,12 @@ def _announce_place(state: ParticipantState, view: ParticipantView, left: float)
         words = remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=Wording(faster=False), urgent=True)
     else:
         return
-    state.guidance = state.guidance.with_announced(True)
+    state.guidance = state.guidance.with_approach_announced(True)
     state.say(words)
 
 
 def about_to_arrive(state: ParticipantState, view: ParticipantView) -> bool:
-    """Whether only the end of the last stretch is left."""
+    """Returns whether only the end of the last stretch is left."""
     progress = state.route.progress
     if progress is None or progress.left(view.station) > state.config.arrival_distance:
         return False
@@ -91,17 +91,17 @@ def about_to_arrive(state: ParticipantState, view: ParticipantView) -> bool:
 
 
 def _is_time_to_stop(state: ParticipantState, view: ParticipantView, left: float) -> bool:
-    """Whether the words, begun now, stop the car closer to the place than if begun at the next decision."""
-    if state.guidance.announced and left > state.config.slow_distance:
+    """Returns whether a stop instruction given now stops the car closer to the place than one at the next decision."""
+    if state.guidance.approach_announced and left > state.config.slow_distance:
         return False  # the car is about to slow down
     room, after = _room_to_stop(state, view, left)
     return room <= (state.config.short_stop if state.route.misses else 0.0) or room < -after
 
 
 def _room_to_stop(state: ParticipantState, view: ParticipantView, left: float) -> tuple[float, float]:
-    """Returns the distance before the place at which the car stops [m]: told now, and told at the next decision.
+    """Returns the distance before the place at which the car stops [m]: instructed now, and at the next decision.
 
-    Negative distances lie behind the place. The words take effect when they are over; until then the present
+    Negative distances lie behind the place. The words take effect when they end; until then the present
     acceleration is extrapolated.
     """
     interval, config = state.clock.interval, state.config
@@ -119,24 +119,24 @@ def _room_to_stop(state: ParticipantState, view: ParticipantView, left: float) -
 
 
 def _guide_standing(state: ParticipantState, view: ParticipantView, left: float) -> bool:
-    """Tells a standing car how to go on; returns whether it is close to the place."""
+    """Instructs a standing car how to continue; returns whether it is close to the place."""
     since, config = state.motion.standing_since, state.config
     if since is None or left > STANDING_RANGE:
         return False
     waited = view.time - max(since, state.guidance.nudged_at, state.speech.last_end, state.conversation.heard_at)
     patient = abs(left) <= config.arrived_within or not state.guidance.guiding
     if waited > (PATIENT_TIME if patient else config.ready_time):
-        state.say(inch_on(state, view))
+        state.say(creep_instruction(state, view))
     return True
 
 
-def inch_on(state: ParticipantState, view: ParticipantView) -> Remark:
+def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:
     """Returns the instruction for a car that stands a little before the place."""
     assert state.route.progress is not None
     state.guidance = state.guidance.after_nudging(view.time)
     left = state.route.progress.left(view.station)
     if left > 30.0:
-        state.guidance = state.guidance.with_announced(False)
+        state.guidance = state.guidance.with_approach_announced(False)
     shortened = max(left - state.config.distance_reserve, 10.0)
     wording = Wording(distance=shortened) if left > 9.0 else Wording(topic="further")
     return remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording=wording)

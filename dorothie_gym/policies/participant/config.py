@@ -25,11 +25,11 @@ class ParticipantConfig(GuidanceConfig):
         report_delay: range of the delay before the completion of a task is reported [s].
         next_task_delay: pause before the next task where it does not follow at once [s].
         goes_first: probability that a new task on the way is done before the present one.
-        tells_ahead: probability that the change of a later task is mentioned at once.
+        announces_ahead: probability that the change of a later task is mentioned at once.
         leaves_route: probability that the choice of the route is left to the car in words.
         unanswered_after: silence after which the car is asked whether it has understood [s].
         guides_at_once: probability that guidance to an unknown place begins right after its description.
-        tells_looks: probability that a place is also described by what stands there.
+        describes_looks: probability that a place is also described by an object there.
         near_landmark: distance between a landmark and the goal within which it helps to describe the goal [m].
         turn_late_distance: distance at which a turn is announced even if the car has not asked [m].
         switch_time: time that the car is given for a lane change before the next instruction [s].
@@ -40,8 +40,8 @@ class ParticipantConfig(GuidanceConfig):
         run_up: least distance from a U-turn to the goal [m].
         run_up_per_lane: additional distance for each lane change in between [m].
         lane_return_time: time after which a repeated lane change counts as a return to the lane [s].
-        most_u_turns: U-turns for one goal after which another route is used.
-        off_route: decisions off the route after which a new one is planned.
+        most_u_turns: number of U-turns for one goal after which another route is used.
+        off_route: number of decisions off the route after which a new one is planned.
         missed_within: distance to the goal below which leaving the route counts as a miss [m].
         wrong_turn_detour: increase of the distance after which a wrong turn is pointed out [m].
         lost_detour: increase over the least distance after which the car counts as lost [m].
@@ -53,14 +53,14 @@ class ParticipantConfig(GuidanceConfig):
         short_stop: distance before the goal at which the car is stopped after a miss [m].
         start_pull: acceleration above which a car has just started [m/s^2].
         pull: acceleration expected of such a car [m/s^2].
-        ready_time: standstill after which the car is told how to go on [s].
+        ready_time: standstill after which a car near the goal gets its next instruction [s].
         distance_reserve: distance by which spoken distances are shortened, because they are rounded to tens and the car
             rolls on [m].
-        nudge_time: time for which a car told to go on a little is left alone [s].
+        nudge_time: time after an instruction to drive on a little in which no other follows [s].
         late_stop: distance behind the goal beyond which the stop instruction is shortened [m].
-        arrival_distance: distance to the goal within which nothing else is talked about [m].
+        arrival_distance: distance to the goal within which other remarks are dropped [m].
         elsewhere_distance: distance to the goal beyond which a standing car is elsewhere [m].
-        explains_order: probability that the order of two tasks is told by naming the first one.
+        explains_order: probability that the order of two tasks is explained by naming the first one.
         nods_first: probability that a remark begins with an acknowledgement of what was heard meanwhile.
         just_said: time after an answer within which the same question needs no other one [s].
         unsure: probability that a yes is preceded by hesitation.
@@ -83,11 +83,11 @@ class ParticipantConfig(GuidanceConfig):
     report_delay: tuple[float, float] = (0.5, 2.5)
     next_task_delay: float = 9.0
     goes_first: float = 0.6
-    tells_ahead: float = 0.8
+    announces_ahead: float = 0.8
     leaves_route: float = 0.06
     unanswered_after: float = 8.0
     guides_at_once: float = 0.12
-    tells_looks: float = 0.5
+    describes_looks: float = 0.5
     near_landmark: float = 90.0
     turn_late_distance: float = 60.0
     switch_time: float = 13.0
@@ -143,7 +143,7 @@ class ParticipantStyle:
         hurries: probability that the next task follows in the same breath as the report of the last.
         patience: standstill after which the reason is asked for [s].
         chat: mean time between remarks beside the task [s].
-        waits: probability that a turn is told only when the car asks, or shortly before the junction.
+        waits: probability that a turn is announced only if the car asks, or shortly before the junction.
         hints: probability that a step is phrased as an explanation instead of an instruction.
         reasons: probability that a reason is given with a place or a step.
         aligns: probability of a question whether an utterance was understood.

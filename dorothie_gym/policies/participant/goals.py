@@ -1,4 +1,4 @@
-"""Choice of the next task, and remarks about tasks: announced, changed, dropped, done, described."""
+"""Choice of the next task, and remarks that announce, describe, change, drop or complete tasks."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ _FEATURES = (
 
 def note_tasks(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     """Compares the subgoals with those of the last decision, and reports what has changed."""
-    before = state.errand.subgoals
-    state.errand = state.errand.with_subgoals(view.subgoals)
+    before = state.task.subgoals
+    state.task = state.task.with_subgoals(view.subgoals)
     for old, new in zip(before, view.subgoals, strict=False):
         if new.reached and not old.reached:
             _report_done(state, view, new, rng)
@@ -68,12 +68,12 @@ def _report_done(
     # leaves the car time to report its arrival first
     delay = float(rng.uniform(*state.config.report_delay))
     state.speech = state.speech.cleared().hold(view.time + delay).plan(done)
-    state.errand = state.errand.closed(subgoal.index)
-    if subgoal.index == state.errand.target:
+    state.task = state.task.closed(subgoal.index)
+    if subgoal.index == state.task.target:
         state.forget_target()
-        goes_on = bool(rng.random() < state.style.hurries)
-        next_at = -math.inf if goes_on else view.time + state.config.next_task_delay
-        state.errand = state.errand.with_next_task(goes_on=goes_on, next_at=next_at)
+        same_breath = bool(rng.random() < state.style.hurries)
+        next_at = -math.inf if same_breath else view.time + state.config.next_task_delay
+        state.task = state.task.with_next_task(same_breath=same_breath, next_at=next_at)
 
 
 def _report_added(
@@ -90,7 +90,7 @@ def _report_added(
     progress = state.route.progress
     far = progress is not None and progress.left(view.station) > state.config.wait_distance
     if view.speed > 2.0 and far and state.speech.idle and rng.random() < state.style.waits:
-        state.errand = state.errand.halted_until(view.time + state.config.thinking_time)
+        state.task = state.task.waiting_until(view.time + state.config.thinking_time)
         stop = remark(DialogueMove.INSTRUCT, ActionValue.STOP, urgent=True)
         state.say(stop, replace(news, joined=True))
     else:
@@ -98,21 +98,21 @@ def _report_added(
 
 
 def _has_to_wait(state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark) -> bool:
-    """Whether the target, which the car knows of, now has to wait for the new subgoal."""
-    errand = state.errand
-    if errand.target is None or errand.goal is None or not errand.told or errand.goal.name is landmark.name:
+    """Returns whether the announced target now has to wait for the new subgoal."""
+    task = state.task
+    if task.target is None or task.goal is None or not task.announced or task.goal.name is landmark.name:
         return False
-    return subgoal.allowed and not next(task.allowed for task in view.subgoals if task.index == errand.target)
+    return subgoal.allowed and not next(item.allowed for item in view.subgoals if item.index == task.target)
 
 
 def _is_on_the_way(
     state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark
 ) -> bool:
-    """Whether a new subgoal may be reached now, and is nearer than the target, which the car knows of."""
-    errand, progress = state.errand, state.route.progress
-    if errand.goal is None or progress is None or not errand.told or not subgoal.allowed:
+    """Returns whether a new subgoal may be reached now and is nearer than the announced target."""
+    task, progress = state.task, state.route.progress
+    if task.goal is None or progress is None or not task.announced or not subgoal.allowed:
         return False
-    if errand.goal.name is landmark.name or progress.left(view.station) < state.config.wait_distance:
+    if task.goal.name is landmark.name or progress.left(view.station) < state.config.wait_distance:
         return False
     return route_length(state, view, landmark) < progress.left(view.station)
 
@@ -124,8 +124,8 @@ def route_length(state: ParticipantState, view: ParticipantView, landmark: SeenL
 
 
 def _go_first(state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark) -> None:
-    """Interrupts the target for a subgoal that has just come up."""
-    former = state.errand.goal
+    """Interrupts the target for a subgoal that was just added."""
+    former = state.task.goal
     assert former is not None
     switch_target(state, view, subgoal, landmark)
     first: list[SlotValue] = [landmark.name, GoalStatus.ONGOING]
@@ -138,19 +138,19 @@ def _go_first(state: ParticipantState, view: ParticipantView, subgoal: SeenSubgo
 
 
 def switch_target(state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark) -> None:
-    """Puts off the target for another subgoal that the car knows of."""
-    state.errand = state.errand.put_off_target()
+    """Puts off the target for another subgoal, which the car already knows or is about to hear of."""
+    state.task = state.task.put_off_target()
     state.forget_target()
     _aim_at(state, view, subgoal, landmark)
-    state.errand = state.errand.after_telling(view.time)
+    state.task = state.task.after_announcement(view.time)
     state.set_guiding(False)
 
 
-def go_on(state: ParticipantState, view: ParticipantView) -> None:
-    """Sends on a car that was told to wait."""
-    if view.time < state.errand.go_at or not state.speech.idle:
+def resume_after_wait(state: ParticipantState, view: ParticipantView) -> None:
+    """Instructs a waiting car to start when its time to wait is over."""
+    if view.time < state.task.resume_at or not state.speech.idle:
         return
-    state.errand = state.errand.halted_until(math.inf)
+    state.task = state.task.waiting_until(math.inf)
     if view.standing:
         state.say(remark(DialogueMove.INSTRUCT, ActionValue.START))
 
@@ -161,10 +161,10 @@ def _report_dropped(
     landmark = view.landmark(subgoal.landmark)
     if landmark is None:
         return
-    state.errand = state.errand.closed(subgoal.index)
-    if subgoal.index == state.errand.target:
+    state.task = state.task.closed(subgoal.index)
+    if subgoal.index == state.task.target:
         state.forget_target()
-        state.errand = state.errand.going_on(True)
+        state.task = state.task.with_same_breath(True)
         state.speech = state.speech.cleared()
     move = DialogueMove.INSTRUCT if rng.random() < 0.8 else DialogueMove.EXPLAIN
     state.say(remark(move, landmark.name, GoalStatus.ABANDONED))
@@ -176,20 +176,20 @@ def _report_changed(
     former, landmark = view.landmark(old.landmark), view.landmark(new.landmark)
     if former is None or landmark is None:
         return
-    errand = state.errand
-    if new.index != errand.target:
-        busy = errand.goal is not None and errand.goal.name in (former.name, landmark.name)
-        if former.name is not landmark.name and not busy and rng.random() < state.config.tells_ahead:
+    task = state.task
+    if new.index != task.target:
+        busy = task.goal is not None and task.goal.name in (former.name, landmark.name)
+        if former.name is not landmark.name and not busy and rng.random() < state.config.announces_ahead:
             values = (former.name, landmark.name, GoalStatus.ABANDONED, GoalStatus.PENDING)
             wording = Wording(topic="changed_later", dropped=former.name)
             state.say(remark(DialogueMove.INSTRUCT, *values, wording=wording))
-        return  # otherwise the car is told when the subgoal becomes the target
-    told = errand.told
+        return  # the change is announced when the subgoal becomes the target
+    was_announced = task.announced
     state.forget_target()
     state.speech = state.speech.cleared()
-    if told and former.name is not landmark.name:
+    if was_announced and former.name is not landmark.name:
         _aim_at(state, view, new, landmark)
-        state.errand = state.errand.after_telling(view.time)
+        state.task = state.task.after_announcement(view.time)
         changed = (former.name, landmark.name, GoalStatus.ABANDONED, GoalStatus.ONGOING)
         state.say(remark(DialogueMove.INSTRUCT, *changed, wording=Wording(dropped=former.name), urgent=True))
 
@@ -199,8 +199,8 @@ def _report_changed(
 
 def choose_target(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     """Keeps an open target; otherwise chooses the nearest subgoal that may be reached now."""
-    if state.errand.target is not None:
-        current = view.subgoals[state.errand.target]
+    if state.task.target is not None:
+        current = view.subgoals[state.task.target]
         if current.open and current.allowed:
             return
         state.forget_target()
@@ -216,20 +216,20 @@ def choose_target(state: ParticipantState, view: ParticipantView, rng: np.random
 
 
 def _aim_at(state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark) -> None:
-    state.errand = state.errand.with_target(subgoal.index, landmark)
+    state.task = state.task.with_target(subgoal.index, landmark)
     progress = RouteProgress.plan(state.town, view.place, landmark.place, state.route.blocked)
     state.route = state.route.with_progress(progress)
 
 
 def announcement(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> Remark:
     """Returns the target as an instruction, with its street where that helps."""
-    errand = state.errand
-    assert errand.goal is not None
-    values: list[SlotValue] = [errand.goal.name]
-    if not view.unique(errand.goal) or rng.random() < state.style.names_street:
-        values.append(errand.goal.street)
-    if errand.target in errand.put_off:
-        return remark(DialogueMove.INSTRUCT, errand.goal.name, GoalStatus.ONGOING, wording=Wording(topic="resume"))
+    task = state.task
+    assert task.goal is not None
+    values: list[SlotValue] = [task.goal.name]
+    if not view.unique(task.goal) or rng.random() < state.style.names_street:
+        values.append(task.goal.street)
+    if task.target in task.put_off:
+        return remark(DialogueMove.INSTRUCT, task.goal.name, GoalStatus.ONGOING, wording=Wording(topic="resume"))
     more = sum(subgoal.open for subgoal in view.subgoals) > 2
     topic = "first" if more and len(values) == 1 and rng.random() < 0.5 else None
     if topic is None and len(values) == 1 and rng.random() < state.config.leaves_route:
@@ -238,25 +238,27 @@ def announcement(state: ParticipantState, view: ParticipantView, rng: np.random.
 
 
 def reason_topic(state: ParticipantState) -> str | None:
-    """Returns the topic of a reason to go to the target: an errand in a shop, or a visit."""
-    if state.errand.goal is None:
+    """Returns the topic of a reason to go to the target: a purpose such as shopping, or a visit."""
+    if state.task.goal is None:
         return None
-    return "visit" if state.errand.goal.name in (LandmarkName.HOUSE, LandmarkName.PERSON) else "errand"
+    return "visit" if state.task.goal.name in (LandmarkName.HOUSE, LandmarkName.PERSON) else "purpose"
 
 
-def _announce(state: ParticipantState, view: ParticipantView, goes_on: bool, rng: np.random.Generator) -> None:
+def _say_announcement(
+    state: ParticipantState, view: ParticipantView, same_breath: bool, rng: np.random.Generator
+) -> None:
     """Names the target, perhaps with a reason, and perhaps a later task."""
-    words = replace(announcement(state, view, rng), joined=goes_on)
+    words = replace(announcement(state, view, rng), joined=same_breath)
     draw = rng.random()
     if draw < state.style.reasons:
-        reason = remark(DialogueMove.EXPLAIN, joined=goes_on, wording=Wording(topic=reason_topic(state)))
+        reason = remark(DialogueMove.EXPLAIN, joined=same_breath, wording=Wording(topic=reason_topic(state)))
         state.say(reason, replace(words, joined=True))
     elif draw < 1.6 * state.style.reasons:
         reason = remark(DialogueMove.EXPLAIN, joined=True, wording=Wording(topic=reason_topic(state)))
         state.say(words, reason)
     else:
         state.say(words)
-    goal, target = state.errand.goal, state.errand.target
+    goal, target = state.task.goal, state.task.target
     later = [view.landmark(item.landmark) for item in view.subgoals if item.open and item.index != target]
     named = [mark for mark in later if mark is not None and goal is not None and mark.name is not goal.name]
     if named and rng.random() < 0.25:
@@ -265,24 +267,24 @@ def _announce(state: ParticipantState, view: ParticipantView, goes_on: bool, rng
         state.say(remark(DialogueMove.ALIGN, joined=True))
 
 
-def tell_target(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Tells the car of the target in its turn, and reminds a car that does not answer."""
-    goes_on = state.errand.goes_on
-    errand = state.errand = state.errand.going_on(False)
-    if errand.goal is None or not (state.speech.idle or goes_on):
+def announce_target(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
+    """Announces the target when it is due, and reminds a car that does not answer."""
+    same_breath = state.task.same_breath
+    task = state.task = state.task.with_same_breath(False)
+    if task.goal is None or not (state.speech.idle or same_breath):
         return
-    if not errand.told and view.time >= errand.next_at:
-        state.errand = errand.after_telling(view.time)
+    if not task.announced and view.time >= task.next_at:
+        state.task = task.after_announcement(view.time)
         if not state.guidance.guiding or rng.random() < state.style.names_goal:
-            _announce(state, view, goes_on and not state.speech.idle, rng)
+            _say_announcement(state, view, same_breath and not state.speech.idle, rng)
         return
-    if not errand.told:
+    if not task.announced:
         return
-    silence = view.time - max(errand.told_at, state.speech.last_end)
-    unheard = state.conversation.heard_at < errand.told_at and silence > state.config.unanswered_after
+    silence = view.time - max(task.announced_at, state.speech.last_end)
+    unheard = state.conversation.heard_at < task.announced_at and silence > state.config.unanswered_after
     if view.standing and not state.guidance.guiding and unheard and state.guidance.repeats < 3:
         state.guidance = state.guidance.after_reminding()
-        state.errand = errand.after_reminding(view.time)
+        state.task = task.after_reminding(view.time)
         if state.guidance.repeats == 1:
             state.say(remark(DialogueMove.ALIGN))
         else:
@@ -293,17 +295,17 @@ def tell_target(state: ParticipantState, view: ParticipantView, rng: np.random.G
 
 
 def describe(state: ParticipantState, view: ParticipantView, move: DialogueMove, rng: np.random.Generator) -> None:
-    """Describes where the target is: street, a landmark nearby, what stands there; guidance follows now or later."""
-    goal = state.errand.goal
+    """Describes the place of the target by street, a landmark nearby and an object; guidance follows now or later."""
+    goal = state.task.goal
     assert goal is not None
     no_street = goal.street is StreetName.UNKNOWN
-    state.set_guiding(bool(no_street or state.errand.described or rng.random() < state.config.guides_at_once))
-    state.errand = state.errand.after_describing()
+    state.set_guiding(bool(no_street or state.task.described or rng.random() < state.config.guides_at_once))
+    state.task = state.task.after_describing()
     values: list[SlotValue] = [] if no_street else [goal.street]
     near = _famous_nearby(goal, view, state.config.near_landmark)
     if near is not None:
         values.append(near.name)
-    looks = (_looks(goal),) if rng.random() < state.config.tells_looks else ()
+    looks = (_looks(goal),) if rng.random() < state.config.describes_looks else ()
     state.say_first(remark(move, *values, wording=Wording(topic="where")), *looks)
 
 

@@ -53,23 +53,23 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
 
 
 def _point_out_wrong_turn(state: ParticipantState, view: ParticipantView, before: float) -> None:
-    """Says so if the car has not taken the turn that it was told."""
+    """Points out that the car has not taken the announced turn."""
     guidance, progress = state.guidance, state.route.progress
     assert progress is not None
-    told_turn = guidance.guiding and guidance.step is not None and guidance.step[0] == "turn"
+    turn_given = guidance.guiding and guidance.step is not None and guidance.step[0] == "turn"
     farther = progress.left(view.station) > before + state.config.wrong_turn_detour and math.isfinite(before)
-    if told_turn and farther:
+    if turn_given and farther:
         expires = view.time + WRONG_WAY_EXPIRES
         state.say_only(remark(DialogueMove.EXPLAIN, wording=Wording(topic="wrong_way"), expires=expires))
 
 
 def watch(state: ParticipantState, view: ParticipantView) -> None:
-    """Begins to guide a car that goes far out of its way or stands for long."""
+    """Begins to guide a car that makes a long detour or stands for a long time."""
     progress, config = state.route.progress, state.config
-    if state.guidance.guiding or progress is None or not state.errand.told:
+    if state.guidance.guiding or progress is None or not state.task.announced:
         return
     left = progress.left(view.station)
-    if state.errand.described and left < config.take_over_distance:
+    if state.task.described and left < config.take_over_distance:
         state.set_guiding(True)
         return
     lost = left > state.guidance.best + config.lost_detour
@@ -83,7 +83,7 @@ def watch(state: ParticipantState, view: ParticipantView) -> None:
 def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     """Gives the next step if it is due."""
     progress, config = state.route.progress, state.config
-    if progress is None or not state.errand.told or view.turning or progress.astray:
+    if progress is None or not state.task.announced or view.turning or progress.astray:
         return
     _stop_circling(state, view)
     if not _may_speak(state, view) or approach(state, view, rng) or not state.guidance.guiding:
@@ -92,7 +92,7 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     if step is None:
         return
     key, distance, words = step
-    if _ease(state, view) or (key[0] == "round" and _takes_run_up(state, view)):
+    if _slow_down_early(state, view) or (key[0] == "round" and _takes_run_up(state, view)):
         return
     near = distance < (_u_turn_distance(state, view) if key[0] == "round" else config.turn_distance)
     if _is_left_to_ask(state, view, key, distance, words.wording.direction is Direction.STRAIGHT, rng):
@@ -116,7 +116,7 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
         if key[0] in ("turn", "lane") and not again and rng.random() < state.style.hints:
             words = replace(words, act=DialogueAct(DialogueMove.EXPLAIN, words.act.slots))
         note_step(state, view, key)
-        state.say(*_rounded_off(state, words, again, rng))
+        state.say(*_with_addition(state, words, again, rng))
 
 
 def _stop_circling(state: ParticipantState, view: ParticipantView) -> None:
@@ -133,14 +133,14 @@ def _stop_circling(state: ParticipantState, view: ParticipantView) -> None:
 
 
 def _may_speak(state: ParticipantState, view: ParticipantView) -> bool:
-    """Whether a step may be said now; close to the place, other remarks are dropped."""
+    """Returns whether a step may be announced now; close to the place, drops other remarks."""
     if state.guidance.guiding and about_to_arrive(state, view):
         state.speech = state.speech.cleared()
     return state.speech.idle and view.speaking <= 0.0
 
 
-def _rounded_off(state: ParticipantState, words: Remark, again: bool, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns a step with what is said in the same breath: a hint, or a question whether it was understood."""
+def _with_addition(state: ParticipantState, words: Remark, again: bool, rng: np.random.Generator) -> tuple[Remark, ...]:
+    """Returns a step with a possible addition in the same breath: a hint, or a question whether it was understood."""
     draw = rng.random()
     if words.act.values(Slot.ACTION) == (ActionValue.U_TURN,):
         # the moment must not be missed: the shorter of two wordings
@@ -163,7 +163,7 @@ def _is_left_to_ask(
     goes_straight: bool,
     rng: np.random.Generator,
 ) -> bool:
-    """Whether a turn is told only when the car asks; going straight on need not be told at all."""
+    """Returns whether a turn is announced only if the car asks; driving straight on needs no announcement."""
     if key[0] != "turn" or state.guidance.step == key:
         return False
     if state.guidance.considered != key:
@@ -173,23 +173,23 @@ def _is_left_to_ask(
     return distance > state.config.turn_late_distance or goes_straight
 
 
-def _ease(state: ParticipantState, view: ParticipantView) -> bool:
-    """Tells the car to slow down for a place that was missed before, or is easily missed behind a manoeuvre."""
+def _slow_down_early(state: ParticipantState, view: ParticipantView) -> bool:
+    """Asks the car to slow down for a place that was missed before, or is easily missed behind a manoeuvre."""
     progress, config = state.route.progress, state.config
     assert progress is not None
     far = progress.left(view.station) > config.stop_distance
-    if state.guidance.eased or far or view.speed < config.slow_speed:
+    if state.guidance.slowed_early or far or view.speed < config.slow_speed:
         return False
     if not state.route.misses and not _is_easily_missed(state, view):
         return False
-    state.guidance = state.guidance.after_easing()
+    state.guidance = state.guidance.after_slowing_early()
     wording = Wording(faster=False, speed=config.careful_speed)
     state.say(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=wording))
     return True
 
 
 def _is_easily_missed(state: ParticipantState, view: ParticipantView) -> bool:
-    """Whether there is hardly time to stop between the next junction, or lane change, and the place."""
+    """Returns whether there is hardly time to stop between the next junction or lane change and the place."""
     progress, step, config = state.route.progress, state.guidance.step, state.config
     assert progress is not None
     left = progress.left(view.station)
@@ -197,8 +197,8 @@ def _is_easily_missed(state: ParticipantState, view: ParticipantView) -> bool:
     if crossing is None:
         manoeuvre = progress.next_manoeuvre(view.station)
         return manoeuvre is not None and manoeuvre[0] is not LaneEntry.U_TURN
-    told = step is not None and step[0] == "turn"
-    return told and crossing.distance < config.corner_distance and left - crossing.distance < config.behind_corner
+    announced = step is not None and step[0] == "turn"
+    return announced and crossing.distance < config.corner_distance and left - crossing.distance < config.behind_corner
 
 
 def _u_turn_distance(state: ParticipantState, view: ParticipantView) -> float:
@@ -211,7 +211,7 @@ def _u_turn_distance(state: ParticipantState, view: ParticipantView) -> float:
 
 
 def _takes_run_up(state: ParticipantState, view: ParticipantView) -> bool:
-    """Whether to drive on for now, because a car that turned round here would pass the place before it could stop."""
+    """Returns whether the U-turn is postponed: a car that turned round here could not stop at the place in time."""
     progress, config = state.route.progress, state.config
     assert progress is not None
     after = progress.run_up()
@@ -230,7 +230,7 @@ def _takes_run_up(state: ParticipantState, view: ParticipantView) -> bool:
 
 
 def _turns_better(state: ParticipantState, view: ParticipantView, farther: float) -> bool:
-    """Whether a U-turn farther ahead [m] is possible, too, and leaves more road before the place."""
+    """Returns whether a U-turn `farther` metres ahead is possible as well and leaves more road before the place."""
     progress = state.route.progress
     assert progress is not None
     later = progress.replanned(state.town, (view.lane, view.station + farther), state.route.closed)
@@ -239,7 +239,7 @@ def _turns_better(state: ParticipantState, view: ParticipantView, farther: float
 
 
 def _send_on(state: ParticipantState, view: ParticipantView) -> None:
-    """Lets a standing car drive on, to turn round later."""
+    """Instructs a standing car to drive on and turn round later."""
     waited = view.time - max(state.guidance.step_at, state.conversation.heard_at, state.speech.last_end)
     if view.standing and waited > state.config.ready_time and view.time > state.motion.excused_until:
         note_step(state, view, ("on", view.lane, 0))
@@ -247,7 +247,7 @@ def _send_on(state: ParticipantState, view: ParticipantView) -> None:
 
 
 def note_step(state: ParticipantState, view: ParticipantView, key: StepKey) -> None:
-    """Notes a step that the car is told."""
+    """Records a step that is announced to the car."""
     state.guidance = state.guidance.after_step(key, view.time, state.config.lane_return_time)
 
 
@@ -306,7 +306,7 @@ def _turn_remark(
 
 
 def _is_ambiguous(state: ParticipantState, view: ParticipantView, crossing: RouteJunction) -> bool:
-    """Whether the direction alone means another exit."""
+    """Returns whether the direction alone refers to another exit."""
     choice = next_choice(state.town, view.lane, view.station)
     own = choice is not None and choice.lane == crossing.lane
     asked = choice if own else Choice(lane=crossing.lane, distance=0.0, exits=state.town.exits(crossing.lane))

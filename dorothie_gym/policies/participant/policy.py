@@ -14,7 +14,7 @@ from dorothie_gym.maps import Town
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
-from dorothie_gym.policies.participant.goals import choose_target, go_on, note_tasks, tell_target
+from dorothie_gym.policies.participant.goals import announce_target, choose_target, note_tasks, resume_after_wait
 from dorothie_gym.policies.participant.guidance import follow_route, guide, watch
 from dorothie_gym.policies.participant.reactions import react, scene_of
 from dorothie_gym.policies.participant.replies import listen
@@ -30,10 +30,10 @@ TURN_TIME = 4.0
 
 
 class ScriptedParticipant(Policy[ParticipantState]):
-    """Rule-based participant that wants the subgoals of the storyboard done and knows where everything is.
+    """Rule-based participant that knows all places and directs the car to the subgoals of the storyboard.
 
     It names places or guides turn by turn (by its style, drawn for each session), answers questions, corrects wrong
-    turns, reports what is done, and takes up changes of the tasks.
+    turns, reports completed subgoals, and announces changes of the tasks.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class ScriptedParticipant(Policy[ParticipantState]):
         self._style, self._config = style, ParticipantConfig() if config is None else config
 
     def initial_state(self, seed: int, town: Town) -> ParticipantState:
-        """Returns the state before anything was said."""
+        """Returns the state at the start of a session."""
         rng = np.random.default_rng((seed, 0))
         style = ParticipantStyle.draw(rng) if self._style is None else self._style
         chat_at = float(rng.uniform(25.0, style.chat + 25.0))
@@ -62,7 +62,7 @@ class ScriptedParticipant(Policy[ParticipantState]):
         return ParticipantState(seed=seed, town=town, style=style, config=self._config, conversation=conversation)
 
     def step(self, observation: Mapping[str, Any], state: ParticipantState) -> tuple[ActionDict, ParticipantState]:
-        """Listens, looks, and says something or nothing."""
+        """Processes utterances, observes the car, and chooses a remark or silence."""
         updated = copy(state)
         updated.count += 1
         rng = np.random.default_rng((updated.seed, updated.count))
@@ -76,8 +76,8 @@ class ScriptedParticipant(Policy[ParticipantState]):
         choose_target(updated, view, rng)
         follow_route(updated, view)
         listen(updated, view, rng)
-        tell_target(updated, view, rng)
-        go_on(updated, view)
+        announce_target(updated, view, rng)
+        resume_after_wait(updated, view)
         watch(updated, view)
         guide(updated, view, rng)
         react(updated, view, rng)

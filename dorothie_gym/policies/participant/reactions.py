@@ -61,7 +61,7 @@ def scene_of(state: ParticipantState, view: ParticipantView) -> WordingContext:
 def react(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     """Queues a remark about the surroundings, if no other is queued or being said."""
     note_blocked(state, view)
-    if not state.speech.idle or view.speaking > 0.0 or not state.errand.told:
+    if not state.speech.idle or view.speaking > 0.0 or not state.task.announced:
         return
     for consider in (_mention_weather, _mention_lights, _ask_why_standing, _wonder, _chat):
         consider(state, view, rng)
@@ -70,7 +70,7 @@ def react(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
 
 
 def note_blocked(state: ParticipantState, view: ParticipantView, near: bool = False) -> None:
-    """Notes an obstacle on the route and plans around it.
+    """Records an obstacle on the route and plans around it.
 
     Args:
         state: working copy of the state.
@@ -109,7 +109,7 @@ def _obstacle_on_route(state: ParticipantState, view: ParticipantView) -> Place 
 
 
 def _mention_weather(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Tells the car to slow down in bad weather, and to speed up afterwards."""
+    """Asks the car to slow down in bad weather, and to speed up afterwards."""
     fog = weather(view.raw, WeatherParameter.FOG_DENSITY)
     rain = weather(view.raw, WeatherParameter.PRECIPITATION)
     config = state.config
@@ -185,7 +185,7 @@ def _wonder(state: ParticipantState, view: ParticipantView, rng: np.random.Gener
 def _chat(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     """Says something beside the task when no step of the guidance is near."""
     progress = state.route.progress
-    if view.time < state.conversation.chat_at or view.standing or progress is None or state.errand.goal is None:
+    if view.time < state.conversation.chat_at or view.standing or progress is None or state.task.goal is None:
         return
     crossing, manoeuvre = progress.next_crossing(state.town, view.station), progress.next_manoeuvre(view.station)
     steps = [
@@ -202,7 +202,7 @@ def _chat(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
 
 def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> list[tuple[Remark, ...]]:
     """Returns the remarks that are possible now; equal ones count several times."""
-    goal = state.errand.goal
+    goal = state.task.goal
     assert goal is not None
     found: list[tuple[Remark, ...]] = [
         *((remark(DialogueMove.IRRELEVANT),),) * 2,

@@ -1,4 +1,4 @@
-"""Repairs of the dialogue: the participant has not understood the car, or the car has not understood it."""
+"""Repairs of the dialogue: the participant has not understood the car, or the car the participant."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SIDEWAYS = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)
 
 
 def has_missed(state: ParticipantState, view: ParticipantView, heard: HeardUtterance, rng: np.random.Generator) -> bool:
-    """Whether the participant has to ask what the car said while it was speaking itself.
+    """Returns whether the participant has to ask for words that the car said while the participant was speaking.
 
     Args:
         state: working copy of the state; keeps the utterance, to answer it after the clarification.
@@ -45,7 +45,7 @@ def _has_named_slot(act: DialogueAct) -> bool:
 
 
 def correction(state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText) -> Remark | None:
-    """Returns the correction of a car that takes up something it was not told; None if it has understood.
+    """Returns the correction of a car that takes up an instruction that was not given; None if it has understood.
 
     Args:
         state: working copy of the state.
@@ -53,14 +53,14 @@ def correction(state: ParticipantState, view: ParticipantView, act: DialogueAct,
         act: act of the car.
         words: words of the car.
     """
-    if act.move not in _TAKES_UP or state.errand.goal is None or not state.errand.told:
+    if act.move not in _TAKES_UP or state.task.goal is None or not state.task.announced:
         return None
     return _corrected_place(state, act) or _corrected_side(state, view, act, words)
 
 
 def _corrected_place(state: ParticipantState, act: DialogueAct) -> Remark | None:
     """Returns the place again if another one was taken up."""
-    goal = state.errand.goal
+    goal = state.task.goal
     assert goal is not None
     named = {value for value in act.values(Slot.LANDMARK) if value.label not in ("Unknown", "Queried")}
     said = {value for item in state.speech.said for value in item.act.slots}
@@ -68,7 +68,7 @@ def _corrected_place(state: ParticipantState, act: DialogueAct) -> Remark | None
     if not named or goal.name in named or named & (said | dropped):
         return None
     if act.move is DialogueMove.EXPLAIN and GoalStatus.UNKNOWN not in act.slots:
-        return None  # a remark about what is in sight
+        return None  # a remark about something in sight
     values: list[SlotValue] = [goal.name]
     if goal.street.label not in ("Unknown", "Queried"):
         values.append(goal.street)

@@ -21,7 +21,7 @@ from dorothie_gym.ontology import (
     SlotValue,
 )
 from dorothie_gym.policies.observation_parser import SeenSubgoal
-from dorothie_gym.policies.participant.arriving import about_to_arrive, inch_on
+from dorothie_gym.policies.participant.arriving import about_to_arrive, creep_instruction
 from dorothie_gym.policies.participant.goals import announcement, describe, reason_topic, route_length, switch_target
 from dorothie_gym.policies.participant.guidance import next_step, note_step
 from dorothie_gym.policies.participant.reactions import note_blocked
@@ -47,7 +47,7 @@ _AHEAD = frozenset({ActionValue.LANE_FOLLOW, ActionValue.J_TURN})
 
 
 def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Takes in what the car has said since the last decision, and queues replies."""
+    """Processes the utterance of the car since the last decision and queues replies."""
     heard = heard_utterance(view.raw, Role.CO_WIZARD)
     if heard is None:
         return
@@ -72,14 +72,14 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
         _nod(state, view, rng, alone=heard.acts[0].move not in _ACKNOWLEDGEMENTS)
 
 
-# --- questions that want a yes or no --------------------------------------------------------------------------------
+# --- yes/no questions-------------- --------------------------------------------------------------------------------
 
 
 def _check(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     landmarks, streets = act.values(Slot.LANDMARK), act.values(Slot.STREET)
-    goal = state.errand.goal
+    goal = state.task.goal
     if goal is not None and landmarks:
         right = landmarks == (goal.name,) and streets in ((), (goal.street,))
         if not right:
@@ -97,15 +97,15 @@ def _check(
 def _fits(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> bool:
-    """Whether an action named by the car is the next step, or what the car has just been told to do."""
+    """Returns whether an action named by the car is the next step or the last instruction."""
     step = next_step(state, view, DialogueMove.INSTRUCT, rng)
     actions = set(act.values(Slot.ACTION))
     if step is None or actions & _FREE:
         return True
-    told = next((item for item in reversed(state.speech.said) if item.act.values(Slot.ACTION)), None)
+    instructed = next((item for item in reversed(state.speech.said) if item.act.values(Slot.ACTION)), None)
     lately = state.speech.has_just_spoken(view.time, state.config.checked_within)
-    if told is not None and lately and actions & set(told.act.slots):
-        return told.wording.direction in (None, words.direction)
+    if instructed is not None and lately and actions & set(instructed.act.slots):
+        return instructed.wording.direction in (None, words.direction)
     meant, wanted = set(step[2].act.values(Slot.ACTION)), step[2].wording.direction
     if wanted is Direction.STRAIGHT:
         return bool(actions & _AHEAD) and words.direction in (None, Direction.STRAIGHT)
@@ -121,7 +121,7 @@ def _addition(state: ParticipantState, rng: np.random.Generator) -> tuple[Remark
 
 
 def _refuse_with_step(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Says no, and names the right step unless a stop is being told anyway."""
+    """Says no, and names the right step unless a stop instruction is under way."""
     step = next_step(state, view, DialogueMove.INSTRUCT, rng)
     refusal = remark(DialogueMove.REPLY_N)
     just_stopped = view.time - state.guidance.stopped_at < state.config.just_said
@@ -145,10 +145,10 @@ def _yes_or_no(
     elif objects:
         seen = any(thing.kind in objects for thing in view.objects)
         state.say_first(remark(DialogueMove.REPLY_Y if seen else DialogueMove.REPLY_N))
-    elif landmarks and state.errand.goal is not None:
-        if state.errand.goal.name in landmarks and _is_elsewhere(state, view):
+    elif landmarks and state.task.goal is not None:
+        if state.task.goal.name in landmarks and _is_elsewhere(state, view):
             _deny_arrival(state)
-        elif state.errand.goal.name in landmarks:
+        elif state.task.goal.name in landmarks:
             state.say_first(remark(DialogueMove.REPLY_Y))
         else:
             again = announcement(state, view, rng)
@@ -157,7 +157,7 @@ def _yes_or_no(
         state.set_guiding(True)
         _answer_proposal(state, view, act, words, rng)
     elif not act.slots and _is_just_short(state, view):
-        state.say_only(remark(DialogueMove.REPLY_N), replace(inch_on(state, view), joined=True))
+        state.say_only(remark(DialogueMove.REPLY_N), replace(creep_instruction(state, view), joined=True))
     elif rng.random() < state.config.unsure:
         state.say_first(remark(DialogueMove.REPLY_U), remark(DialogueMove.REPLY_Y))
     else:
@@ -168,7 +168,7 @@ def _offered_subgoal(
     state: ParticipantState, view: ParticipantView, landmarks: tuple[SlotValue, ...]
 ) -> SeenSubgoal | None:
     """Returns the subgoal, other than the target, that the car proposes to do first."""
-    if state.errand.goal is None or state.errand.goal.name in landmarks:
+    if state.task.goal is None or state.task.goal.name in landmarks:
         return None
     for subgoal in view.subgoals:
         landmark = view.landmark(subgoal.landmark)
@@ -179,7 +179,7 @@ def _offered_subgoal(
 
 def _answer_offer(state: ParticipantState, view: ParticipantView, offered: SeenSubgoal) -> None:
     """Accepts a subgoal that is nearer than the target, and insists on the target otherwise."""
-    goal, progress = state.errand.goal, state.route.progress
+    goal, progress = state.task.goal, state.route.progress
     assert goal is not None
     landmark = view.landmark(offered.landmark)
     left = progress.left(view.station) if progress is not None else math.inf
@@ -222,7 +222,7 @@ def _open_question(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     landmarks, actions = act.values(Slot.LANDMARK), act.values(Slot.ACTION)
-    if state.errand.goal is None:
+    if state.task.goal is None:
         state.say_first(remark(DialogueMove.REPLY_U))
     elif words.order is not None and landmarks:
         _name_order(state, rng)
@@ -231,8 +231,8 @@ def _open_question(
     elif GoalStatus.QUERIED in act.values(Slot.STATUS):
         _name_target(state, view, rng)
     elif landmarks == (LandmarkName.QUERIED,):
-        told_lately = view.time - state.errand.told_at < state.config.just_said
-        if not told_lately and not _was_just_named(state, view):
+        named_lately = view.time - state.task.announced_at < state.config.just_said
+        if not named_lately and not _was_just_named(state, view):
             _name_target(state, view, rng, *_addition(state, rng))
     elif actions:
         if not _was_just_named(state, view):
@@ -244,7 +244,7 @@ def _open_question(
 
 def _name_target(state: ParticipantState, view: ParticipantView, rng: np.random.Generator, *more: Remark) -> None:
     """Answers the question where to go."""
-    state.errand = state.errand.after_telling(view.time)
+    state.task = state.task.after_announcement(view.time)
     named = [value for value in announcement(state, view, rng).act.slots if value.slot in (Slot.LANDMARK, Slot.STREET)]
     answer = remark(DialogueMove.REPLY_W, *named, wording=Wording(topic="goal"))
     state.say_only(answer, *more)
@@ -252,7 +252,7 @@ def _name_target(state: ParticipantState, view: ParticipantView, rng: np.random.
 
 def _name_order(state: ParticipantState, rng: np.random.Generator) -> None:
     """Answers the question about the order of two tasks: the target is finished first."""
-    goal = state.errand.goal
+    goal = state.task.goal
     assert goal is not None
     state.say_first(remark(DialogueMove.REPLY_W, wording=Wording(topic="after")))
     if rng.random() < state.config.explains_order:
@@ -261,21 +261,21 @@ def _name_order(state: ParticipantState, rng: np.random.Generator) -> None:
 
 
 def _was_just_named(state: ParticipantState, view: ParticipantView) -> bool:
-    """Whether the place was named a moment ago, so that the car cannot have taken it up yet."""
-    goal = state.errand.goal
+    """Returns whether the place was named so recently that the car cannot have reacted yet."""
+    goal = state.task.goal
     if goal is None or not state.speech.has_just_spoken(view.time, state.config.just_said):
         return False
     return any(goal.name in item.act.values(Slot.LANDMARK) for item in state.speech.said[-LONGEST_BREATH:])
 
 
 def _name_step(state: ParticipantState, view: ParticipantView, move: DialogueMove, rng: np.random.Generator) -> None:
-    """Tells the next step, unless a stop or an answer is being told anyway."""
+    """Announces the next step, unless a stop instruction or the same answer is under way."""
     step = next_step(state, view, move, rng)
     if step is None:
         return
     key, distance, words = step
     if key[0] == "on" and distance < state.config.stop_distance:
-        return  # the stop at the place is told next
+        return  # the stop at the place is announced next
     answers = move is DialogueMove.REPLY_W
     if answers and state.guidance.step == key and view.time - state.guidance.step_at < state.config.just_said:
         return  # the question was asked during the answer
@@ -287,14 +287,14 @@ def _name_step(state: ParticipantState, view: ParticipantView, move: DialogueMov
 
 
 def _is_elsewhere(state: ParticipantState, view: ParticipantView) -> bool:
-    """Whether the car stands, and not at the target."""
+    """Returns whether the car stands far from the target."""
     progress = state.route.progress
     far = progress is not None and progress.left(view.station) > state.config.elsewhere_distance
     return view.standing and far
 
 
 def _is_just_short(state: ParticipantState, view: ParticipantView) -> bool:
-    """Whether the car stands just before the target that it is guided to."""
+    """Returns whether the car stands just before the target that it is guided to."""
     progress = state.route.progress
     if not state.guidance.guiding or not view.standing or progress is None:
         return False
@@ -302,10 +302,10 @@ def _is_just_short(state: ParticipantState, view: ParticipantView) -> bool:
 
 
 def _deny_arrival(state: ParticipantState) -> None:
-    """Tells the car that it has mistaken another place for the target."""
-    assert state.errand.goal is not None
+    """Corrects a car that has mistaken another place for the target."""
+    assert state.task.goal is not None
     state.set_guiding(True)
-    state.say_first(remark(DialogueMove.REPLY_N, state.errand.goal.name))
+    state.say_first(remark(DialogueMove.REPLY_N, state.task.goal.name))
 
 
 def _explanation(
@@ -314,7 +314,7 @@ def _explanation(
     landmarks, statuses = act.values(Slot.LANDMARK), act.values(Slot.STATUS)
     if _correct(state, view, act, words):
         return
-    names_goal = state.errand.goal is not None and state.errand.goal.name in landmarks
+    names_goal = state.task.goal is not None and state.task.goal.name in landmarks
     if GoalStatus.UNKNOWN in statuses and names_goal:
         describe(state, view, DialogueMove.EXPLAIN, rng)
         return
@@ -345,7 +345,7 @@ def _correct(state: ParticipantState, view: ParticipantView, act: DialogueAct, w
     again = correction(state, view, act, words)
     if again is None:
         return False
-    state.errand = state.errand.after_reminding(view.time)
+    state.task = state.task.after_reminding(view.time)
     refusal = (remark(DialogueMove.REPLY_N),) if act.move is DialogueMove.CONFIRM else ()
     state.say_only(*refusal, replace(again, joined=bool(refusal)))
     return True
@@ -355,10 +355,10 @@ def _confusion(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     """Clarifies the last step, the target, or the last remark."""
-    last, goal = state.speech.last, state.errand.goal
+    last, goal = state.speech.last, state.task.goal
     if state.guidance.guiding and state.guidance.step is not None:
         _name_step(state, view, DialogueMove.CLARIFY, rng)
-    elif goal is not None and state.errand.told:
+    elif goal is not None and state.task.announced:
         state.say_first(remark(DialogueMove.CLARIFY, goal.name))
     elif last is not None:
         state.say_first(remark(DialogueMove.CLARIFY, *last.act.slots, wording=last.wording))
@@ -370,7 +370,7 @@ def _acknowledgement(
     """Ends the guidance of a car that repeats the place, because it knows the way; corrects one that names another."""
     if _correct(state, view, act, words):
         return
-    if state.errand.goal is not None and state.errand.goal.name in act.values(Slot.LANDMARK):
+    if state.task.goal is not None and state.task.goal.name in act.values(Slot.LANDMARK):
         state.set_guiding(False)
 
 
@@ -386,7 +386,7 @@ def _request(
     """Guides a car that asks for help; a car that names a place or a turn only repeats an instruction."""
     if act.values(Slot.LANDMARK):
         _acknowledgement(state, view, act, words, rng)
-    elif state.errand.goal is not None and not act.values(Slot.ACTION):
+    elif state.task.goal is not None and not act.values(Slot.ACTION):
         state.set_guiding(True)
         _name_step(state, view, DialogueMove.INSTRUCT, rng)
 

@@ -1,4 +1,4 @@
-"""State of the scripted participant between decisions: conversation, errand, guidance, route and motion of the car.
+"""State of the scripted participant between decisions: conversation, tasks, guidance, route and motion of the car.
 
 Each group is frozen. Its methods are the only places where its fields change, and each returns a new group. A step
 works on a shallow copy of `ParticipantState` and replaces whole groups in it; the state handed in is not changed.
@@ -29,16 +29,16 @@ class ConversationState:
     """Course of the conversation beside the guidance.
 
     Attributes:
-        speech: remarks queued and said.
+        speech: queued and spoken remarks.
         heard_at: time of the last utterance of the car [s].
         puzzled_by: utterance of the car that was not understood and has to be repeated.
         asked_at: time of the last question why the car stands [s].
-        wondered_at: time at which unexpected behaviour was last asked about, or let pass [s].
+        wondered_at: time at which unexpected behaviour was last asked about or ignored [s].
         chat_at: time of the next remark beside the task [s].
         lights_at: time at which the head lights were last mentioned [s].
-        slowed: whether slowing down for the weather has been dealt with.
+        slowed: whether a lower speed for the weather has been requested or was not needed.
         bad_weather_since: start of the present bad weather [s]; infinite in good weather.
-        hurried: whether the car has been told to go faster.
+        hurried: whether the car has been asked to go faster.
     """
 
     speech: SpeechState = field(default_factory=lambda: SpeechState(role=Role.PARTICIPANT))
@@ -53,23 +53,23 @@ class ConversationState:
     hurried: bool = False
 
     def with_speech(self, speech: SpeechState) -> ConversationState:
-        """Replaces the queued and said remarks."""
+        """Replaces the queued and spoken remarks."""
         return replace(self, speech=speech)
 
     def after_hearing(self, now: float, acts: Sequence[DialogueAct]) -> ConversationState:
-        """Notes an utterance of the car at `now` [s]."""
+        """Records an utterance of the car at `now` [s]."""
         return replace(self, heard_at=now, speech=self.speech.heard_other(now, acts))
 
     def with_puzzle(self, heard: HeardUtterance | None) -> ConversationState:
-        """Notes an utterance that has to be repeated; None when it has been dealt with."""
+        """Sets the utterance that has to be repeated; None once it has been clarified."""
         return replace(self, puzzled_by=heard)
 
     def after_asking_why(self, now: float) -> ConversationState:
-        """Notes a question why the car stands."""
+        """Records a question why the car stands."""
         return replace(self, asked_at=now)
 
     def after_wondering(self, now: float) -> ConversationState:
-        """Notes that unexpected behaviour has been dealt with."""
+        """Records that unexpected behaviour was asked about or ignored."""
         return replace(self, wondered_at=now)
 
     def with_next_chat(self, at: float) -> ConversationState:
@@ -77,92 +77,92 @@ class ConversationState:
         return replace(self, chat_at=at)
 
     def after_mentioning_lights(self, now: float) -> ConversationState:
-        """Notes that the head lights were mentioned."""
+        """Records a mention of the head lights."""
         return replace(self, lights_at=now)
 
     def with_weather(self, now: float, *, bad: bool) -> ConversationState:
-        """Updates the beginning of the present bad weather."""
+        """Updates the start of the present bad weather."""
         since = min(self.bad_weather_since, now) if bad else math.inf
         return self if since == self.bad_weather_since else replace(self, bad_weather_since=since)
 
     def with_slowed(self, slowed: bool) -> ConversationState:
-        """Sets whether slowing down for the weather has been dealt with."""
+        """Sets whether a lower speed for the weather has been requested or was not needed."""
         return replace(self, slowed=slowed)
 
     def after_hurrying(self) -> ConversationState:
-        """Notes that the car was told to go faster."""
+        """Records a request to go faster."""
         return replace(self, hurried=True)
 
 
 @dataclass(frozen=True, kw_only=True)
-class ErrandState:
-    """Subgoals and the one in hand, the target.
+class TaskProgress:
+    """Subgoals, and the target: the subgoal that the car is to do now.
 
     Attributes:
         subgoals: subgoals at the last decision.
         target: index of the target.
         goal: landmark of the target.
-        told: whether the car has been told of the target.
-        told_at: time at which it was told [s].
+        announced: whether the target has been announced to the car.
+        announced_at: time of the last announcement or reminder [s].
         described: whether the place of the target has been described to the car.
-        goes_on: whether the next task is named in the breath that reports the last.
+        same_breath: whether the next task is named in the same breath as the report of the last one.
         next_at: time before which the next task is not named unless the car asks [s].
-        go_at: time at which a car that was told to wait is to go on [s].
+        resume_at: time at which a car that was asked to wait is sent on [s]; infinite where it does not wait.
         put_off: subgoals that were interrupted and are to be resumed.
     """
 
     subgoals: tuple[SeenSubgoal, ...] = ()
     target: int | None = None
     goal: SeenLandmark | None = None
-    told: bool = False
-    told_at: float = -math.inf
+    announced: bool = False
+    announced_at: float = -math.inf
     described: bool = False
-    goes_on: bool = False
+    same_breath: bool = False
     next_at: float = -math.inf
-    go_at: float = math.inf
+    resume_at: float = math.inf
     put_off: frozenset[int] = frozenset()
 
-    def with_subgoals(self, subgoals: tuple[SeenSubgoal, ...]) -> ErrandState:
+    def with_subgoals(self, subgoals: tuple[SeenSubgoal, ...]) -> TaskProgress:
         """Sets the subgoals as observed."""
         return replace(self, subgoals=subgoals)
 
-    def with_target(self, index: int, goal: SeenLandmark) -> ErrandState:
+    def with_target(self, index: int, goal: SeenLandmark) -> TaskProgress:
         """Sets the target."""
         return replace(self, target=index, goal=goal)
 
-    def without_target(self) -> ErrandState:
+    def without_target(self) -> TaskProgress:
         """Drops the target."""
-        return replace(self, target=None, goal=None, told=False, described=False)
+        return replace(self, target=None, goal=None, announced=False, described=False)
 
-    def after_telling(self, now: float) -> ErrandState:
-        """Notes that the car was told of the target."""
-        return replace(self, told=True, told_at=now)
+    def after_announcement(self, now: float) -> TaskProgress:
+        """Records that the target was announced."""
+        return replace(self, announced=True, announced_at=now)
 
-    def after_reminding(self, now: float) -> ErrandState:
-        """Notes that the car was reminded of the target."""
-        return replace(self, told_at=now)
+    def after_reminding(self, now: float) -> TaskProgress:
+        """Records a reminder of the target."""
+        return replace(self, announced_at=now)
 
-    def after_describing(self) -> ErrandState:
-        """Notes that the place of the target was described."""
+    def after_describing(self) -> TaskProgress:
+        """Records a description of the place of the target."""
         return replace(self, described=True)
 
-    def with_next_task(self, *, goes_on: bool, next_at: float) -> ErrandState:
+    def with_next_task(self, *, same_breath: bool, next_at: float) -> TaskProgress:
         """Sets when the next task is named: in the same breath, or not before a time [s]."""
-        return replace(self, goes_on=goes_on, next_at=next_at)
+        return replace(self, same_breath=same_breath, next_at=next_at)
 
-    def going_on(self, goes_on: bool) -> ErrandState:
+    def with_same_breath(self, same_breath: bool) -> TaskProgress:
         """Sets whether the next task is named in the same breath."""
-        return self if goes_on is self.goes_on else replace(self, goes_on=goes_on)
+        return self if same_breath is self.same_breath else replace(self, same_breath=same_breath)
 
-    def halted_until(self, go_at: float) -> ErrandState:
-        """Sets when a waiting car is to go on [s]; infinite for a car that does not wait."""
-        return replace(self, go_at=go_at)
+    def waiting_until(self, resume_at: float) -> TaskProgress:
+        """Sets the time at which a waiting car is sent on [s]; infinite for a car that does not wait."""
+        return replace(self, resume_at=resume_at)
 
-    def put_off_target(self) -> ErrandState:
+    def put_off_target(self) -> TaskProgress:
         """Marks the target as interrupted."""
         return self if self.target is None else replace(self, put_off=self.put_off | {self.target})
 
-    def closed(self, index: int) -> ErrandState:
+    def closed(self, index: int) -> TaskProgress:
         """Removes a subgoal from those to be resumed."""
         return replace(self, put_off=self.put_off - {index})
 
@@ -174,18 +174,18 @@ class GuidanceState:
     Attributes:
         guiding: whether the car is guided turn by turn.
         best: least distance to the target so far [m].
-        step: last step that the car was told.
-        step_at: time at which it was told [s].
+        step: last step that was announced.
+        step_at: time at which it was announced [s].
         repeats: number of repetitions of that step.
-        u_turns: number of U-turns told on the way to the target.
-        lane_changes: lanes that the car was told to leave, and when [s].
-        announced: whether the car has been told that the place is near.
-        eased: whether it has been told to go slowly because the place is easily missed.
+        u_turns: number of U-turns announced on the way to the target.
+        lane_changes: lanes that the car was instructed to leave, and the times of the instructions [s].
+        approach_announced: whether the car has been informed that the place is near.
+        slowed_early: whether it has been asked to slow down because the place is easily missed.
         stop_text: words to stop the car with; empty until they are chosen.
-        stopped_at: time at which they were said [s].
-        nudged_at: time at which the car was last told to go on a little [s].
-        considered: step for which leaving it to a question has been decided on.
-        left_to_ask: that decision.
+        stopped_at: time of the last stop instruction [s].
+        nudged_at: time of the last instruction to drive on a little [s].
+        considered: last step for which it was decided whether to wait for a question of the car.
+        left_to_ask: result of that decision.
     """
 
     guiding: bool = False
@@ -195,8 +195,8 @@ class GuidanceState:
     repeats: int = 0
     u_turns: int = 0
     lane_changes: tuple[tuple[int, float], ...] = ()
-    announced: bool = False
-    eased: bool = False
+    approach_announced: bool = False
+    slowed_early: bool = False
     stop_text: str = ""
     stopped_at: float = -math.inf
     nudged_at: float = -math.inf
@@ -221,7 +221,7 @@ class GuidanceState:
         return replace(self, best=left, step=None)
 
     def after_step(self, step: StepKey, now: float, return_time: float) -> GuidanceState:
-        """Notes a step told at `now` [s].
+        """Records a step announced at `now` [s].
 
         Args:
             step: the step.
@@ -229,7 +229,7 @@ class GuidanceState:
             return_time: time after which a repeated lane change counts as a return to the lane [s].
         """
         changes = self.lane_changes
-        if step[0] == "lane" and all(lane != step[1] or now - told > return_time for lane, told in changes):
+        if step[0] == "lane" and all(lane != step[1] or now - at > return_time for lane, at in changes):
             changes = (*changes, (step[1], now))
         return replace(
             self,
@@ -246,38 +246,38 @@ class GuidanceState:
 
     def without_circling(self, lane: int) -> GuidanceState:
         """Restarts the counts of U-turns, and of lane changes on a lane."""
-        return replace(self, u_turns=0, lane_changes=tuple(told for told in self.lane_changes if told[0] != lane))
+        return replace(self, u_turns=0, lane_changes=tuple(change for change in self.lane_changes if change[0] != lane))
 
     def for_another_approach(self) -> GuidanceState:
-        """Prepares to announce the place again."""
-        return replace(self, announced=False, stop_text="")
+        """Prepares another announcement of the approach."""
+        return replace(self, approach_announced=False, stop_text="")
 
     def after_miss(self) -> GuidanceState:
-        """Prepares to slow the car down again."""
-        return replace(self, eased=False)
+        """Prepares another request to slow down."""
+        return replace(self, slowed_early=False)
 
-    def with_announced(self, announced: bool) -> GuidanceState:
-        """Sets whether the place has been announced."""
-        return replace(self, announced=announced)
+    def with_approach_announced(self, announced: bool) -> GuidanceState:
+        """Sets whether the approach to the place has been announced."""
+        return replace(self, approach_announced=announced)
 
-    def after_easing(self) -> GuidanceState:
-        """Notes that the car was told to go slowly."""
-        return replace(self, eased=True)
+    def after_slowing_early(self) -> GuidanceState:
+        """Records a request to slow down before the place."""
+        return replace(self, slowed_early=True)
 
     def with_stop_text(self, text: str) -> GuidanceState:
         """Sets the words to stop the car with."""
         return replace(self, stop_text=text)
 
     def after_stopping(self, now: float) -> GuidanceState:
-        """Notes that the car was told to stop."""
+        """Records an instruction to stop."""
         return replace(self, stopped_at=now)
 
     def after_nudging(self, now: float) -> GuidanceState:
-        """Notes that the car was told to go on a little."""
+        """Records an instruction to drive on a little."""
         return replace(self, nudged_at=now)
 
     def with_consideration(self, step: StepKey, left_to_ask: bool) -> GuidanceState:
-        """Notes whether a step is left to a question of the car."""
+        """Records whether a step is left to a question of the car."""
         return replace(self, considered=step, left_to_ask=left_to_ask)
 
 
@@ -332,7 +332,7 @@ class ParticipantState:
         count: number of decisions taken.
         clock: time between decisions.
         conversation: course of the conversation.
-        errand: subgoals and target.
+        task: subgoals and target.
         guidance: turn-by-turn guidance to the target.
         route: route to the target.
         motion: observed motion of the car.
@@ -345,14 +345,14 @@ class ParticipantState:
     count: int = 0
     clock: DecisionClock = field(default_factory=DecisionClock)
     conversation: ConversationState = field(default_factory=ConversationState)
-    errand: ErrandState = field(default_factory=ErrandState)
+    task: TaskProgress = field(default_factory=TaskProgress)
     guidance: GuidanceState = field(default_factory=GuidanceState)
     route: RouteState = field(default_factory=RouteState)
     motion: MotionState = field(default_factory=MotionState)
 
     @property
     def speech(self) -> SpeechState:
-        """Remarks queued and said."""
+        """Remarks queued and spoken."""
         return self.conversation.speech
 
     @speech.setter
@@ -377,6 +377,6 @@ class ParticipantState:
 
     def forget_target(self) -> None:
         """Drops the target with its route and guidance; roadblocks stay known."""
-        self.errand = self.errand.without_target()
+        self.task = self.task.without_target()
         self.route = self.route.with_progress(None).for_new_goal()
         self.guidance = self.guidance.for_new_target()

@@ -84,7 +84,7 @@ class ParticipantView:
 
     @property
     def standing(self) -> bool:
-        """Whether the car stands."""
+        """Returns whether the car stands."""
         return self.speed < STANDING_SPEED
 
     def landmark(self, row: int) -> SeenLandmark | None:
@@ -92,7 +92,7 @@ class ParticipantView:
         return next((landmark for landmark in self.landmarks if landmark.row == row), None)
 
     def unique(self, landmark: SeenLandmark) -> bool:
-        """Whether the name identifies the landmark."""
+        """Returns whether the name identifies the landmark."""
         return sum(other.name is landmark.name for other in self.landmarks) == 1 and landmark.name not in (
             LandmarkName.HOUSE,
             LandmarkName.PERSON,
