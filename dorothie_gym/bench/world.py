@@ -15,7 +15,7 @@ from dorothie_gym.ontology import PropKind
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_prop, populate
-from dorothie_gym.sim.state.records import Kind, Walk
+from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.step import step

@@ -12,8 +12,8 @@ from dorothie_gym.errors import StoryboardError
 from dorothie_gym.maps.model import Array, LinkType
 from dorothie_gym.ontology import ExceptionKind, GoalStatus, PropKind
 from dorothie_gym.sim.bodies import Prop
-from dorothie_gym.sim.collisions import Box, boxes_touch
-from dorothie_gym.sim.ego.obstacles import BRAKING
+from dorothie_gym.sim.collisions import OrientedBox, boxes_touch
+from dorothie_gym.sim.ego.limits import PLANNED_BRAKING
 from dorothie_gym.sim.roadblocks import crowds, cuts_off
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import AdWizardAction
@@ -205,7 +205,7 @@ class ExceptionExecutor:
 
     def _stopping_distance(self) -> float:
         """Way in which the car stops, on the road as wet as it is [m]."""
-        return self._world.weather.braking_distance(float(self._world.car.speed), BRAKING)
+        return self._world.weather.braking_distance(float(self._world.car.speed), PLANNED_BRAKING)
 
     def _unsafe(self, action: AdWizardAction, kind: PropKind, *, without: Prop | None) -> str | None:
         """Why a prop must not stand at a place.
@@ -227,11 +227,11 @@ class ExceptionExecutor:
             if site.lane == lane.id and abs(site.station - station) < FROM_SITE:
                 return "it would stand where a landmark is reached"
         props = [prop for prop in world.actors.props if prop is not without]
-        box = Box(
+        box = OrientedBox(
             float(place[0]), float(place[1]), lane.heading_at(station), kind.length + FROM_PROP, kind.width + FROM_PROP
         )
         if any(math.hypot(*(place - other.position)) < FROM_VEHICLE for other in world.actors.vehicles) or any(
-            boxes_touch(box, Box.of(prop)) for prop in props
+            boxes_touch(box, OrientedBox.of(prop)) for prop in props
         ):
             return "there is something in that place already"
         standing = [(prop.lane_id, prop.station) for prop in props]

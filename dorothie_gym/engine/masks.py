@@ -12,7 +12,7 @@ from dorothie_gym.engine.observation_buffers import ObservationBuffer, Shape
 from dorothie_gym.engine.upcoming_junction import UpcomingJunction
 from dorothie_gym.maps import LinkType
 from dorothie_gym.ontology import SPEED_STEP, ExceptionKind, PhysicalAction, Role
-from dorothie_gym.sim.ego.ego_controller import MAX_CRUISE, MIN_CRUISE
+from dorothie_gym.sim.ego.limits import MAX_CRUISE, MIN_CRUISE
 from dorothie_gym.sim.ego.manoeuvre_lanes import SIDES
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import SpaceLimits, action_space

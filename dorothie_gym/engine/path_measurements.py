@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from dorothie_gym.compilation import allocating
 from dorothie_gym.maps.model import Array
-from dorothie_gym.sim.network.lane_lookup import wrapped
+from dorothie_gym.sim.network.lane_lookup import wrap_radians
 from dorothie_gym.sim.sensing.seeing import see
-from dorothie_gym.sim.world import Senses, World
+from dorothie_gym.sim.world import SensorArrays, World
 
 
 @allocating
@@ -120,7 +120,7 @@ def write_waypoints(s: Array, points: Array, heading: float, start: float, spaci
 
 @allocating
 def write_objects(
-    senses: Senses,
+    senses: SensorArrays,
     frame: int,
     x: float,
     y: float,
@@ -154,7 +154,7 @@ def write_objects(
     for row in range(min(count, len(objects))):
         body = senses.seen[row]
         dx, dy = body.x - x, body.y - y
-        distance, bearing = math.sqrt(dx * dx + dy * dy), wrapped(math.atan2(dy, dx) - heading)
+        distance, bearing = math.sqrt(dx * dx + dy * dy), wrap_radians(math.atan2(dy, dx) - heading)
         for table in (objects, believed):
             table[row, 0], table[row, 3], table[row, 4] = body.kind, distance, bearing
             table[row, 5], table[row, 6], table[row, 7] = body.length, body.width, body.speed

@@ -18,7 +18,8 @@ from dorothie_gym.maps import LightColour, LightProgramme, Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.recording import ACTOR_DTYPE, ActorKind, Decision, SessionWriter
 from dorothie_gym.sim.bodies import Pedestrian
-from dorothie_gym.sim.state.records import Kind, Walk, plain
+from dorothie_gym.sim.state.codes import Kind, Walk
+from dorothie_gym.sim.state.records import plain
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import ActionDict, SpaceLimits, action_space, noop
 

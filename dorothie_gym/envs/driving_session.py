@@ -27,7 +27,7 @@ from dorothie_gym.policies.navigation.junction_exits import JunctionExits
 from dorothie_gym.policies.navigation.observation_vector import HeardInstruction, NavigationEncoder, Vector
 from dorothie_gym.policies.observation_parser import read_landmarks
 from dorothie_gym.policies.policy import policy_seed
-from dorothie_gym.sim.ego.ego_controller import MAX_CRUISE, MIN_CRUISE
+from dorothie_gym.sim.ego.limits import MAX_CRUISE, MIN_CRUISE
 from dorothie_gym.sim.infractions import INFRACTION_KINDS, WorldEventKind
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.world import World

@@ -22,7 +22,7 @@ from dorothie_gym.sim.population import (
     remove_prop,
 )
 from dorothie_gym.sim.road import TownRoad
-from dorothie_gym.sim.state.records import NOBODY, Kind, Walk
+from dorothie_gym.sim.state.codes import NOBODY, Kind, Walk
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, grown
 from dorothie_gym.sim.traffic.parameters import CYCLIST_SHARE, CYCLIST_SPEEDS
@@ -76,7 +76,7 @@ class Actors:
     def has_props(self) -> bool:
         """Whether there is any prop."""
         if self._present_of is not self.arrays:
-            self._present_of, self._present = self.arrays, self.arrays.props.view(np.ndarray)["present"]
+            self._present_of, self._present = self.arrays, self.arrays.props["present"]
         return len(self._present) > 0 and bool(self._present.any())
 
     # --- coming and going -------------------------------------------------------------------------------------------
@@ -139,8 +139,8 @@ class Actors:
         """Replaces the arrays by bigger ones if so many more do not fit."""
         state = self.arrays
         free = (
-            int((state.vehicles.kind == Kind.EMPTY).sum()), int((state.pedestrians.state == Walk.EMPTY).sum()),
-            int((~state.props.present).sum()),
+            int((state.vehicles["kind"] == Kind.EMPTY).sum()), int((state.pedestrians["state"] == Walk.EMPTY).sum()),
+            int((~state.props["present"]).sum()),
         )  # fmt: skip
         missing = [max(n - there, 0) for n, there in zip((vehicles, pedestrians, props), free, strict=True)]
         if any(missing):

@@ -25,20 +25,23 @@ from dorothie_gym.ontology import PropKind
 from dorothie_gym.sim.collisions import WALKER_SIZE
 from dorothie_gym.sim.network.lane import PolylineLane
 from dorothie_gym.sim.network.network import LaneIndex, Route
-from dorothie_gym.sim.state.record_views import Holder, Row, field, heading_field
-from dorothie_gym.sim.state.records import PEDESTRIAN, PROP, VEHICLE, Kind, Walk
+from dorothie_gym.sim.state.codes import Kind, Walk
+from dorothie_gym.sim.state.record_views import ArrayHolder, BodyView, field, field_offset, heading_field
+from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord, record_dtype
 from dorothie_gym.sim.state.town_arrays import town_arrays
-from dorothie_gym.sim.step import find
+from dorothie_gym.sim.step import update_lane
 from dorothie_gym.sim.traffic.parameters import PLANNED
 from dorothie_gym.sim.traffic.route import extend, take
 from dorothie_gym.sim.traffic.vehicle_models import slip_of, steering_angle
+
+VEHICLE, PEDESTRIAN, PROP = (record_dtype(kind) for kind in (VehicleRecord, PedestrianRecord, PropRecord))
 
 _KIND_OF_SIZE = {(kind.length, kind.width): kind for kind in PropKind}
 if len(_KIND_OF_SIZE) != len(PropKind):
     raise ImportError("two kinds of props have the same size, by which their views tell them apart")
 
 
-class TrafficVehicle(Row, IDMVehicle):
+class TrafficVehicle(BodyView, IDMVehicle):
     """A vehicle of the traffic, as highway-env's.
 
     Attributes:
@@ -73,7 +76,7 @@ class TrafficVehicle(Row, IDMVehicle):
     station, lateral = field(VEHICLE, "own_station"), field(VEHICLE, "own_lateral")
     _followed, _planned = field(VEHICLE, "plan"), field(VEHICLE, "planned")
 
-    def __init__(self, road: Any, holder: Holder, row: int) -> None:
+    def __init__(self, road: Any, holder: ArrayHolder, row: int) -> None:
         """Looks at a row of `holder.arrays.vehicles`; `road` is a `TownRoad` of the same town."""
         super().__init__(road, holder, row)
         self.log: list[Any] = []
@@ -151,7 +154,7 @@ class TrafficVehicle(Row, IDMVehicle):
         record.plan[: len(lanes)] = lanes
         record.planned = len(lanes)
         if moves_on:
-            find(town, record)
+            update_lane(town, record)
         extend(town, record)
 
     @property
@@ -196,7 +199,7 @@ class TrafficVehicle(Row, IDMVehicle):
 
     def on_state_update(self) -> None:
         """Finds the closest lane, and the place on the lane that it follows; to be called after it was moved."""
-        find(town_arrays(self.road.network), self.record)
+        update_lane(town_arrays(self.road.network), self.record)
         if self.road.record_history:
             self.remember()
 
@@ -208,7 +211,7 @@ class TrafficVehicle(Row, IDMVehicle):
         self.history.appendleft(self.create_from(self))
 
 
-_PLAN = VEHICLE.fields["plan"][1] // 4  # type: ignore[index]
+_PLAN = field_offset(VEHICLE, "plan") // 4
 """Where the plan begins in the integers of a row."""
 
 
@@ -216,7 +219,7 @@ class Cyclist(TrafficVehicle):
     """A cyclist: a narrow, slow vehicle that keeps to the right."""
 
 
-class _Thing(Row):
+class _Thing(BodyView):
     """What is on the road but no vehicle: it has no lane of its own, and highway-env never moves it."""
 
     height: Any
@@ -257,7 +260,7 @@ class Pedestrian(_Thing, RoadObject):
     key = field(PEDESTRIAN, "key")
     state = field(PEDESTRIAN, "state", Walk)
 
-    def __init__(self, road: Any, holder: Holder, row: int) -> None:
+    def __init__(self, road: Any, holder: ArrayHolder, row: int) -> None:
         """Looks at a row of `holder.arrays.pedestrians`; `road` is a `TownRoad` of the same town."""
         super().__init__(road, holder, row)
 
@@ -295,7 +298,7 @@ class Prop(_Thing, Obstacle):
     key = field(PROP, "key")
     lane_id, station = field(PROP, "lane"), field(PROP, "station")
 
-    def __init__(self, road: Any, holder: Holder, row: int) -> None:
+    def __init__(self, road: Any, holder: ArrayHolder, row: int) -> None:
         """Looks at a row of `holder.arrays.props`; `road` is a `TownRoad` of the same town."""
         super().__init__(road, holder, row)
 
@@ -308,10 +311,10 @@ class Prop(_Thing, Obstacle):
 class Bodies:
     """The views of a world, each made when it is asked for first."""
 
-    def __init__(self, road: Any, holder: Holder) -> None:
+    def __init__(self, road: Any, holder: ArrayHolder) -> None:
         """Shows the arrays of a holder on a road of the same town."""
         self._road, self._holder = road, holder
-        self._made: dict[tuple[type[Row], int], Any] = {}
+        self._made: dict[tuple[type[BodyView], int], Any] = {}
 
     def vehicles(self) -> list[TrafficVehicle]:
         """Traffic, cyclists among it, in the order of the rows; whoever is driven from outside is not among it."""
@@ -333,7 +336,7 @@ class Bodies:
         present = np.asarray(self._holder.arrays.props)["present"].tolist()
         return [self._view(Prop, row) for row, here in enumerate(present) if here]
 
-    def _view(self, kind: type[Row], row: int) -> Any:
+    def _view(self, kind: type[BodyView], row: int) -> Any:
         view = self._made.get((kind, row))
         if view is None:
             view = self._made[kind, row] = kind(self._road, self._holder, row)

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.sim.network.ahead import LEVEL
+from dorothie_gym.sim.state.codes import PEDESTRIAN_CLASS, STATIC, VEHICLES, EventCode, Kind, Walk
 from dorothie_gym.sim.state.event_log import log
-from dorothie_gym.sim.state.records import PEDESTRIAN_CLASS, STATIC, VEHICLES, EventCode, Kind, Records, Walk
+from dorothie_gym.sim.state.records import PlacedBody, VehicleRecord
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
@@ -198,7 +199,7 @@ def _book(world: WorldArrays, kind: int, key: int, body: int, x: float, y: float
 
 
 @inlined
-def _touch(vehicle: Records, other: Records, radius: float, length: float, width: float) -> bool:
+def _touch(vehicle: VehicleRecord, other: PlacedBody, radius: float, length: float, width: float) -> bool:
     dx, dy = other.x - vehicle.x, other.y - vehicle.y
     reach = vehicle.radius + radius
     if dx * dx + dy * dy > reach * reach or abs(other.height - vehicle.height) > LEVEL:
@@ -209,7 +210,7 @@ def _touch(vehicle: Records, other: Records, radius: float, length: float, width
 # --- Oriented boxes: whether two things touch ------------------------------------------------------------------------
 
 
-class Box(NamedTuple):
+class OrientedBox(NamedTuple):
     """Outline of a thing on the ground: its middle [m], heading [rad], length along it and width across it [m]."""
 
     x: float
@@ -219,13 +220,13 @@ class Box(NamedTuple):
     width: float
 
     @classmethod
-    def of(cls, thing: Any) -> Box:
+    def of(cls, thing: Any) -> OrientedBox:
         """The outline of a highway-env object as it stands."""
         x, y = thing.position
         return cls(float(x), float(y), float(thing.heading), float(thing.LENGTH), float(thing.WIDTH))
 
 
-def boxes_touch(one: Box, other: Box) -> bool:
+def boxes_touch(one: OrientedBox, other: OrientedBox) -> bool:
     """Whether two boxes have a point in common, by the separating axis theorem (Gottschalk et al. 1996, in the plane).
 
     Boxes are convex: they are apart if and only if they are so along one of the four directions of their sides.

@@ -13,7 +13,7 @@ from highway_env.vehicle.behavior import IDMVehicle
 
 from dorothie_gym.maps.model import Lane
 from dorothie_gym.sim.network.network import TownNetwork
-from dorothie_gym.sim.state.records import Kind
+from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 POINTS_APART = 2.0
@@ -43,7 +43,7 @@ def stock_road(network: TownNetwork, world: WorldArrays) -> Road:
     for index, lane in network.lanes_dict().items():
         plain.add_lane(index[0], index[1], stock_lane(lane.town_lane))
     road = Road(network=plain, np_random=np.random.default_rng(0))
-    for vehicle in world.vehicles[world.vehicles.kind != Kind.EMPTY]:
+    for vehicle in world.vehicles[world.vehicles["kind"] != Kind.EMPTY]:
         place = np.array([float(vehicle.x), float(vehicle.y)])
         road.vehicles.append(
             IDMVehicle(

@@ -23,9 +23,9 @@ from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.network import TownNetwork
-from dorothie_gym.sim.state.records import FINDING, LINE, MARK, Records
+from dorothie_gym.sim.state.records import FindingRecord, LineMarkRecord, RecordArray, StopLineRecord, empty_records
 from dorothie_gym.sim.state.town_arrays import town_arrays
-from dorothie_gym.sim.traffic_rules import HEIGHT, WIDE, Found, WatchArrays, X, Y, watch
+from dorothie_gym.sim.traffic_rules import HEIGHT, WIDE, FindingKind, WatchArrays, X, Y, watch
 
 LONG_AGO = -(1 << 40)
 """A frame before all others."""
@@ -79,8 +79,8 @@ class InfractionWatch:
         self._wide = bool(network.table.points[:, WIDTH].max() > WIDE)
         self._arrays = WatchArrays(
             town.points, town.lanes, town.origin, town.cells, town.entries, self._lines.records,
-            np.zeros(len(self._lines.lanes), dtype=MARK).view(np.recarray), np.full(2, LONG_AGO),
-            np.zeros(0, dtype=FINDING).view(np.recarray),
+            empty_records(LineMarkRecord, len(self._lines.lanes)), np.full(2, LONG_AGO),
+            empty_records(FindingRecord, 0),
         )  # fmt: skip
 
     def look(self, poses: Array, frame: int) -> list[Breach]:
@@ -92,15 +92,15 @@ class InfractionWatch:
             frame: of the first pose.
         """
         if len(self._arrays.found) < 3 * len(poses):
-            room = np.zeros(3 * len(poses), dtype=FINDING).view(np.recarray)
+            room = empty_records(FindingRecord, 3 * len(poses))
             self._arrays = self._arrays._replace(found=room)
         count = watch(self._arrays, poses, frame, self._length, self._wide)
         found: list[Breach] = []
         for station, k, kind, number in self._arrays.found[:count].tolist() if count else ():
-            if kind in (Found.LIGHT, Found.STOP_SIGN):
+            if kind in (FindingKind.LIGHT, FindingKind.STOP_SIGN):
                 found += self._at_line(number, frame + k, poses[k])
             else:
-                breach = Infraction.OFF_ROAD if kind == Found.OFF_ROAD else Infraction.WRONG_WAY
+                breach = Infraction.OFF_ROAD if kind == FindingKind.OFF_ROAD else Infraction.WRONG_WAY
                 found.append(self._beside_lanes(breach, number, station, frame + k, poses[k]))
         return found
 
@@ -141,9 +141,9 @@ class InfractionWatch:
 
 @dataclass(frozen=True, eq=False)
 class _Lines:
-    """Ends of lanes with a light or stop sign: `kernel.records.LINE` (m,), lanes, kinds and ids of signals."""
+    """Ends of lanes with a light or stop sign: `StopLineRecord` (m,), lanes, kinds and ids of signals."""
 
-    records: Records
+    records: RecordArray[StopLineRecord]
     lanes: tuple[int, ...]
     signals: tuple[tuple[SignalKind, int], ...]
 
@@ -168,7 +168,7 @@ def _look_for_lines(network: TownNetwork) -> _Lines:
         for lane in signal.lanes
         if rules.control(lane) is signal.kind
     }
-    records = np.zeros(len(found), dtype=LINE).view(np.recarray)
+    records = empty_records(StopLineRecord, len(found))
     for record, lane in zip(records, sorted(found), strict=True):
         end, heading = town.lanes[lane].points[-1], float(town.lanes[lane].headings[-1])
         record.x, record.y, record.height = end
@@ -197,7 +197,7 @@ INFRACTION_KINDS = (
     WorldEventKind.COLLISION, WorldEventKind.RED_LIGHT, WorldEventKind.STOP_SIGN, WorldEventKind.OFF_ROAD,
     WorldEventKind.WRONG_WAY,
 )  # fmt: skip
-"""Reports of a breach of the rules of the road; their data tells place and counterpart (`Reports.infraction`)."""
+"""Reports of a breach of the rules of the road; their data tells place and counterpart (`WorldEventLog.infraction`)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -209,7 +209,7 @@ class WorldEvent:
     data: Mapping[str, Any] = field(default_factory=dict)
 
 
-class Reports:
+class WorldEventLog:
     """Collects what happens to the car.
 
     Attributes:

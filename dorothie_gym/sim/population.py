@@ -13,7 +13,8 @@ from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.footways import closest_walk, place_beside
 from dorothie_gym.sim.pedestrians.pacing import KERB, WALKING_SPEED
 from dorothie_gym.sim.pedestrians.walking import place_walker
-from dorothie_gym.sim.state.records import NOBODY, PEDESTRIAN, Footway, Kind, Records, Walk
+from dorothie_gym.sim.state.codes import NOBODY, Footway, Kind, Walk
+from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, empty_records
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.state.world_arrays import CAR_KEY, WorldArrays
 from dorothie_gym.sim.traffic.lane_index import rebuild
@@ -55,7 +56,7 @@ def add_vehicle(
     Raises:
         ValueError: the world has no room for another one.
     """
-    empty = np.flatnonzero(world.vehicles.kind == Kind.EMPTY)
+    empty = np.flatnonzero(world.vehicles["kind"] == Kind.EMPTY)
     if not len(empty):
         raise ValueError(f"the world has room for {len(world.vehicles)} vehicles, and all are there")
     number = int(empty[0])
@@ -107,7 +108,7 @@ def add_pedestrian(town: TownArrays, world: WorldArrays, walk: int, station: flo
     Raises:
         ValueError: the world has no room for another one, or there is no such footway.
     """
-    empty = np.flatnonzero(world.pedestrians.state == Walk.EMPTY)
+    empty = np.flatnonzero(world.pedestrians["state"] == Walk.EMPTY)
     if not len(empty):
         raise ValueError(f"the world has room for {len(world.pedestrians)} pedestrians, and all are there")
     if not 0 <= walk < len(town.walks) or town.walks[walk].length <= 0.0:
@@ -146,7 +147,7 @@ def add_street_walker(
     walk, at, _ = closest_walk(town, Footway.STREET, x, y, BESIDE)
     if walk < 0 or town.walks[walk].lane != beside.id or not is_clear_of_people(world, x, y, NOBODY, CLEAR_OF_WALKER):
         return None
-    if (world.pedestrians.state != Walk.EMPTY).all():
+    if (world.pedestrians["state"] != Walk.EMPTY).all():
         return None
     return add_pedestrian(town, world, walk, at, pace=WALKING_SPEED)
 
@@ -176,7 +177,7 @@ def add_prop(
     Raises:
         ValueError: the world has no room for another one.
     """
-    empty = np.flatnonzero(~world.props.present)
+    empty = np.flatnonzero(~world.props["present"])
     if not len(empty):
         raise ValueError(f"the world has room for {len(world.props)} props, and all are there")
     number = int(empty[0])
@@ -219,13 +220,13 @@ def remove_prop(town: TownArrays, world: WorldArrays, number: int) -> None:
     rebuild(town, world)
 
 
-def _reached(network: TownNetwork, town: TownArrays, prop: Records) -> list[tuple[int, float]]:
+def _reached(network: TownNetwork, town: TownArrays, prop: PropRecord) -> list[tuple[int, float]]:
     """Lanes on which a vehicle would touch a prop, the closest first, and where [m]."""
     found = []
     half = 0.5 * max(prop.width, prop.length) + 0.5 * CAR_WIDTH
     lanes = town.lanes
-    near = (lanes.left_edge < prop.x + half) & (lanes.right_edge > prop.x - half)
-    near &= (lanes.low_edge < prop.y + half) & (lanes.high_edge > prop.y - half)
+    near = (lanes["left_edge"] < prop.x + half) & (lanes["right_edge"] > prop.x - half)
+    near &= (lanes["low_edge"] < prop.y + half) & (lanes["high_edge"] > prop.y - half)
     for number in np.flatnonzero(near):
         lane = network.town.lanes[number]
         station, lateral = network.lane_of(lane.id).local_coordinates(np.array([prop.x, prop.y]))
@@ -290,8 +291,8 @@ def populate(
 def _add_traffic(
     network: TownNetwork, town: TownArrays, world: WorldArrays, rng: np.random.Generator, vehicles: int, cyclists: float
 ) -> None:
-    room = min(vehicles, int((world.vehicles.kind == Kind.EMPTY).sum()))
-    rideable = town.lanes.cycling & (town.lanes.right < 0) & (town.lanes.junction < 0)
+    room = min(vehicles, int((world.vehicles["kind"] == Kind.EMPTY).sum()))
+    rideable = town.lanes["cycling"] & (town.lanes["right"] < 0) & (town.lanes["junction"] < 0)
     kinds = np.where(rng.random(room) < cyclists * rideable.any(), Kind.CYCLIST, Kind.CAR)
     count = 0
     for lane, station in free_places(network.town, rng, TRIES * vehicles):
@@ -307,14 +308,14 @@ def _add_traffic(
 
 
 def _add_people(town: TownArrays, world: WorldArrays, rng: np.random.Generator, pedestrians: int) -> None:
-    lengths = np.where(town.walks.kind == Footway.PAVEMENT, town.walks.length, 0.0)
+    lengths = np.where(town.walks["kind"] == Footway.PAVEMENT, town.walks["length"], 0.0)
     if not lengths.any():
-        lengths = np.where(town.walks.kind == Footway.STREET, town.walks.length, 0.0)
-    room = min(pedestrians, int((world.pedestrians.state == Walk.EMPTY).sum()))
+        lengths = np.where(town.walks["kind"] == Footway.STREET, town.walks["length"], 0.0)
+    room = min(pedestrians, int((world.pedestrians["state"] == Walk.EMPTY).sum()))
     if room == 0 or not lengths.any():
         return
     count = 0
-    place = np.zeros(1, dtype=PEDESTRIAN).view(np.recarray)[0]
+    place = empty_records(PedestrianRecord, 1)[0]
     place.direction = 1.0
     for walk in rng.choice(len(lengths), size=TRIES * room, p=lengths / lengths.sum()):
         if count == room:

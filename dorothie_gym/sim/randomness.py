@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.state.records import RandomBody
 
 MASK = 0xFFFFFFFF
 
 
 @compiled
-def draw(body: Any) -> float:
+def draw(body: RandomBody) -> float:
     """A number in [0, 1); moves the field `random` of a body on, which is never 0."""
     state = int(body.random)
     state ^= (state << 13) & MASK
@@ -21,6 +24,6 @@ def draw(body: Any) -> float:
 
 
 @compiled
-def choose(body: Any, count: int) -> int:
+def choose(body: RandomBody, count: int) -> int:
     """A number of 0, 1, ... count - 1."""
     return int(draw(body) * count)

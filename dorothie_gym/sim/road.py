@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.bodies import Bodies, TrafficVehicle
-from dorothie_gym.sim.collisions import Box, boxes_touch
+from dorothie_gym.sim.collisions import OrientedBox, boxes_touch
 from dorothie_gym.sim.network.ahead import LEVEL, LaneChains, Neighbours, lane_zones, neighbours_on
 from dorothie_gym.sim.network.network import LaneIndex, Route, TownNetwork
-from dorothie_gym.sim.state.record_views import Row
-from dorothie_gym.sim.state.records import Kind, Walk
+from dorothie_gym.sim.state.codes import Kind, Walk
+from dorothie_gym.sim.state.record_views import BodyView
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
-from dorothie_gym.sim.step import find, step_around
+from dorothie_gym.sim.step import step_around, update_lane
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.respawn import new_key, put_on_lane
 
@@ -325,17 +325,17 @@ class CompiledRoad(TownRoad):
 
     def _mark_props(self, guest: Any) -> None:
         """Marks the props that a guest has run into, as highway-env does; the kernel keeps no such mark."""
-        outline = Box.of(guest)
+        outline = OrientedBox.of(guest)
         for prop in self._bodies.props():
-            prop.crashed = prop.crashed or boxes_touch(outline, Box.of(prop))
+            prop.crashed = prop.crashed or boxes_touch(outline, OrientedBox.of(prop))
 
     def _note_changes(self) -> None:
         """Heeds that somebody was put into the lists, or taken out of them."""
         if self._listed == (self.vehicles, self.objects):
             return
         self._listed = list(self.vehicles), list(self.objects)
-        guests = [vehicle for vehicle in self.vehicles if not isinstance(vehicle, Row)]
-        self._things = [thing for thing in self.objects if not isinstance(thing, Row)]
+        guests = [vehicle for vehicle in self.vehicles if not isinstance(vehicle, BodyView)]
+        self._things = [thing for thing in self.objects if not isinstance(thing, BodyView)]
         before = dict(zip(map(id, self._guests), self._rows.tolist(), strict=True))
         rows = [before.get(id(guest)) for guest in guests]
         self._send_away({row for row in rows if row is not None})
@@ -348,7 +348,7 @@ class CompiledRoad(TownRoad):
 
     def _send_away(self, guests: set[int]) -> None:
         """Empties the rows of those who are not in the lists any more; `guests` are rows of guests who stay."""
-        shown = {(view.RECORDS, view.row) for view in [*self.vehicles, *self.objects] if isinstance(view, Row)}
+        shown = {(view.RECORDS, view.row) for view in [*self.vehicles, *self.objects] if isinstance(view, BodyView)}
         arrays = self.arrays
         for row in range(len(arrays.vehicles)):
             if ("vehicles", row) not in shown and row not in guests:
@@ -363,7 +363,7 @@ class CompiledRoad(TownRoad):
     def _seat(self, guest: Any) -> int:
         """Gives a guest a row, and returns its number; the first guest of a world has the key 0."""
         town = self.town_arrays
-        empty = np.flatnonzero(self.arrays.vehicles.kind == Kind.EMPTY)
+        empty = np.flatnonzero(self.arrays.vehicles["kind"] == Kind.EMPTY)
         if not len(empty):
             empty = np.array([len(self.arrays.vehicles)])
             self.arrays = enlarged(town, self.arrays, 2 * len(self.arrays.vehicles) + 1)
@@ -377,7 +377,7 @@ class CompiledRoad(TownRoad):
         put_on_lane(town, record, lane.town_lane.id, lane.local_coordinates(guest.position)[0])
         (record.x, record.y), record.heading, record.speed = guest.position, guest.heading, guest.speed
         record.cos, record.sin, record.crashed = math.cos(guest.heading), math.sin(guest.heading), guest.crashed
-        find(town, record)
+        update_lane(town, record)
         return row
 
 

@@ -14,11 +14,12 @@ from dorothie_gym.sim.collisions import collide
 from dorothie_gym.sim.ego.motion_control import guide
 from dorothie_gym.sim.network.lane_lookup import closest_lane, value_near
 from dorothie_gym.sim.pedestrians.walking import walk
+from dorothie_gym.sim.state.codes import Kind, Wait
 from dorothie_gym.sim.state.event_log import note_pose, trace
-from dorothie_gym.sim.state.records import Kind, Records, Wait
+from dorothie_gym.sim.state.records import VehicleRecord
 from dorothie_gym.sim.traffic.idm_traffic import drive
 from dorothie_gym.sim.traffic.lane_index import rebuild
-from dorothie_gym.sim.traffic.parameters import STUCK_SPEED
+from dorothie_gym.sim.traffic.parameters import STANDING
 from dorothie_gym.sim.traffic.respawn import tow
 from dorothie_gym.sim.traffic.route import locate
 from dorothie_gym.sim.traffic.vehicle_models import move, slip_of
@@ -95,21 +96,21 @@ def _meet(town: TownArrays, world: WorldArrays, dt: float, tows: bool) -> None:
 
 
 @inlined
-def _go_on(town: TownArrays, vehicle: Records, dt: float) -> None:
+def _go_on(town: TownArrays, vehicle: VehicleRecord, dt: float) -> None:
     """Moves a vehicle and finds out where it is."""
     vehicle.timer += dt
-    if vehicle.speed < STUCK_SPEED:
+    if vehicle.speed < STANDING:
         vehicle.standing += dt if vehicle.wait != Wait.LIGHT else 0.0
     else:
         vehicle.standing = 0.0
     if vehicle.speed == 0.0 and vehicle.acceleration <= 0.0:
         return  # it stands, and stays where it was found
     move(vehicle, dt)
-    find(town, vehicle)
+    update_lane(town, vehicle)
 
 
 @inlined
-def find(town: TownArrays, vehicle: Records) -> None:
+def update_lane(town: TownArrays, vehicle: VehicleRecord) -> None:
     """Finds the closest lane of a vehicle, and its place on the lane that it follows."""
     lane, station, lateral, segment = closest_lane(
         town, vehicle.x, vehicle.y, vehicle.heading, vehicle.cos, vehicle.sin, vehicle.height, vehicle.lane
@@ -148,7 +149,7 @@ def step_around(town: TownArrays, world: WorldArrays, dt: float, rows: NDArray[n
         vehicle = vehicles[rows[k]]
         vehicle.x, vehicle.y, vehicle.heading, vehicle.speed = poses[k, 0], poses[k, 1], poses[k, 2], poses[k, 3]
         vehicle.cos, vehicle.sin = math.cos(vehicle.heading), math.sin(vehicle.heading)
-        find(town, vehicle)
+        update_lane(town, vehicle)
         intact = intact and not vehicle.crashed
     _meet(town, world, dt, intact)
     world.clock[0].time = world.clock[0].frame * dt

@@ -20,7 +20,8 @@ from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.network.network import FARTHEST, TownNetwork
 from dorothie_gym.sim.population import free_places, populate
 from dorothie_gym.sim.road import CompiledRoad
-from dorothie_gym.sim.state.records import Kind, Walk
+from dorothie_gym.sim.state.codes import Kind, Walk
+from dorothie_gym.sim.state.records import plain
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.traffic.lane_index import rebuild
@@ -48,7 +49,8 @@ def populate_around(
         pedestrians: how many people on foot.
     """
     town = town_arrays(network)
-    ego, bodies = world.vehicles[0], (world.vehicles[1:], world.pedestrians)
+    ego = world.vehicles[0]
+    others = ((plain(world.vehicles)[1:], "kind", Kind.EMPTY), (plain(world.pedestrians), "state", Walk.EMPTY))
     for _ in range(ROUNDS):
         there = _counts(world)
         missing = np.array((vehicles + 1, pedestrians)) - there
@@ -58,15 +60,15 @@ def populate_around(
         populate(network, town, world, seed=seed, vehicles=int(missing[0]), pedestrians=int(missing[1]))
         if (_counts(world) == there).all():
             break  # the town is full
-        for records, field, nobody in zip(bodies, ("kind", "state"), (Kind.EMPTY, Walk.EMPTY), strict=True):
-            close = np.hypot(records.x - ego.x, records.y - ego.y) < CLEAR_OF_EGO
-            records[field][close] = nobody
+        for bodies, state, empty in others:
+            close = np.hypot(bodies["x"] - ego.x, bodies["y"] - ego.y) < CLEAR_OF_EGO
+            bodies[state][close] = empty
     rebuild(town, world)
 
 
 def _counts(world: WorldArrays) -> NDArray[np.int64]:
     """How many vehicles and pedestrians there are (2,)."""
-    return np.array(((world.vehicles.kind != Kind.EMPTY).sum(), (world.pedestrians.state != Walk.EMPTY).sum()))
+    return np.array(((world.vehicles["kind"] != Kind.EMPTY).sum(), (world.pedestrians["state"] != Walk.EMPTY).sum()))
 
 
 # --- highway-env's `Kinematics` and `OccupancyGrid` without what takes most of the time of a step in a co ------------

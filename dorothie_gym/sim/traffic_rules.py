@@ -17,7 +17,16 @@ from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.lane_lookup import CELL, REACH, SLACK, closest_segment, coordinates, value_near
-from dorothie_gym.sim.state.records import NOBODY, POSE, Records
+from dorothie_gym.sim.state.codes import NOBODY
+from dorothie_gym.sim.state.records import (
+    POSE,
+    CellEntryRecord,
+    FindingRecord,
+    LaneRecord,
+    LineMarkRecord,
+    RecordArray,
+    StopLineRecord,
+)
 from dorothie_gym.sim.traffic.parameters import AT_LINE, STANDING
 
 OFF_ROAD = 0.5
@@ -45,7 +54,7 @@ X, Y, HEADING, SPEED, HEIGHT, TURNING = range(len(POSE))
 """Columns of poses."""
 
 
-class Found(enum.IntEnum):
+class FindingKind(enum.IntEnum):
     """What is found along a way."""
 
     LIGHT = 0
@@ -71,14 +80,14 @@ class WatchArrays(NamedTuple):
     """
 
     points: Array
-    lanes: Records
+    lanes: RecordArray[LaneRecord]
     origin: Array
     cells: NDArray[Any]
-    entries: Records
-    lines: Records
-    marks: Records
+    entries: RecordArray[CellEntryRecord]
+    lines: RecordArray[StopLineRecord]
+    marks: RecordArray[LineMarkRecord]
     last: NDArray[Any]
-    found: Records
+    found: RecordArray[FindingRecord]
 
 
 @compiled
@@ -160,7 +169,7 @@ def _at_lines(arrays: WatchArrays, poses: Array, k: int, length: float, near: in
         return count
     mark, is_stop = arrays.marks[passed], arrays.lines[passed].is_stop
     if not is_stop or not mark.stood:
-        kind = Found.STOP_SIGN if is_stop else Found.LIGHT
+        kind = FindingKind.STOP_SIGN if is_stop else FindingKind.LIGHT
         _note(arrays.found[count], k, kind, passed, 0.0)
         count += 1
     mark.stood = False
@@ -168,7 +177,7 @@ def _at_lines(arrays: WatchArrays, poses: Array, k: int, length: float, near: in
 
 
 @inlined
-def _is_on(line: Records, x: float, y: float, cos: float, sin: float, height: float) -> bool:
+def _is_on(line: StopLineRecord, x: float, y: float, cos: float, sin: float, height: float) -> bool:
     """Whether a place is on the lane of a line, before or behind it, and heads its way."""
     across = (y - line.y) * line.cos - (x - line.x) * line.sin
     facing = cos * line.cos + sin * line.sin
@@ -189,7 +198,7 @@ def _forget(arrays: WatchArrays, poses: Array, length: float, near: int) -> None
 
 
 @inlined
-def _note(finding: Records, k: int, kind: int, number: int, station: float) -> None:
+def _note(finding: FindingRecord, k: int, kind: int, number: int, station: float) -> None:
     finding.pose, finding.kind, finding.number, finding.station = k, kind, number, station
 
 
@@ -201,16 +210,16 @@ def _beside_lanes(arrays: WatchArrays, poses: Array, k: int, frame: int, wide: b
     """Finds out whether the car is off the road or against the traffic; returns the number of findings."""
     off_road, against = _state(arrays, poses, k, wide)
     if off_road:
-        count = _tell(arrays, poses, k, frame, Found.OFF_ROAD, count)
+        count = _tell(arrays, poses, k, frame, FindingKind.OFF_ROAD, count)
     if against:
-        count = _tell(arrays, poses, k, frame, Found.WRONG_WAY, count)
+        count = _tell(arrays, poses, k, frame, FindingKind.WRONG_WAY, count)
     return count
 
 
 @compiled
 def _tell(arrays: WatchArrays, poses: Array, k: int, frame: int, kind: int, count: int) -> int:
     """Notes a breach if it has been over for long enough to count anew."""
-    which = kind - Found.OFF_ROAD
+    which = kind - FindingKind.OFF_ROAD
     last = arrays.last[which]
     arrays.last[which] = frame
     if frame - last <= OVER:
@@ -251,7 +260,7 @@ def _state(arrays: WatchArrays, poses: Array, k: int, wide: bool) -> tuple[bool,
 
 @inlined
 def _outside(
-    points: Array, lane: Records, at: int, share: float, gap: float, poses: Array, k: int
+    points: Array, lane: LaneRecord, at: int, share: float, gap: float, poses: Array, k: int
 ) -> tuple[float, float, bool]:
     """How far outside of a lane's area a pose is (negative inside, infinite at another height), and the station [m]."""
     station, lateral = coordinates(points, lane, at, share, gap, poses[k, X], poses[k, Y])
@@ -262,7 +271,7 @@ def _outside(
 
 
 @inlined
-def _is_with(points: Array, lane: Records, at: int, station: float, heading: float) -> bool:
+def _is_with(points: Array, lane: LaneRecord, at: int, station: float, heading: float) -> bool:
     """Whether a heading on a lane is not against it; in junctions none is."""
     return bool(lane.junction >= 0 or math.cos(heading - value_near(points, lane, at, 3, station)) > AGAINST)
 

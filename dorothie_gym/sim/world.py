@@ -12,10 +12,10 @@ from dorothie_gym.ontology import ObjectClass, Sensor, WeatherParameter
 from dorothie_gym.sim.actors import Actors
 from dorothie_gym.sim.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
 from dorothie_gym.sim.ego.ego_controller import EgoController
-from dorothie_gym.sim.ego.obstacles import Body, Hazard
+from dorothie_gym.sim.ego.obstacles import Hazard, PerceivedBody
 from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.ego.vehicle import Car, CarRecord
-from dorothie_gym.sim.infractions import Reports, WorldEvent, WorldEventKind
+from dorothie_gym.sim.infractions import WorldEvent, WorldEventKind, WorldEventLog
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_car
 from dorothie_gym.sim.road import TownRoad
@@ -23,7 +23,17 @@ from dorothie_gym.sim.sensing.localizer import Localizer
 from dorothie_gym.sim.sensing.perception import BODY, Perception
 from dorothie_gym.sim.sensing.seeing import look_around
 from dorothie_gym.sim.sensing.visibility import Visibility
-from dorothie_gym.sim.state.records import EventCode, Records, plain
+from dorothie_gym.sim.state.codes import EventCode
+from dorothie_gym.sim.state.records import (
+    EventRecord,
+    EyeRecord,
+    PedestrianRecord,
+    PropRecord,
+    RecordArray,
+    SeenRecord,
+    VehicleRecord,
+    plain,
+)
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.step import step
@@ -38,14 +48,14 @@ CLARITY = {Sensor.BLUR: 0.25, Sensor.VIEW: 0.0}
 """Share of the signal that a fault of the view leaves: blur halves the sight."""
 
 
-class Senses(NamedTuple):
+class SensorArrays(NamedTuple):
     """Arrays of a world that `kernel.seeing.see` takes, see `kernel.WorldArrays`."""
 
-    vehicles: Records
-    pedestrians: Records
-    props: Records
-    seen: Records
-    eye: Records
+    vehicles: RecordArray[VehicleRecord]
+    pedestrians: RecordArray[PedestrianRecord]
+    props: RecordArray[PropRecord]
+    seen: RecordArray[SeenRecord]
+    eye: RecordArray[EyeRecord]
 
 
 class World:
@@ -95,7 +105,7 @@ class World:
             driven=True,
         )  # fmt: skip
         add_car(self._arrays, state, lane, station)
-        state.car.collision_stop = round(config.collisions_stop * FRAME_RATE)
+        state.car["collision_stop"] = round(config.collisions_stop * FRAME_RATE)
         self.road = TownRoad(self.network, np_random=np.random.default_rng(crowd_seed))
         self.actors = Actors(self.road, self._arrays, state, seed=crowd_seed)
         self.car = Car(self.road, self.actors)
@@ -115,7 +125,7 @@ class World:
         self.frame = 0
         self.frames: Array = np.zeros((0, len(FRAME_COLUMNS)))
         self.offsets: Array = np.zeros(0)
-        self.reports = Reports(self.network, self.car.LENGTH)
+        self.reports = WorldEventLog(self.network, self.car.LENGTH)
 
     # --- time -------------------------------------------------------------------------------------------------------
 
@@ -169,7 +179,7 @@ class World:
             wind = self.weather.above_clear(WeatherParameter.WIND_INTENSITY)
             self._record.air[()] = self.weather.friction, wind, self.wind.heading, tuple(self.wind.phases)
 
-    def _report(self, events: Records) -> None:
+    def _report(self, events: RecordArray[EventRecord]) -> None:
         """Takes over what happened to the car, `kernel.records.EVENT`."""
         for event in events:
             frame, kind = int(event.frame), ObjectClass(int(event.kind))
@@ -219,10 +229,10 @@ class World:
         """How far the car perceives all bodies now [m]."""
         return self.visibility.sight
 
-    def perceived(self) -> list[Body]:
+    def perceived(self) -> list[PerceivedBody]:
         """Bodies that the car perceives, where it takes them to be, nearest first."""
         return [
-            Body(
+            PerceivedBody(
                 key=int(key), kind=ObjectClass(int(kind)), x=x, y=y, heading=heading, length=length, width=width,
                 speed=speed, height=height,
             )
@@ -230,11 +240,11 @@ class World:
         ]  # fmt: skip
 
     @property
-    def senses(self) -> Senses:
+    def senses(self) -> SensorArrays:
         """What the car sees with now, and what there is to be seen."""
         arrays = self.actors.arrays
         self._tell_weather(arrays)
-        return Senses(arrays.vehicles, arrays.pedestrians, arrays.props, arrays.seen, arrays.eye)
+        return SensorArrays(arrays.vehicles, arrays.pedestrians, arrays.props, arrays.seen, arrays.eye)
 
     def seen(self) -> Array:
         """What `perceived` tells in numbers (n, 9), columns `perception.BODY` [m, rad, m/s]."""

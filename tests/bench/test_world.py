@@ -9,7 +9,7 @@ from dorothie_gym.bench.world import FROM_PROPS, bytes_per_world, crowd, measure
 from dorothie_gym.maps import load_town
 from dorothie_gym.sim.highway_reference import run_stock, stock_lane, stock_road
 from dorothie_gym.sim.network.network import TownNetwork
-from dorothie_gym.sim.state.records import Kind
+from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.state.town_arrays import town_arrays
 
 KEYS = [

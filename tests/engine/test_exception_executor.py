@@ -12,7 +12,7 @@ from dorothie_gym.engine.scenario import draw_scenario
 from dorothie_gym.maps import LinkType, Town
 from dorothie_gym.maps.lane_neighbours import oncoming_lanes
 from dorothie_gym.ontology import ExceptionKind, PropKind, Sensor, WeatherParameter
-from dorothie_gym.sim.collisions import Box, boxes_touch
+from dorothie_gym.sim.collisions import OrientedBox, boxes_touch
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import AdWizardAction
@@ -194,7 +194,7 @@ def test_as_many_are_spawned_as_fit_and_then_nobody(kind: ExceptionKind, extent:
     assert sum(counts) == len(crowd)
     assert len(crowd) >= {5: 1, 15: 2, 40: 6}[extent]
     for one, other in itertools.combinations(crowd, 2):  # some stand in the tunnel, others above it
-        assert abs(one.height - other.height) > 2.5 or not boxes_touch(Box.of(one), Box.of(other))
+        assert abs(one.height - other.height) > 2.5 or not boxes_touch(OrientedBox.of(one), OrientedBox.of(other))
 
 
 def test_no_vehicle_is_spawned_on_a_waypoint() -> None:

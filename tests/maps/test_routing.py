@@ -12,7 +12,7 @@ from dorothie_gym.maps.lane_neighbours import oncoming_lanes
 from dorothie_gym.maps.routing import SHORT_CHANGE, LaneEntry, Router, router
 from dorothie_gym.maps.routing_graph import CHANGE_LEAD
 from dorothie_gym.ontology import PhysicalAction
-from dorothie_gym.sim.ego.manoeuvre_lanes import LEAD, MIN_SWITCH
+from dorothie_gym.sim.ego.limits import LEAD, MIN_SWITCH
 from dorothie_gym.sim.ego.planner import LocalPlanner
 from tests.maps.opendrive_text import shared_map
 from tests.maps.routes import (

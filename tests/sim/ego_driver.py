@@ -11,9 +11,9 @@ from dorothie_gym.maps.routing import LaneEntry, Leg, router
 from dorothie_gym.ontology import ARRIVAL_DISTANCE, PhysicalAction
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.ego_controller import GoalAhead
-from dorothie_gym.sim.ego.manoeuvre_lanes import LEAD, Lanes
-from dorothie_gym.sim.ego.obstacles import BRAKING
-from dorothie_gym.sim.ego.planner import U_TURN_SPEED, LocalPlanner
+from dorothie_gym.sim.ego.limits import LEAD, PLANNED_BRAKING, U_TURN_SPEED
+from dorothie_gym.sim.ego.manoeuvre_lanes import LaneChooser
+from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.network.network import TownNetwork
 from tests.sim.driving import Trip, on_lane
 
@@ -70,7 +70,7 @@ def _next(town: Town, planner: LocalPlanner, goal: Site, speed: float) -> Instru
     for before, leg in zip(route.legs, route.legs[1:], strict=False):
         if leg.entry is not LaneEntry.FOLLOW:
             return _aside(planner, before, leg, speed)
-        if town.lanes[leg.lane].in_junction and Lanes(town).offers_turns(before.lane):
+        if town.lanes[leg.lane].in_junction and LaneChooser(town).offers_turns(before.lane):
             (angle,) = (way.angle for way in town.exits(before.lane) if way.connector == leg.lane)
             return None if planner.turn_ahead == angle else (PhysicalAction.J_TURN, angle)
     return None
@@ -83,7 +83,7 @@ def _aside(planner: LocalPlanner, before: Leg, leg: Leg, speed: float) -> Instru
         return None
     left = before.end - planner.station
     if leg.entry is LaneEntry.U_TURN:
-        braking = LEAD + max(speed**2 - U_TURN_SPEED**2, 0.0) / (2.0 * BRAKING)
+        braking = LEAD + u_turn_braking(speed)
         return (PhysicalAction.U_TURN, 0) if left <= max(3.0, braking + DECISION * speed) else None
     if left > max(3.0, 0.8 * speed):
         return None

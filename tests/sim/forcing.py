@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dorothie_gym.maps import Town
 from dorothie_gym.sim.bodies import TrafficVehicle
-from dorothie_gym.sim.state.records import Kind
+from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.world import World
 from tests.sim.network.towns import lane, town
 

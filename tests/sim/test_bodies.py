@@ -16,7 +16,7 @@ from dorothie_gym.sim.bodies import Bodies, Cyclist, Pedestrian, Prop, TrafficVe
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_pedestrian, add_prop, add_vehicle, populate
 from dorothie_gym.sim.road import TownRoad, enlarged
-from dorothie_gym.sim.state.records import Kind, Walk
+from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
 from dorothie_gym.sim.step import step

@@ -14,11 +14,11 @@ from highway_env.vehicle.kinematics import Vehicle
 from highway_env.vehicle.objects import Obstacle
 
 from dorothie_gym.ontology import PropKind
-from dorothie_gym.sim.collisions import Box, boxes_touch
+from dorothie_gym.sim.collisions import OrientedBox, boxes_touch
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_pedestrian, add_prop, add_vehicle, populate
 from dorothie_gym.sim.road import CompiledRoad, TownRoad
-from dorothie_gym.sim.state.records import Kind
+from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
 from tests.sim.network.towns import find_town, lane, straight_town, town
@@ -89,7 +89,7 @@ def test_who_touches_has_crashed_on_both_sides_and_in_the_same_substep() -> None
     for _ in range(120):
         road.act()
         road.step(DT)
-        assert guest.crashed == other.crashed == boxes_touch(Box.of(guest), Box.of(other))
+        assert guest.crashed == other.crashed == boxes_touch(OrientedBox.of(guest), OrientedBox.of(other))
         if guest.crashed:
             break
     assert guest.crashed

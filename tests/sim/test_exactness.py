@@ -7,7 +7,7 @@ import pytest
 from highway_env.vehicle.kinematics import Vehicle
 
 from dorothie_gym.sim.network.network import TownNetwork
-from dorothie_gym.sim.state.records import Kind
+from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.step import step
 from dorothie_gym.sim.traffic.idm_traffic import drive
 from dorothie_gym.sim.traffic.vehicle_models import slip_of, steering_angle

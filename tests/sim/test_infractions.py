@@ -8,7 +8,7 @@ import pytest
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import Array, SignalKind
 from dorothie_gym.ontology import ObjectClass, PhysicalAction, PropKind
-from dorothie_gym.sim.collisions import Box, boxes_touch
+from dorothie_gym.sim.collisions import OrientedBox, boxes_touch
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.infractions import (
     INFRACTION_KINDS,
@@ -224,7 +224,8 @@ def test_boxes_touch_where_their_outlines_do() -> None:
     answers = []
     for _ in range(5000):
         boxes = [
-            Box(*rng.uniform(-4, 4, 2), rng.uniform(-7, 7), rng.uniform(0.3, 6), rng.uniform(0.3, 3)) for _ in "ab"
+            OrientedBox(*rng.uniform(-4, 4, 2), rng.uniform(-7, 7), rng.uniform(0.3, 6), rng.uniform(0.3, 3))
+            for _ in "ab"
         ]
         answers.append(boxes_touch(*boxes))
         assert answers[-1] == boxes_touch(*boxes[::-1])
@@ -232,7 +233,7 @@ def test_boxes_touch_where_their_outlines_do() -> None:
     assert 0.2 < np.mean(answers) < 0.8
 
 
-def corners(box: Box) -> list[complex]:
+def corners(box: OrientedBox) -> list[complex]:
     turn = complex(math.cos(box.heading), math.sin(box.heading))
     half = [complex(a * box.length / 2, b * box.width / 2) for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
     return [complex(box.x, box.y) + place * turn for place in half]

@@ -17,10 +17,11 @@ from dorothie_gym.ontology import ObjectClass, PhysicalAction
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.infractions import WorldEvent, WorldEventKind
 from dorothie_gym.sim.population import add_vehicle
-from dorothie_gym.sim.state.records import Kind, Records, Wait
+from dorothie_gym.sim.state.codes import Kind, Wait
+from dorothie_gym.sim.state.records import RecordArray, VehicleRecord
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, grown
-from dorothie_gym.sim.step import find
+from dorothie_gym.sim.step import update_lane
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.world import World
 from tests.sim.crossings import ARMS, across, crossing, lit, lit_crossing, way_in, way_out
@@ -40,7 +41,7 @@ def world_in(town: Town, arm: str = "s", station: float = 20.0) -> World:
     return world
 
 
-def others(world: World) -> Records:
+def others(world: World) -> RecordArray[VehicleRecord]:
     return world.actors.arrays.vehicles
 
 
@@ -222,7 +223,7 @@ def test_who_comes_along_gives_way_to_the_car_that_turns_round(away: float) -> N
     vehicle.heading = arm.heading_at(station)
     vehicle.cos, vehicle.sin = math.cos(vehicle.heading), math.sin(vehicle.heading)
     vehicle.speed = 8.0
-    find(town, vehicle)
+    update_lane(town, vehicle)
     rebuild(town, world.actors.arrays)
     slowest = 8.0
 

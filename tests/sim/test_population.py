@@ -14,7 +14,7 @@ from dorothie_gym.sim.population import (
     remove_pedestrian,
     remove_vehicle,
 )
-from dorothie_gym.sim.state.records import Kind, Walk
+from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world, grown
 from dorothie_gym.sim.step import step

@@ -4,7 +4,7 @@ import numpy as np
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import ObjectClass
-from dorothie_gym.sim.infractions import Reports, WorldEventKind
+from dorothie_gym.sim.infractions import WorldEventKind, WorldEventLog
 from dorothie_gym.sim.network.network import TownNetwork
 from tests.sim.crossings import lit_crossing, way_in
 from tests.sim.driving import network
@@ -19,7 +19,7 @@ def way(first: float, last: float, count: int) -> Array:
 
 
 def test_reports_come_in_the_order_of_their_frames_and_once() -> None:
-    reports = Reports(TownNetwork(lit_crossing("ew")), 5.0)
+    reports = WorldEventLog(TownNetwork(lit_crossing("ew")), 5.0)
     reports.add(WorldEventKind.HAZARD_STOP, 6, reason="Static")
     reports.add(WorldEventKind.HAZARD_END, 1, reason="Static")
     poses = way(16.0, 12.0, 9)
@@ -33,7 +33,7 @@ def test_reports_come_in_the_order_of_their_frames_and_once() -> None:
 
 
 def test_infractions_are_counted_and_name_their_counterpart() -> None:
-    reports = Reports(network("brookside"), 5.0)
+    reports = WorldEventLog(network("brookside"), 5.0)
     for key in (3, 4):
         reports.infraction(
             WorldEventKind.COLLISION, 10, lane=1, station=2.0, x=3.0, y=4.0, key=key, other=ObjectClass.VEHICLES

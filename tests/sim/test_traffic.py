@@ -9,7 +9,7 @@ import pytest
 
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.sim.config import WorldConfig
-from dorothie_gym.sim.state.records import Kind
+from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.traffic.parameters import OUT_OF_SIGHT
 from dorothie_gym.sim.world import World
 from tests.sim.driving import network, run, world_at

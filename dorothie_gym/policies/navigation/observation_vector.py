@@ -28,7 +28,7 @@ from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 from dorothie_gym.policies.navigation.instructor import NavigationInstruction
 from dorothie_gym.policies.navigation.junction_exits import SECTORS, JunctionExits, SectorExit
 from dorothie_gym.policies.observation_parser import street_of
-from dorothie_gym.sim.ego.ego_controller import MAX_CRUISE
+from dorothie_gym.sim.ego.limits import MAX_CRUISE
 from dorothie_gym.spaces import ExitColumn, Motion, ObjectColumn
 from dorothie_gym.spaces.fields import share, signal, sizes
 

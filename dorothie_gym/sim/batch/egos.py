@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle
@@ -17,8 +17,9 @@ from dorothie_gym.sim.batch.worlds import world_of
 from dorothie_gym.sim.network.lane_lookup import project, value_near
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.randomness import choose
-from dorothie_gym.sim.state.records import Kind, Records, Walk
-from dorothie_gym.sim.step import find, step_around
+from dorothie_gym.sim.state.codes import Kind, Walk
+from dorothie_gym.sim.state.records import Flag, Float, Int32, MovingBody, PlacedBody, RecordArray, VehicleRecord
+from dorothie_gym.sim.step import step_around, update_lane
 from dorothie_gym.sim.traffic.parameters import AFTER_END, CAR_LENGTH, MAX_SPEED
 from dorothie_gym.sim.traffic.vehicle_models import slip_towards, steering_angle
 
@@ -39,16 +40,16 @@ REACHABLE = 2.0
 NOTHING, LEFT, IDLE, RIGHT, FASTER, SLOWER = range(-1, 5)
 """Meta actions, as `DiscreteMetaAction.ACTIONS_ALL` numbers them, and none at all."""
 
-HELM = np.dtype(
-    [
-        ("target_speed", "f8"),  # [m/s]
-        ("acceleration", "f8"), ("steering", "f8"),  # what it does [m/s^2], [rad]
-        ("lowest", "f8"), ("highest", "f8"),  # speeds beyond which it no longer accelerates [m/s]
-        ("lane", "i4"),  # target lane
-    ],
-    align=True,
-)  # fmt: skip
-"""What the ego has in mind."""
+
+class HelmRecord:
+    """Targets and present action of an ego."""
+
+    target_speed: Float  # [m/s]
+    acceleration: Float  # [m/s^2]
+    steering: Float  # [rad]
+    lowest: Float  # speeds beyond which it no longer accelerates [m/s]
+    highest: Float
+    lane: Int32  # target lane
 
 
 def lanes_beside(network: TownNetwork) -> NDArray[np.int32]:
@@ -62,7 +63,7 @@ def lanes_beside(network: TownNetwork) -> NDArray[np.int32]:
 
 
 @compiled
-def take_helm(vehicle: Records, helm: Records, speeds: Array) -> None:
+def take_helm(vehicle: VehicleRecord, helm: HelmRecord, speeds: Array) -> None:
     """Begins to drive: on the closest lane, at the possible speed that is closest to the present one."""
     helm.lane = vehicle.lane
     helm.acceleration, helm.steering = 0.0, 0.0
@@ -81,7 +82,7 @@ def speed_index(speeds: Array, speed: float) -> int:
 
 @compiled
 def decide(
-    town: TownArrays, beside: NDArray[np.int32], vehicle: Records, helm: Records, speeds: Array, action: int
+    town: TownArrays, beside: NDArray[np.int32], vehicle: VehicleRecord, helm: HelmRecord, speeds: Array, action: int
 ) -> None:
     """Takes a meta action: `MDPVehicle.act` with one.
 
@@ -104,7 +105,7 @@ def decide(
 
 
 @compiled
-def is_reachable(town: TownArrays, lane: int, vehicle: Records) -> bool:
+def is_reachable(town: TownArrays, lane: int, vehicle: VehicleRecord) -> bool:
     """Whether a vehicle may change to a lane: `AbstractLane.is_reachable_from`."""
     station, lateral, segment = project(town, lane, vehicle.x, vehicle.y)
     if not 0.0 <= station < town.lanes[lane].length + CAR_LENGTH:
@@ -113,7 +114,7 @@ def is_reachable(town: TownArrays, lane: int, vehicle: Records) -> bool:
 
 
 @inlined
-def control(town: TownArrays, vehicle: Records, helm: Records) -> None:
+def control(town: TownArrays, vehicle: VehicleRecord, helm: HelmRecord) -> None:
     """Steers towards the target lane and accelerates to the target speed: `MDPVehicle.act` without an action."""
     station, lateral, segment = _follow_road(town, vehicle, helm)
     slip = slip_towards(town.points, town.lanes[helm.lane], vehicle, segment, station, lateral)
@@ -122,7 +123,7 @@ def control(town: TownArrays, vehicle: Records, helm: Records) -> None:
 
 
 @inlined
-def move(vehicle: Records, helm: Records, pose: Array, dt: float) -> None:
+def move(vehicle: VehicleRecord, helm: HelmRecord, pose: Array, dt: float) -> None:
     """Writes where it is after a time [s], as `Vehicle.step`: x, y, heading and speed (4,)."""
     speed, heading = vehicle.speed, vehicle.heading
     if vehicle.crashed:
@@ -139,7 +140,7 @@ def move(vehicle: Records, helm: Records, pose: Array, dt: float) -> None:
 
 
 @compiled
-def _follow_road(town: TownArrays, vehicle: Records, helm: Records) -> tuple[float, float, int]:
+def _follow_road(town: TownArrays, vehicle: VehicleRecord, helm: HelmRecord) -> tuple[float, float, int]:
     """Goes on to a next lane at the end of the target lane; returns the place on the target lane, as `project`."""
     station, lateral, segment = project(town, helm.lane, vehicle.x, vehicle.y)
     lane = town.lanes[helm.lane]
@@ -151,7 +152,7 @@ def _follow_road(town: TownArrays, vehicle: Records, helm: Records) -> tuple[flo
 
 
 @compiled
-def speed_along(town: TownArrays, vehicle: Records) -> float:
+def speed_along(town: TownArrays, vehicle: VehicleRecord) -> float:
     """Speed along the closest lane [m/s], 0 off the road (`RoadObject.on_road`)."""
     lane, station = town.lanes[vehicle.lane], vehicle.own_station
     if not -CAR_LENGTH <= station < lane.length + CAR_LENGTH:
@@ -257,7 +258,7 @@ def _find_nearest(
 
 
 @inlined
-def _ahead(town: TownArrays, observer: Any, other: Any) -> float:
+def _ahead(town: TownArrays, observer: VehicleRecord, other: PlacedBody) -> float:
     """How far along the observer's lane another body is ahead of it [m]; NaN for those too far away."""
     dx, dy = other.x - observer.x, other.y - observer.y
     if dx * dx + dy * dy >= PERCEIVED * PERCEIVED:
@@ -286,7 +287,7 @@ def _list(
 
 
 @inlined
-def _feature(vehicle: Any, feature: int) -> float:
+def _feature(vehicle: MovingBody, feature: int) -> float:
     if feature == X:
         return float(vehicle.x)
     if feature == Y:
@@ -304,8 +305,13 @@ def _feature(vehicle: Any, feature: int) -> float:
 
 # --- Decisions of many egos at once, each the first vehicle of its world: they act, the worlds go on, the ------------
 
-OUTCOME = np.dtype([("speed", "f8"), ("along", "f8"), ("crashed", "b1")], align=True)
-"""How an ego fares: its speed, and that along its lane, 0 off the road [m/s]."""
+
+class OutcomeRecord:
+    """State of an ego after a decision: its speed, the speed along its lane (0 off the road) [m/s], and crashes."""
+
+    speed: Float
+    along: Float
+    crashed: Flag
 
 
 class Egos(NamedTuple):
@@ -316,24 +322,24 @@ class Egos(NamedTuple):
         speeds: that may be held [m/s]; empty for egos that are given acceleration and steering.
         rows: int64 (1,) the row of an ego in its world.
         poses: (worlds, 1, 4) scratch: where they will be.
-        helms: `meta.HELM`.
+        helms: `HelmRecord`.
         ranges: (worlds, f, 2) see `kinematics.observe`.
         nearest: int32 (worlds, n) scratch, with `distances`.
         distances: (worlds, n) see there.
         observations: float32 (worlds, n, f).
-        outcomes: `OUTCOME`.
+        outcomes: `OutcomeRecord`.
     """
 
     beside: NDArray[np.int32]
     speeds: Array
     rows: NDArray[np.int64]
     poses: Array
-    helms: Records
+    helms: RecordArray[HelmRecord]
     ranges: Array
     nearest: NDArray[np.int32]
     distances: Array
     observations: NDArray[np.float32]
-    outcomes: Records
+    outcomes: RecordArray[OutcomeRecord]
 
 
 @concurrent
@@ -347,8 +353,8 @@ def begin_one(number: int, town: TownArrays, batch: WorldArrays, view: View, ego
         view: what is observed.
         egos: the egos of all worlds.
     """
-    vehicle = batch.vehicles[number][0]
-    find(town, vehicle)
+    vehicle = world_of(batch, number).vehicles[0]
+    update_lane(town, vehicle)
     take_helm(vehicle, egos.helms[number], egos.speeds)
     _report(number, town, batch, view, egos)
 

@@ -22,14 +22,14 @@ from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.batch.egos import (
     FASTER,
     FEATURES,
-    HELM,
     IDLE,
     LEFT,
     NOTHING,
-    OUTCOME,
     RIGHT,
     SLOWER,
     Egos,
+    HelmRecord,
+    OutcomeRecord,
     View,
     begin_one,
     lanes_beside,
@@ -38,7 +38,8 @@ from dorothie_gym.sim.batch.egos import (
 from dorothie_gym.sim.batch.worlds import VectorWorld
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_vehicle, free_places
-from dorothie_gym.sim.state.records import Kind, Records
+from dorothie_gym.sim.state.codes import Kind
+from dorothie_gym.sim.state.records import RecordArray, empty_records
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.town_env import SEEDS, TownEnv, finite, populate_around
@@ -81,13 +82,15 @@ class Actions:
         if stock.speed_range and max(map(abs, stock.speed_range)) > Vehicle.MAX_SPEED:
             raise _sync_only("action", f"a speed_range beyond {Vehicle.MAX_SPEED} m/s")
 
-    def read(self, actions: NDArray[Any], space: spaces.Space[Any], helms: Records) -> NDArray[np.int32]:
+    def read(
+        self, actions: NDArray[Any], space: spaces.Space[Any], helms: RecordArray[HelmRecord]
+    ) -> NDArray[np.int32]:
         """Codes (n,) of meta actions; continuous actions are written to the helms, and are no meta actions.
 
         Args:
             actions: (n, ...) one for each ego.
             space: of the actions of all.
-            helms: `meta.HELM` of each ego.
+            helms: `HelmRecord` of each ego.
 
         Raises:
             ValueError: actions of the wrong shape, or that do not exist.
@@ -101,11 +104,11 @@ class Actions:
             return codes
         stock: ContinuousAction = self._stock
         wanted = np.clip(actions, -1, 1) if stock.clip else actions
-        helms.acceleration = lmap(wanted[:, 0], [-1, 1], stock.acceleration_range) if stock.longitudinal else 0.0
-        helms.steering = lmap(wanted[:, -1], [-1, 1], stock.steering_range) if stock.lateral else 0.0
+        helms["acceleration"] = lmap(wanted[:, 0], [-1, 1], stock.acceleration_range) if stock.longitudinal else 0.0
+        helms["steering"] = lmap(wanted[:, -1], [-1, 1], stock.steering_range) if stock.lateral else 0.0
         return np.full(len(actions), NOTHING, dtype=np.int32)
 
-    def limit(self, helm: Records) -> None:
+    def limit(self, helm: HelmRecord) -> None:
         """Tells an ego of the range of its speeds."""
         if not self._discrete and self._stock.speed_range:
             helm.lowest, helm.highest = self._stock.speed_range
@@ -242,12 +245,12 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
             self._actions.speeds,
             np.zeros(1, dtype=np.int64),
             np.zeros((self.num_envs, 1, 4)),
-            np.zeros(self.num_envs, dtype=HELM).view(np.recarray),
+            empty_records(HelmRecord, self.num_envs),
             np.zeros((self.num_envs, shape[2], 2)),
             np.zeros(shape[:2], dtype=np.int32),
             np.zeros(shape[:2]),
             np.zeros(shape, dtype=np.float32),
-            np.zeros(self.num_envs, dtype=OUTCOME).view(np.recarray),
+            empty_records(OutcomeRecord, self.num_envs),
         )
 
     # --- gymnasium's interface --------------------------------------------------------------------------------------
@@ -306,7 +309,7 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         self._play(codes, ~again)
         self._begin_all(again)
         rewards = np.where(again, 0.0, sum(self._terms().values()))
-        terminations = ~again & self._egos.outcomes.crashed
+        terminations = ~again & self._egos.outcomes["crashed"]
         truncations = ~again & (self._elapsed >= self.config["duration"])
         self._over = terminations | truncations
         observations, infos = self._observe(everywhere), self._infos(everywhere, _without(actions, again))
@@ -379,7 +382,7 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         world = self._empty(int(rng.integers(SEEDS)))
         lane, station = free_places(self._network.town, rng, 2)[0]
         add_vehicle(self._town, world, lane, station, kind=Kind.EGO, desired=0.0)
-        world.vehicles.key[0] = world.clock.keys[0] = 0
+        world.vehicles["key"][0] = world.clock["keys"][0] = 0
         vehicles, pedestrians = int(self.config["vehicles"]), int(self.config["pedestrians"])
         populate_around(self._network, world, rng, vehicles=vehicles, pedestrians=pedestrians)
         self._worlds.put(i, world)
@@ -415,14 +418,14 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
     def _terms(self) -> dict[str, NDArray[np.float64]]:
         outcomes = self._egos.outcomes
         return {
-            "progress": np.clip(outcomes.along / self.config["reward_speed"], 0.0, 1.0),
-            "collision": self.config["collision_reward"] * outcomes.crashed.astype(np.float64),
+            "progress": np.clip(outcomes["along"] / self.config["reward_speed"], 0.0, 1.0),
+            "collision": self.config["collision_reward"] * outcomes["crashed"].astype(np.float64),
         }
 
     def _infos(self, mask: NDArray[np.bool_], actions: NDArray[Any]) -> dict[str, Any]:
         """What `SyncVectorEnv` tells of plain environments, of those of a mask."""
         outcomes = self._egos.outcomes
-        values: dict[str, Any] = {"speed": outcomes.speed, "crashed": outcomes.crashed, "action": actions}
+        values: dict[str, Any] = {"speed": outcomes["speed"], "crashed": outcomes["crashed"], "action": actions}
         infos: dict[str, Any] = {"rewards": _with_masks(self._terms(), mask), "_rewards": mask.copy()}
         return {**_with_masks(values, mask), **infos}
 

@@ -40,11 +40,11 @@ def put(batch: WorldArrays, number: int, world: WorldArrays) -> None:
     Raises:
         ValueError: the other world has room for other numbers of bodies.
     """
-    for name, row, array in zip(WorldArrays._fields, world_of(batch, number), world, strict=True):
+    for name, row, array in zip(WorldArrays._fields, world_of(batch, number).plain(), world.plain(), strict=True):
         if row.shape != array.shape:
             raise ValueError(f"the worlds of this batch have {name} of the shape {row.shape}, this one {array.shape}")
         # as bytes, since NumPy leaves out those between the fields of records
-        np.copyto(np.asarray(row).view(np.uint8), np.asarray(array).view(np.uint8))
+        np.copyto(row.view(np.uint8), array.view(np.uint8))
 
 
 def world_of(batch: WorldArrays, number: int) -> WorldArrays:

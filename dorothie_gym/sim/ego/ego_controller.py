@@ -11,39 +11,45 @@ import numpy as np
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import SPEED_STEP, PhysicalAction
-from dorothie_gym.sim.ego.limits import KMH, LATERAL_ACCELERATION, PROFILE_BRAKING, VehicleControl
+from dorothie_gym.sim.ego.feasibility import may_change_cruise
+from dorothie_gym.sim.ego.limits import (
+    KMH,
+    LATERAL_ACCELERATION,
+    MAX_CRUISE,
+    MIN_CRUISE,
+    PROFILE_BRAKING,
+    U_TURN_SPEED,
+    VehicleControl,
+)
 from dorothie_gym.sim.ego.path import Path
 from dorothie_gym.sim.ego.path_tracking import find_sides
-from dorothie_gym.sim.ego.planner import U_TURN_SPEED, LocalPlanner
+from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.ego.vehicle import Car, CarRecord
 from dorothie_gym.sim.state.records import plain
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CAR_WIDTH
 
 END_GAP = 0.8
-"""Room left between the nose of a waiting car and the end of its lane [m]."""
-
-MIN_CRUISE, MAX_CRUISE = 5.0, 90.0
-"""Range of the cruise speed [km/h]."""
+"""Room between the nose of a waiting ego and the end of its lane [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class GoalAhead:
-    """A place where the car is expected to stop: its lane and the distance along it [m]."""
+    """Place where the ego is expected to stop: lane and distance along it [m]."""
 
     lane: int
     station: float
 
 
 BEHIND, AHEAD = 12.0, 150.0
-"""Stretch of path that the compiled world is told at least, behind and ahead of the car [m]."""
+"""Stretch of path behind and ahead of the ego that is written into the arrays at least [m]."""
 
 
 def speed_profile(path: Path, stop_at: float | None) -> Array:
-    """Speed that curves, limits and the end of a path allow at each of its points (n,) [m/s].
+    """Returns the speed that curves, limits and the end of a path allow at each of its points (n,) [m/s].
 
     Args:
         path: the path.
-        stop_at: where the car has to stop [m], or None.
+        stop_at: distance along the path at which the ego has to stop [m], or None.
     """
     bend = np.convolve(np.pad(np.abs(path.curvatures), 1, mode="edge"), np.full(3, 1 / 3), mode="valid")
     squared = np.minimum(path.limits**2, LATERAL_ACCELERATION / np.maximum(bend, 1e-4))
@@ -63,13 +69,13 @@ def write_path(arrays: Any, path: Path, s: float, speeds: Array) -> float:
     """Writes the stretch of a path around a place into the arrays of a world.
 
     Args:
-        arrays: `kernel.WorldArrays` of a world with a driven car.
+        arrays: arrays of a world with a driven ego.
         path: the path.
-        s: where the car is on it [m].
-        speeds: allowed at its points (n,) [m/s].
+        s: place of the ego along it [m].
+        speeds: allowed speed at its points (n,) [m/s].
 
     Returns:
-        Where the stretch ends [m].
+        Distance along the path at which the stretch ends [m].
     """
     car, table = plain(arrays.car)[0], plain(arrays.path)
     first = path.index_at(s - BEHIND)
@@ -109,8 +115,8 @@ class EgoController:
         self.goals: Sequence[GoalAhead] = ()
         self.manual: VehicleControl | None = None
         self._car = car
-        self._told: Path | None = None
-        self._told_until = 0.0
+        self._written: Path | None = None
+        self._written_until = 0.0
         self._speeds: Array = np.zeros(0)
 
     def apply(self, action: PhysicalAction, *, angle: int = 0, up: bool = True) -> str | None:
@@ -135,29 +141,28 @@ class EgoController:
 
     def change_cruise(self, up: bool) -> str | None:
         """Changes the cruise speed by one step; returns the reason of a refusal."""
-        wanted = self.cruise + (SPEED_STEP if up else -SPEED_STEP)
-        if not MIN_CRUISE <= wanted <= MAX_CRUISE:
+        if not may_change_cruise(self.cruise, up):
             return f"the cruise speed stays within {MIN_CRUISE:.0f} and {MAX_CRUISE:.0f} km/h"
-        self.cruise = wanted
+        self.cruise += SPEED_STEP if up else -SPEED_STEP
         return None
 
     def set_goals(self, goals: Sequence[GoalAhead]) -> None:
-        """Sets where the car is expected to stop."""
+        """Sets the places where the ego is expected to stop."""
         self.goals = tuple(goals)
-        self._told = None
+        self._written = None
 
     def brief(self, arrays: Any, record: CarRecord) -> None:
-        """Writes what the car is to do into the arrays of a world, before it is stepped.
+        """Writes path, manoeuvre, cruise speed and pedals into the arrays of a world, before it is stepped.
 
         Args:
-            arrays: `kernel.WorldArrays`.
-            record: what drives the car in them.
+            arrays: arrays of the world.
+            record: the ego's fields in them.
         """
         planner = self.planner
-        if planner.path is not self._told:
-            self._tell(arrays, anew=True)
-        elif self._told_until < min(planner.s + AHEAD, planner.path.length):
-            self._tell(arrays, anew=False)
+        if planner.path is not self._written:
+            self._write(arrays, anew=True)
+        elif self._written_until < min(planner.s + AHEAD, planner.path.length):
+            self._write(arrays, anew=False)
         action, _ = planner.manoeuvre
         number, manual = 0 if action is None else action.value, self.manual
         record.orders[()] = number, planner.manoeuvre_end, self.cruise * KMH, planner.held, manual is not None
@@ -165,19 +170,19 @@ class EgoController:
             record.pedals[()] = manual.throttle, manual.steer, manual.brake
 
     def debrief(self, record: CarRecord) -> None:
-        """Takes over where the car is, after the world was stepped; see `brief`."""
+        """Reads the ego's place on the path after the world was stepped; see `brief`."""
         self.planner.note(*record.place.item())
 
     def speed_at(self, s: float) -> float:
-        """Speed that curves, limits and the end of the path allow at a distance along the path [m/s].
+        """Returns the speed that curves, limits and the end of the path allow at a distance along the path [m/s].
 
-        It is that of the path as the world was last stepped.
+        The path is that of the last step of the world.
         """
-        path = self._told
+        path = self._written
         return float(np.interp(s, path.s, self._speeds)) if path is not None else self.cruise * KMH
 
-    def _tell(self, arrays: Any, *, anew: bool) -> None:
-        """Writes the stretch of path around the car; all else that follows from the path if that was laid anew."""
+    def _write(self, arrays: Any, *, anew: bool) -> None:
+        """Writes the stretch of path around the ego, and for a new path its speeds, goals and end."""
         path, s, car = self.planner.path, self.planner.s, plain(arrays.car)[0]
         if anew:
             stop_at = path.length - self._car.LENGTH / 2 - END_GAP if self.planner.waits_at_end else None
@@ -185,12 +190,12 @@ class EgoController:
             goals = self._goals_on(path)[: car["goal"].shape[0]]
             car["goals"], car["goal"][: len(goals)] = len(goals), goals
             car["stop_at"] = math.inf if stop_at is None else stop_at
-            self._told = path
+            self._written = path
         car["offset"] = self.planner.offset
-        self._told_until = write_path(arrays, path, s, self._speeds)
+        self._written_until = write_path(arrays, path, s, self._speeds)
 
     def _goals_on(self, path: Path) -> list[float]:
-        """Places of the goals along a path [m], those of the lanes beside it among them."""
+        """Returns the places of the goals along a path [m], goals on lanes beside it included."""
         found: list[float] = []
         for goal in self.goals:
             for lane, station in self.planner.beside(goal.lane, goal.station):

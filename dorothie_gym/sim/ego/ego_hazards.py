@@ -7,29 +7,12 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.ontology import ObjectClass
-from dorothie_gym.sim.ego.obstacles import (
-    BRAKING,
-    FROM_PROP,
-    HEIGHT_MARGIN,
-    ROADBLOCK_GAP,
-    STANDSTILL_GAP,
-    bodies_ahead,
-    offer,
-)
-from dorothie_gym.sim.ego.path import U_TURN_REACH
+from dorothie_gym.sim.ego.limits import BEGUN, EGO_STANDING, FROM_PROP, HEIGHT_MARGIN, PLANNED_BRAKING, U_TURN_REACH
+from dorothie_gym.sim.ego.obstacles import ROADBLOCK_GAP, STANDSTILL_GAP, bodies_ahead, offer
 from dorothie_gym.sim.ego.path_tracking import point_at
-from dorothie_gym.sim.ego.planner import BEGUN
 from dorothie_gym.sim.network.lane_lookup import project, value_near
-from dorothie_gym.sim.state.records import (
-    PEDESTRIAN_CLASS,
-    STATIC,
-    U_TURN,
-    VEHICLES,
-    Control,
-    Records,
-    Wait,
-    Walk,
-)
+from dorothie_gym.sim.state.codes import PEDESTRIAN_CLASS, STATIC, U_TURN, VEHICLES, TrafficControl, Wait, Walk
+from dorothie_gym.sim.state.records import PassageRecord, SeenRecord
 from dorothie_gym.sim.traffic.idm_traffic import STEP_AHEAD, STEP_PAST
 from dorothie_gym.sim.traffic.junctions import announce, close, request
 from dorothie_gym.sim.traffic.parameters import CRITICAL_GAP, HARDEST_BRAKING
@@ -46,9 +29,6 @@ ASKING = 11.5
 
 UPSTREAM = 50.0
 """How far before a lane's start vehicles that come towards it are looked for [m]."""
-
-STANDING = 0.1
-"""Slower than this the car stands [m/s]."""
 
 BEFORE_MANOEUVRE = 15.0
 """How far before it would have to brake for a lane switch or U-turn it looks whether others are in its way [m]."""
@@ -100,7 +80,7 @@ def _crosswalk(town: TownArrays, world: WorldArrays, best: float) -> float:
     """Offers the next crosswalk on the path with people on it, whom the car sees and for whom it can still stop."""
     car, vehicle, path = world.car[0], world.vehicles[0], world.path
     braking = vehicle.speed * vehicle.speed
-    reach = braking / (2.0 * BRAKING) + ASKING + 0.5 * vehicle.length
+    reach = braking / (2.0 * PLANNED_BRAKING) + ASKING + 0.5 * vehicle.length
     last = point_at(world, car.s + reach)
     for r in range(car.run, car.runs):
         k = max(int(car.run_first[r]), int(car.at))
@@ -123,7 +103,7 @@ def _crosswalk(town: TownArrays, world: WorldArrays, best: float) -> float:
 
 
 @compiled
-def _walker_on(world: WorldArrays, passage: Records) -> int:
+def _walker_on(world: WorldArrays, passage: PassageRecord) -> int:
     """Key of somebody in sight on a crosswalk who is about to pass a lane, or has only just passed it; or -1."""
     vehicle, sight = world.vehicles[0], world.eye[0].sight
     for p in range(len(world.pedestrians)):
@@ -140,9 +120,9 @@ def _walker_on(world: WorldArrays, passage: Records) -> int:
 def _junction(town: TownArrays, world: WorldArrays, best: float) -> float:
     """Offers the line before a junction that the car may not enter yet."""
     car, vehicle, path = world.car[0], world.vehicles[0], world.path
-    if car.held and vehicle.speed < STANDING:
+    if car.held and vehicle.speed < EGO_STANDING:
         return best  # asks for nothing that it does not use
-    asking = vehicle.speed * vehicle.speed / (2.0 * BRAKING) + ASKING
+    asking = vehicle.speed * vehicle.speed / (2.0 * PLANNED_BRAKING) + ASKING
     half = 0.5 * vehicle.length
     last = point_at(world, car.s + max(asking, CRITICAL_GAP * vehicle.speed) + half)
     for r in range(car.run + 1, car.runs):
@@ -171,7 +151,11 @@ def _holder(town: TownArrays, wait: int, lane: int) -> int:
     if wait == Wait.LIGHT:
         return TRAFFIC_LIGHT
     control = town.lanes[lane].control
-    if (control == Control.STOP or control == Control.YIELD) and wait != Wait.NO_ROOM and wait != Wait.CLOSED:
+    if (
+        (control == TrafficControl.STOP or control == TrafficControl.YIELD)
+        and wait != Wait.NO_ROOM
+        and wait != Wait.CLOSED
+    ):
         return TRAFFIC_SIGN
     return VEHICLES
 
@@ -195,14 +179,14 @@ def _gap_to_others(town: TownArrays, world: WorldArrays, seen: int, blocked: boo
     car, vehicle, path = world.car[0], world.vehicles[0], world.path
     turning = car.action == U_TURN
     start = int(car.at)
-    if path[start].manoeuvre and (car.s > BEGUN or vehicle.speed > STANDING):
+    if path[start].manoeuvre and (car.s > BEGUN or vehicle.speed > EGO_STANDING):
         if not turning:
             way, other = _gap_beside(town, world, seen, int(path[start].lane))
             return way, other, VEHICLES
         if not blocked:
             _close_junctions(town, world, start)
         return math.inf, 0, VEHICLES
-    reach = BEFORE_MANOEUVRE + vehicle.speed * vehicle.speed / (2.0 * BRAKING)
+    reach = BEFORE_MANOEUVRE + vehicle.speed * vehicle.speed / (2.0 * PLANNED_BRAKING)
     while start < car.points and not path[start].manoeuvre and path[start].s - car.s <= reach:
         start += 1
     if start >= car.points or not path[start].manoeuvre or path[start].s - car.s > reach:
@@ -232,7 +216,7 @@ def _gap_to_others(town: TownArrays, world: WorldArrays, seen: int, blocked: boo
 
 
 @compiled
-def _leads_to(town: TownArrays, world: WorldArrays, start: int, meeting: float, prop: Records) -> bool:
+def _leads_to(town: TownArrays, world: WorldArrays, start: int, meeting: float, prop: SeenRecord) -> bool:
     """Whether a lane switch would lead the car too close to a prop on the new lane to get away from it again.
 
     Args:
@@ -247,7 +231,7 @@ def _leads_to(town: TownArrays, world: WorldArrays, start: int, meeting: float, 
     while end + 1 < car.points and path[end].manoeuvre:
         end += 1
     station, lateral, segment = project(town, target, prop.x, prop.y)
-    until = path[end].s - path[start].s + vehicle.speed * vehicle.speed / (2.0 * BRAKING) + FROM_PROP
+    until = path[end].s - path[start].s + vehicle.speed * vehicle.speed / (2.0 * PLANNED_BRAKING) + FROM_PROP
     if abs(lateral) > town.lanes[target].half_width or not -0.5 * vehicle.length < station - meeting < until:
         return False
     height = value_near(town.points, town.lanes[target], segment, 4, station)
@@ -312,7 +296,7 @@ def _find_upstream(town: TownArrays, world: WorldArrays, target: int) -> int:
 
 
 @compiled
-def _place_towards(town: TownArrays, world: WorldArrays, lanes: int, body: Records) -> float:
+def _place_towards(town: TownArrays, world: WorldArrays, lanes: int, body: SeenRecord) -> float:
     """Where a body is along the lane that was looked upstream from, negative before it [m]; infinite if it is not."""
     other = world.vehicles[body.body]
     for k in range(lanes):

@@ -1,10 +1,12 @@
-"""Throttle, brake and steering wheel, and the gains of the controllers that use them (`kernel.guiding`)."""
+"""Limits and tunables of the ego car: pedals, speeds, decelerations and the room that manoeuvres take."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
+
+# --- Pedals and steering ----------------------------------------------------------------------------------------------
 
 MAX_STEERING = math.pi / 3
 """Front wheel angle at full lock [rad], highway-env's."""
@@ -21,7 +23,7 @@ MAX_BRAKING = 8.0
 
 @dataclass(frozen=True, kw_only=True)
 class VehicleControl:
-    """What the car's actuators are told, normalised (paper, appendix A.2).
+    """Input of the ego's actuators, normalised (paper, appendix A.2).
 
     Attributes:
         throttle: in [0, 1].
@@ -35,7 +37,7 @@ class VehicleControl:
 
     @property
     def acceleration(self) -> float:
-        """[m/s^2]."""
+        """Acceleration on a dry road [m/s^2]."""
         return self.throttle * MAX_ACCELERATION - self.brake * MAX_BRAKING
 
     @property
@@ -54,34 +56,87 @@ class PIDGains(NamedTuple):
 
 
 LATERAL = PIDGains(proportional=1.2, integral=0.1, derivative=0.1, integral_limit=0.5)
-"""Of the distance from the path [m]."""
+"""Controller of the distance from the path [m]."""
 
 LONGITUDINAL = PIDGains(proportional=1.6, integral=0.15, integral_limit=0.8)
-"""Of the speed [m/s]."""
+"""Controller of the speed [m/s]."""
 
-
-# --- How fast the car goes and how it brakes: limits that its driver and the compiled world share --------------------
+# --- Speeds -----------------------------------------------------------------------------------------------------------
 
 KMH = 1 / 3.6
 """[m/s] of one km/h."""
 
-LATERAL_ACCELERATION = 2.2
-"""Comfortable in curves [m/s^2]."""
+MIN_CRUISE, MAX_CRUISE = 5.0, 90.0
+"""Range of the cruise speed [km/h]."""
 
-PROFILE_BRAKING = 2.0
-"""Deceleration towards a curve or the end of the path [m/s^2]."""
+EGO_STANDING = 0.1
+"""Speed below which the ego counts as standing [m/s]."""
 
-SURE_BRAKING = 1.8
-"""From this on, braking that is needed is applied whatever the speed controller says [m/s^2]."""
+EGO_MOVING = 0.5
+"""Speed above which the way to stop matters for a manoeuvre [m/s]."""
+
+U_TURN_SPEED = 3.5
+"""Speed of a U-turn [m/s]."""
 
 APPROACH_SPEED = 14.0 * KMH
 """Speed near a goal, under the design's 15 km/h [m/s]."""
 
 APPROACH_DISTANCE = 20.0
-"""Where a goal begins to be near [m]."""
-
-PROP_DEPTH = 1.25
-"""Half the length of the longest prop: it is in sight when its middle is [m]."""
+"""Distance to a goal from which on `APPROACH_SPEED` holds [m]."""
 
 WALKING_SPEED = 1.5
-"""Speed of a car that hardly sees anything [m/s]."""
+"""Speed with hardly any sight [m/s]."""
+
+# --- Accelerations ----------------------------------------------------------------------------------------------------
+
+LATERAL_ACCELERATION = 2.2
+"""Comfortable lateral acceleration in curves [m/s^2]."""
+
+PROFILE_BRAKING = 2.0
+"""Deceleration towards a curve or the end of the path [m/s^2]."""
+
+SURE_BRAKING = 1.8
+"""Deceleration from which on the brake that is needed overrides the speed controller [m/s^2]."""
+
+PLANNED_BRAKING = 3.0
+"""Deceleration of the action Stop, and the one that plans count on [m/s^2]."""
+
+HARD_STOP = 5.0
+"""Deceleration with which the ego still stops before a junction when its plan is changed [m/s^2]."""
+
+# --- Room for manoeuvres ----------------------------------------------------------------------------------------------
+
+HALF_LENGTH = 2.5
+"""Half the length of the ego [m]."""
+
+PROP_DEPTH = 1.25
+"""Half the length of the longest prop [m]: a prop is in sight when its middle is."""
+
+LEAD = 1.0
+"""Path before the beginning of a manoeuvre [m]."""
+
+BEGUN = 1.0
+"""Way after which a manoeuvre from a stand has begun [m]."""
+
+SWITCH_TIME = 3.0
+"""Duration of a lane switch [s]."""
+
+MIN_SWITCH = 14.0
+"""Length of the shortest lane switch [m]."""
+
+U_TURN_REACH = 14.0
+"""Room ahead of its middle that the ego needs for a U-turn [m]: 11 m for its middle where lanes are 3.5 m apart, 1 m
+for its side, and what is kept free beside it."""
+
+U_TURN_SAMPLES = 4
+"""Step in the points of a U-turn, half a metre apart, at which traffic checks for a conflict."""
+
+LANDING = 6.0
+"""Oncoming lane left after a U-turn [m], so that the ego stands straight before it waits at the lane's end."""
+
+HEIGHT_MARGIN = 2.5
+"""Difference of height from which on a body is on another road [m]."""
+
+FROM_PROP = 16.5
+"""Least distance of the ego's middle to that of a prop at the end of a lane switch or U-turn, less the way to stop [m]:
+`obstacles.ROADBLOCK_GAP`, half the ego and half the prop."""

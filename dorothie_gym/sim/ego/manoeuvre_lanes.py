@@ -9,19 +9,14 @@ from dataclasses import dataclass
 from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.town import Town
-from dorothie_gym.sim.ego.path import Piece, follow, switch
+from dorothie_gym.sim.ego.limits import LEAD, MIN_SWITCH, SWITCH_TIME
+from dorothie_gym.sim.ego.path import PathPiece, follow, switch
 
 HORIZON = 120.0
 """Length of path kept ahead [m]."""
 
 LAID = 180.0
 """Length of path that is laid ahead: so it has to be laid anew only now and then [m]."""
-
-SWITCH_TIME = 3.0
-"""A lane switch takes about this long [s]."""
-
-MIN_SWITCH = 14.0
-"""Shortest lane switch [m]."""
 
 SWITCH_COST = 20.0
 """Degrees by which an exit of the own lane may fit worse than that of a lane beside it and still be taken."""
@@ -34,9 +29,6 @@ EXACT = 5.0
 
 ANOTHER_WAY = 15.0
 """Exits whose angles differ by more than this are different turns [degrees]."""
-
-LEAD = 1.0
-"""Room that a manoeuvre leaves to the car before it begins [m]."""
 
 STOPPING = 3.0
 """Deceleration of a car that finds somebody beside it before a lane switch [m/s^2]."""
@@ -51,14 +43,14 @@ SIDES = (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT)
 
 
 @dataclass(frozen=True)
-class Step:
+class LaneStep:
     """A lane of a plan, and whether it is entered from the side."""
 
     lane: int
     change: bool = False
 
 
-class Lanes:
+class LaneChooser:
     """Questions about the lanes of a town that plans ask."""
 
     def __init__(self, town: Town) -> None:
@@ -96,26 +88,26 @@ class Lanes:
             return None
         return min(exits, key=lambda way: (abs(way.angle), way.connector)).connector
 
-    def through_junction(self, lane: int) -> list[Step]:
+    def through_junction(self, lane: int) -> list[LaneStep]:
         """The lane, and where it crosses a junction those up to the lane behind it."""
-        steps = [Step(lane)]
+        steps = [LaneStep(lane)]
         while self._town.lanes[steps[-1].lane].in_junction:
             on = self.default_successor(steps[-1].lane)
             if on is None:
                 break
-            steps.append(Step(on))
+            steps.append(LaneStep(on))
         return steps
 
-    def steps_along(self, lanes: Sequence[int]) -> list[Step]:
+    def steps_along(self, lanes: Sequence[int]) -> list[LaneStep]:
         """The steps that lead along lanes which follow, or lie beside, one another."""
-        steps = [Step(lane) for lane in lanes]
+        steps = [LaneStep(lane) for lane in lanes]
         for k in range(1, len(steps)):
             beside = [self._town.neighbour(steps[k - 1].lane, side) for side in SIDES]
             if steps[k].lane in beside:
-                steps[k] = Step(steps[k].lane, change=True)
+                steps[k] = LaneStep(steps[k].lane, change=True)
         return steps
 
-    def find_turn(self, first: list[Step], station: float, angle: int) -> tuple[list[Step], Exit] | None:
+    def find_turn(self, first: list[LaneStep], station: float, angle: int) -> tuple[list[LaneStep], Exit] | None:
         """Steps to the exit that fits an angle best, changing lanes before the junction if that fits much better.
 
         Args:
@@ -129,12 +121,12 @@ class Lanes:
             # where the lane itself leads on as asked, it is kept to its end: a lane is changed further on, if at all
             fits = [way for way in town.exits(own) if abs(wrap_degrees(way.angle - angle)) <= EXACT]
             if fits:
-                first = [*first, Step(fits[0].connector), *self._onward(fits[0])]
+                first = [*first, LaneStep(fits[0].connector), *self._onward(fits[0])]
                 if fits[0].junction_id >= 0 and abs(fits[0].angle) > ANOTHER_WAY:
                     return first, fits[0]  # everybody has to turn there: that is the turn which was asked for
-        best: tuple[float, list[Step], Exit] | None = None
+        best: tuple[float, list[LaneStep], Exit] | None = None
         # lanes that go on are looked at before lanes beside, so that a lane is changed as late as there is room for it
-        queue: deque[tuple[list[Step], int]] = deque([(first, 0)])
+        queue: deque[tuple[list[LaneStep], int]] = deque([(first, 0)])
         seen = {first[-1].lane}
         while queue:
             steps, changes = queue.popleft()
@@ -143,30 +135,30 @@ class Lanes:
                 for way in town.exits(lane):
                     misfit = abs(wrap_degrees(way.angle - angle)) + SWITCH_COST * changes
                     if best is None or misfit < best[0]:
-                        best = (misfit, [*steps, Step(way.connector), *self._onward(way)], way)
+                        best = (misfit, [*steps, LaneStep(way.connector), *self._onward(way)], way)
             else:
                 on = self.default_successor(lane)
                 if on is not None and on not in seen:
                     seen.add(on)
-                    queue.appendleft(([*steps, Step(on)], changes))
+                    queue.appendleft(([*steps, LaneStep(on)], changes))
             for side in SIDES:
                 beside = town.neighbour(lane, side)
                 if beside is None or beside in seen or changes == MOST_CHANGES:
                     continue
                 if self._room_to_switch(steps, station):
                     seen.add(beside)
-                    queue.append(([*steps, Step(beside, change=True)], changes + 1))
+                    queue.append(([*steps, LaneStep(beside, change=True)], changes + 1))
         return None if best is None else (best[1], best[2])
 
-    def _onward(self, way: Exit) -> list[Step]:
+    def _onward(self, way: Exit) -> list[LaneStep]:
         """Connectors and lane from the entered one to the exit's lane."""
         steps, lane = [], way.connector
         while lane != way.lane:
             lane = self._town.successors(lane)[0].target
-            steps.append(Step(lane))
+            steps.append(LaneStep(lane))
         return steps
 
-    def _room_to_switch(self, steps: list[Step], station: float) -> bool:
+    def _room_to_switch(self, steps: list[LaneStep], station: float) -> bool:
         lane = self._town.lanes[steps[-1].lane]
         changes = 1
         for step in reversed(steps):
@@ -179,7 +171,7 @@ class Lanes:
 
     # --- pieces of path ---------------------------------------------------------------------------------------------
 
-    def lay(self, steps: list[Step], station: float, speed: float) -> tuple[list[Piece], bool]:
+    def lay(self, steps: list[LaneStep], station: float, speed: float) -> tuple[list[PathPiece], bool]:
         """Pieces of path along steps, and on from there while nothing has to be chosen.
 
         Args:
@@ -193,7 +185,7 @@ class Lanes:
         steps = list(steps)
         lengths = [self._town.lanes[step.lane].length for step in steps if not step.change]
         open_end = self._grow(steps, sum(lengths) - station)
-        pieces: list[Piece] = []
+        pieces: list[PathPiece] = []
         at = station
         for k, step in enumerate(steps):
             lane = self._town.lanes[step.lane]
@@ -222,12 +214,12 @@ class Lanes:
             at = float(pieces[-1].stations[-1])
         return pieces, open_end
 
-    def _grow(self, steps: list[Step], ahead: float) -> bool:
+    def _grow(self, steps: list[LaneStep], ahead: float) -> bool:
         """Adds the lanes that follow until there is path enough; tells whether the path has an open end."""
         while ahead < LAID:
             on = self.default_successor(steps[-1].lane)
             if on is None:
                 return True
-            steps.append(Step(on))
+            steps.append(LaneStep(on))
             ahead += self._town.lanes[on].length
         return False

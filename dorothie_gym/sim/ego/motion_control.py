@@ -10,24 +10,26 @@ from dorothie_gym.sim.ego.ego_hazards import look
 from dorothie_gym.sim.ego.limits import (
     APPROACH_DISTANCE,
     APPROACH_SPEED,
+    BEGUN,
     LATERAL,
     LONGITUDINAL,
     MAX_ACCELERATION,
     MAX_BRAKING,
     MAX_SLIP,
     MAX_STEERING,
+    PLANNED_BRAKING,
     PROFILE_BRAKING,
     PROP_DEPTH,
     SURE_BRAKING,
     WALKING_SPEED,
 )
-from dorothie_gym.sim.ego.obstacles import BRAKING, CLOSEST, room, safe_speed
+from dorothie_gym.sim.ego.obstacles import CLOSEST, room, safe_speed
 from dorothie_gym.sim.ego.path_tracking import advance, heading_at, point_at, take_lanes
-from dorothie_gym.sim.ego.planner import BEGUN
-from dorothie_gym.sim.network.lane_lookup import wrapped
+from dorothie_gym.sim.network.lane_lookup import wrap_radians
 from dorothie_gym.sim.sensing.seeing import see
+from dorothie_gym.sim.state.codes import STATIC, U_TURN, EventCode
 from dorothie_gym.sim.state.event_log import log
-from dorothie_gym.sim.state.records import STATIC, U_TURN, EventCode, Records
+from dorothie_gym.sim.state.records import EgoRecord
 from dorothie_gym.sim.traffic.junctions import note
 from dorothie_gym.sim.traffic.vehicle_models import slip_of
 from dorothie_gym.sim.weather import (
@@ -46,7 +48,7 @@ if TYPE_CHECKING:
 
 
 @inlined
-def drift(car: Records, time: float, heading: float, speed: float) -> float:
+def drift(car: EgoRecord, time: float, heading: float, speed: float) -> float:
     """Angle by which the car's course lies beside its heading, positive right [rad]: `Wind.drift`."""
     swing = 0.0
     for k in range(len(PERIODS)):
@@ -102,7 +104,7 @@ def guide(town: TownArrays, world: WorldArrays, dt: float) -> None:
         target, limiting = min(free, safe), safe < free - LIMITING
     if car.held:
         slow = vehicle.speed if car.hold_speed < 0.0 else min(car.hold_speed, vehicle.speed)
-        car.hold_speed = max(slow - BRAKING * dt, 0.0)
+        car.hold_speed = max(slow - PLANNED_BRAKING * dt, 0.0)
         target = min(target, car.hold_speed)
     else:
         car.hold_speed = -1.0
@@ -162,7 +164,7 @@ def _control(world: WorldArrays, target: float, dt: float) -> None:
         car.lateral_last = error
         back = LATERAL.proportional * error + LATERAL.integral * car.lateral_sum + LATERAL.derivative * slope
     wanted = heading_at(world, car.s + 0.5 * vehicle.speed * dt) + math.atan2(back * BACK, max(vehicle.speed, 1.0))
-    slip = min(max(wrapped(wanted - vehicle.heading), -MAX_SLIP), MAX_SLIP)
+    slip = min(max(wrap_radians(wanted - vehicle.heading), -MAX_SLIP), MAX_SLIP)
     error = target - vehicle.speed
     limit = LONGITUDINAL.integral_limit
     car.speed_sum = min(max(car.speed_sum + error * dt, -limit), limit)

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.maps.model import Lane
 from dorothie_gym.ontology import ObjectClass
-from dorothie_gym.sim.ego.manoeuvre_lanes import LEAD, MIN_SWITCH, SWITCH_TIME
-from dorothie_gym.sim.ego.path import SPACING, U_TURN_REACH
+from dorothie_gym.sim.ego.limits import HEIGHT_MARGIN
+from dorothie_gym.sim.ego.path import SPACING
 from dorothie_gym.sim.ego.path_tracking import WIDEST, point_at
-from dorothie_gym.sim.state.records import STATIC, Records
+from dorothie_gym.sim.state.codes import STATIC
+from dorothie_gym.sim.state.records import EgoRecord, SeenRecord
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
@@ -26,9 +23,6 @@ LOOKAHEAD = 45.0
 
 SIDE_MARGIN = 0.35
 """Room kept beside the car [m]."""
-
-HEIGHT_MARGIN = 2.5
-"""Things further above or below are on another road [m]."""
 
 CROSSING = 0.35
 """Sine of the angle to the path from which on a moving body counts as crossing it."""
@@ -53,7 +47,7 @@ HARD_BRAKING = 4.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Body:
+class PerceivedBody:
     """A thing that can be hit, as perceived.
 
     Attributes:
@@ -127,7 +121,7 @@ def safe_speed(speed: float, left: float, friction: float) -> float:
 
 
 @inlined
-def offer(car: Records, best: float, kind: int, gap: float, speed: float, key: int, tight: bool, line: bool) -> float:
+def offer(car: EgoRecord, best: float, kind: int, gap: float, speed: float, key: int, tight: bool, line: bool) -> float:
     """Notes something as what limits the car if it asks for less speed than `best` [m/s]; returns the lesser one."""
     safe = safe_speed(speed, room(kind, gap, speed, tight, line), 1.0)
     if safe >= best:
@@ -171,7 +165,7 @@ def bodies_ahead(world: WorldArrays, seen: int) -> float:
 
 
 @compiled
-def _meet(world: WorldArrays, body: Records, last: int) -> tuple[int, float, float]:
+def _meet(world: WorldArrays, body: SeenRecord, last: int) -> tuple[int, float, float]:
     """The first place of the path where the car would touch a body, now or where it is heading.
 
     The path is not longer than its points say: those that are closer together than the body is away are skipped.
@@ -220,49 +214,3 @@ def _skip(world: WorldArrays, k: int, last: int, away: float) -> int:
     while k + step <= last and step > 1 and path[k + step].s > target:
         step -= 1
     return k + max(step, 1)
-
-
-# --- Room before props: whether a manoeuvre would lead the car so close to one that it cannot get away ag ------------
-
-LANDING = 6.0
-"""Oncoming lane left after a U-turn, so that the car stands straight before it waits at the lane's end [m]."""
-
-HALF_LENGTH = 2.5
-"""Of the car [m]."""
-
-FROM_PROP = 16.5
-"""Where a lane switch or a U-turn ends, the car's middle is at least this far before that of a prop, less the way to
-stop [m]: `hazards.ROADBLOCK_GAP`, half the car and half the prop."""
-
-BRAKING = 3.0
-"""Deceleration that plans count on [m/s^2]."""
-
-Props = Iterable[tuple[float, float, float]]
-"""Where the middles of props are: x, y and the height of the road there [m]."""
-
-
-def switch_is_blocked(props: Props, lane: Lane, station: float, speed: float) -> bool:
-    """Whether a prop is too close on the lane to switch to.
-
-    Args:
-        props: that the car sees.
-        lane: the lane to switch to.
-        station: how far along it the car is [m].
-        speed: of the car [m/s].
-    """
-    way = LEAD + max(MIN_SWITCH, SWITCH_TIME * speed) + speed**2 / (2 * BRAKING)
-    return _is_blocked(props, lane, station - HALF_LENGTH, station + way + FROM_PROP)
-
-
-def landing_is_blocked(props: Props, lane: Lane, station: float) -> bool:
-    """Whether a prop is too close on an oncoming lane to turn round onto it at a station [m]."""
-    return _is_blocked(props, lane, station - U_TURN_REACH, station + LANDING + FROM_PROP)
-
-
-def _is_blocked(props: Props, lane: Lane, begin: float, end: float) -> bool:
-    for x, y, height in props:
-        station, lateral = lane.project(np.array((x, y)))
-        level = abs(lane.height_at(station) - height) < HEIGHT_MARGIN
-        if level and abs(lateral) < lane.width_at(station) / 2 and begin < station < end:
-            return True
-    return False

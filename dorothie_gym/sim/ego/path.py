@@ -18,13 +18,8 @@ TURNING_RADIUS = 4.5
 """Radius of a U-turn [m]: a little over the 3.8 m of highway-env's bicycle at full lock (60 degrees, 5 m long)."""
 
 
-U_TURN_REACH = 14.0
-"""Room ahead of its middle that a car needs for a U-turn [m]: 11 m for its middle where lanes are 3.5 m apart, 1 m for
-its side, and what is kept free beside it."""
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Piece:
+class PathPiece:
     """A stretch of path that belongs to one lane.
 
     Attributes:
@@ -44,15 +39,17 @@ class Piece:
     manoeuvre: bool = False
 
 
-def follow(lane: Lane, start: float = 0.0, end: float | None = None) -> Piece:
+def follow(lane: Lane, start: float = 0.0, end: float | None = None) -> PathPiece:
     """Stretch along the centre line of a lane."""
     end = lane.length if end is None else end
     count = max(2, math.ceil((end - start) / SPACING) + 1)
     s = np.linspace(start, end, count)
-    return Piece(lane=lane.id, points=_sample(lane, s), heights=_heights(lane, s), stations=s, limit=lane.speed_limit)
+    return PathPiece(
+        lane=lane.id, points=_sample(lane, s), heights=_heights(lane, s), stations=s, limit=lane.speed_limit
+    )
 
 
-def switch(source: Lane, target: Lane, start: float, distance: float) -> Piece:
+def switch(source: Lane, target: Lane, start: float, distance: float) -> PathPiece:
     """Stretch from one lane to the one beside it.
 
     The lateral shift follows 10 t^3 - 15 t^4 + 6 t^5, which has no jump in curvature at either end.
@@ -69,7 +66,7 @@ def switch(source: Lane, target: Lane, start: float, distance: float) -> Piece:
     weight = (t**3 * (10 - 15 * t + 6 * t**2))[:, None]
     stations = begin + t * (end - begin)
     points = (1 - weight) * _sample(source, start + t * distance) + weight * _sample(target, stations)
-    return Piece(
+    return PathPiece(
         lane=target.id,
         points=points,
         heights=_heights(target, stations),
@@ -79,7 +76,7 @@ def switch(source: Lane, target: Lane, start: float, distance: float) -> Piece:
     )
 
 
-def u_turn(source: Lane, target: Lane, start: float, radius: float = TURNING_RADIUS) -> Piece:
+def u_turn(source: Lane, target: Lane, start: float, radius: float = TURNING_RADIUS) -> PathPiece:
     """Stretch from a lane to the oncoming one on its left.
 
     Where the lanes are closer than two radii the car first swings out: arcs right, left by more than a half circle,
@@ -115,7 +112,7 @@ def u_turn(source: Lane, target: Lane, start: float, radius: float = TURNING_RAD
             psi += turn
             points.append((x, y))
     line = np.array(points)
-    return Piece(
+    return PathPiece(
         lane=target.id,
         points=line,
         heights=np.full(len(line), target.height_at(station)),
@@ -140,7 +137,7 @@ class Path:
         manoeuvre: whether each point is off the lanes' centre lines (n,).
     """
 
-    def __init__(self, pieces: Sequence[Piece]) -> None:
+    def __init__(self, pieces: Sequence[PathPiece]) -> None:
         points = np.concatenate([piece.points for piece in pieces])
         keep = np.concatenate(([True], np.hypot(*np.diff(points, axis=0).T) > 1e-3))
         piece_of = np.repeat(np.arange(len(pieces), dtype=np.int16), [len(piece.points) for piece in pieces])[keep]

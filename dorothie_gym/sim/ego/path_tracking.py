@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.sim.state.records import Records
+from dorothie_gym.sim.state.records import PathPointRecord, RecordArray, VehicleRecord
 from dorothie_gym.sim.traffic.parameters import PLANNED
 from dorothie_gym.sim.traffic.route import locate
 
@@ -44,7 +44,7 @@ def heading_at(world: WorldArrays, s: float) -> float:
 
 
 @compiled
-def advance(town: TownArrays, world: WorldArrays, vehicle: Records) -> None:
+def advance(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> None:
     """Finds the closest place of the path around the last one: distance along it, and from it (positive right)."""
     path, car = world.path, world.car[0]
     last = int(car.points) - 1
@@ -70,7 +70,7 @@ def advance(town: TownArrays, world: WorldArrays, vehicle: Records) -> None:
 
 
 @compiled
-def find_sides(path: Records, count: int, length: float, width: float) -> None:
+def find_sides(path: RecordArray[PathPointRecord], count: int, length: float, width: float) -> None:
     """Finds out how far a car comes to the left and to the right of its middle's path, by its corners.
 
     highway-env's bicycle moves along its heading plus a slip angle, and turns by the sine of that over half its length:
@@ -99,7 +99,7 @@ def find_sides(path: Records, count: int, length: float, width: float) -> None:
 
 
 @inlined
-def take_lanes(town: TownArrays, world: WorldArrays, vehicle: Records) -> None:
+def take_lanes(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> None:
     """The lanes of the path from the car's place on become the vehicle's plan, and it is found on the first of them."""
     car = world.car[0]
     r = 0

@@ -1,7 +1,7 @@
-"""The local planner: turns physical actions into a path (paper, section 3.1).
+"""Local planner of the ego: turns navigation actions into a path (paper, section 3.1).
 
-By default the car follows its lane and goes on where there is one way only. Where a lane ends at a junction with a
-choice, and no turn was asked for, the path ends there and the car waits.
+By default the ego follows its lane, and goes on where only one way leads on. Where a lane ends at a junction with a
+choice and no turn is planned, the path ends there and the ego waits.
 """
 
 from __future__ import annotations
@@ -14,38 +14,34 @@ from dorothie_gym.maps.lane_neighbours import Oncoming, oncoming_lanes
 from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology import PhysicalAction
-from dorothie_gym.sim.ego.manoeuvre_lanes import HORIZON, LEAD, MIN_SWITCH, Lanes, Step
-from dorothie_gym.sim.ego.obstacles import BRAKING, HALF_LENGTH, LANDING, landing_is_blocked, switch_is_blocked
-from dorothie_gym.sim.ego.path import TURNING_RADIUS, U_TURN_REACH, Path, Piece, follow, u_turn
-
-BEGUN = 1.0
-"""A manoeuvre from a stand has begun after this way [m]."""
-
-SWEEP_STEP = 4
-"""Of the points of a U-turn, which are half a metre apart, others are told every so many."""
-
-U_TURN_SPEED = 3.5
-"""Speed of a U-turn [m/s]."""
-
-HARD_STOP = 5.0
-"""Deceleration with which the car still stops before a junction when its plan is changed [m/s^2]."""
+from dorothie_gym.sim.ego.feasibility import (
+    FeasibleManoeuvres,
+    has_room_to_switch,
+    is_past_stopping,
+    landing_is_blocked,
+    switch_is_blocked,
+    u_turn_start,
+)
+from dorothie_gym.sim.ego.limits import EGO_MOVING, HALF_LENGTH, LANDING, U_TURN_REACH
+from dorothie_gym.sim.ego.manoeuvre_lanes import HORIZON, LaneChooser, LaneStep
+from dorothie_gym.sim.ego.path import TURNING_RADIUS, Path, PathPiece, follow, u_turn
 
 
 class LocalPlanner:
-    """Keeps the path of the car, and changes it by physical actions.
+    """Path of the ego, changed by navigation actions.
 
     Attributes:
-        path: the present path; it is laid anew by every manoeuvre, `s` is always measured on the present one.
-        s: how far along the path the car is [m].
+        path: the present path; every manoeuvre lays it anew, and `s` is measured on the present one.
+        s: place of the ego along the path [m].
         offset: its distance from the path, positive right [m].
-        held: whether the car stands by the action Stop.
-        roadblock: how far ahead of the car's middle a roadblock is seen [m], or inf.
-        props: where all props are that the car sees (x, y, height) [m].
+        held: whether the ego stands by the action Stop.
+        roadblock: distance from the ego's middle to a roadblock on the path [m], or inf.
+        props: places of all props that the ego sees (x, y, height) [m].
     """
 
     def __init__(self, town: Town, lane: int, station: float) -> None:
         self._town = town
-        self._lanes = Lanes(town)
+        self._lanes = LaneChooser(town)
         self._oncoming = oncoming_lanes(town)
         self.held = False
         self.roadblock = math.inf
@@ -57,15 +53,15 @@ class LocalPlanner:
         self._begin(lane, station, 0.0)
 
     def _begin(self, lane: int, station: float, offset: float) -> None:
-        pieces, self._open_end = self._lanes.lay([Step(lane)], station, 0.0)
+        pieces, self._open_end = self._lanes.lay([LaneStep(lane)], station, 0.0)
         self.path = Path(pieces or [follow(self._town.lanes[lane], self._town.lanes[lane].length - 0.5)])
         self.s, self.offset = (0.0 if pieces else self.path.length), offset
 
-    # --- where the car is -------------------------------------------------------------------------------------------
+    # --- Place on the path ------------------------------------------------------------------------------------------
 
     @property
     def lane(self) -> int:
-        """Lane that the car counts as being on."""
+        """Lane that the ego counts as being on."""
         return int(self.path.lanes[self.path.index_at(self.s)])
 
     @property
@@ -77,7 +73,7 @@ class LocalPlanner:
 
     @property
     def height(self) -> float:
-        """Height of the road under the car [m]."""
+        """Height of the road under the ego [m]."""
         return float(self.path.heights[self.path.index_at(self.s)])
 
     @property
@@ -87,7 +83,7 @@ class LocalPlanner:
 
     @property
     def room(self) -> float:
-        """Path left ahead of the car's middle [m]."""
+        """Path left ahead of the ego's middle [m]."""
         return self.path.length - self.s
 
     @property
@@ -97,58 +93,58 @@ class LocalPlanner:
 
     @property
     def lanes_ahead(self) -> list[int]:
-        """Lanes of the path from here on, each once, in order."""
+        """Lanes of the path ahead, in order."""
         lanes = self.path.lanes[self.path.index_at(self.s) :]
         change = np.concatenate(([True], lanes[1:] != lanes[:-1]))
         return [int(lane) for lane in lanes[change]]
 
     @property
     def in_manoeuvre(self) -> bool:
-        """Whether the car is off the centre lines: switching or turning round."""
+        """Whether the ego is off the centre lines, in a lane switch or U-turn."""
         return bool(self.path.manoeuvre[self.path.index_at(self.s)])
 
     @property
     def manoeuvre_end(self) -> float:
-        """Where along the path the manoeuvre is over [m]."""
+        """Distance along the path at which the manoeuvre ends [m]."""
         return self._manoeuvre_end
 
     def note(self, s: float, offset: float, roadblock: float) -> None:
-        """Takes note of where the car is along the path, how far to the right of it, and where a roadblock is [m]."""
+        """Takes over place along the path, offset to its right and distance of a roadblock [m]."""
         self.s, self.offset, self.roadblock = s, offset, roadblock
         if self._manoeuvre is not None and s >= self._manoeuvre_end:
             self._manoeuvre, self._manoeuvre_angle = None, 0
 
     def extend(self, speed: float) -> None:
-        """Lengthens the path ahead where the way is clear; to be called once a decision, with the speed [m/s]."""
+        """Lengthens the path ahead where only one way leads on; called once a decision, with the speed [m/s]."""
         if self.room < HORIZON and not self._open_end:
             self._lay_from_here(self._lanes.steps_along(self.lanes_ahead), speed)
 
     def restart(self, lane: int, station: float, offset: float) -> None:
-        """Lays the path anew for a car that has left it, and forgets what was planned.
+        """Lays the path anew for an ego that has left it, and drops the plan.
 
         Args:
-            lane: where the car is: the lane,
-            station: the distance along it [m],
-            offset: and from it, positive right [m].
+            lane: lane of the ego.
+            station: distance along it [m].
+            offset: distance from it, positive right [m].
         """
         self._clear()
         self._begin(lane, station, offset)
 
     def beside(self, lane: int, station: float) -> list[tuple[int, float]]:
-        """A place, and those beside it on the other lanes of its direction: lane and distance along it [m]."""
+        """Returns lane and station [m] of a place, and of those beside it on the other lanes of its direction."""
         position = self._town.lanes[lane].position(station)
         return [
             (other, station if other == lane else self._town.lanes[other].project(position)[0])
             for other in self._lanes.side_by_side(lane)
         ]
 
-    # --- turn options -----------------------------------------------------------------------------------------------
+    # --- Turn options -----------------------------------------------------------------------------------------------
 
     def exits(self) -> tuple[tuple[Exit, ...], float]:
-        """Turn options at the next junction with a choice, and the distance to it along the path [m].
+        """Returns the turn options at the next junction with a choice, and the distance to it along the path [m].
 
-        While the turn for that junction is already in the plan, the options and distance are still those of that
-        junction, until the car enters it.
+        While a turn at that junction is planned, options and distance remain those of that junction until the ego
+        enters it.
         """
         k = self.path.index_at(self.s)
         lanes = self.path.lanes
@@ -161,18 +157,18 @@ class LocalPlanner:
                 return self._town.exits(lane), float(self.path.s[last]) + left - self.s
         return (), 0.0
 
-    # --- actions ----------------------------------------------------------------------------------------------------
+    # --- Navigation actions -----------------------------------------------------------------------------------------
 
     def command(self, action: PhysicalAction, angle: int, speed: float) -> str | None:
-        """Carries out a navigation action.
+        """Applies a navigation action.
 
         Args:
             action: one of the six navigation actions.
             angle: degrees, positive left; for JTurn and LaneSwitch.
-            speed: of the car [m/s].
+            speed: of the ego [m/s].
 
         Returns:
-            None, or the reason why nothing was changed.
+            None, or the reason of the refusal; then nothing has changed.
         """
         if action is PhysicalAction.STOP:
             if self.held:
@@ -205,7 +201,7 @@ class LocalPlanner:
         if self.is_committed(speed):
             return "the car cannot stop before the junction any more"
         self._clear()
-        self._lay([Step(self.lane)], self.station)
+        self._lay([LaneStep(self.lane)], self.station)
         return None
 
     def _switch_lane(self, angle: int, speed: float) -> str | None:
@@ -216,22 +212,35 @@ class LocalPlanner:
             return target
         self._clear()
         self._manoeuvre, self._manoeuvre_angle = PhysicalAction.LANE_SWITCH, 90 if angle > 0 else -90
-        self._lay([Step(self.lane), Step(target, change=True)], self.station, speed)
+        self._lay([LaneStep(self.lane), LaneStep(target, change=True)], self.station, speed)
         return None
+
+    def feasible(self, speed: float) -> FeasibleManoeuvres:
+        """Returns the navigation actions that would be carried out at a speed [m/s]."""
+        committed = self.is_committed(speed)
+        if self.in_manoeuvre or self._town.lanes[self.lane].in_junction:
+            return FeasibleManoeuvres(False, False, False, False, not committed)
+        return FeasibleManoeuvres(
+            not committed and (self.held or self._manoeuvre is not None),
+            self.may_switch(LinkType.LANE_CHANGE_LEFT, speed),
+            self.may_switch(LinkType.LANE_CHANGE_RIGHT, speed),
+            self.may_turn_round(speed),
+            not committed,
+        )
 
     def may_switch(self, side: LinkType, speed: float = 0.0) -> bool:
         """Whether a lane switch would be carried out at a speed [m/s]; `side` is one of the two lane-change types."""
         return not isinstance(self._plan_switch(side, speed), str)
 
     def _plan_switch(self, side: LinkType, speed: float) -> int | str:
-        """The lane to switch to, or why there can be no switch."""
+        """Returns the lane to switch to, or the reason of a refusal."""
         name = "left" if side is LinkType.LANE_CHANGE_LEFT else "right"
         if self.in_manoeuvre or self._town.lanes[self.lane].in_junction:
             return "the car is in the middle of a manoeuvre"
         target = self._town.neighbour(self.lane, side)
         if target is None:
             return f"there is no lane to the {name}"
-        if self._town.lanes[self.lane].length - self.station < MIN_SWITCH + LEAD:
+        if not has_room_to_switch(self._town.lanes[self.lane].length - self.station):
             return f"there is no room left to switch to the {name}"
         lane = self._town.lanes[target]
         beside = lane.project(self._town.lanes[self.lane].position(self.station))[0]
@@ -241,7 +250,7 @@ class LocalPlanner:
 
     @property
     def turn_ahead(self) -> int | None:
-        """Angle of the turn that is planned and not yet begun [degrees], or None."""
+        """Angle of the turn that is planned and has not begun [degrees], or None."""
         if self._manoeuvre is not PhysicalAction.J_TURN:
             return None
         lane, connector = self._town.lanes[self.lane], self._town.lanes[self._chosen[0]]
@@ -249,7 +258,7 @@ class LocalPlanner:
         return None if begun else self._manoeuvre_angle
 
     def is_committed(self, speed: float) -> bool:
-        """Whether the car cannot stop any more before the junction at which it is to turn, at this speed [m/s]."""
+        """Whether the ego cannot stop any more before the junction of the planned turn, at a speed [m/s]."""
         if self.turn_ahead is None:
             return False
         k = self.path.index_at(self.s)
@@ -257,7 +266,7 @@ class LocalPlanner:
         if not len(turn):
             return False
         room = float(self.path.s[k + int(turn[0])]) - self.s - HALF_LENGTH
-        return speed > 0.5 and speed**2 / (2 * HARD_STOP) > room
+        return is_past_stopping(speed, room)
 
     def may_turn_round(self, speed: float) -> bool:
         """Whether a U-turn would be carried out at this speed [m/s]."""
@@ -273,14 +282,14 @@ class LocalPlanner:
         return None
 
     def _plan_u_turn(self, speed: float) -> tuple[Oncoming, float] | str:
-        """Where a U-turn would lead and the station where it would begin, or why there can be none."""
+        """Returns landing and first station of a U-turn, or the reason of a refusal."""
         lane, station = self._town.lanes[self.lane], self.station
         if self.in_manoeuvre or lane.in_junction:
             return "the car is in the middle of a manoeuvre"
-        begin = station + LEAD * (speed > 0.5) + max(0.0, speed**2 - U_TURN_SPEED**2) / (2 * BRAKING)
+        begin = u_turn_start(station, speed)
         oncoming = self._oncoming.at(lane.id, min(begin, lane.length))
         if oncoming is not None:
-            # just behind a junction: go on a little, so that the turn ends before the oncoming lane does
+            # right behind a junction: begin a little later, so that the turn ends before the oncoming lane does
             short = LANDING - (self._town.lanes[oncoming.lane].length - oncoming.station)
             if short > 0.0:
                 begin += short
@@ -289,7 +298,7 @@ class LocalPlanner:
             if self._town.neighbour(lane.id, LinkType.LANE_CHANGE_LEFT) is not None:
                 return "a U-turn begins on the leftmost lane"
             return "there is no oncoming lane beside this one"
-        if speed > 0.5 and begin - station + U_TURN_REACH > self.roadblock:
+        if speed > EGO_MOVING and begin - station + U_TURN_REACH > self.roadblock:
             return "the car is too fast to turn round before the roadblock"
         if begin > lane.length + 0.5:
             return "there is no room left to turn round"
@@ -298,7 +307,7 @@ class LocalPlanner:
         return oncoming, min(begin, lane.length)
 
     def _turn(self, angle: int, speed: float) -> str | None:
-        _, free = self._under_way()  # lanes can be changed again from where a manoeuvre under way ends
+        _, free = self._under_way()  # lanes can be changed again from the end of a manoeuvre under way
         found = self._lanes.find_turn(self._lanes.through_junction(self.lane), free, angle)
         if found is None:
             return "there is no junction with a choice ahead"
@@ -317,25 +326,27 @@ class LocalPlanner:
     def _clear(self) -> None:
         self._manoeuvre, self._manoeuvre_angle, self._chosen = None, 0, (-1, -1)
 
-    # --- laying the path --------------------------------------------------------------------------------------------
+    # --- Laying the path --------------------------------------------------------------------------------------------
 
-    def _lay(self, steps: list[Step], station: float, speed: float = 0.0, head: list[Piece] | None = None) -> None:
+    def _lay(
+        self, steps: list[LaneStep], station: float, speed: float = 0.0, head: list[PathPiece] | None = None
+    ) -> None:
         """Lays the path anew: `steps[0]` from `station` on, behind the pieces of `head`."""
         pieces, self._open_end = self._lanes.lay(steps, station, speed)
         self._set_path([*(head or []), *pieces])
 
-    def _lay_from_here(self, steps: list[Step], speed: float = 0.0) -> None:
-        """Lays the path anew from the car's place, keeping the rest of a lane switch or U-turn under way."""
+    def _lay_from_here(self, steps: list[LaneStep], speed: float = 0.0) -> None:
+        """Lays the path anew from the ego's place, and keeps the rest of a lane switch or U-turn under way."""
         head, station = self._under_way()
         self._lay(steps, station, speed, head)
 
-    def _under_way(self) -> tuple[list[Piece], float]:
+    def _under_way(self) -> tuple[list[PathPiece], float]:
         k = self.path.index_at(self.s)
         if not self.path.manoeuvre[k]:
             return [], self.station
         end = k + int(np.argmin(self.path.manoeuvre[k:])) if not self.path.manoeuvre[k:].all() else len(self.path.s)
         cut = slice(k, end)
-        piece = Piece(
+        piece = PathPiece(
             lane=self.lane,
             points=self.path.points[cut],
             heights=self.path.heights[cut],
@@ -345,20 +356,20 @@ class LocalPlanner:
         )
         if len(piece.points) < 2:
             return [], self.station
-        # the lane goes on where it did before: a little behind the end of a U-turn, lest the path turn back on itself
+        # the lane continues where it did before: a little behind the end of a U-turn, or the path would turn back
         landing = end if end < len(self.path.s) and int(self.path.lanes[end]) == self.lane else end - 1
         return [piece], float(self.path.stations[landing])
 
     def _lay_u_turn(self, oncoming: Oncoming, begin: float) -> None:
         lane, target = self._town.lanes[self.lane], self._town.lanes[oncoming.lane]
-        head: list[Piece] = []
+        head: list[PathPiece] = []
         if begin > self.station + 1e-3:
             head.append(follow(lane, self.station, begin))
         head.append(u_turn(lane, target, begin, TURNING_RADIUS))
         landing = min(oncoming.station + 0.5, target.length)
-        self._lay([Step(target.id)], landing, head=head)
+        self._lay([LaneStep(target.id)], landing, head=head)
 
-    def _set_path(self, pieces: list[Piece]) -> None:
+    def _set_path(self, pieces: list[PathPiece]) -> None:
         if not pieces:  # the very end of a lane: its last half metre
             lane = self._town.lanes[self.lane]
             pieces = [follow(lane, lane.length - 0.5)]

@@ -16,7 +16,8 @@ from dorothie_gym.compilation import allocating, compiled, inlined
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.polyline import closest_on_segment
 from dorothie_gym.sim.network.grid import SAME_LEVEL
-from dorothie_gym.sim.state.records import ENTRY, NOBODY, Records
+from dorothie_gym.sim.state.codes import NOBODY
+from dorothie_gym.sim.state.records import CellEntryRecord, LaneRecord, RecordArray, empty_records
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
@@ -35,7 +36,7 @@ TURNED = 1.0
 """A lane that is off a body's heading by more than this [rad] costs more than this [m] in highway-env's ranking."""
 
 
-class Cells(NamedTuple):
+class LaneCells(NamedTuple):
     """The lists of all cells.
 
     Attributes:
@@ -46,38 +47,38 @@ class Cells(NamedTuple):
 
     origin: Array
     bounds: NDArray[np.int32]
-    entries: Records
+    entries: RecordArray[CellEntryRecord]
 
 
-def build_cells(points: Array, lanes: Records) -> Cells:
+def build_cells(points: Array, lanes: RecordArray[LaneRecord]) -> LaneCells:
     """Lists the lanes of a town.
 
     Args:
         points: (p, 6) as in `polyline.LaneTable`.
         lanes: `records.LANE`.
     """
-    order = np.argsort(lanes.rank).astype(np.int64)
-    low = np.array([lanes.left_edge.min(), lanes.low_edge.min()]) - REACH - CELL
-    high = np.array([lanes.right_edge.max(), lanes.high_edge.max()]) + REACH + CELL
+    order = np.argsort(lanes["rank"]).astype(np.int64)
+    low = np.array([lanes["left_edge"].min(), lanes["low_edge"].min()]) - REACH - CELL
+    high = np.array([lanes["right_edge"].max(), lanes["high_edge"].max()]) + REACH + CELL
     columns, rows = (int(n) for n in np.ceil((high - low) / CELL))
     counts = np.zeros((rows, columns), dtype=np.int32)
-    none = np.zeros(0, dtype=ENTRY).view(np.recarray)
+    none = empty_records(CellEntryRecord, 0)
     _list_lanes(points, lanes, order, low, counts, none)
     stops = np.cumsum(counts.ravel(), dtype=np.int32).reshape(counts.shape)
     starts = stops - counts
-    entries = np.zeros(int(stops[-1, -1]), dtype=ENTRY).view(np.recarray)
+    entries = empty_records(CellEntryRecord, int(stops[-1, -1]))
     _list_lanes(points, lanes, order, low, starts.copy(), entries)
-    return Cells(low, np.ascontiguousarray(np.stack((starts, stops), axis=-1)), entries)
+    return LaneCells(low, np.ascontiguousarray(np.stack((starts, stops), axis=-1)), entries)
 
 
 @allocating
 def _list_lanes(
     points: Array,
-    lanes: Records,
+    lanes: RecordArray[LaneRecord],
     order: NDArray[np.int64],
     origin: Array,
     cursors: NDArray[np.int32],
-    entries: Records,
+    entries: RecordArray[CellEntryRecord],
 ) -> None:
     """Counts the lanes of each cell in `cursors`; if there are `entries`, writes them where the cursors stand."""
     rows, columns = cursors.shape
@@ -127,7 +128,7 @@ def _stretch(points: Array, first: int, last: int, x: float, y: float) -> tuple[
 
 
 @allocating
-def _write(entry: Records, points: Array, lane: int, first: int, last: int) -> None:
+def _write(entry: CellEntryRecord, points: Array, lane: int, first: int, last: int) -> None:
     low = high = points[first, 3]
     for k in range(first, last + 2):
         low, high = min(low, points[k, 3]), max(high, points[k, 3])
@@ -150,7 +151,7 @@ TURN = 2.0 * math.pi
 
 
 @inlined
-def wrapped(angle: float) -> float:
+def wrap_radians(angle: float) -> float:
     """The same angle in [-pi, pi) [rad], as `highway_env.utils.wrap_to_pi` gives it."""
     turned = angle + math.pi
     # a remainder takes longer than all the rest, and within two turns a sum is the same to the last bit
@@ -162,7 +163,7 @@ def wrapped(angle: float) -> float:
 
 
 @inlined
-def value_near(points: Array, lane: Records, segment: int, column: int, station: float) -> float:
+def value_near(points: Array, lane: LaneRecord, segment: int, column: int, station: float) -> float:
     """A column of a lane's points at a station, linear between them: `polyline.value_at`, searched from a segment."""
     k, last = segment, lane.last
     if station <= 0.0:
@@ -198,7 +199,7 @@ def closest_segment(points: Array, first: int, last: int, x: float, y: float) ->
 
 @inlined
 def coordinates(
-    points: Array, lane: Records, at: int, share: float, gap: float, x: float, y: float
+    points: Array, lane: LaneRecord, at: int, share: float, gap: float, x: float, y: float
 ) -> tuple[float, float]:
     """Station and lateral distance [m] by the closest segment: `polyline.local_coordinates`."""
     if at == lane.first and share == 0.0:
@@ -238,14 +239,14 @@ def project(town: TownArrays, number: int, x: float, y: float) -> tuple[float, f
 
 
 @inlined
-def cost(points: Array, lane: Records, at: int, station: float, lateral: float, heading: float) -> float:
+def cost(points: Array, lane: LaneRecord, at: int, station: float, lateral: float, heading: float) -> float:
     """highway-env's distance to a lane with heading: |lateral| + overshoot [m] + difference of heading [rad]."""
     found = abs(lateral) + max(station - points[lane.last, 2], 0.0) + max(0.0 - station, 0.0)
-    return float(found + abs(wrapped(heading - value_near(points, lane, at, 3, station))))
+    return float(found + abs(wrap_radians(heading - value_near(points, lane, at, 3, station))))
 
 
 @inlined
-def is_level(town: TownArrays, lane: Records, at: int, station: float, height: float) -> bool:
+def is_level(town: TownArrays, lane: LaneRecord, at: int, station: float, height: float) -> bool:
     """Whether a lane is at about a height where it is closest."""
     if town.flat or math.isnan(height):
         return True
@@ -303,7 +304,7 @@ def closest_lane(
 
 
 @inlined
-def _is_out_of_question(entry: Records, x: float, y: float, cos: float, sin: float, best: float) -> bool:
+def _is_out_of_question(entry: CellEntryRecord, x: float, y: float, cos: float, sin: float, best: float) -> bool:
     """Whether a lane runs another way than a body, or lies farther away, than the best lane is off."""
     if best <= TURNED and entry.cos * cos + entry.sin * sin < entry.limit:
         return True

@@ -12,7 +12,7 @@ from dorothie_gym.maps.lane_neighbours import LaneEdges, leftmost, oncoming_lane
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.pedestrians.pacing import FROM_ENDS, FROM_JUNCTION, KERB, SHORTEST_WALK, WALK_STEP
-from dorothie_gym.sim.state.records import Records
+from dorothie_gym.sim.state.records import LaneRecord, PedestrianRecord, RecordArray, WalkwayRecord
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
@@ -26,13 +26,13 @@ FROM_EDGE = 0.4
 
 
 @inlined
-def side_kept(way: Records) -> float:
+def side_kept(way: WalkwayRecord) -> float:
     """How far to the right of the middle of a way one walks [m]."""
     return float(min(ASIDE, max(way.half_width - FROM_EDGE, 0.0)))
 
 
 @inlined
-def locate(town: TownArrays, walker: Records) -> float:
+def locate(town: TownArrays, walker: PedestrianRecord) -> float:
     """Finds the station, segment and height of a pedestrian on its footway.
 
     Returns:
@@ -64,7 +64,7 @@ def _along(points: Array, k: int, x: float, y: float) -> float:
 
 
 @inlined
-def find_segment(town: TownArrays, walker: Records) -> None:
+def find_segment(town: TownArrays, walker: PedestrianRecord) -> None:
     """Finds the segment of a pedestrian's footway that its station is on."""
     way, points = town.walks[walker.walk], town.walk_points
     k = way.first
@@ -74,7 +74,9 @@ def find_segment(town: TownArrays, walker: Records) -> None:
 
 
 @compiled
-def place_beside(town: TownArrays, walker: Records, station: float, aside: float) -> tuple[float, float, float, float]:
+def place_beside(
+    town: TownArrays, walker: PedestrianRecord, station: float, aside: float
+) -> tuple[float, float, float, float]:
     """A place on a pedestrian's footway, to the right of its middle as it walks [m], and the direction there.
 
     Beyond its ends the way goes straight on.
@@ -94,7 +96,7 @@ def place_beside(town: TownArrays, walker: Records, station: float, aside: float
 
 
 @inlined
-def enter_next(town: TownArrays, walker: Records) -> None:
+def enter_next(town: TownArrays, walker: PedestrianRecord) -> None:
     """Goes over to the next footway at the end of one, or turns round where there is none."""
     way = town.walks[walker.walk]
     end = 1 if walker.direction > 0.0 else 0
@@ -154,7 +156,7 @@ class StreetWalk(NamedTuple):
     points: Array
 
 
-def street_walks(points: Array, lanes: Records, town: Town, edges: LaneEdges) -> list[StreetWalk]:
+def street_walks(points: Array, lanes: RecordArray[LaneRecord], town: Town, edges: LaneEdges) -> list[StreetWalk]:
     """All ways beside lanes outside junctions, as long as no other lane is in their way.
 
     Args:
@@ -186,7 +188,7 @@ def street_walks(points: Array, lanes: Records, town: Town, edges: LaneEdges) ->
     ]  # fmt: skip
 
 
-def _beside(points: Array, lane: Records) -> Array | None:
+def _beside(points: Array, lane: LaneRecord) -> Array | None:
     """x, y, station on the lane, heading, height, 0 at the kerb of a lane; None if nobody walks beside it."""
     count = int((lane.length - 2.0 * FROM_ENDS) / WALK_STEP) + 1
     if lane.right >= 0 or lane.junction >= 0 or (count - 1) * WALK_STEP < SHORTEST_WALK:
@@ -194,7 +196,7 @@ def _beside(points: Array, lane: Records) -> Array | None:
     return _offset(points, lane, np.linspace(FROM_ENDS, FROM_ENDS + (count - 1) * WALK_STEP, count), 1.0)
 
 
-def _offset(points: Array, lane: Records, stations: Array, side: float) -> Array:
+def _offset(points: Array, lane: LaneRecord, stations: Array, side: float) -> Array:
     """As `_beside` at some stations, to the right of a lane (side 1) or to the left (-1)."""
     own = points[lane.first : lane.last + 1]
     x, y, heading, height, width = (np.interp(stations, own[:, 2], own[:, k]) for k in (0, 1, 3, 4, 5))
@@ -204,7 +206,7 @@ def _offset(points: Array, lane: Records, stations: Array, side: float) -> Array
     )
 
 
-def _across(points: Array, lanes: Records, town: Town, walk: StreetWalk) -> Array:
+def _across(points: Array, lanes: RecordArray[LaneRecord], town: Town, walk: StreetWalk) -> Array:
     """How far it is straight to the left over all lanes of both directions (n,) [m], 0 where nobody crosses."""
     row, own = walk.points, town.lanes[walk.lane]
     far, side = leftmost(town, walk.lane), -1.0

@@ -18,7 +18,8 @@ from dorothie_gym.sim.pedestrians.pacing import (
     walk_towards,
 )
 from dorothie_gym.sim.randomness import draw
-from dorothie_gym.sim.state.records import Footway, Kind, Records, Walk
+from dorothie_gym.sim.state.codes import Footway, Kind, Walk
+from dorothie_gym.sim.state.records import PedestrianRecord, VehicleRecord
 from dorothie_gym.sim.traffic.parameters import ASKING, CRITICAL_GAP
 from dorothie_gym.sim.traffic.vehicle_models import brake_to
 
@@ -46,7 +47,7 @@ GAP = 2.0
 
 
 @inlined
-def steps_out(town: TownArrays, world: WorldArrays, walker: Records, time: float) -> bool:
+def steps_out(town: TownArrays, world: WorldArrays, walker: PedestrianRecord, time: float) -> bool:
     """Whether somebody beside a street begins to cross it, who wants to now and then."""
     points = town.walk_points
     far = min(points[walker.segment, 5], points[walker.segment + 1, 5])
@@ -58,7 +59,7 @@ def steps_out(town: TownArrays, world: WorldArrays, walker: Records, time: float
 
 
 @compiled
-def _is_clear(world: WorldArrays, walker: Records) -> bool:
+def _is_clear(world: WorldArrays, walker: PedestrianRecord) -> bool:
     """Whether nobody drives close by."""
     for i in range(len(world.vehicles)):
         vehicle = world.vehicles[i]
@@ -107,7 +108,7 @@ def stray(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
 
 
 @inlined
-def _arrive(town: TownArrays, walker: Records) -> None:
+def _arrive(town: TownArrays, walker: PedestrianRecord) -> None:
     """Walks on beside the other side of the road, or stands there for a while where no way is."""
     found, station, segment = closest_walk(town, Footway.STREET, walker.x, walker.y, JOINED)
     walker.waited, walker.speed = 0.0, 0.0
@@ -137,7 +138,7 @@ def give_way_to_strayers(town: TownArrays, world: WorldArrays, i: int) -> float:
 
 
 @inlined
-def _way_to(town: TownArrays, vehicle: Records, walker: Records, reach: float) -> float:
+def _way_to(town: TownArrays, vehicle: VehicleRecord, walker: PedestrianRecord, reach: float) -> float:
     """From a vehicle's front along its lanes to somebody who is in its way, or comes into it [m]; inf for nobody."""
     begin = -vehicle.station
     for k in range(int(vehicle.planned)):

@@ -6,7 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.sim.state.records import Kind, Records, Walk
+from dorothie_gym.sim.state.codes import Kind, Walk
+from dorothie_gym.sim.state.records import PedestrianRecord, SizedBody
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
@@ -86,7 +87,7 @@ PLACE = 3.0
 
 
 @inlined
-def note_progress(walker: Records, time: float) -> None:
+def note_progress(walker: PedestrianRecord, time: float) -> None:
     """Counts for how long somebody has not got on [s]."""
     walker.staying += time
     dx, dy = walker.x - walker.left_x, walker.y - walker.left_y
@@ -209,7 +210,7 @@ def _bumps(world: WorldArrays, p: int, cos: float, sin: float, step: float, time
 
 
 @inlined
-def _touches_vehicle(world: WorldArrays, walker: Records, x: float, y: float) -> bool:
+def _touches_vehicle(world: WorldArrays, walker: PedestrianRecord, x: float, y: float) -> bool:
     """Whether a step leads closer to a vehicle that is close: nobody walks into the side of a car."""
     for i in range(len(world.vehicles)):
         vehicle = world.vehicles[i]
@@ -224,7 +225,7 @@ def _touches_vehicle(world: WorldArrays, walker: Records, x: float, y: float) ->
 
 
 @inlined
-def _room_beside(body: Records, x: float, y: float) -> float:
+def _room_beside(body: SizedBody, x: float, y: float) -> float:
     """How far outside of a body's outline a place is, along its length or its width [m]; negative inside."""
     dx, dy = x - body.x, y - body.y
     along = abs(dx * body.cos + dy * body.sin) - 0.5 * body.length

@@ -14,8 +14,10 @@ from dorothie_gym.sim.pedestrians.footways import ASIDE, enter_next, find_segmen
 from dorothie_gym.sim.pedestrians.jaywalking import steps_out, stray
 from dorothie_gym.sim.pedestrians.pacing import AHEAD, LEVEL, PATIENCE, note_progress, walk_towards
 from dorothie_gym.sim.randomness import draw
-from dorothie_gym.sim.state.records import NOBODY, Colour, Footway, Kind, Records, Walk
+from dorothie_gym.sim.state.codes import NOBODY, Colour, Footway, Kind, Walk
+from dorothie_gym.sim.state.records import CrossingRecord, PedestrianRecord, VehicleRecord, WalkwayRecord
 from dorothie_gym.sim.traffic.junctions import light
+from dorothie_gym.sim.traffic.parameters import STANDING
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
@@ -30,9 +32,6 @@ BRAKING = 3.0
 
 ROOM = 4.0
 """... and to stop this far before the crosswalk's middle line at the latest, measured from the front [m]."""
-
-STANDING = 0.3
-"""Slower than this a vehicle stands [m/s]."""
 
 VEHICLES_SIGHT = 60.0
 """How far people look for those who drive [m]."""
@@ -66,7 +65,7 @@ OVER = 0.1
 
 
 @inlined
-def comes_to_crosswalk(town: TownArrays, walker: Records, way: Records, time: float) -> bool:
+def comes_to_crosswalk(town: TownArrays, walker: PedestrianRecord, way: WalkwayRecord, time: float) -> bool:
     """Whether one stops at a crosswalk that is passed within some time [s], to wait there."""
     step = walker.pace * time
     for m in range(way.mouth, way.mouth + way.mouths):
@@ -133,7 +132,7 @@ def cross(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
 
 
 @inlined
-def _advance(crossing: Records, walker: Records) -> float:
+def _advance(crossing: CrossingRecord, walker: PedestrianRecord) -> float:
     """Finds out how far along a crosswalk somebody is; returns how far to the right of its line [m]."""
     dx, dy = walker.x - crossing.x[0], walker.y - crossing.y[0]
     walker.station = dx * crossing.cos + dy * crossing.sin
@@ -142,7 +141,7 @@ def _advance(crossing: Records, walker: Records) -> float:
 
 
 @inlined
-def _leave(town: TownArrays, walker: Records) -> None:
+def _leave(town: TownArrays, walker: PedestrianRecord) -> None:
     """Walks on along the pavement where one has been waiting, or come to."""
     crossing = town.crossings[walker.crossing]
     walker.walk, walker.station = crossing.walk[walker.mouth], crossing.station[walker.mouth]
@@ -152,7 +151,7 @@ def _leave(town: TownArrays, walker: Records) -> None:
 
 
 @compiled
-def _may_step(town: TownArrays, world: WorldArrays, crossing: Records, time: float) -> bool:
+def _may_step(town: TownArrays, world: WorldArrays, crossing: CrossingRecord, time: float) -> bool:
     """Whether one may step onto a crosswalk that takes some time to cross [s].
 
     Not while a lane with a light leads onto it whose light is not red, or will not be until one is across; nor while
@@ -172,7 +171,7 @@ def _may_step(town: TownArrays, world: WorldArrays, crossing: Records, time: flo
 
 
 @inlined
-def _is_danger(vehicle: Records, crossing: Records) -> bool:
+def _is_danger(vehicle: VehicleRecord, crossing: CrossingRecord) -> bool:
     """Whether a vehicle is on a crosswalk, or comes towards it too fast to stop with ease."""
     dx, dy = vehicle.x - crossing.x[0], vehicle.y - crossing.y[0]
     along = min(max(dx * crossing.cos + dy * crossing.sin, 0.0), crossing.length)
@@ -265,7 +264,7 @@ def _stroll(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
 
 
 @compiled
-def place_walker(town: TownArrays, walker: Records) -> None:
+def place_walker(town: TownArrays, walker: PedestrianRecord) -> None:
     """Puts a pedestrian where its footway and station say, with nothing of its past but its random numbers."""
     walker.state, walker.crossing, walker.crashed, walker.mouth = Walk.WALKING, NOBODY, False, 0
     walker.waited, walker.staying, walker.crash_age, walker.far = 0.0, 0.0, 0.0, 0.0

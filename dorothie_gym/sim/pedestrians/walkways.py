@@ -16,7 +16,17 @@ from dorothie_gym.maps.model import Array, Crosswalk, Lane, Sidewalk
 from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.footways import street_walks
-from dorothie_gym.sim.state.records import CROSSING, MOUTH, NOBODY, PASSAGE, WALKWAY, Footway, Records
+from dorothie_gym.sim.state.codes import NOBODY, Footway
+from dorothie_gym.sim.state.records import (
+    CrossingRecord,
+    LaneRecord,
+    MouthRecord,
+    PassageRecord,
+    RecordArray,
+    WalkwayRecord,
+    empty_records,
+    filled_records,
+)
 
 JOINT = 0.5
 """Ends of pavements that are this close are one place [m]."""
@@ -60,14 +70,14 @@ class Walkways(NamedTuple):
     """Arrays of the pavements and crosswalks; see `TownArrays`. `heeded` are lists of lanes, for `CROSSING.light`."""
 
     points: Array
-    walks: Records
-    mouths: Records
-    crossings: Records
-    passages: Records
+    walks: RecordArray[WalkwayRecord]
+    mouths: RecordArray[MouthRecord]
+    crossings: RecordArray[CrossingRecord]
+    passages: RecordArray[PassageRecord]
     heeded: NDArray[np.int32]
 
 
-def build_walkways(network: TownNetwork, lanes: Records) -> Walkways:
+def build_walkways(network: TownNetwork, lanes: RecordArray[LaneRecord]) -> Walkways:
     """All ways along which people walk, and the crosswalks; notes passages in `lanes`.
 
     Args:
@@ -82,15 +92,15 @@ def build_walkways(network: TownNetwork, lanes: Records) -> Walkways:
     streets = street_walks(network.table.points, lanes, town, edges)
     rows = ways + [street.points for street in streets]
     firsts = np.concatenate(([0], np.cumsum([len(row) for row in rows]))).astype(int)
-    walks: Records = np.zeros(max(len(rows), 1), dtype=WALKWAY).view(np.recarray)
-    walks.next_walk = walks.lane = NOBODY
+    walks = empty_records(WalkwayRecord, max(len(rows), 1))
+    walks["next_walk"] = walks["lane"] = NOBODY
     for k, row in enumerate(rows):
         walks[k].first, walks[k].last, walks[k].length = firsts[k], firsts[k + 1] - 1, row[-1, 2]
         walks[k].half_width = row[0, 5] / 2
-    walks.kind[len(pavements) : len(ways)] = Footway.CORNER
-    walks.kind[len(ways) : len(rows)] = Footway.STREET
-    walks.half_width[len(ways) : len(rows)] = STREET_HALF_WIDTH
-    walks.lane[len(ways) : len(rows)] = [street.lane for street in streets]
+    walks["kind"][len(pavements) : len(ways)] = Footway.CORNER
+    walks["kind"][len(ways) : len(rows)] = Footway.STREET
+    walks["half_width"][len(ways) : len(rows)] = STREET_HALF_WIDTH
+    walks["lane"][len(ways) : len(rows)] = [street.lane for street in streets]
     for (walk, end), (after, which) in corners.onward.items():
         walks[walk].next_walk[end], walks[walk].next_end[end] = after, which
     crossings, mouths = _crossings(network, walks, pavements)
@@ -179,7 +189,9 @@ def _way_on(places: Array, one: int, others: Sequence[int], edges: LaneEdges) ->
     return None
 
 
-def _crossings(network: TownNetwork, walks: Records, pavements: Sequence[Array]) -> tuple[Records, Records]:
+def _crossings(
+    network: TownNetwork, walks: RecordArray[WalkwayRecord], pavements: Sequence[Array]
+) -> tuple[RecordArray[CrossingRecord], RecordArray[MouthRecord]]:
     town = network.town
     found: list[tuple[Array, list[tuple[float, int, float]]]] = []
     owners = np.repeat(np.arange(len(pavements)), [len(rows) for rows in pavements])
@@ -189,7 +201,7 @@ def _crossings(network: TownNetwork, walks: Records, pavements: Sequence[Array])
         sides = [_nearest_walk(rows, owners, end) for end in ends]
         if all(side[0] < KERB_REACH for side in sides):
             found.append((ends, sides))
-    crossings = np.zeros(max(len(found), 1), dtype=CROSSING).view(np.recarray)
+    crossings = empty_records(CrossingRecord, max(len(found), 1))
     by_walk: defaultdict[int, list[tuple[float, int, int]]] = defaultdict(list)
     for k, (kerbs, sides) in enumerate(found):
         ends = _as_far_as(kerbs, np.array([_at(town.sidewalks[walk], s) for _, walk, s in sides]))
@@ -205,7 +217,7 @@ def _crossings(network: TownNetwork, walks: Records, pavements: Sequence[Array])
     for walk in range(len(walks)):
         walks[walk].mouth, walks[walk].mouths = len(mouths), len(by_walk[walk])
         mouths += sorted(by_walk[walk])
-    return crossings, np.array(mouths or [(0.0, 0, 0)], dtype=MOUTH).view(np.recarray)
+    return crossings, filled_records(MouthRecord, mouths)
 
 
 def _ends(network: TownNetwork, crosswalk: Crosswalk) -> Array:
@@ -253,22 +265,24 @@ def _at(walk: Sidewalk, station: float) -> Array:
     return np.array([np.interp(station, stations, walk.points[:, column]) for column in range(3)])
 
 
-def _passages(town: Town, lanes: Records, crossings: Records) -> Records:
+def _passages(
+    town: Town, lanes: RecordArray[LaneRecord], crossings: RecordArray[CrossingRecord]
+) -> RecordArray[PassageRecord]:
     """Where lanes pass crosswalks: within half a crosswalk's depth of the line on which one walks."""
     found: list[tuple[float, float, float, int]] = []
-    reach = crossings.length / 2 + CROSSWALK_DEPTH
-    middles = np.column_stack((crossings.x.mean(axis=1), crossings.y.mean(axis=1)))
+    reach = crossings["length"] / 2 + CROSSWALK_DEPTH
+    middles = np.column_stack((crossings["x"].mean(axis=1), crossings["y"].mean(axis=1)))
     for lane in town.lanes:
         low, high = lane.points[:, :2].min(axis=0), lane.points[:, :2].max(axis=0)
         near = (middles > low - reach[:, None]).all(axis=1) & (middles < high + reach[:, None]).all(axis=1)
-        passages = [(_passage(lane, crossings[k]), k) for k in np.flatnonzero(near & (crossings.length > 0.0))]
+        passages = [(_passage(lane, crossings[k]), k) for k in np.flatnonzero(near & (crossings["length"] > 0.0))]
         own = sorted((*passage, int(k)) for passage, k in passages if passage is not None)
         lanes[lane.id].passage, lanes[lane.id].passages = len(found), len(own)
         found += own
-    return np.array(found or [(0.0, 0.0, 0.0, 0)], dtype=PASSAGE).view(np.recarray)
+    return filled_records(PassageRecord, found)
 
 
-def _passage(lane: Lane, crossing: Records) -> tuple[float, float, float] | None:
+def _passage(lane: Lane, crossing: CrossingRecord) -> tuple[float, float, float] | None:
     """First and last station of a lane on a crosswalk [m], and where along the crosswalk that is [m]."""
     stations = np.linspace(0.0, lane.length, int(lane.length / SAMPLE) + 2)
     x, y, z = (np.interp(stations, lane.stations, lane.points[:, column]) for column in range(3))
@@ -282,7 +296,12 @@ def _passage(lane: Lane, crossing: Records) -> tuple[float, float, float] | None
     return float(stations[on][0]), float(stations[on][-1]), float(along[on].mean())
 
 
-def _lights(town: Town, lanes: Records, crossings: Records, passages: Records) -> NDArray[np.int32]:
+def _lights(
+    town: Town,
+    lanes: RecordArray[LaneRecord],
+    crossings: RecordArray[CrossingRecord],
+    passages: RecordArray[PassageRecord],
+) -> NDArray[np.int32]:
     """Notes for each crosswalk the lanes that lead onto it from a light which stands right before it."""
     passing: defaultdict[int, set[int]] = defaultdict(set)
     for lane in town.lanes:

@@ -6,7 +6,7 @@ import numpy as np
 
 from dorothie_gym.sim.sensing.seeing import detection_chance, errors_of_place
 from dorothie_gym.sim.sensing.visibility import Visibility
-from dorothie_gym.sim.state.records import Records
+from dorothie_gym.sim.state.records import EyeRecord, RecordArray
 
 
 class Perception:
@@ -14,9 +14,9 @@ class Perception:
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._seed = int(rng.integers(1 << 63))
-        self._opened: tuple[Records, Visibility] | None = None
+        self._opened: tuple[RecordArray[EyeRecord], Visibility] | None = None
 
-    def open(self, eyes: Records, visibility: Visibility) -> bool:
+    def open(self, eyes: RecordArray[EyeRecord], visibility: Visibility) -> bool:
         """Lets eyes see as well as visibility allows now, with this one's errors.
 
         Args:

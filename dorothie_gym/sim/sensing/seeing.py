@@ -14,7 +14,16 @@ from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.sim.collisions import WALKER_SIZE
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT, SHORTEST_SIGHT, gain, signal
-from dorothie_gym.sim.state.records import Group, Kind, Records, Walk
+from dorothie_gym.sim.state.codes import Group, Kind, Walk
+from dorothie_gym.sim.state.records import (
+    EyeRecord,
+    PedestrianRecord,
+    PlacedBody,
+    PropRecord,
+    RecordArray,
+    SeenRecord,
+    VehicleRecord,
+)
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
@@ -52,7 +61,8 @@ _UNIT = 2.0**-53
 
 @compiled
 def see(
-    vehicles: Records, pedestrians: Records, props: Records, seen: Records, eye: Records,
+    vehicles: RecordArray[VehicleRecord], pedestrians: RecordArray[PedestrianRecord],
+    props: RecordArray[PropRecord], seen: RecordArray[SeenRecord], eye: EyeRecord,
     x: float, y: float, frame: int, skip: int,
 ) -> int:  # fmt: skip
     """Looks at all bodies within `visibility.CLEAR_SIGHT`.
@@ -140,14 +150,22 @@ def errors_of_place(gain: float, distance2: float) -> tuple[float, float]:
 
 
 @inlined
-def _is_near(body: Records, x: float, y: float) -> bool:
+def _is_near(body: PlacedBody, x: float, y: float) -> bool:
     dx, dy = body.x - x, body.y - y
     return bool(dx * dx + dy * dy < _FAR)
 
 
 @inlined
 def _look_at(
-    seen: Records, count: int, eye: Records, body: Records, x: float, y: float, frame: int, number: int, group: int
+    seen: RecordArray[SeenRecord],
+    count: int,
+    eye: EyeRecord,
+    body: PlacedBody,
+    x: float,
+    y: float,
+    frame: int,
+    number: int,
+    group: int,
 ) -> int:
     """Adds a body to those that are seen if it is; returns how many they are."""
     key, found_x, found_y, is_seen = int(body.key), float(body.x), float(body.y), True
@@ -161,7 +179,7 @@ def _look_at(
 
 @compiled
 def _glimpse(
-    eye: Records, key: int, body_x: float, body_y: float, x: float, y: float, frame: int
+    eye: EyeRecord, key: int, body_x: float, body_y: float, x: float, y: float, frame: int
 ) -> tuple[float, float, bool]:
     """Where a body seems to be, and whether it is perceived at all."""
     dx, dy = body_x - x, body_y - y
@@ -185,7 +203,9 @@ def _glimpse(
 
 
 @inlined
-def _insert(seen: Records, count: int, distance2: float, key: int, x: float, y: float, number: int, group: int) -> int:
+def _insert(
+    seen: RecordArray[SeenRecord], count: int, distance2: float, key: int, x: float, y: float, number: int, group: int
+) -> int:
     """Puts a body where it belongs in the list by distance and key; returns the list's length."""
     at = count
     if count == len(seen):
@@ -206,12 +226,17 @@ def _insert(seen: Records, count: int, distance2: float, key: int, x: float, y: 
 
 
 @inlined
-def _is_before(distance2: float, key: int, other: Records) -> bool:
+def _is_before(distance2: float, key: int, other: SeenRecord) -> bool:
     return bool(distance2 < other.distance2 or (distance2 == other.distance2 and key < other.key))
 
 
 @inlined
-def _describe(thing: Records, vehicles: Records, pedestrians: Records, props: Records) -> None:
+def _describe(
+    thing: SeenRecord,
+    vehicles: RecordArray[VehicleRecord],
+    pedestrians: RecordArray[PedestrianRecord],
+    props: RecordArray[PropRecord],
+) -> None:
     """Fills in what is not in error."""
     if thing.group == Group.VEHICLES:
         vehicle = vehicles[thing.body]

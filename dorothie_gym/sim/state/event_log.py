@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.sim.state.records import U_TURN
+from dorothie_gym.sim.state.codes import U_TURN
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays

@@ -17,7 +17,7 @@ from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 
-class Holder(Protocol):
+class ArrayHolder(Protocol):
     """Who has the arrays of a world, and may replace them by bigger ones with the same bodies in the same rows."""
 
     arrays: WorldArrays
@@ -27,25 +27,31 @@ CASTS = {"f8": (0, "d"), "i4": (1, "i"), "b1": (2, "?")}
 """Types of fields: in which of a row's memory views they are, and its format."""
 
 
+def field_offset(dtype: np.dtype[np.void], name: str) -> int:
+    """Returns the place of a field in its record [bytes]."""
+    assert dtype.fields is not None
+    return dtype.fields[name][1]
+
+
 def field(dtype: np.dtype[np.void], name: str, cast: Callable[[Any], Any] | None = None) -> Any:
     """A property that reads and writes a field of the view's row; `cast` changes what is read."""
-    kind, offset = dtype.fields[name]  # type: ignore[index, misc]
-    which, _ = CASTS[kind.base.str[1:]]
-    at = offset // kind.base.itemsize
+    kind = dtype[name].base
+    which, _ = CASTS[kind.str[1:]]
+    at = field_offset(dtype, name) // kind.itemsize
 
-    def read(view: Row) -> Any:
+    def read(view: BodyView) -> Any:
         return view.memory()[which][at]
 
-    def read_cast(view: Row) -> Any:
+    def read_cast(view: BodyView) -> Any:
         return cast(view.memory()[which][at])  # type: ignore[misc]
 
-    def write(view: Row, value: Any) -> None:
+    def write(view: BodyView, value: Any) -> None:
         view.memory()[which][at] = value
 
     return property(read if cast is None else read_cast, write)
 
 
-class Row:
+class BodyView:
     """A row of the arrays. Its memory is looked up once and again whenever the holder has other arrays.
 
     Attributes:
@@ -70,7 +76,7 @@ class Row:
     lane_id: Any
     station: Any
 
-    def __init__(self, road: Any, holder: Holder, row: int) -> None:
+    def __init__(self, road: Any, holder: ArrayHolder, row: int) -> None:
         """Looks at a row; `road` is a `TownRoad` of the same town."""
         self.road = road
         self._holder = holder
@@ -90,7 +96,7 @@ class Row:
             size = self.DTYPE.itemsize
             records = np.asarray(getattr(arrays, self.RECORDS)).view(np.uint8)
             cells: Any = records[self._row * size : (self._row + 1) * size].data
-            place = np.frombuffer(cells, dtype=np.float64, count=2, offset=self.DTYPE.fields["x"][1])  # type: ignore[index]
+            place = np.frombuffer(cells, dtype=np.float64, count=2, offset=field_offset(self.DTYPE, "x"))
             self._views = (*(cells.cast(code) for _, code in CASTS.values()), place)
             self._arrays = arrays
         return self._views
@@ -165,7 +171,7 @@ def heading_field(dtype: np.dtype[np.void]) -> Any:
     """The direction in which a body looks [rad]; its cosine and sine change with it."""
     plain = field(dtype, "heading")
 
-    def write(view: Row, value: float) -> None:
+    def write(view: BodyView, value: float) -> None:
         plain.fset(view, value)
         view.cos, view.sin = math.cos(value), math.sin(value)
 

@@ -1,385 +1,553 @@
-"""The records that the compiled loops work on, field by field.
+"""Records that the compiled loops work on, field by field.
 
-Records are read and written by attribute (`vehicle.speed`), compiled and in plain Python alike.
+A record is read and written by attribute (`vehicle.speed`), compiled and in plain Python alike. Its class here names
+the fields for mypy and makes the dtype of the arrays; at runtime records are NumPy's own.
 """
 
 from __future__ import annotations
 
-import enum
-from typing import Any, TypeAlias
+from collections.abc import Iterator
+from functools import cache
+from typing import Annotated, Any, Protocol, TypeAlias, TypeVar, cast, get_type_hints, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dorothie_gym.ontology import ObjectClass, PhysicalAction
 from dorothie_gym.sim.traffic.parameters import CLOSED, GOALS, PLANNED
 
-VEHICLES, PEDESTRIAN_CLASS, STATIC = (
-    int(kind.value) for kind in (ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC)
-)
-"""Object classes of bodies, as plain numbers."""
+Float: TypeAlias = Annotated[float, "f8"]
+Int32: TypeAlias = Annotated[int, "i4"]
+Int64: TypeAlias = Annotated[int, "i8"]
+Flag: TypeAlias = Annotated[bool, "b1"]
 
-U_TURN = int(PhysicalAction.U_TURN.value)
-
-Records: TypeAlias = Any
-"""An array of records; mypy knows no types of their fields."""
+Record = TypeVar("Record")
 
 
-def plain(records: Records) -> Any:
-    """The same records as an array whose fields are read by name only, which is several times faster in Python."""
-    return records.view(np.dtype((np.void, records.dtype)), np.ndarray)
+class RecordArray(Protocol[Record]):
+    """An array of records of one class, as NumPy's `recarray`; a name selects a column."""
+
+    @property
+    def dtype(self) -> np.dtype[np.void]:
+        """Fields of the records."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Numbers of records along the axes."""
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the array [bytes]."""
+
+    def __len__(self) -> int: ...
+
+    def __iter__(self) -> Iterator[Record]: ...
+
+    @overload
+    def __getitem__(self, key: int | np.integer[Any]) -> Record: ...
+
+    @overload
+    def __getitem__(self, key: str) -> NDArray[Any]: ...
+
+    @overload
+    def __getitem__(self, key: slice | NDArray[Any]) -> RecordArray[Record]: ...
+
+    def __setitem__(self, key: object, value: object) -> None: ...
+
+    def tolist(self) -> list[tuple[Any, ...]]:
+        """Returns the records as tuples of plain numbers."""
+
+    def tobytes(self) -> bytes:
+        """Returns the memory of the records."""
 
 
-def fields(records: Records, *names: str) -> Any:
-    """Some fields of the first record as an array without axes, to be read or written all at once in Python.
+class RandomBody(Protocol):
+    """A record with the state of its own random numbers."""
+
+    random: int
+
+
+class PlacedBody(Protocol):
+    """A record of a vehicle, pedestrian, prop or perceived body: its place and heading."""
+
+    x: float
+    y: float
+    heading: float
+    cos: float
+    sin: float
+    height: float
+    key: int
+
+
+class MovingBody(PlacedBody, Protocol):
+    """A record of a vehicle or pedestrian."""
+
+    speed: float
+
+
+class SizedBody(PlacedBody, Protocol):
+    """A record of a vehicle, prop or perceived body: its outline, too."""
+
+    length: float
+    width: float
+
+
+def record_dtype(kind: type) -> np.dtype[np.void]:
+    """Returns the dtype of a record class, aligned as in C."""
+    return _dtype_of(kind)
+
+
+@cache
+def _dtype_of(kind: type) -> np.dtype[np.void]:
+    hints = get_type_hints(kind, include_extras=True)
+    return np.dtype([(name, *hint.__metadata__) for name, hint in hints.items()], align=True)
+
+
+def empty_records(kind: type[Record], count: int) -> RecordArray[Record]:
+    """Returns an array of `count` records that are all zeros."""
+    return cast(RecordArray[Record], np.zeros(count, dtype=record_dtype(kind)).view(np.recarray))
+
+
+def filled_records(kind: type[Record], rows: list[tuple[Any, ...]]) -> RecordArray[Record]:
+    """Returns an array of records with given fields; a single record of zeros where there are none."""
+    if not rows:
+        return empty_records(kind, 1)
+    return cast(RecordArray[Record], np.array(rows, dtype=record_dtype(kind)).view(np.recarray))
+
+
+def plain(records: RecordArray[Record]) -> NDArray[np.void]:
+    """Returns the same records with access by name only, which is several times faster in Python."""
+    array = cast(NDArray[np.void], records)
+    return array.view(np.dtype((np.void, array.dtype)), np.ndarray)
+
+
+def fields(records: RecordArray[Record], *names: str) -> NDArray[np.void]:
+    """Returns some fields of the first record as an array without axes, to be read or written at once in Python.
 
     ``fields(...).item()`` is a tuple of plain numbers, and ``fields(...)[()] = numbers`` takes one, either in about the
     time that a single field of `plain` takes.
     """
-    return records.view(np.ndarray)[list(names)][:1].reshape(())
+    return cast(NDArray[np.void], records).view(np.ndarray)[list(names)][:1].reshape(())
 
 
-NOBODY: Any = np.int64(-1)
-"""No lane, node or body. For a plain number numba would compile its readers twice: for this value, and for others."""
+# --- Town -------------------------------------------------------------------------------------------------------------
 
 
-class Kind(enum.IntEnum):
-    """What a vehicle is."""
+class LaneRecord:
+    """A lane of a town; indices are -1 where there is none."""
 
-    EMPTY = 0
-    CAR = 1
-    CYCLIST = 2
-    EGO = 3
-    DRIVEN = 4
-
-
-class Control(enum.IntEnum):
-    """What has to be heeded at the end of a lane."""
-
-    NONE = 0
-    LIGHT = 1
-    STOP = 2
-    YIELD = 3
-
-
-class Colour(enum.IntEnum):
-    """What a light shows."""
-
-    GREEN = 0
-    YELLOW = 1
-    RED = 2
-
-
-class Relation(enum.IntEnum):
-    """Of one connector to another one of its junction."""
-
-    APART = 0
-    FOE = 1
-    WAITS = 2
-
-
-class Wait(enum.IntEnum):
-    """Why a vehicle may not enter a junction."""
-
-    NOT = 0
-    LIGHT = 1
-    """Its light is red, or yellow and it can stop."""
-    STOP_SIGN = 2
-    """It has not come to a stand at its stop sign."""
-    GIVING_WAY = 3
-    """Somebody comes who has priority."""
-    TURN = 4
-    """Somebody else has been waiting for longer."""
-    OCCUPIED = 5
-    """Somebody is on a path that crosses its own."""
-    CLOSED = 6
-    """The car turns round in the junction."""
-    NO_ROOM = 7
-    """There is no room behind the junction."""
+    length: Float  # [m]
+    limit: Float  # speed limit [m/s]
+    curve_speed: Float  # speed in its tightest bend [m/s]
+    half_width: Float  # [m]
+    cos_first: Float  # directions of its two ends
+    sin_first: Float
+    cos_last: Float
+    sin_last: Float
+    left_edge: Float  # bounding box [m]
+    low_edge: Float
+    right_edge: Float
+    high_edge: Float
+    first: Int32  # first and last row of its points
+    last: Int32
+    rank: Int32  # place in the order of the network's lanes: settles ties
+    successor: Int32  # beginning and length of its lists in `neighbours`
+    successors: Int32
+    predecessor: Int32
+    predecessors: Int32
+    left: Int32  # lanes that one may change to
+    right: Int32
+    junction: Int32  # junction that it crosses
+    exit: Int32  # of a connector: the first lane behind the junction
+    place: Int32  # of a connector: its place among those of its junction
+    relation: Int32  # of a connector: beginning of its row of `relations`
+    control: Int32  # `TrafficControl`
+    cycling: Flag  # whether cyclists use it: it is slow, and does not lead to fast lanes only
+    programme: Int32  # light programme, and place of its light in it
+    slot: Int32
+    sibling: Int32  # rows of `siblings`
+    siblings: Int32
+    passage: Int32  # rows of `passages`
+    passages: Int32
 
 
-class Group(enum.IntEnum):
-    """In which array of a world a body is."""
+class CellEntryRecord:
+    """A lane in the list of a cell."""
 
-    VEHICLES = 0
-    PEDESTRIANS = 1
-    PROPS = 2
-
-
-class Walk(enum.IntEnum):
-    """What a pedestrian does; who strays crosses the road where there is no crosswalk."""
-
-    EMPTY = 0
-    WALKING = 1
-    WAITING = 2
-    CROSSING = 3
-    STRAYING = 4
+    cos: Float  # mean direction of the lane near the cell
+    sin: Float
+    limit: Float  # cosine below which a heading is off that direction by more than `lane_lookup.TURNED`
+    along_low: Float  # box around those segments, along that direction and across it [m]
+    along_high: Float
+    across_low: Float
+    across_high: Float
+    lane: Int32
+    first: Int32  # segments that can be the closest ones from within the cell
+    last: Int32
 
 
-class Footway(enum.IntEnum):
-    """What a way is that people walk along."""
+class SiblingRecord:
+    """A lane with the same beginning as another one: bodies on it before `until` [m] are in the way on the other."""
 
-    PAVEMENT = 0
-    CORNER = 1
-    STREET = 2
-
-
-LANE = np.dtype(
-    [
-        ("length", "f8"),  # [m]
-        ("limit", "f8"),  # speed limit [m/s]
-        ("curve_speed", "f8"),  # at which its tightest bend is driven [m/s]
-        ("half_width", "f8"),  # [m]
-        ("cos_first", "f8"), ("sin_first", "f8"), ("cos_last", "f8"), ("sin_last", "f8"),  # directions of its ends
-        ("left_edge", "f8"), ("low_edge", "f8"), ("right_edge", "f8"), ("high_edge", "f8"),  # bounding box [m]
-        ("first", "i4"), ("last", "i4"),  # first and last row of its points
-        ("rank", "i4"),  # place in the order of the network's lanes: settles ties
-        ("successor", "i4"), ("successors", "i4"),  # where its list begins in `neighbours`, and how many there are
-        ("predecessor", "i4"), ("predecessors", "i4"),
-        ("left", "i4"), ("right", "i4"),  # lanes that one may change to, or -1
-        ("junction", "i4"),  # number of the junction that it crosses, or -1
-        ("exit", "i4"),  # of a connector: the first lane behind the junction, or -1
-        ("place", "i4"),  # of a connector: its place among those of its junction
-        ("relation", "i4"),  # of a connector: where its row of `relations` begins
-        ("control", "i4"),  # `Control`
-        ("cycling", "b1"),  # whether cyclists ride on it: it is slow, and one may go on without coming to a fast one
-        ("programme", "i4"), ("slot", "i4"),  # light programme, and the place of its light in it
-        ("sibling", "i4"), ("siblings", "i4"),  # rows of `siblings`
-        ("passage", "i4"), ("passages", "i4"),  # rows of `passages`
-    ],
-    align=True,
-)  # fmt: skip
-"""A lane of a town."""
-
-ENTRY = np.dtype(
-    [
-        ("cos", "f8"), ("sin", "f8"),  # mean direction of the lane near the cell
-        ("limit", "f8"),  # headings whose cosine to that is less are off by more than `cells.TURNED`
-        ("along_low", "f8"), ("along_high", "f8"),  # box around those segments: along that direction [m]
-        ("across_low", "f8"), ("across_high", "f8"),  # and across it [m]
-        ("lane", "i4"),
-        ("first", "i4"), ("last", "i4"),  # its segments that can be the closest ones from within the cell
-    ],
-    align=True,
-)  # fmt: skip
-"""A lane in the list of a cell."""
-
-SIBLING = np.dtype([("until", "f8"), ("lane", "i4")], align=True)
-"""A lane that begins where another one begins: who is on it before `until` [m] is in the way on the other one, too."""
-
-PASSAGE = np.dtype([("start", "f8"), ("stop", "f8"), ("across", "f8"), ("crossing", "i4")], align=True)
-"""A lane's way over a crosswalk: its stations there, and how far along the crosswalk it is met [m]."""
-
-PROGRAMME = np.dtype(
-    [("offset", "f8"), ("cycle", "f8"), ("phase", "i4"), ("phases", "i4"), ("colour", "i4"), ("slots", "i4")],
-    align=True,
-)
-"""A light programme: its phases' ends are `phase_ends[phase : phase + phases]`, and `colours` begin at `colour`."""
-
-WALKWAY = np.dtype(
-    [("length", "f8"), ("first", "i4"), ("last", "i4"), ("mouth", "i4"), ("mouths", "i4"), ("half_width", "f8"),
-     ("next_walk", "i4", (2,)), ("next_end", "i4", (2,)), ("kind", "i4"), ("lane", "i4")],
-    align=True,
-)  # fmt: skip
-"""A way along which people walk: its points, the mouths of crosswalks along it, and where one walks on beyond its two
-ends, or -1; its kind (`Footway`), and of a street walk the lane that it is beside, else -1."""
-
-CROSSING = np.dtype(
-    [("x", "f8", (2,)), ("y", "f8", (2,)), ("cos", "f8"), ("sin", "f8"), ("length", "f8"), ("height", "f8"),
-     ("walk", "i4", (2,)), ("station", "f8", (2,)), ("light", "i4"), ("lights", "i4")],
-    align=True,
-)  # fmt: skip
-"""A crosswalk: its two ends, its direction from the first to the second, the pavements that it joins, and where the
-lanes are in `neighbours` whose lights must be red while one crosses."""
-
-MOUTH = np.dtype([("station", "f8"), ("crossing", "i4"), ("end", "i4")], align=True)
-"""Where a crosswalk leaves a pavement."""
-
-VEHICLE = np.dtype(
-    [
-        ("x", "f8"), ("y", "f8"),  # position of its middle [m]
-        ("heading", "f8"), ("cos", "f8"), ("sin", "f8"),  # [rad]
-        ("speed", "f8"),  # [m/s]
-        ("height", "f8"),  # of the road under it [m]
-        ("acceleration", "f8"), ("slip", "f8"),  # what it does: [m/s^2], and sine of the slip angle
-        ("desired", "f8"),  # speed that it likes [m/s]
-        ("length", "f8"), ("width", "f8"), ("radius", "f8"),  # [m]; half its diagonal
-        ("to_right", "f8"),  # where it keeps in its lane [m]
-        ("station", "f8"), ("lateral", "f8"),  # on the lane that it follows [m]
-        ("own_station", "f8"), ("own_lateral", "f8"),  # on the lane that is closest [m]
-        ("timer", "f8"),  # since it thought of changing lanes [s]
-        ("standing", "f8"),  # for how long it has been standing, its light not being red [s]
-        ("stuck", "f8"),  # the same less the time for which the light ahead was not green, also behind others [s]
-        ("crash_age", "f8"),  # since it crashed [s]
-        ("odometer", "f8"),  # way driven [m]
-        ("distance", "f8"),  # from its front to the line before the next junction [m]
-        ("seen", "f8"), ("asked", "f8"), ("since", "f8"),  # when it came near, asked, began to wait [s]
-        ("claim_since", "f8"), ("claim_asked", "f8"),  # [s]
-        ("rerouted", "f8"),  # when it chose another way last, for want of room on the one it planned [s]
-        ("random", "i8"),
-        ("lane", "i4"), ("segment", "i4"),  # the closest lane; the closest segment of the lane that it follows
-        ("planned", "i4"), ("plan", "i4", (PLANNED,)),  # lanes ahead; the first is the one that it follows
-        ("approach", "i4"), ("approach_lane", "i4"),  # connector that it announced, and where it comes from
-        ("claim", "i4"), ("inside", "i4"),  # connector that it was let into, and that it is on
-        ("kind", "i4"), ("wait", "i4"),
-        ("key", "i4"),  # tells it apart from other bodies; who comes back after towing has a new one
-        ("stood", "b1"), ("crashed", "b1"),
-        ("blocked", "b1"),  # whether a prop is next ahead
-        ("touched", "b1"),  # whether the car has touched it
-    ],
-    align=True,
-)  # fmt: skip
-"""A car or cyclist; a place that is empty has the kind `Kind.EMPTY`."""
-
-PEDESTRIAN = np.dtype(
-    [
-        ("x", "f8"), ("y", "f8"), ("heading", "f8"), ("cos", "f8"), ("sin", "f8"), ("speed", "f8"), ("height", "f8"),
-        ("station", "f8"), ("direction", "f8"),  # along the pavement or crosswalk [m], and 1 or -1
-        ("pace", "f8"),  # speed that it likes [m/s]
-        ("aside", "f8"),  # how far to the right of the middle it keeps [m]
-        ("waited", "f8"), ("odometer", "f8"),
-        ("far", "f8"),  # of who strays: to the other side of the road [m]
-        ("staying", "f8"), ("left_x", "f8"), ("left_y", "f8"),  # for how long it has not got on [s], and from where [m]
-        ("crash_age", "f8"),  # since it was touched [s]
-        ("random", "i8"),
-        ("walk", "i4"), ("segment", "i4"), ("crossing", "i4"), ("mouth", "i4"), ("state", "i4"), ("key", "i4"),
-        ("crashed", "b1"),
-    ],
-    align=True,
-)  # fmt: skip
-"""Somebody on foot."""
-
-PROP = np.dtype(
-    [
-        ("x", "f8"), ("y", "f8"), ("heading", "f8"), ("cos", "f8"), ("sin", "f8"), ("height", "f8"),
-        ("length", "f8"), ("width", "f8"), ("radius", "f8"),
-        ("station", "f8", (4,)), ("lane", "i4", (4,)), ("key", "i4"), ("present", "b1"),
-    ],
-    align=True,
-)  # fmt: skip
-"""A thing on the road, and the lanes that it reaches into."""
-
-NODE = np.dtype(
-    [("station", "f8"), ("speed", "f8"), ("cos", "f8"), ("sin", "f8"), ("half_length", "f8"),
-     ("lane", "i4"), ("next", "i4"), ("before", "i4"), ("body", "i4")],
-    align=True,
-)  # fmt: skip
-"""A body in the list of a lane, ordered by station."""
-
-POINT = np.dtype(
-    [
-        ("s", "f8"),  # distance along the path [m]
-        ("x", "f8"), ("y", "f8"), ("heading", "f8"), ("cos", "f8"), ("sin", "f8"), ("height", "f8"),
-        ("station", "f8"),  # along its lane [m]; during a U-turn where that ends
-        ("speed", "f8"),  # that curves, limits and the path's end allow [m/s]
-        ("left", "f8"), ("right", "f8"),  # how far the car's corners sweep to either side of the path [m]
-        ("lane", "i4"),
-        ("manoeuvre", "b1"),  # whether the path is off the lanes' middles here: lane switch or U-turn
-    ],
-    align=True,
-)  # fmt: skip
-"""A point of the path that the car follows."""
-
-CAR = np.dtype(
-    [
-        ("points", "i4"), ("at", "i4"),  # of the path: how many, and the one at or before the car
-        ("s", "f8"), ("offset", "f8"),  # where it is along the path, and how far to the right of it [m]
-        ("stop_at", "f8"),  # where it has to stop, infinite where the path does not end [m]
-        ("runs", "i4"), ("run", "i4"),  # lanes of the path one after another: how many, and the one that it is on
-        ("run_lane", "i4", (PLANNED,)), ("run_first", "i4", (PLANNED,)),  # and the first point on each
-        ("action", "i4"), ("action_end", "f8"),  # manoeuvre, a `PhysicalAction` or 0, and where it ends [m]
-        ("cruise", "f8"),  # desired speed [m/s]
-        ("held", "b1"), ("hold_speed", "f8"),  # whether it stops by command, and how fast it still is then; -1 for none
-        ("goals", "i4"), ("goal", "f8", (GOALS,)),  # places along the path to come up to slowly [m]
-        ("lateral_sum", "f8"), ("lateral_last", "f8"), ("speed_sum", "f8"),  # memory of the controllers
-        ("throttle", "f8"), ("steer", "f8"), ("brake", "f8"),
-        ("manual", "b1"),  # whether these three are given, and not found by the controllers
-        ("before", "f8"),  # speed at the start of the substep [m/s]
-        ("friction", "f8"),  # share of the dry road's grip
-        ("wind", "f8"), ("wind_heading", "f8"), ("wind_phase", "f8", (3,)),  # strength in [0, 1], where to, gusts
-        ("roadblock", "f8"),  # how far ahead of its middle a prop is seen on the path [m], or infinite
-        ("sweeping", "b1"), ("sweep_first", "i4"), ("sweep_last", "i4"),  # points still to be passed turning round
-        ("closed", "i4", (CLOSED,)), ("closed_at", "f8", (CLOSED,)),  # junctions that it needs to turn round, and when
-        ("kind", "i4"), ("gap", "f8"), ("ahead_speed", "f8"), ("other", "i4"),  # what limits its speed: `ObjectClass`
-        ("tight", "b1"), ("line", "b1"),  # or 0, gap [m], speed [m/s], key; whether in a manoeuvre, or for a line
-        ("hazard", "i4"), ("hazard_gap", "f8"), ("hazard_key", "i4"),  # what it stops for: as `kind`, 0 for nothing
-        ("hazard_since", "i8"), ("hazard_seen", "i8"),  # frames
-        ("stopped_until", "i8"), ("collision_stop", "i8"),  # frames for which it stands after a collision
-        ("collisions", "i8"),  # those of its own making
-        ("events", "i4"), ("frames", "i4"),  # rows of `events` and `trace` that are in use
-    ],
-    align=True,
-)  # fmt: skip
-"""What drives the session's car, the vehicle of the kind `Kind.DRIVEN`."""
+    until: Float
+    lane: Int32
 
 
-class EventCode(enum.IntEnum):
-    """What happened to the car."""
+class PassageRecord:
+    """Stretch of a lane on a crosswalk: its stations, and the distance along the crosswalk [m]."""
 
-    HAZARD_STOP = 1
-    HAZARD_END = 2
-    COLLISION = 3
+    start: Float
+    stop: Float
+    across: Float
+    crossing: Int32
 
 
-EVENT = np.dtype(
-    [
-        ("frame", "i8"), ("code", "i4"), ("kind", "i4"), ("key", "i4"), ("body", "i4"), ("own", "b1"),
-        ("value", "f8"),  # gap [m], seconds, or speed [m/s]
-        ("x", "f8"), ("y", "f8"), ("station", "f8"), ("lane", "i4"),
-    ],
-    align=True,
-)  # fmt: skip
-"""Something that happened to the car: an `EventCode`, with the class, key and number of the counterpart."""
+class ProgrammeRecord:
+    """A light programme: its phases end at `phase_ends[phase : phase + phases]`; `colours` begin at `colour`."""
+
+    offset: Float
+    cycle: Float
+    phase: Int32
+    phases: Int32
+    colour: Int32
+    slots: Int32
+
+
+class WalkwayRecord:
+    """A footway: its points, the mouths of crosswalks along it, and the footways beyond its two ends, or -1."""
+
+    length: Float
+    first: Int32
+    last: Int32
+    mouth: Int32
+    mouths: Int32
+    half_width: Float
+    next_walk: Annotated[NDArray[np.int32], "i4", (2,)]
+    next_end: Annotated[NDArray[np.int32], "i4", (2,)]
+    kind: Int32  # `Footway`
+    lane: Int32  # of a way beside a street: the lane, else -1
+
+
+class CrossingRecord:
+    """A crosswalk: its ends, the direction from the first to the second, and the pavements that it joins."""
+
+    x: Annotated[NDArray[np.float64], "f8", (2,)]
+    y: Annotated[NDArray[np.float64], "f8", (2,)]
+    cos: Float
+    sin: Float
+    length: Float
+    height: Float
+    walk: Annotated[NDArray[np.int32], "i4", (2,)]
+    station: Annotated[NDArray[np.float64], "f8", (2,)]
+    light: Int32  # rows of `neighbours`: lanes whose lights must be red while a pedestrian crosses
+    lights: Int32
+
+
+class MouthRecord:
+    """Place where a crosswalk leaves a pavement."""
+
+    station: Float
+    crossing: Int32
+    end: Int32
+
+
+# --- Bodies -----------------------------------------------------------------------------------------------------------
+
+
+class VehicleRecord:
+    """A car or cyclist; a free row has the kind `Kind.EMPTY`."""
+
+    x: Float  # position of its middle [m]
+    y: Float
+    heading: Float  # [rad]
+    cos: Float
+    sin: Float
+    speed: Float  # [m/s]
+    height: Float  # of the road under it [m]
+    acceleration: Float  # present action: [m/s^2], and sine of the slip angle
+    slip: Float
+    desired: Float  # desired speed [m/s]
+    length: Float  # [m]
+    width: Float
+    radius: Float  # half its diagonal [m]
+    to_right: Float  # offset that it keeps in its lane [m]
+    station: Float  # on the lane that it follows [m]
+    lateral: Float
+    own_station: Float  # on the closest lane [m]
+    own_lateral: Float
+    timer: Float  # since it last considered a lane change [s]
+    standing: Float  # duration of its stand, its light not being red [s]
+    stuck: Float  # the same less the time for which the light ahead was not green, also behind others [s]
+    crash_age: Float  # since it crashed [s]
+    odometer: Float  # distance driven [m]
+    distance: Float  # from its front to the line before the next junction [m]
+    seen: Float  # times at which it came near, asked, began to wait [s]
+    asked: Float
+    since: Float
+    claim_since: Float  # [s]
+    claim_asked: Float
+    rerouted: Float  # time at which it last chose another way for lack of room on the planned one [s]
+    random: Int64
+    lane: Int32  # the closest lane
+    segment: Int32  # the closest segment of the lane that it follows
+    planned: Int32  # number of lanes in its plan
+    plan: Annotated[NDArray[np.int32], "i4", (PLANNED,)]  # lanes ahead; the first is the one that it follows
+    approach: Int32  # connector that it announced, and the lane before
+    approach_lane: Int32
+    claim: Int32  # connector that it was granted, and the one that it is on
+    inside: Int32
+    kind: Int32  # `Kind`
+    wait: Int32  # `Wait`
+    key: Int32  # identifies the body; a respawned one gets a new key
+    stood: Flag  # whether it has stood at the stop line
+    crashed: Flag
+    blocked: Flag  # whether a prop is next ahead
+    touched: Flag  # whether the ego has touched it
+
+
+class PedestrianRecord:
+    """A pedestrian; a free row has the state `Walk.EMPTY`."""
+
+    x: Float
+    y: Float
+    heading: Float
+    cos: Float
+    sin: Float
+    speed: Float
+    height: Float
+    station: Float  # along the footway or crosswalk [m]
+    direction: Float  # 1 or -1
+    pace: Float  # desired speed [m/s]
+    aside: Float  # offset to the right of the middle of the way [m]
+    waited: Float
+    odometer: Float
+    far: Float  # while straying: distance to the other side of the road [m]
+    staying: Float  # duration without progress [s], and the place where it began [m]
+    left_x: Float
+    left_y: Float
+    crash_age: Float  # since it was touched [s]
+    random: Int64
+    walk: Int32
+    segment: Int32
+    crossing: Int32
+    mouth: Int32
+    state: Int32  # `Walk`
+    key: Int32
+    crashed: Flag
+
+
+class PropRecord:
+    """A thing on the road, and the lanes that it reaches into."""
+
+    x: Float
+    y: Float
+    heading: Float
+    cos: Float
+    sin: Float
+    height: Float
+    length: Float
+    width: Float
+    radius: Float
+    station: Annotated[NDArray[np.float64], "f8", (4,)]
+    lane: Annotated[NDArray[np.int32], "i4", (4,)]
+    key: Int32
+    present: Flag
+
+
+class NodeRecord:
+    """A body in the list of a lane, ordered by station."""
+
+    station: Float
+    speed: Float
+    cos: Float
+    sin: Float
+    half_length: Float
+    lane: Int32
+    next: Int32
+    before: Int32
+    body: Int32
+
+
+# --- Ego --------------------------------------------------------------------------------------------------------------
+
+
+class PathPointRecord:
+    """A point of the path that the ego follows."""
+
+    s: Float  # distance along the path [m]
+    x: Float
+    y: Float
+    heading: Float
+    cos: Float
+    sin: Float
+    height: Float
+    station: Float  # along its lane [m]; during a U-turn that of its end
+    speed: Float  # speed that curves, limits and the path's end allow [m/s]
+    left: Float  # sweep of the ego's corners to either side of the path [m]
+    right: Float
+    lane: Int32
+    manoeuvre: Flag  # whether the path leaves the centre lines here: lane switch or U-turn
+
+
+class EgoRecord:
+    """Control of the ego, the vehicle of the kind `Kind.DRIVEN`."""
+
+    points: Int32  # number of points of the path, and the one at or before the ego
+    at: Int32
+    s: Float  # distance along the path, and offset to its right [m]
+    offset: Float
+    stop_at: Float  # place of a stop at the path's end [m]; infinite where the path goes on
+    runs: Int32  # number of lanes along the path, and the one of the ego
+    run: Int32
+    run_lane: Annotated[NDArray[np.int32], "i4", (PLANNED,)]
+    run_first: Annotated[NDArray[np.int32], "i4", (PLANNED,)]  # the first point on each
+    action: Int32  # manoeuvre: a `PhysicalAction` or 0
+    action_end: Float  # end of the manoeuvre [m]
+    cruise: Float  # desired speed [m/s]
+    held: Flag  # whether it stops by the action Stop
+    hold_speed: Float  # speed of a stop in progress [m/s]; -1 for none
+    goals: Int32  # places along the path to approach slowly [m]
+    goal: Annotated[NDArray[np.float64], "f8", (GOALS,)]
+    lateral_sum: Float  # state of the controllers
+    lateral_last: Float
+    speed_sum: Float
+    throttle: Float
+    steer: Float
+    brake: Float
+    manual: Flag  # whether these three are given, not found by the controllers
+    before: Float  # speed at the start of the substep [m/s]
+    friction: Float  # share of the dry road's grip
+    wind: Float  # strength in [0, 1]
+    wind_heading: Float  # direction to which it blows [rad]
+    wind_phase: Annotated[NDArray[np.float64], "f8", (3,)]  # phases of its gusts [rad]
+    roadblock: Float  # distance from its middle to a prop on the path [m], or infinite
+    sweeping: Flag  # whether it is in a U-turn, and the points of it that are left
+    sweep_first: Int32
+    sweep_last: Int32
+    closed: Annotated[NDArray[np.int32], "i4", (CLOSED,)]  # junctions that it needs for a U-turn, and when asked
+    closed_at: Annotated[NDArray[np.float64], "f8", (CLOSED,)]
+    kind: Int32  # limit of its speed: `ObjectClass` or 0, gap [m], speed [m/s] and key of the body
+    gap: Float
+    ahead_speed: Float
+    other: Int32
+    tight: Flag  # whether the limit is met in a manoeuvre, and whether it is a line
+    line: Flag
+    hazard: Int32  # hazard stop in progress: `ObjectClass` or 0, gap [m], key, first and last frame
+    hazard_gap: Float
+    hazard_key: Int32
+    hazard_since: Int64
+    hazard_seen: Int64
+    stopped_until: Int64  # frame up to which it stands after a collision, and length of such stands [frames]
+    collision_stop: Int64
+    collisions: Int64  # number of collisions by its own fault
+    events: Int32  # rows of `events` and `trace` in use
+    frames: Int32
+
+
+class EventRecord:
+    """An event of the ego, with class, key and row of the counterpart."""
+
+    frame: Int64
+    code: Int32  # `EventCode`
+    kind: Int32
+    key: Int32
+    body: Int32
+    own: Flag  # whether a collision is the ego's own fault
+    value: Float  # gap [m], duration [frames] or speed [m/s]
+    x: Float
+    y: Float
+    station: Float
+    lane: Int32
+
 
 TRACE = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "brake", "lane", "offset")
-"""Columns of the way of the car."""
+"""Columns of the ego's trajectory."""
 
 POSE = ("x", "y", "heading", "speed", "height", "turning")
-"""Columns of its poses: place [m], heading [rad], speed [m/s], height of the road [m], 1 if it turns round."""
+"""Columns of the ego's poses: place [m], heading [rad], speed [m/s], height of the road [m], 1 during a U-turn."""
 
-CLOCK = np.dtype(
-    [("time", "f8"), ("frame", "i8"), ("collisions", "i8"), ("run_over", "i8"), ("random", "i8"), ("towed", "i8"),
-     ("keys", "i8"), ("straying", "i8")],
-    align=True,
-)  # fmt: skip
-"""What a world counts: time [s], substeps, collisions of vehicles, pedestrians touched, vehicles towed, keys given, and
-how many stray over a road now; `random` is a number from which those of all bodies are drawn."""
 
-LAMP = np.dtype([("until", "f8"), ("phase", "i4")], align=True)
-"""The phase of a light programme now, which holds until a time [s]."""
+class ClockRecord:
+    """Time and counters of a world; the seeds of all bodies are drawn from `random`."""
 
-SEEN = np.dtype(
-    [
-        ("distance2", "f8"),  # square of its distance, as it seems [m^2]
-        ("x", "f8"), ("y", "f8"),  # where it seems to be [m]
-        ("heading", "f8"), ("cos", "f8"), ("sin", "f8"), ("speed", "f8"),
-        ("length", "f8"), ("width", "f8"), ("height", "f8"),  # its outline, and the height of the road under it [m]
-        ("kind", "i4"),  # value of the ontology's `ObjectClass`
-        ("key", "i4"),
-        ("body", "i4"), ("group", "i4"),  # its place in the array of its `Group`
-    ],
-    align=True,
-)  # fmt: skip
-"""A body that is perceived."""
+    time: Float  # [s]
+    frame: Int64  # substeps
+    collisions: Int64  # collisions of vehicles
+    run_over: Int64  # pedestrians touched
+    random: Int64
+    towed: Int64  # vehicles respawned
+    keys: Int64  # keys given
+    straying: Int64  # pedestrians straying over a road now
 
-EYE = np.dtype(
-    [
-        ("seed", "i8"),
-        ("sight", "f8"),  # within which nothing is missed [m]
-        ("fog", "f8"), ("fog_start", "f8"), ("rain", "f8"), ("light", "f8"), ("lamps", "f8"), ("clarity", "f8"),
-        ("clear", "b1"),  # whether all within `visibility.CLEAR_SIGHT` is seen where it is
-    ],
-    align=True,
-)  # fmt: skip
-"""How well one sees: the fields of `visibility.Visibility`, and the seed of errors and misses."""
 
-LINE = np.dtype(
-    [("x", "f8"), ("y", "f8"), ("cos", "f8"), ("sin", "f8"), ("half_width", "f8"), ("height", "f8"), ("is_stop", "b1")],
-    align=True,
-)  # fmt: skip
-"""The end of a lane with a light or a stop sign: place [m], direction, half of the lane's width and height [m]."""
+class LampRecord:
+    """Present phase of a light programme, which holds until a time [s]."""
 
-MARK = np.dtype([("near", "i4"), ("stood", "b1")], align=True)
-"""A line, as one car has it: whether it has stood there; `near` lists the lines near it, for this moment only."""
+    until: Float
+    phase: Int32
 
-FINDING = np.dtype([("station", "f8"), ("pose", "i4"), ("kind", "i4"), ("number", "i4")], align=True)
-"""What was found: at which pose, `rules.Found`, and of which line or lane; on a lane, how far along it [m]."""
+
+# --- Perception -------------------------------------------------------------------------------------------------------
+
+
+class SeenRecord:
+    """A perceived body."""
+
+    distance2: Float  # square of its perceived distance [m^2]
+    x: Float  # perceived place [m]
+    y: Float
+    heading: Float
+    cos: Float
+    sin: Float
+    speed: Float
+    length: Float
+    width: Float
+    height: Float  # of the road under it [m]
+    kind: Int32  # `ObjectClass`
+    key: Int32
+    body: Int32  # row in the array of its `Group`
+    group: Int32
+
+
+class EyeRecord:
+    """Visibility: the fields of `visibility.Visibility`, and the seed of errors and misses."""
+
+    seed: Int64
+    sight: Float  # range within which nothing is missed [m]
+    fog: Float
+    fog_start: Float
+    rain: Float
+    light: Float
+    lamps: Float
+    clarity: Float
+    clear: Flag  # whether all within `visibility.CLEAR_SIGHT` is seen without errors
+
+
+# --- Rules ------------------------------------------------------------------------------------------------------------
+
+
+class StopLineRecord:
+    """End of a lane with a light or a stop sign: place [m], direction, half of the lane's width and height [m]."""
+
+    x: Float
+    y: Float
+    cos: Float
+    sin: Float
+    half_width: Float
+    height: Float
+    is_stop: Flag
+
+
+class LineMarkRecord:
+    """State of a line for one vehicle: whether it has stood there; `near` is a scratch list of the lines nearby."""
+
+    near: Int32
+    stood: Flag
+
+
+class FindingRecord:
+    """A breach of a rule: pose, `traffic_rules.FindingKind`, number of line or lane, and station on a lane [m]."""
+
+    station: Float
+    pose: Int32
+    kind: Int32
+    number: Int32

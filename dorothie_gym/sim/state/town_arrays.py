@@ -17,7 +17,20 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.network.lane_lookup import build_cells
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.walkways import build_walkways
-from dorothie_gym.sim.state.records import LANE, NOBODY, PROGRAMME, SIBLING, Colour, Control, Records, Relation
+from dorothie_gym.sim.state.codes import NOBODY, Colour, Relation, TrafficControl
+from dorothie_gym.sim.state.records import (
+    CellEntryRecord,
+    CrossingRecord,
+    LaneRecord,
+    MouthRecord,
+    PassageRecord,
+    ProgrammeRecord,
+    RecordArray,
+    SiblingRecord,
+    WalkwayRecord,
+    empty_records,
+    filled_records,
+)
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CURVE_ACCELERATION, CYCLIST_ROADS
 
 SIDE_BY_SIDE = 2.5
@@ -30,8 +43,8 @@ LEVEL_TOWN = 2.0
 """In a town whose lanes are no further apart in height than this, heights decide nothing [m]."""
 
 _CONTROLS = {
-    None: Control.NONE, SignalKind.TRAFFIC_LIGHT: Control.LIGHT,
-    SignalKind.STOP: Control.STOP, SignalKind.YIELD: Control.YIELD,
+    None: TrafficControl.NONE, SignalKind.TRAFFIC_LIGHT: TrafficControl.LIGHT,
+    SignalKind.STOP: TrafficControl.STOP, SignalKind.YIELD: TrafficControl.YIELD,
 }  # fmt: skip
 
 
@@ -62,21 +75,21 @@ class TownArrays(NamedTuple):
     """
 
     points: Array
-    lanes: Records
+    lanes: RecordArray[LaneRecord]
     neighbours: NDArray[np.int32]
     relations: NDArray[np.uint8]
-    siblings: Records
-    programmes: Records
+    siblings: RecordArray[SiblingRecord]
+    programmes: RecordArray[ProgrammeRecord]
     phase_ends: Array
     colours: NDArray[np.uint8]
     origin: Array
     cells: NDArray[np.int32]
-    entries: Records
+    entries: RecordArray[CellEntryRecord]
     walk_points: Array
-    walks: Records
-    mouths: Records
-    crossings: Records
-    passages: Records
+    walks: RecordArray[WalkwayRecord]
+    mouths: RecordArray[MouthRecord]
+    crossings: RecordArray[CrossingRecord]
+    passages: RecordArray[PassageRecord]
     junctions: Array
     flat: bool
 
@@ -99,7 +112,7 @@ def town_arrays(network: TownNetwork) -> TownArrays:
 
 def _build(network: TownNetwork) -> TownArrays:
     town = network.town
-    lanes = np.zeros(len(town.lanes), dtype=LANE).view(np.recarray)
+    lanes = empty_records(LaneRecord, len(town.lanes))
     for lane in town.lanes:
         _describe(lanes[lane.id], lane, network.row(network.index_of(lane.id)), network.table)
     neighbours = _link(town, lanes)
@@ -109,7 +122,7 @@ def _build(network: TownNetwork) -> TownArrays:
     programmes, phase_ends, colours = _lights(town, lanes)
     cells = build_cells(network.table.points, lanes)
     walkways = build_walkways(network, lanes)
-    walkways.crossings.light += len(neighbours)
+    walkways.crossings["light"] += len(neighbours)
     neighbours = np.concatenate((neighbours, walkways.heeded))
     low, high = network.height_range
     return TownArrays(
@@ -120,7 +133,7 @@ def _build(network: TownNetwork) -> TownArrays:
     )  # fmt: skip
 
 
-def _describe(record: Records, lane: Lane, row: int, table: LaneTable) -> None:
+def _describe(record: LaneRecord, lane: Lane, row: int, table: LaneTable) -> None:
     record.length = float(table.points[table.offsets[row + 1] - 1, 2])
     record.limit = lane.speed_limit
     record.curve_speed = curve_speed(lane)
@@ -130,7 +143,7 @@ def _describe(record: Records, lane: Lane, row: int, table: LaneTable) -> None:
     record.first, record.last = table.offsets[row], table.offsets[row + 1] - 1
     record.rank = row
     for name in ("left", "right", "junction", "exit", "programme", "place"):
-        record[name] = NOBODY
+        setattr(record, name, NOBODY)
 
 
 def curve_speed(lane: Lane) -> float:
@@ -145,7 +158,7 @@ def curve_speed(lane: Lane) -> float:
     return min(lane.speed_limit, math.sqrt(CURVE_ACCELERATION / max(tightest, 1e-4)))
 
 
-def _link(town: Town, lanes: Records) -> NDArray[np.int32]:
+def _link(town: Town, lanes: RecordArray[LaneRecord]) -> NDArray[np.int32]:
     pool: list[int] = []
     for lane in town.lanes:
         record = lanes[lane.id]
@@ -156,24 +169,24 @@ def _link(town: Town, lanes: Records) -> NDArray[np.int32]:
         pool += after + before
         for name, side in (("left", LinkType.LANE_CHANGE_LEFT), ("right", LinkType.LANE_CHANGE_RIGHT)):
             beside = town.neighbour(lane.id, side)
-            record[name] = NOBODY if beside is None else beside
+            setattr(record, name, NOBODY if beside is None else beside)
     return np.array(pool, dtype=np.int32)
 
 
-def _find_cycling(lanes: Records, neighbours: NDArray[np.int32]) -> None:
+def _find_cycling(lanes: RecordArray[LaneRecord], neighbours: NDArray[np.int32]) -> None:
     """Notes on which lanes cyclists ride: on slow ones, unless all ways on lead to faster ones, as from ramps."""
-    lanes.cycling = lanes.limit <= CYCLIST_ROADS
+    lanes["cycling"] = lanes["limit"] <= CYCLIST_ROADS
     changed = True
     while changed:
         changed = False
-        for number in np.flatnonzero(lanes.cycling & (lanes.successors > 0)):
+        for number in np.flatnonzero(lanes["cycling"] & (lanes["successors"] > 0)):
             lane = lanes[number]
             after = neighbours[lane.successor : lane.successor + lane.successors]
-            if not lanes.cycling[after].any():
+            if not lanes["cycling"][after].any():
                 lane.cycling, changed = False, True
 
 
-def _relate(town: Town, lanes: Records, rules: RightOfWay) -> NDArray[np.uint8]:
+def _relate(town: Town, lanes: RecordArray[LaneRecord], rules: RightOfWay) -> NDArray[np.uint8]:
     """Numbers the junctions and connectors, and says of each pair of one junction what they are to each other."""
     rows: list[NDArray[np.uint8]] = []
     begin = 0
@@ -197,8 +210,8 @@ def _relate(town: Town, lanes: Records, rules: RightOfWay) -> NDArray[np.uint8]:
     return np.concatenate(rows) if rows else np.zeros(1, dtype=np.uint8)
 
 
-def _mouths(town: Town, lanes: Records) -> Array:
-    found = np.zeros((max(int(lanes.junction.max()) + 1, 1), 3))
+def _mouths(town: Town, lanes: RecordArray[LaneRecord]) -> Array:
+    found = np.zeros((max(int(lanes["junction"].max()) + 1, 1), 3))
     for number in range(len(found)):
         points = [lane.points[:, :2] for lane in town.lanes if lanes[lane.id].junction == number]
         if points:
@@ -219,7 +232,7 @@ def _exit(town: Town, connector: int) -> int:
     return int(NOBODY)
 
 
-def _siblings(town: Town, lanes: Records) -> Records:
+def _siblings(town: Town, lanes: RecordArray[LaneRecord]) -> RecordArray[SiblingRecord]:
     """Lanes that begin on one lane: up to where each is in the way on the others."""
     found: list[tuple[float, int]] = []
     for lane in town.lanes:
@@ -228,7 +241,7 @@ def _siblings(town: Town, lanes: Records) -> Records:
         )
         lanes[lane.id].sibling, lanes[lane.id].siblings = len(found), len(beside)
         found += [(_parting(lane, town.lanes[other]), other) for other in beside]
-    return np.array(found or [(0.0, 0)], dtype=SIBLING).view(np.recarray)
+    return filled_records(SiblingRecord, found)
 
 
 def _parting(lane: Lane, other: Lane) -> float:
@@ -239,8 +252,10 @@ def _parting(lane: Lane, other: Lane) -> float:
     return other.length + CAR_REAR
 
 
-def _lights(town: Town, lanes: Records) -> tuple[Records, Array, NDArray[np.uint8]]:
-    programmes = np.zeros(max(len(town.programmes), 1), dtype=PROGRAMME).view(np.recarray)
+def _lights(
+    town: Town, lanes: RecordArray[LaneRecord]
+) -> tuple[RecordArray[ProgrammeRecord], Array, NDArray[np.uint8]]:
+    programmes = empty_records(ProgrammeRecord, max(len(town.programmes), 1))
     ends: list[float] = []
     colours: list[Sequence[int]] = []
     begin = 0

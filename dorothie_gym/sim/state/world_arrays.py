@@ -9,22 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
+from dorothie_gym.sim.state.codes import NOBODY
 from dorothie_gym.sim.state.records import (
-    CAR,
-    CLOCK,
-    EVENT,
-    EYE,
-    LAMP,
-    NOBODY,
-    NODE,
-    PEDESTRIAN,
-    POINT,
     POSE,
-    PROP,
-    SEEN,
     TRACE,
-    VEHICLE,
-    Records,
+    ClockRecord,
+    EgoRecord,
+    EventRecord,
+    EyeRecord,
+    LampRecord,
+    NodeRecord,
+    PathPointRecord,
+    PedestrianRecord,
+    PropRecord,
+    RecordArray,
+    SeenRecord,
+    VehicleRecord,
+    empty_records,
 )
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.traffic.lane_index import rebuild
@@ -65,41 +66,45 @@ class WorldArrays(NamedTuple):
         events: `records.EVENT`: what happened to it then.
     """
 
-    vehicles: Records
-    pedestrians: Records
-    props: Records
-    nodes: Records
+    vehicles: RecordArray[VehicleRecord]
+    pedestrians: RecordArray[PedestrianRecord]
+    props: RecordArray[PropRecord]
+    nodes: RecordArray[NodeRecord]
     heads: NDArray[np.int32]
     order: NDArray[np.int32]
     keys: Array
-    lamps: Records
+    lamps: RecordArray[LampRecord]
     busy: NDArray[np.int32]
     stack: NDArray[np.int32]
     starts: Array
-    clock: Records
-    car: Records
-    path: Records
-    eye: Records
-    seen: Records
+    clock: RecordArray[ClockRecord]
+    car: RecordArray[EgoRecord]
+    path: RecordArray[PathPointRecord]
+    eye: RecordArray[EyeRecord]
+    seen: RecordArray[SeenRecord]
     trace: Array
     poses: Array
-    events: Records
+    events: RecordArray[EventRecord]
 
     @property
     def nbytes(self) -> int:
         """Memory of all arrays [bytes]."""
         return sum(array.nbytes for array in self)
 
+    def plain(self) -> list[NDArray[Any]]:
+        """Returns the arrays as plain NumPy arrays that share their memory."""
+        return [np.asarray(array) for array in self]
+
     def copy(self) -> WorldArrays:
-        """The same world once more."""
-        return WorldArrays(*(_same(array) for array in self))
+        """Returns a copy of the world."""
+        return WorldArrays(*(_copy_of(array) for array in self))
 
     def tobytes(self) -> bytes:
         """The state byte by byte, to compare worlds."""
         return b"".join(array.tobytes() for array in self)
 
 
-def _same(array: Any) -> Any:
+def _copy_of(array: Any) -> Any:
     """A copy with all bytes, also those between the fields of records, which NumPy leaves out."""
     copied = np.frombuffer(bytearray(array.tobytes()), dtype=array.dtype).reshape(array.shape)
     return copied.view(np.recarray) if isinstance(array, np.recarray) else copied
@@ -124,31 +129,37 @@ def empty_world(
         seed: of all that is drawn at random in it.
         driven: whether vehicle 0 will be a car that follows a path, `Kind.DRIVEN`.
     """
-
-    def records(count: int, kind: np.dtype[np.void]) -> Records:
-        return np.zeros(count, dtype=kind).view(np.recarray)
-
     world = WorldArrays(
-        records(vehicles, VEHICLE), records(pedestrians, PEDESTRIAN), records(props, PROP),
-        records(2 * vehicles + 4 * props, NODE), np.full(len(town.lanes), NOBODY, dtype=np.int32),
-        np.arange(vehicles + pedestrians + props, dtype=np.int32), np.zeros(vehicles + pedestrians + props),
-        records(len(town.programmes), LAMP), np.zeros(len(town.crossings), dtype=np.int32),
-        np.zeros(STACK, dtype=np.int32), np.zeros(STACK), records(1, CLOCK),
-        records(1, CAR), records(POINTS if driven else 1, POINT), records(1, EYE),
-        records(vehicles + pedestrians + props if driven else 1, SEEN),
-        np.zeros((FRAMES if driven else 1, len(TRACE))), np.zeros((1 + FRAMES if driven else 1, len(POSE))),
-        records(EVENTS if driven else 1, EVENT),
-    )  # fmt: skip
-    world.car.closed = NOBODY
-    world.car.closed_at = -math.inf
-    world.car.lateral_last = world.car.stop_at = world.car.roadblock = world.car.action_end = math.inf
-    world.car.hold_speed = -1.0
-    world.nodes.lane = world.nodes.next = world.nodes.before = NOBODY
-    world.lamps.until = -math.inf
-    world.props.lane = NOBODY
-    world.vehicles.lane = world.vehicles.approach = world.vehicles.claim = world.vehicles.inside = NOBODY
+        vehicles=empty_records(VehicleRecord, vehicles),
+        pedestrians=empty_records(PedestrianRecord, pedestrians),
+        props=empty_records(PropRecord, props),
+        nodes=empty_records(NodeRecord, 2 * vehicles + 4 * props),
+        heads=np.full(len(town.lanes), NOBODY, dtype=np.int32),
+        order=np.arange(vehicles + pedestrians + props, dtype=np.int32),
+        keys=np.zeros(vehicles + pedestrians + props),
+        lamps=empty_records(LampRecord, len(town.programmes)),
+        busy=np.zeros(len(town.crossings), dtype=np.int32),
+        stack=np.zeros(STACK, dtype=np.int32),
+        starts=np.zeros(STACK),
+        clock=empty_records(ClockRecord, 1),
+        car=empty_records(EgoRecord, 1),
+        path=empty_records(PathPointRecord, POINTS if driven else 1),
+        eye=empty_records(EyeRecord, 1),
+        seen=empty_records(SeenRecord, vehicles + pedestrians + props if driven else 1),
+        trace=np.zeros((FRAMES if driven else 1, len(TRACE))),
+        poses=np.zeros((1 + FRAMES if driven else 1, len(POSE))),
+        events=empty_records(EventRecord, EVENTS if driven else 1),
+    )
+    world.car["closed"] = NOBODY
+    world.car["closed_at"] = -math.inf
+    world.car["lateral_last"] = world.car["stop_at"] = world.car["roadblock"] = world.car["action_end"] = math.inf
+    world.car["hold_speed"] = -1.0
+    world.nodes["lane"] = world.nodes["next"] = world.nodes["before"] = NOBODY
+    world.lamps["until"] = -math.inf
+    world.props["lane"] = NOBODY
+    world.vehicles["lane"] = world.vehicles["approach"] = world.vehicles["claim"] = world.vehicles["inside"] = NOBODY
     source = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
-    world.clock.random = int(source.generate_state(1)[0]) | 1
+    world.clock["random"] = int(source.generate_state(1)[0]) | 1
     return world
 
 
@@ -170,7 +181,7 @@ def grown(town: TownArrays, world: WorldArrays, *, vehicles: int, pedestrians: i
         raise ValueError(f"a world with room for {room} vehicles, pedestrians and props does not shrink to {wanted}")
     driven = len(world.path) > 1
     bigger = empty_world(town, vehicles=vehicles, pedestrians=pedestrians, props=props, driven=driven)
-    for name, old, new in zip(WorldArrays._fields, world, bigger, strict=True):
+    for name, old, new in zip(WorldArrays._fields, world.plain(), bigger.plain(), strict=True):
         if name not in ("nodes", "heads", "order", "keys"):  # made anew from the bodies, whose numbers they hold
             new[: len(old)] = old
     rebuild(town, bigger)

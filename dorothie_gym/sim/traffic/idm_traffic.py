@@ -6,11 +6,12 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.sim.ego.planner import SWEEP_STEP
+from dorothie_gym.sim.ego.limits import U_TURN_SAMPLES
 from dorothie_gym.sim.network.ahead import HORIZON, LEVEL
 from dorothie_gym.sim.network.lane_lookup import project
 from dorothie_gym.sim.pedestrians.jaywalking import give_way_to_strayers
-from dorothie_gym.sim.state.records import NOBODY, Kind, Records, Wait, Walk
+from dorothie_gym.sim.state.codes import NOBODY, Kind, Wait, Walk
+from dorothie_gym.sim.state.records import LaneRecord, PassageRecord, VehicleRecord
 from dorothie_gym.sim.traffic.junctions import announce, forget, note, request
 from dorothie_gym.sim.traffic.lane_index import around, next_on_lane
 from dorothie_gym.sim.traffic.parameters import (
@@ -116,7 +117,7 @@ def _acceleration(town: TownArrays, world: WorldArrays, i: int) -> float:
 
 
 @compiled
-def _give_way_to_turning(town: TownArrays, world: WorldArrays, vehicle: Records) -> float:
+def _give_way_to_turning(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> float:
     """Acceleration that stops a vehicle before the way of the car that turns round [m/s^2]; inf where it is clear."""
     car, other = world.car[0], world.vehicles[0]
     if not car.sweeping:
@@ -128,7 +129,7 @@ def _give_way_to_turning(town: TownArrays, world: WorldArrays, vehicle: Records)
     beside = 0.5 * (vehicle.width + other.width) + CROSSING_MARGIN
     for k in range(min(int(vehicle.planned), 3)):
         lane = town.lanes[vehicle.plan[k]]
-        for p in range(car.sweep_first, car.sweep_last + 1, SWEEP_STEP):
+        for p in range(car.sweep_first, car.sweep_last + 1, U_TURN_SAMPLES):
             station, lateral, _ = project(town, vehicle.plan[k], world.path[p].x, world.path[p].y)
             if abs(lateral) < beside and 0.0 <= station <= lane.length:
                 gap = min(gap, start + station - vehicle.station)
@@ -139,7 +140,7 @@ def _give_way_to_turning(town: TownArrays, world: WorldArrays, vehicle: Records)
 
 
 @inlined
-def _held_up(world: WorldArrays, vehicle: Records, front: int, gap: float) -> float:
+def _held_up(world: WorldArrays, vehicle: VehicleRecord, front: int, gap: float) -> float:
     node = world.nodes[front]
     along = node.speed * (vehicle.cos * node.cos + vehicle.sin * node.sin)
     return following_acceleration(vehicle.speed, along, gap, 0.5 * vehicle.length + node.half_length)
@@ -157,7 +158,7 @@ def _held_up_beside(town: TownArrays, world: WorldArrays, i: int) -> float:
 
 
 @inlined
-def _first_on(town: TownArrays, world: WorldArrays, i: int, k: int, lane: Records) -> tuple[int, float]:
+def _first_on(town: TownArrays, world: WorldArrays, i: int, k: int, lane: LaneRecord) -> tuple[int, float]:
     """The first body ahead on the `k`-th lane of a plan: its node (-1 for nobody), and its station [m].
 
     Who is still near the start of a lane that begins where this one does is in the way, too.
@@ -216,7 +217,7 @@ def _approach(town: TownArrays, world: WorldArrays, i: int, k: int, line: float,
 
 
 @compiled
-def _choose_another_way(town: TownArrays, vehicle: Records, k: int, now: float) -> None:
+def _choose_another_way(town: TownArrays, vehicle: VehicleRecord, k: int, now: float) -> None:
     """Draws anew what follows the first `k` planned lanes, when there has long been no room where they lead.
 
     So no ring of full lanes lasts for ever in which everybody waits for the next one.
@@ -233,7 +234,9 @@ def _is_let_in(world: WorldArrays, front: int) -> bool:
 
 
 @compiled
-def _give_way_to_walkers(town: TownArrays, world: WorldArrays, vehicle: Records, lane: Records, begin: float) -> float:
+def _give_way_to_walkers(
+    town: TownArrays, world: WorldArrays, vehicle: VehicleRecord, lane: LaneRecord, begin: float
+) -> float:
     """Acceleration that stops a vehicle before crosswalks of a lane on which somebody walks in its way [m/s^2]."""
     found = math.inf
     for p in range(lane.passage, lane.passage + lane.passages):
@@ -251,7 +254,7 @@ def _give_way_to_walkers(town: TownArrays, world: WorldArrays, vehicle: Records,
 
 
 @compiled
-def _is_walked(world: WorldArrays, passage: Records) -> bool:
+def _is_walked(world: WorldArrays, passage: PassageRecord) -> bool:
     """Whether somebody on a crosswalk is about to pass a lane, or has only just passed it."""
     for p in range(len(world.pedestrians)):
         walker = world.pedestrians[p]

@@ -10,7 +10,8 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.sim.state.records import NOBODY, Colour, Control, Kind, Records, Relation, Wait
+from dorothie_gym.sim.state.codes import NOBODY, Colour, Kind, Relation, TrafficControl, Wait
+from dorothie_gym.sim.state.records import LaneRecord, VehicleRecord
 from dorothie_gym.sim.traffic.parameters import (
     AFTER_END,
     AT_LINE,
@@ -79,7 +80,7 @@ CLEAR = 0.5
 
 
 @inlined
-def announce(vehicle: Records, lane: int, connector: int, distance: float, now: float) -> None:
+def announce(vehicle: VehicleRecord, lane: int, connector: int, distance: float, now: float) -> None:
     """Tells that a vehicle comes along a lane to a connector, its front `distance` [m] before it."""
     if vehicle.approach != connector or vehicle.approach_lane != lane:
         if vehicle.approach < 0 or vehicle.approach_lane != lane:
@@ -92,7 +93,7 @@ def announce(vehicle: Records, lane: int, connector: int, distance: float, now: 
 
 
 @inlined
-def forget(vehicle: Records) -> None:
+def forget(vehicle: VehicleRecord) -> None:
     """The vehicle comes to no junction any more."""
     vehicle.approach, vehicle.approach_lane, vehicle.stood, vehicle.wait = NOBODY, NOBODY, False, Wait.NOT
 
@@ -126,7 +127,7 @@ def request(town: TownArrays, world: WorldArrays, i: int, k: int) -> int:
 
 
 @inlined
-def note(town: TownArrays, vehicle: Records, now: float) -> None:
+def note(town: TownArrays, vehicle: VehicleRecord, now: float) -> None:
     """Takes note of where a vehicle is: enters or leaves its connector, or does not use what it was granted."""
     followed = vehicle.plan[0]
     if vehicle.claim >= 0:
@@ -224,7 +225,7 @@ def _others(town: TownArrays, world: WorldArrays, i: int, now: float) -> int:
 
 
 @inlined
-def relation(town: TownArrays, connector: Records, other: int) -> int:
+def relation(town: TownArrays, connector: LaneRecord, other: int) -> int:
     """`Relation` of a connector to another lane (or -1, for none)."""
     if other < 0 or town.lanes[other].junction != connector.junction:
         return 0  # Relation.APART
@@ -232,7 +233,7 @@ def relation(town: TownArrays, connector: Records, other: int) -> int:
 
 
 @compiled
-def _light_stops(town: TownArrays, world: WorldArrays, vehicle: Records, now: float, let_in: bool) -> bool:
+def _light_stops(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord, now: float, let_in: bool) -> bool:
     """Whether a vehicle has to stop for its light, and can; `let_in` if it was about to enter."""
     if town.lanes[vehicle.approach_lane].programme < 0 or vehicle.distance < -OVER_LINE:
         return False
@@ -246,7 +247,7 @@ def _light_stops(town: TownArrays, world: WorldArrays, vehicle: Records, now: fl
 
 
 @compiled
-def _may_sneak(town: TownArrays, world: WorldArrays, vehicle: Records, now: float, let_in: bool) -> bool:
+def _may_sneak(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord, now: float, let_in: bool) -> bool:
     """Whether who gave way at the line all the green time may use the yellow: it must not last into the red."""
     if now - vehicle.since <= SNEAKING or vehicle.distance >= AT_LINE:
         return False
@@ -258,12 +259,12 @@ def _may_sneak(town: TownArrays, world: WorldArrays, vehicle: Records, now: floa
 
 
 @compiled
-def _has_to_stop(town: TownArrays, vehicle: Records) -> bool:
-    return bool(not vehicle.stood and town.lanes[vehicle.approach_lane].control == Control.STOP)
+def _has_to_stop(town: TownArrays, vehicle: VehicleRecord) -> bool:
+    return bool(not vehicle.stood and town.lanes[vehicle.approach_lane].control == TrafficControl.STOP)
 
 
 @compiled
-def _comes_first(town: TownArrays, other: Records, own: Records, meeting: int, now: float) -> bool:
+def _comes_first(town: TownArrays, other: VehicleRecord, own: VehicleRecord, meeting: int, now: float) -> bool:
     """Whether one who waits goes before another by the time of waiting; priority is none of it, but patience is."""
     if other.since >= own.since or now - other.asked >= LAPSE:
         return False
@@ -279,7 +280,7 @@ def _comes_first(town: TownArrays, other: Records, own: Records, meeting: int, n
 
 
 @inlined
-def _have_one_exit(town: TownArrays, one: Records, other: Records) -> bool:
+def _have_one_exit(town: TownArrays, one: VehicleRecord, other: VehicleRecord) -> bool:
     """Whether two who announced themselves leave the junction on the same lane."""
     exit = town.lanes[one.approach].exit
     return bool(exit >= 0 and exit == town.lanes[other.approach].exit)

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.sim.network.ahead import HORIZON, MARGIN
 from dorothie_gym.sim.network.lane_lookup import project
-from dorothie_gym.sim.state.records import NOBODY, Kind, Records
+from dorothie_gym.sim.state.codes import NOBODY, Kind
+from dorothie_gym.sim.state.records import NodeRecord, RecordArray, VehicleRecord
 from dorothie_gym.sim.traffic.parameters import CAR_WIDTH
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def rebuild(town: TownArrays, world: WorldArrays) -> None:
 
 
 @inlined
-def _is_on_followed(town: TownArrays, vehicle: Records) -> bool:
+def _is_on_followed(town: TownArrays, vehicle: VehicleRecord) -> bool:
     """Whether a vehicle is on the lane that it follows, which is not the closest one."""
     lane = town.lanes[vehicle.lane]
     beside = lane.left == vehicle.plan[0] or lane.right == vehicle.plan[0]
@@ -67,7 +68,9 @@ def _is_on_followed(town: TownArrays, vehicle: Records) -> bool:
 
 
 @inlined
-def _list_beside(town: TownArrays, nodes: Records, heads: NDArray[np.int32], vehicle: Records, body: int) -> None:
+def _list_beside(
+    town: TownArrays, nodes: RecordArray[NodeRecord], heads: NDArray[np.int32], vehicle: VehicleRecord, body: int
+) -> None:
     """Lists a vehicle on the lane beside into which it reaches so far that nobody passes it there."""
     lane = town.lanes[vehicle.lane]
     if lane.left < 0 and lane.right < 0:
@@ -82,7 +85,12 @@ def _list_beside(town: TownArrays, nodes: Records, heads: NDArray[np.int32], veh
 
 @compiled
 def _list_astride(
-    town: TownArrays, nodes: Records, heads: NDArray[np.int32], vehicle: Records, body: int, turned: float
+    town: TownArrays,
+    nodes: RecordArray[NodeRecord],
+    heads: NDArray[np.int32],
+    vehicle: VehicleRecord,
+    body: int,
+    turned: float,
 ) -> None:
     """See `_list_beside`; `turned` is the sine of the vehicle's angle to its lane."""
     reach = 0.5 * (vehicle.width * math.sqrt(max(1.0 - turned * turned, 0.0)) + vehicle.length * turned)
@@ -98,7 +106,13 @@ def _list_astride(
 
 @inlined
 def _list_vehicle(
-    nodes: Records, heads: NDArray[np.int32], vehicle: Records, body: int, n: int, lane: int, station: float
+    nodes: RecordArray[NodeRecord],
+    heads: NDArray[np.int32],
+    vehicle: VehicleRecord,
+    body: int,
+    n: int,
+    lane: int,
+    station: float,
 ) -> None:
     node = nodes[n]
     node.station, node.lane, node.body = station, lane, body
@@ -107,7 +121,7 @@ def _list_vehicle(
 
 
 @inlined
-def _insert(nodes: Records, heads: NDArray[np.int32], n: int) -> None:
+def _insert(nodes: RecordArray[NodeRecord], heads: NDArray[np.int32], n: int) -> None:
     node = nodes[n]
     before, after = NOBODY, heads[node.lane]
     while after >= 0 and nodes[after].station <= node.station:
@@ -122,7 +136,7 @@ def _insert(nodes: Records, heads: NDArray[np.int32], n: int) -> None:
 
 
 @inlined
-def next_on_lane(nodes: Records, n: int, body: int) -> int:
+def next_on_lane(nodes: RecordArray[NodeRecord], n: int, body: int) -> int:
     """The first node from `n` on along its lane that is not of a body, or -1."""
     while n >= 0 and nodes[n].body == body:
         n = nodes[n].next

@@ -83,9 +83,6 @@ FRAMES = 15
 STOPPED = 0.05
 """Who brakes at less than this stands [m/s]."""
 
-STUCK_SPEED = 0.3
-"""Slower than this a vehicle counts as standing [m/s]."""
-
 CHANGE_TIME = 3.0
 """A lane change takes about this long; where less is left before the lane ends none is begun [s]."""
 

@@ -6,11 +6,13 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.network.lane_lookup import value_near
 from dorothie_gym.sim.pedestrians.footways import place_beside
 from dorothie_gym.sim.pedestrians.walking import place_walker
 from dorothie_gym.sim.randomness import choose, draw
-from dorothie_gym.sim.state.records import NOBODY, Colour, Footway, Kind, Records, Walk
+from dorothie_gym.sim.state.codes import NOBODY, Colour, Footway, Kind, Walk
+from dorothie_gym.sim.state.records import VehicleRecord
 from dorothie_gym.sim.traffic.junctions import light
 from dorothie_gym.sim.traffic.parameters import (
     CAR_LENGTH,
@@ -20,7 +22,7 @@ from dorothie_gym.sim.traffic.parameters import (
     CLEAR_OF_PEOPLE,
     GOES_HOME,
     OUT_OF_SIGHT,
-    STUCK_SPEED,
+    STANDING,
     TOW_BLOCKED,
     TOW_CRASHED,
     TOW_FACING,
@@ -47,9 +49,6 @@ LOOK_EVERY = 6
 FACING = 6.0
 """From a vehicle's outline to the middle of the car before which it stands [m]."""
 
-STANDING = 0.1
-"""Slower than this the car stands [m/s]."""
-
 
 @inlined
 def tow(town: TownArrays, world: WorldArrays, dt: float, turning: bool = False) -> None:
@@ -67,7 +66,7 @@ def tow(town: TownArrays, world: WorldArrays, dt: float, turning: bool = False) 
         if vehicle.kind == Kind.CAR or vehicle.kind == Kind.CYCLIST:
             if vehicle.crashed:
                 vehicle.crash_age += dt
-            if vehicle.speed >= STUCK_SPEED:
+            if vehicle.speed >= STANDING:
                 vehicle.stuck = 0.0
             elif (frame + i) % LOOK_EVERY == 0 and _may_go(town, world, vehicle):
                 vehicle.stuck += LOOK_EVERY * dt
@@ -82,7 +81,7 @@ def tow(town: TownArrays, world: WorldArrays, dt: float, turning: bool = False) 
 
 
 @compiled
-def _may_go(town: TownArrays, world: WorldArrays, vehicle: Records) -> bool:
+def _may_go(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> bool:
     """Whether no light holds a vehicle up: neither itself nor in a queue, which may reach back through junctions."""
     now = world.clock[0].time
     # a short one follows its connector before its front is over the line
@@ -105,7 +104,7 @@ def _tow_away(town: TownArrays, world: WorldArrays, i: int, turning: bool) -> No
 
 
 @compiled
-def faces_turning_car(world: WorldArrays, vehicle: Records, turning: bool) -> bool:
+def faces_turning_car(world: WorldArrays, vehicle: VehicleRecord, turning: bool) -> bool:
     """Whether a vehicle is right before the car which stands in the middle of a U-turn, in each other's way.
 
     Args:
@@ -114,7 +113,7 @@ def faces_turning_car(world: WorldArrays, vehicle: Records, turning: bool) -> bo
         turning: whether the car is in the middle of a U-turn.
     """
     car = world.vehicles[0]
-    if not turning or car.kind != Kind.DRIVEN or car.speed >= STANDING:
+    if not turning or car.kind != Kind.DRIVEN or car.speed >= EGO_STANDING:
         return False
     dx, dy = vehicle.x - car.x, vehicle.y - car.y
     reach = FACING + vehicle.radius
@@ -229,7 +228,7 @@ def _is_close(dx: float, dy: float, cos: float, sin: float) -> bool:
 
 
 @compiled
-def put_on_lane(town: TownArrays, vehicle: Records, number: int, station: float) -> None:
+def put_on_lane(town: TownArrays, vehicle: VehicleRecord, number: int, station: float) -> None:
     """Puts a vehicle that stands at a station of a lane [m], with nothing of its past but its random numbers."""
     lane, points = town.lanes[number], town.points
     heading = value_near(points, lane, lane.first, 3, station)

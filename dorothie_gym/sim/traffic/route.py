@@ -8,7 +8,8 @@ from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.sim.network.ahead import HORIZON
 from dorothie_gym.sim.network.lane_lookup import project
 from dorothie_gym.sim.randomness import choose
-from dorothie_gym.sim.state.records import Kind, Records
+from dorothie_gym.sim.state.codes import Kind
+from dorothie_gym.sim.state.records import LaneRecord, VehicleRecord
 from dorothie_gym.sim.traffic.parameters import AFTER_END, CYCLIST_FROM_EDGE, PLANNED
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @inlined
-def follow_road(town: TownArrays, vehicle: Records) -> None:
+def follow_road(town: TownArrays, vehicle: VehicleRecord) -> None:
     """Goes on to the next planned lane at the end of the present one, and plans on."""
     while vehicle.planned > 1 and vehicle.station > town.lanes[vehicle.plan[0]].length - AFTER_END:
         for k in range(1, vehicle.planned):
@@ -28,20 +29,20 @@ def follow_road(town: TownArrays, vehicle: Records) -> None:
 
 
 @inlined
-def keep_side(vehicle: Records, lane: Records) -> None:
+def keep_side(vehicle: VehicleRecord, lane: LaneRecord) -> None:
     """A cyclist keeps to the right edge of its lane, cars to its middle."""
     if vehicle.kind == Kind.CYCLIST:
         vehicle.to_right = max(lane.half_width - CYCLIST_FROM_EDGE, 0.0)
 
 
 @inlined
-def locate(town: TownArrays, vehicle: Records) -> None:
+def locate(town: TownArrays, vehicle: VehicleRecord) -> None:
     """Finds the place of a vehicle on the lane that it follows."""
     vehicle.station, vehicle.lateral, vehicle.segment = project(town, vehicle.plan[0], vehicle.x, vehicle.y)
 
 
 @compiled
-def take(town: TownArrays, vehicle: Records, lane: int) -> None:
+def take(town: TownArrays, vehicle: VehicleRecord, lane: int) -> None:
     """Follows a lane and plans on from there."""
     vehicle.plan[0], vehicle.planned = lane, 1
     keep_side(vehicle, town.lanes[lane])
@@ -50,7 +51,7 @@ def take(town: TownArrays, vehicle: Records, lane: int) -> None:
 
 
 @compiled
-def extend(town: TownArrays, vehicle: Records) -> None:
+def extend(town: TownArrays, vehicle: VehicleRecord) -> None:
     """Draws lanes until the plan reaches `HORIZON` beyond the lane that the vehicle follows."""
     ahead = 0.0
     for k in range(1, vehicle.planned):
@@ -68,7 +69,7 @@ def extend(town: TownArrays, vehicle: Records) -> None:
 
 
 @compiled
-def _drawn(town: TownArrays, vehicle: Records, last: Records) -> int:
+def _drawn(town: TownArrays, vehicle: VehicleRecord, last: LaneRecord) -> int:
     """One of the ways on from a lane; for cyclists of those that lead along streets where they may ride, if any do."""
     streets = 0
     if vehicle.kind == Kind.CYCLIST:

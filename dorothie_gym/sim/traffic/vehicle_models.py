@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array
-from dorothie_gym.sim.network.lane_lookup import project, value_near, wrapped
-from dorothie_gym.sim.state.records import Kind, Records
+from dorothie_gym.sim.network.lane_lookup import project, value_near, wrap_radians
+from dorothie_gym.sim.state.codes import Kind
+from dorothie_gym.sim.state.records import LaneRecord, VehicleRecord
 from dorothie_gym.sim.traffic.lane_index import around
 from dorothie_gym.sim.traffic.parameters import (
     ACC_MAX,
@@ -93,13 +94,15 @@ STEEP = math.sin(LARGEST_HEADING)
 
 
 @inlined
-def slip_towards_lane(points: Array, lane: Records, vehicle: Records) -> float:
+def slip_towards_lane(points: Array, lane: LaneRecord, vehicle: VehicleRecord) -> float:
     """Sine of the slip angle that keeps a vehicle on the lane that it follows (where `station` and `lateral` are)."""
     return slip_towards(points, lane, vehicle, vehicle.segment, vehicle.station, vehicle.lateral - vehicle.to_right)
 
 
 @inlined
-def slip_towards(points: Array, lane: Records, vehicle: Records, segment: int, station: float, off: float) -> float:
+def slip_towards(
+    points: Array, lane: LaneRecord, vehicle: VehicleRecord, segment: int, station: float, off: float
+) -> float:
     """Sine of the slip angle that brings a vehicle to a lane.
 
     Args:
@@ -119,7 +122,7 @@ def slip_towards(points: Array, lane: Records, vehicle: Records, segment: int, s
         back = -LARGEST_HEADING
     else:
         back = math.asin(back)
-    rate = KP_HEADING * wrapped(ahead + back - vehicle.heading)
+    rate = KP_HEADING * wrap_radians(ahead + back - vehicle.heading)
     return float(min(max(vehicle.length / 2.0 / speed * rate, -MAX_SLIP), MAX_SLIP))
 
 
@@ -137,7 +140,7 @@ def slip_of(steering: float) -> float:
 
 
 @inlined
-def move(vehicle: Records, dt: float) -> None:
+def move(vehicle: VehicleRecord, dt: float) -> None:
     """Moves a vehicle on by `dt` [s] as highway-env's `Vehicle.step`; brakes stop it and do not reverse it."""
     speed, slip = vehicle.speed, vehicle.slip
     acceleration = vehicle.acceleration
@@ -193,7 +196,7 @@ def change_lanes(town: TownArrays, world: WorldArrays, i: int) -> None:
 
 
 @compiled
-def _consider(town: TownArrays, world: WorldArrays, i: int, lane: Records, side: int) -> None:
+def _consider(town: TownArrays, world: WorldArrays, i: int, lane: LaneRecord, side: int) -> None:
     vehicle = world.vehicles[i]
     beside = town.lanes[side]
     if beside.successors == 0 and lane.successors > 0:
@@ -206,7 +209,7 @@ def _consider(town: TownArrays, world: WorldArrays, i: int, lane: Records, side:
 
 
 @compiled
-def _move_over(town: TownArrays, world: WorldArrays, i: int, lane: Records) -> None:
+def _move_over(town: TownArrays, world: WorldArrays, i: int, lane: LaneRecord) -> None:
     """A cyclist changes to the lane to the right, if there is one where it may ride and room on it, and to no other."""
     vehicle = world.vehicles[i]
     if lane.right < 0 or not town.lanes[lane.right].cycling or town.lanes[lane.right].successors == 0:
@@ -246,7 +249,7 @@ def mobil(town: TownArrays, world: WorldArrays, i: int, side: int, station: floa
 
 
 @compiled
-def _held_up(world: WorldArrays, vehicle: Records, front: int, gap: float) -> float:
+def _held_up(world: WorldArrays, vehicle: VehicleRecord, front: int, gap: float) -> float:
     """What a body in front takes off the acceleration [m/s^2]."""
     if front < 0:
         return 0.0

@@ -20,7 +20,7 @@ from highway_env.vehicle.kinematics import Vehicle
 from dorothie_gym.sim.batch.town_vector_env import TownVectorEnv
 from dorothie_gym.sim.randomness import choose
 from dorothie_gym.sim.road import TownRoad
-from dorothie_gym.sim.state.records import Kind
+from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.town_env import TownEnv
 
 LONELY = {"vehicles": 0, "duration": 1e6}

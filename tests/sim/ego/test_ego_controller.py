@@ -5,8 +5,8 @@ import math
 import pytest
 
 from dorothie_gym.ontology import PhysicalAction
-from dorothie_gym.sim.ego.ego_controller import MAX_CRUISE, MIN_CRUISE, GoalAhead
-from dorothie_gym.sim.ego.limits import KMH
+from dorothie_gym.sim.ego.ego_controller import GoalAhead
+from dorothie_gym.sim.ego.limits import KMH, MAX_CRUISE, MIN_CRUISE
 from tests.sim.driving import drive, long_lane, network, on_lane
 
 

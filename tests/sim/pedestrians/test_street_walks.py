@@ -10,7 +10,7 @@ from dorothie_gym.sim.pedestrians.pacing import (
     KERB,
 )
 from dorothie_gym.sim.population import add_street_walker, add_vehicle, populate
-from dorothie_gym.sim.state.records import Footway, Walk
+from dorothie_gym.sim.state.codes import Footway, Walk
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
 from dorothie_gym.sim.step import step

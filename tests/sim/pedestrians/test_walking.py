@@ -7,7 +7,7 @@ from dorothie_gym.maps import LightColour
 from dorothie_gym.ontology import PropKind
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_pedestrian, add_prop, add_vehicle, populate
-from dorothie_gym.sim.state.records import Footway, Kind, Walk
+from dorothie_gym.sim.state.codes import Footway, Kind, Walk
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
 from dorothie_gym.sim.step import step

@@ -5,7 +5,7 @@ import pytest
 
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.walkways import KERB_REACH
-from dorothie_gym.sim.state.records import Footway
+from dorothie_gym.sim.state.codes import Footway
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from tests.sim.network.towns import find_town
 

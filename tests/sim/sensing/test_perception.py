@@ -9,11 +9,19 @@ import numpy as np
 import pytest
 
 from dorothie_gym.ontology import ObjectClass, PropKind, Sensor, WeatherParameter
-from dorothie_gym.sim.ego.obstacles import Body
+from dorothie_gym.sim.ego.obstacles import PerceivedBody
 from dorothie_gym.sim.sensing.perception import Perception, detection_probability, position_error
 from dorothie_gym.sim.sensing.seeing import see
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT, Visibility
-from dorothie_gym.sim.state.records import EYE, PEDESTRIAN, PROP, SEEN, VEHICLE, Kind, Records
+from dorothie_gym.sim.state.codes import Kind
+from dorothie_gym.sim.state.records import (
+    EyeRecord,
+    PedestrianRecord,
+    PropRecord,
+    SeenRecord,
+    VehicleRecord,
+    empty_records,
+)
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.sim.world import World
 from tests.sim.driving import ALONE, long_lane, network, run, world_at
@@ -21,8 +29,10 @@ from tests.sim.driving import ALONE, long_lane, network, run, world_at
 FOG = Visibility(fog=0.05)
 
 
-def body(x: float, y: float = 0.0, key: int = 7) -> Body:
-    return Body(key=key, kind=ObjectClass.VEHICLES, x=x, y=y, heading=0.0, length=5.0, width=2.0, speed=3.0, height=0.0)
+def body(x: float, y: float = 0.0, key: int = 7) -> PerceivedBody:
+    return PerceivedBody(
+        key=key, kind=ObjectClass.VEHICLES, x=x, y=y, heading=0.0, length=5.0, width=2.0, speed=3.0, height=0.0
+    )
 
 
 class Eyes:
@@ -30,11 +40,13 @@ class Eyes:
 
     def __init__(self, seed: int = 0) -> None:
         self._perception = Perception(np.random.default_rng(seed))
-        self._eye = records(1, EYE)
+        self._eye = empty_records(EyeRecord, 1)
 
-    def look(self, bodies: Sequence[Body], view: Visibility, frame: int, x: float = 0.0) -> list[Body]:
+    def look(
+        self, bodies: Sequence[PerceivedBody], view: Visibility, frame: int, x: float = 0.0
+    ) -> list[PerceivedBody]:
         """What is perceived of bodies from a place on the x axis."""
-        vehicles, seen = records(len(bodies), VEHICLE), records(len(bodies), SEEN)
+        vehicles, seen = empty_records(VehicleRecord, len(bodies)), empty_records(SeenRecord, len(bodies))
         for vehicle, thing in zip(vehicles, bodies, strict=True):
             vehicle.kind, vehicle.key, vehicle.x, vehicle.y = Kind.CAR, thing.key, thing.x, thing.y
             vehicle.heading, vehicle.speed, vehicle.height = thing.heading, thing.speed, thing.height
@@ -42,7 +54,7 @@ class Eyes:
         self._perception.open(self._eye, view)
         count = see(vehicles, NO_PEDESTRIANS, NO_PROPS, seen, self._eye[0], x, 0.0, frame, -1)
         return [
-            Body(
+            PerceivedBody(
                 key=int(each.key), kind=ObjectClass(int(each.kind)), x=float(each.x), y=float(each.y),
                 heading=float(each.heading), length=float(each.length), width=float(each.width),
                 speed=float(each.speed), height=float(each.height),
@@ -51,11 +63,7 @@ class Eyes:
         ]  # fmt: skip
 
 
-def records(count: int, kind: np.dtype[np.void]) -> Records:
-    return np.zeros(count, dtype=kind).view(np.recarray)
-
-
-NO_PEDESTRIANS, NO_PROPS = records(0, PEDESTRIAN), records(0, PROP)
+NO_PEDESTRIANS, NO_PROPS = empty_records(PedestrianRecord, 0), empty_records(PropRecord, 0)
 
 
 def test_on_a_clear_noon_everything_is_seen_where_it_is() -> None:

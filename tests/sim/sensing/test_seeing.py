@@ -10,11 +10,20 @@ import numpy as np
 import pytest
 
 from dorothie_gym.ontology import ObjectClass, PropKind, WeatherParameter
-from dorothie_gym.sim.ego.obstacles import Body
+from dorothie_gym.sim.ego.obstacles import PerceivedBody
 from dorothie_gym.sim.sensing.perception import BODY, Perception, detection_probability, position_error
 from dorothie_gym.sim.sensing.seeing import GLANCE, MOST_SIGMAS, see
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT, Visibility
-from dorothie_gym.sim.state.records import EYE, PEDESTRIAN, PROP, SEEN, VEHICLE, Group, Kind, Records, Walk
+from dorothie_gym.sim.state.codes import Group, Kind, Walk
+from dorothie_gym.sim.state.records import (
+    EyeRecord,
+    PedestrianRecord,
+    PropRecord,
+    RecordArray,
+    SeenRecord,
+    VehicleRecord,
+    empty_records,
+)
 from dorothie_gym.sim.weather import Weather
 
 P = WeatherParameter
@@ -34,10 +43,6 @@ def weather_of(sky: str) -> Weather:
     return weather
 
 
-def empty(count: int, kind: np.dtype[np.void]) -> Records:
-    return np.zeros(count, dtype=kind).view(np.recarray)
-
-
 class Street:
     """Bodies at random around a place, the first vehicle being whoever looks."""
 
@@ -45,9 +50,9 @@ class Street:
         rng = np.random.default_rng(seed)
         self.x, self.y = rng.uniform(-500.0, 500.0, 2)
         self.vehicles, self.pedestrians, self.props = (
-            empty(vehicles, VEHICLE),
-            empty(pedestrians, PEDESTRIAN),
-            empty(props, PROP),
+            empty_records(VehicleRecord, vehicles),
+            empty_records(PedestrianRecord, pedestrians),
+            empty_records(PropRecord, props),
         )
         keys = rng.permutation(1000)
         for bodies in (self.vehicles, self.pedestrians, self.props):
@@ -69,10 +74,10 @@ class Street:
         if vehicles:
             self.vehicles[0].kind, self.vehicles[0].x, self.vehicles[0].y = Kind.DRIVEN, self.x, self.y
 
-    def bodies(self) -> list[Body]:
+    def bodies(self) -> list[PerceivedBody]:
         """All within sight of a clear noon, nearest first, as objects."""
         found = [
-            Body(
+            PerceivedBody(
                 key=int(thing.key), kind=kind, x=float(thing.x), y=float(thing.y), heading=float(thing.heading),
                 length=0.5 if kind is ObjectClass.PEDESTRIAN else float(thing.length),
                 width=0.5 if kind is ObjectClass.PEDESTRIAN else float(thing.width),
@@ -88,11 +93,13 @@ class Street:
         near = [body for body in found if self.distance(body) < CLEAR_SIGHT]
         return sorted(near, key=lambda body: (self.distance(body), body.key))
 
-    def distance(self, body: Body) -> float:
+    def distance(self, body: PerceivedBody) -> float:
         return math.hypot(body.x - self.x, body.y - self.y)
 
-    def seen(self, view: Visibility, frame: int, seed: int = 0, room: int = 64, skip: int = 0) -> Records:
-        seen, eyes = empty(room, SEEN), empty(1, EYE)
+    def seen(
+        self, view: Visibility, frame: int, seed: int = 0, room: int = 64, skip: int = 0
+    ) -> RecordArray[SeenRecord]:
+        seen, eyes = empty_records(SeenRecord, room), empty_records(EyeRecord, 1)
         Perception(np.random.default_rng(seed)).open(eyes, view)
         count = see(
             self.vehicles, self.pedestrians, self.props, seen, eyes[0], float(self.x), float(self.y), frame, skip
@@ -100,10 +107,11 @@ class Street:
         return seen[:count]
 
 
-def bodies_seen(seen: Records) -> list[Body]:
+def bodies_seen(seen: RecordArray[SeenRecord]) -> list[PerceivedBody]:
     """What has been seen, as objects."""
     return [
-        Body(**{name: thing[name].item() for name in BODY} | {"kind": ObjectClass(int(thing.kind))}) for thing in seen
+        PerceivedBody(**{name: thing[name].item() for name in BODY} | {"kind": ObjectClass(int(thing.kind))})
+        for thing in seen
     ]
 
 
@@ -131,12 +139,12 @@ class Draw:
 
 
 def plainly_perceived(
-    bodies: Sequence[Body], x: float, y: float, view: Visibility, frame: int, seed: int
-) -> list[Body]:
+    bodies: Sequence[PerceivedBody], x: float, y: float, view: Visibility, frame: int, seed: int
+) -> list[PerceivedBody]:
     number = int(np.random.default_rng(seed).integers(1 << 63))
     if view.is_clear:
         return list(bodies)
-    seen: list[Body] = []
+    seen: list[PerceivedBody] = []
     for body in bodies:
         dx, dy = body.x - x, body.y - y
         distance = math.hypot(dx, dy)

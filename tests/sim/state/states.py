@@ -13,7 +13,7 @@ from dorothie_gym.sim.population import add_vehicle
 from dorothie_gym.sim.road import TownRoad
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
-from dorothie_gym.sim.step import find
+from dorothie_gym.sim.step import update_lane
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.route import take
 
@@ -45,7 +45,7 @@ def kernel_world(network: TownNetwork, poses: Sequence[Pose], seed: int = 0) -> 
         vehicle.speed, vehicle.timer = pose.speed, 0.0
         if pose.target is not None:
             take(town, vehicle, pose.target)
-        find(town, vehicle)
+        update_lane(town, vehicle)
     rebuild(town, world)
     return town, world
 

@@ -4,13 +4,14 @@ import pytest
 from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.right_of_way import right_of_way
 from dorothie_gym.sim.network.network import TownNetwork
-from dorothie_gym.sim.state.records import Control, Relation
+from dorothie_gym.sim.state.codes import Relation, TrafficControl
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from tests.sim.network.towns import WEST_EAST, WEST_IN, WEST_SOUTH, find_town, t_junction_town
 
 CONTROLS = {
-    SignalKind.TRAFFIC_LIGHT: Control.LIGHT, SignalKind.STOP: Control.STOP, SignalKind.YIELD: Control.YIELD,
-    None: Control.NONE,
+    SignalKind.TRAFFIC_LIGHT: TrafficControl.LIGHT, SignalKind.STOP: TrafficControl.STOP,
+    SignalKind.YIELD: TrafficControl.YIELD,
+    None: TrafficControl.NONE,
 }  # fmt: skip
 
 

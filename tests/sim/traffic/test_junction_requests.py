@@ -11,7 +11,7 @@ from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.traffic_lights import LightPhase
 from dorothie_gym.sim.network.network import TownNetwork
-from dorothie_gym.sim.state.records import Kind, Wait
+from dorothie_gym.sim.state.codes import Kind, Wait
 from dorothie_gym.sim.traffic.junctions import announce, close, note, request
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.parameters import GIVING_WAY_PATIENCE, LAPSE

@@ -11,7 +11,7 @@ from dorothie_gym.maps.right_of_way import right_of_way
 from dorothie_gym.maps.traffic_lights import LightColour, LightPhase
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_vehicle, populate
-from dorothie_gym.sim.state.records import Colour, Kind, Wait
+from dorothie_gym.sim.state.codes import Colour, Kind, Wait
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.step import step

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.sim.network.network import TownNetwork
-from dorothie_gym.sim.step import find, step
+from dorothie_gym.sim.step import step, update_lane
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.vehicle_models import GIVING_UP
 from tests.sim.network.towns import straight_town
@@ -72,7 +72,7 @@ def test_who_has_to_stand_before_it_is_over_gives_the_change_up():
 def test_who_has_come_over_when_it_has_to_stand_stays_there():
     town, world = kernel_world(two_lanes(), [Pose(1, 50.0, lateral=-2.3, target=0), Pose(0, 58.0)])
     vehicle = world.vehicles[0]
-    find(town, vehicle)
+    update_lane(town, vehicle)
     assert vehicle.lane == 0
     for _ in range(round((GIVING_UP + 0.5) / DT)):
         world.vehicles[1].speed = world.vehicles[1].desired = 0.0

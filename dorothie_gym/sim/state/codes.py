@@ -1,0 +1,116 @@
+"""Codes that the records hold: kinds of bodies, states, colours of lights, reasons to wait."""
+
+from __future__ import annotations
+
+import enum
+from typing import Any
+
+import numpy as np
+
+from dorothie_gym.ontology import ObjectClass, PhysicalAction
+
+VEHICLES, PEDESTRIAN_CLASS, STATIC = (
+    int(kind.value) for kind in (ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC)
+)
+"""Object classes of bodies, as plain numbers."""
+
+U_TURN = int(PhysicalAction.U_TURN.value)
+"""The manoeuvre U-turn, as a plain number."""
+
+NOBODY: Any = np.int64(-1)
+"""No lane, node or body. With a plain number numba would compile its readers twice: for this value, and for others."""
+
+
+class Kind(enum.IntEnum):
+    """Kind of a vehicle."""
+
+    EMPTY = 0
+    """No vehicle: the row is free."""
+    CAR = 1
+    CYCLIST = 2
+    EGO = 3
+    """Vehicle of `TownEnv`, moved by highway-env or by a batch of egos."""
+    DRIVEN = 4
+    """The ego car of a session, which follows a path."""
+
+
+class TrafficControl(enum.IntEnum):
+    """Light or sign at the end of a lane."""
+
+    NONE = 0
+    LIGHT = 1
+    STOP = 2
+    YIELD = 3
+
+
+class Colour(enum.IntEnum):
+    """Colour of a traffic light."""
+
+    GREEN = 0
+    YELLOW = 1
+    RED = 2
+
+
+class Relation(enum.IntEnum):
+    """Relation of one connector to another one of its junction."""
+
+    APART = 0
+    """Their paths do not cross."""
+    FOE = 1
+    """Their paths cross."""
+    WAITS = 2
+    """Their paths cross, and the other one has priority."""
+
+
+class Wait(enum.IntEnum):
+    """Reason for which a vehicle may not enter a junction."""
+
+    NOT = 0
+    LIGHT = 1
+    """Its light is red, or yellow and it can stop."""
+    STOP_SIGN = 2
+    """It has not come to a stand at its stop sign."""
+    GIVING_WAY = 3
+    """A vehicle with priority is coming."""
+    TURN = 4
+    """Another vehicle has been waiting for longer."""
+    OCCUPIED = 5
+    """Another vehicle is on a path that crosses its own."""
+    CLOSED = 6
+    """The ego turns round in the junction."""
+    NO_ROOM = 7
+    """There is no room behind the junction."""
+
+
+class Group(enum.IntEnum):
+    """Array of a world that holds a body."""
+
+    VEHICLES = 0
+    PEDESTRIANS = 1
+    PROPS = 2
+
+
+class Walk(enum.IntEnum):
+    """State of a pedestrian; a straying one crosses the road where there is no crosswalk."""
+
+    EMPTY = 0
+    WALKING = 1
+    WAITING = 2
+    CROSSING = 3
+    STRAYING = 4
+
+
+class Footway(enum.IntEnum):
+    """Kind of a footway."""
+
+    PAVEMENT = 0
+    CORNER = 1
+    STREET = 2
+
+
+class EventCode(enum.IntEnum):
+    """Kind of an event of the ego."""
+
+    HAZARD_STOP = 1
+    HAZARD_END = 2
+    COLLISION = 3
