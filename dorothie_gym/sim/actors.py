@@ -1,4 +1,4 @@
-"""Everybody and everything on the road besides the car: traffic, pedestrians, props."""
+"""Actors: traffic, pedestrians and props."""
 
 from __future__ import annotations
 
@@ -29,24 +29,24 @@ from dorothie_gym.sim.traffic.parameters import CYCLIST_SHARE, CYCLIST_SPEEDS
 from dorothie_gym.sim.traffic.respawn import is_free
 
 MORE = 8
-"""Places that are made for more vehicles or pedestrians when all are taken."""
+"""Rows by which the arrays grow when all are taken."""
 
 
 class Actors:
     """Traffic, pedestrians and props of a world.
 
     Attributes:
-        arrays: the state of all bodies, the car the first of the vehicles; replaced by a bigger one when more come.
+        arrays: state of all bodies, the ego the first vehicle; replaced by bigger arrays when more are added.
     """
 
     def __init__(self, road: TownRoad, town: TownArrays, arrays: WorldArrays, *, seed: np.random.SeedSequence) -> None:
-        """Takes over the arrays of a world in which the car is there already.
+        """Takes over the arrays of a world that holds the ego already.
 
         Args:
             road: of the town.
             town: its arrays.
             arrays: of the world.
-            seed: of places, kinds and speeds of those who come.
+            seed: of places, kinds and speeds of new actors.
         """
         self.arrays = arrays
         self._road, self._town_arrays, self._town = road, town, road.network.town
@@ -79,10 +79,10 @@ class Actors:
             self._present_of, self._present = self.arrays, self.arrays.props["present"]
         return len(self._present) > 0 and bool(self._present.any())
 
-    # --- coming and going -------------------------------------------------------------------------------------------
+    # --- Adding and removing ------------------------------------------------------------------------------------------
 
     def populate(self, *, vehicles: int, pedestrians: int) -> None:
-        """Brings traffic and pedestrians to random places, as many as fit."""
+        """Adds traffic and pedestrians at random places, as many as fit."""
         self._make_room(vehicles=vehicles, pedestrians=pedestrians)
         populate(
             self._road.network, self._town_arrays, self.arrays,
@@ -90,7 +90,7 @@ class Actors:
         )  # fmt: skip
 
     def add_vehicle(self, lane: int, station: float, *, distance: float) -> bool:
-        """Puts a vehicle, or a cyclist, on a lane if there is room and the car is farther than `distance` [m]."""
+        """Adds a vehicle or cyclist on a lane if there is room and the ego is farther than `distance` [m]."""
         town = self._town_arrays
         if not is_free(town, self.arrays, lane, float(station), int(NOBODY), float(distance)):
             return False
@@ -101,22 +101,22 @@ class Actors:
         return True
 
     def add_pedestrian(self, lane: int, station: float) -> bool:
-        """Puts a pedestrian beside a lane, or to the right of those beside it, if nobody is there.
+        """Adds a pedestrian beside a lane, or to the right of those beside it, if the place is free.
 
-        Such pedestrians keep to the street where they are, and cross it anywhere.
+        Such pedestrians stay at their street, and cross it anywhere.
         """
         self._make_room(pedestrians=1)
         found = add_street_walker(self._road.network, self._town_arrays, self.arrays, lane, station)
         return found is not None
 
     def kerb(self, lane: int, station: float) -> Array:
-        """Where a pedestrian stands beside a lane (2,) [m]; `lane` is the rightmost one of its direction."""
+        """Returns the place of a pedestrian beside a lane (2,) [m]; `lane` is the rightmost one of its direction."""
         town_lane = self._town.lanes[lane]
         place: Array = town_lane.position(station, town_lane.width_at(station) / 2 + KERB)
         return place
 
     def add_prop(self, kind: PropKind, lane: int, station: float) -> Prop:
-        """Puts a prop on a lane; whether it may stand there is the caller's business.
+        """Adds a prop on a lane; the caller has checked that it may stand there.
 
         Args:
             kind: of prop.
@@ -128,15 +128,15 @@ class Actors:
         return self._bodies.prop(row)
 
     def move_prop(self, prop: Prop, lane: int, station: float) -> None:
-        """Puts a prop on another place; it stays the same."""
+        """Moves a prop to another place; it keeps its key."""
         move_prop(self._road.network, self._town_arrays, self.arrays, prop.row, lane, station)
 
     def remove_prop(self, prop: Prop) -> None:
-        """Takes a prop away."""
+        """Removes a prop."""
         remove_prop(self._town_arrays, self.arrays, prop.row)
 
     def _make_room(self, *, vehicles: int = 0, pedestrians: int = 0, props: int = 0) -> None:
-        """Replaces the arrays by bigger ones if so many more do not fit."""
+        """Replaces the arrays by bigger ones if so many more actors do not fit."""
         state = self.arrays
         free = (
             int((state.vehicles["kind"] == Kind.EMPTY).sum()), int((state.pedestrians["state"] == Walk.EMPTY).sum()),

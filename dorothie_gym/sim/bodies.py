@@ -1,12 +1,12 @@
-"""Everybody in the kernel's arrays as highway-env's objects: vehicles, pedestrians and props that own nothing.
+"""Views of the bodies in the arrays as highway-env's objects: vehicles, pedestrians, props.
 
-A view keeps its holder, which has the arrays, and its row. What highway-env reads and writes as attributes it reads and
-writes there: `vehicle.speed` is `holder.arrays.vehicles[row].speed`. So highway-env's observations, viewer and planners
-see what the compiled loops made of the world, and nobody copies states to and fro.
+A view keeps its holder, which has the arrays, and its row. Attributes of highway-env are read and written in the
+arrays: `vehicle.speed` is `holder.arrays.vehicles[row].speed`. So highway-env's observations, viewer and planners
+see the state of the compiled loops, and no state is copied.
 
 By itself a `TrafficVehicle` is highway-env's `IDMVehicle` in full: `act` and `step` are stock, on the arrays. A road
-that is stepped by the kernel does not call them; who copies a vehicle to predict its way does. Parameters that
-highway-env keeps in the vehicle (`DELTA`, `POLITENESS`, ...) do not reach the kernel.
+that is stepped by the compiled loops does not call them; prediction with a copy of a vehicle does. Parameters that
+highway-env keeps in the vehicle (`DELTA`, `POLITENESS`, ...) do not reach the compiled loops.
 """
 
 from __future__ import annotations
@@ -42,16 +42,16 @@ if len(_KIND_OF_SIZE) != len(PropKind):
 
 
 class TrafficVehicle(BodyView, IDMVehicle):
-    """A vehicle of the traffic, as highway-env's.
+    """A vehicle of the traffic as a vehicle of highway-env.
 
     Attributes:
-        key: tells it apart from other bodies; who was towed comes back with another one.
+        key: identifies the body; a respawned one gets another key.
         kind: `Kind`.
         height: of the road under it [m].
         lane_id: closest lane, its id in the town; `station` [m] along it.
-        target_speed: speed that it likes [m/s].
-        standing: how long it has been standing, its light not being red [s].
-        odometer: way driven [m].
+        target_speed: desired speed [m/s].
+        standing: duration of its stand, its light not being red [s].
+        odometer: distance driven [m].
     """
 
     RECORDS = "vehicles"
@@ -92,7 +92,7 @@ class TrafficVehicle(BodyView, IDMVehicle):
 
     @property
     def lane_index(self) -> LaneIndex:
-        """Where the network lists the closest lane."""
+        """Index of the closest lane in the network."""
         index: LaneIndex = self.road.network.index_of(self.lane_id)
         return index
 
@@ -159,7 +159,7 @@ class TrafficVehicle(BodyView, IDMVehicle):
 
     @property
     def destination(self) -> Array:
-        """Where the last lane of its route ends (2,) [m]."""
+        """End of the last lane of its route (2,) [m]."""
         lane = self.road.network.lane_of(self.memory()[1][_PLAN + self._planned - 1])
         end: Array = lane.position(lane.length)
         return end
@@ -177,7 +177,7 @@ class TrafficVehicle(BodyView, IDMVehicle):
 
     @property
     def action(self) -> dict[str, float]:
-        """What it does: `acceleration` [m/s^2] and `steering`, the angle of its front wheels [rad]."""
+        """Present action: `acceleration` [m/s^2] and `steering`, the angle of its front wheels [rad]."""
         record = self.record
         return {"acceleration": float(record.acceleration), "steering": float(steering_angle(record.slip))}
 
@@ -187,7 +187,7 @@ class TrafficVehicle(BodyView, IDMVehicle):
         record.acceleration, record.slip = action["acceleration"], slip_of(float(action["steering"]))
 
     def clip_actions(self) -> None:
-        """Limits what it does, as highway-env; there the action is changed in place."""
+        """Limits the action, as highway-env does in place."""
         action = self.action
         if self.crashed:
             action = {"acceleration": -self.speed, "steering": 0.0}
@@ -204,7 +204,7 @@ class TrafficVehicle(BodyView, IDMVehicle):
             self.remember()
 
     def remember(self) -> None:
-        """Keeps its state for display; of who was towed nothing is kept."""
+        """Keeps its state for display; the history of a respawned vehicle is dropped."""
         if self.key != self._history_of:
             self.history.clear()
             self._history_of = self.key
@@ -212,7 +212,7 @@ class TrafficVehicle(BodyView, IDMVehicle):
 
 
 _PLAN = field_offset(VEHICLE, "plan") // 4
-"""Where the plan begins in the integers of a row."""
+"""Beginning of the plan in the integers of a row."""
 
 
 class Cyclist(TrafficVehicle):
@@ -220,13 +220,13 @@ class Cyclist(TrafficVehicle):
 
 
 class _Thing(BodyView):
-    """What is on the road but no vehicle: it has no lane of its own, and highway-env never moves it."""
+    """A body that is no vehicle: it has no lane of its own, and highway-env never moves it."""
 
     height: Any
 
     @property
     def lane_index(self) -> LaneIndex:
-        """Where the network lists the closest lane of its height."""
+        """Index of the closest lane of its height in the network."""
         index: LaneIndex = self.road.network.get_closest_lane_index(self.position, self.heading, height=self.height)
         return index
 
@@ -238,10 +238,10 @@ class _Thing(BodyView):
 
 
 class Pedestrian(_Thing, RoadObject):
-    """Somebody on foot, as an object on highway-env's road.
+    """A pedestrian as an object on highway-env's road.
 
     Attributes:
-        key: tells it apart from other bodies.
+        key: identifies the body.
         state: `Walk`.
         height: of the ground under it [m].
     """
@@ -271,18 +271,18 @@ class Pedestrian(_Thing, RoadObject):
 
     @property
     def station(self) -> float:
-        """Where it is along the closest lane [m]."""
+        """Station on the closest lane [m]."""
         return self.on_lane()[0]
 
 
 class Prop(_Thing, Obstacle):
-    """A thing that the Ad-Wizard put on the road, across its lane.
+    """A prop that the Ad-Wizard placed on the road, across its lane.
 
     Attributes:
-        key: tells it apart from other bodies.
+        key: identifies the body.
         height: of the road under it [m].
         lane_id: lane that it stands on; `station` [m] along it.
-        crashed: highway-env's mark that somebody ran into it; the kernel keeps none for props.
+        crashed: highway-env's mark of a collision; the compiled loops keep none for props.
     """
 
     RECORDS = "props"
@@ -304,12 +304,12 @@ class Prop(_Thing, Obstacle):
 
     @property
     def kind(self) -> PropKind:
-        """What it is."""
+        """Kind of the prop."""
         return _KIND_OF_SIZE[self.LENGTH, self.WIDTH]
 
 
 class Bodies:
-    """The views of a world, each made when it is asked for first."""
+    """Views of a world, each made at its first use."""
 
     def __init__(self, road: Any, holder: ArrayHolder) -> None:
         """Shows the arrays of a holder on a road of the same town."""
@@ -317,22 +317,22 @@ class Bodies:
         self._made: dict[tuple[type[BodyView], int], Any] = {}
 
     def vehicles(self) -> list[TrafficVehicle]:
-        """Traffic, cyclists among it, in the order of the rows; whoever is driven from outside is not among it."""
+        """Returns the traffic, cyclists included, in the order of the rows, without vehicles driven from outside."""
         kinds = np.asarray(self._holder.arrays.vehicles)["kind"].tolist()
         return [self._view(_CLASSES[kind], row) for row, kind in enumerate(kinds) if kind in _CLASSES]
 
     def pedestrians(self) -> list[Pedestrian]:
-        """People on foot, in the order of the rows."""
+        """Returns the pedestrians in the order of the rows."""
         states = np.asarray(self._holder.arrays.pedestrians)["state"].tolist()
         return [self._view(Pedestrian, row) for row, state in enumerate(states) if state != Walk.EMPTY]
 
     def prop(self, row: int) -> Prop:
-        """The prop in a row."""
+        """Returns the prop in a row."""
         view: Prop = self._view(Prop, row)
         return view
 
     def props(self) -> list[Prop]:
-        """Props, in the order of the rows."""
+        """Returns the props in the order of the rows."""
         present = np.asarray(self._holder.arrays.props)["present"].tolist()
         return [self._view(Prop, row) for row, here in enumerate(present) if here]
 

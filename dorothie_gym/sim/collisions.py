@@ -1,4 +1,4 @@
-"""Who touches whom: sort and sweep along one axis, then separating axes of the outlines.
+"""Collision detection: sort and sweep along one axis, then separating axes of the outlines.
 
 The bodies stay sorted from substep to substep, so that sorting them again takes hardly more than a look at each
 (Cohen, Lin, Manocha and Ponamgi 1995, "I-COLLIDE"). The axis runs askew to the usual streets, along which many bodies
@@ -24,7 +24,7 @@ AXIS_X, AXIS_Y = 0.8, 0.6
 """Direction along which bodies are sorted."""
 
 MOVES = 0.5
-"""A car that is slower than this runs into nobody [m/s]."""
+"""Speed below which the ego is not at fault for a collision [m/s]."""
 
 WALKER_RADIUS, WALKER_SIZE = 0.354, 0.5
 """Half the diagonal and the side of a pedestrian's outline [m], `Pedestrian.LENGTH`."""
@@ -71,7 +71,7 @@ def overlap(
 
 @inlined
 def collide(world: WorldArrays) -> None:
-    """Marks all vehicles, and pedestrians, that touch somebody or something as crashed."""
+    """Marks all vehicles and pedestrians that touch another body as crashed."""
     vehicles, walkers = len(world.vehicles), len(world.pedestrians)
     keys, order = world.keys, world.order
     largest = _project_all(world)
@@ -150,7 +150,7 @@ def _meet(world: WorldArrays, one: int, other: int, vehicles: int, walkers: int)
             walker.crashed = True
             clock.run_over += 1
             if vehicle.kind == Kind.EGO:
-                vehicle.crashed = True  # traffic drives on; who is driven from outside learns of it by this mark
+                vehicle.crashed = True  # traffic drives on; the mark is for vehicles that are driven from outside
     else:
         prop = world.props[other - vehicles - walkers]
         if _touch(vehicle, prop, prop.radius, prop.length, prop.width):
@@ -161,7 +161,7 @@ def _meet(world: WorldArrays, one: int, other: int, vehicles: int, walkers: int)
 
 @compiled
 def _touch_by_car(world: WorldArrays, other: int, vehicles: int, walkers: int) -> None:
-    """Books what the session's car touches, once each, and brings both to a stand; a prop is taken away."""
+    """Logs each body that the ego touches once, and stops both; a prop is removed."""
     vehicle = world.vehicles[0]
     if other < vehicles:
         second = world.vehicles[other]
@@ -187,7 +187,7 @@ def _touch_by_car(world: WorldArrays, other: int, vehicles: int, walkers: int) -
 
 @compiled
 def _book(world: WorldArrays, kind: int, key: int, body: int, x: float, y: float) -> None:
-    """Takes down a collision: it is of the car's own making if it drove towards the other one."""
+    """Logs a collision: it is the ego's own fault if it drove towards the other body."""
     car, vehicle, clock = world.car[0], world.vehicles[0], world.clock[0]
     event = world.events[log(world, EventCode.COLLISION, kind, key, car.before)]
     event.frame, event.body = clock.frame + 1, body
@@ -207,11 +207,11 @@ def _touch(vehicle: VehicleRecord, other: PlacedBody, radius: float, length: flo
     return overlap(dx, dy, vehicle.cos, vehicle.sin, vehicle.length, vehicle.width, other.cos, other.sin, length, width)
 
 
-# --- Oriented boxes: whether two things touch ------------------------------------------------------------------------
+# --- Oriented boxes ---------------------------------------------------------------------------------------------------
 
 
 class OrientedBox(NamedTuple):
-    """Outline of a thing on the ground: its middle [m], heading [rad], length along it and width across it [m]."""
+    """Outline of a body on the ground: its middle [m], heading [rad], length along it and width across it [m]."""
 
     x: float
     y: float
@@ -221,7 +221,7 @@ class OrientedBox(NamedTuple):
 
     @classmethod
     def of(cls, thing: Any) -> OrientedBox:
-        """The outline of a highway-env object as it stands."""
+        """Returns the outline of a highway-env object."""
         x, y = thing.position
         return cls(float(x), float(y), float(thing.heading), float(thing.LENGTH), float(thing.WIDTH))
 

@@ -8,18 +8,18 @@ FRAME_RATE = 30
 """Physics substeps, and frames of a recording, a second (paper, appendix B.2)."""
 
 FRAME_COLUMNS = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "brake", "lane")
-"""What is kept of the car at each frame: metres, radians, m/s, normalised controls; `lane` is the lane's id."""
+"""Columns of the ego's trajectory: metres, radians, m/s, normalised controls; `lane` is the lane's id."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class WorldConfig:
-    """What the world is made of.
+    """Settings of the world.
 
     Attributes:
         vehicles: background vehicles, about one in eight a cyclist, as many as fit.
-        pedestrians: people on foot, as many as fit.
-        cruise_speed: of the car at the start [km/h], a multiple of 5 in 5..90.
-        collisions_stop: how long the car stands after a collision [s].
+        pedestrians: pedestrians, as many as fit.
+        cruise_speed: of the ego at the start [km/h], a multiple of 5 in 5..90.
+        collisions_stop: duration of the ego's stand after a collision [s].
     """
 
     vehicles: int = 10

@@ -29,7 +29,7 @@ _IDLE = 1
 """Its action that changes nothing."""
 
 _TASTE = ("DISTANCE_WANTED", "COMFORT_ACC_MAX", "COMFORT_ACC_MIN")
-"""What it changes of `IDMVehicle`."""
+"""Settings that it changes of `IDMVehicle`."""
 
 
 def stock_road(network: TownNetwork, world: WorldArrays) -> Road:
@@ -101,7 +101,7 @@ class StockIntersection:
 
     @property
     def vehicles(self) -> int:
-        """How many are there now, the car included."""
+        """Number of vehicles now, the ego included."""
         return len(self._env.unwrapped.road.vehicles)
 
     def prepare(self) -> None:

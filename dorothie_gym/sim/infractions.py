@@ -1,7 +1,7 @@
-"""Rules of the road that the car broke: red lights, stop signs, leaving the road, driving against the traffic.
+"""Infractions of the ego: red lights, stop signs, leaving the road, driving against the traffic.
 
-Everything is read off the way that the car took, whoever drove it: nothing here asks what it was told or meant to do.
-Collisions, the fifth kind, are found where bodies move (`boxes`, `world`).
+They follow from the ego's trajectory alone, whatever drove it. Collisions, the fifth kind, are detected in
+`sim.collisions`.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ class Infraction(enum.StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Breach:
-    """That a rule was broken, when, where, and which light or sign tells so.
+    """A breach of a rule: frame, place, and the light or sign.
 
     Attributes:
         kind: of infraction.
         frame: physics frame.
-        lane: lane that was left over its end, that is nearest (off the road), or that is driven against.
+        lane: lane that was left over its end, nearest lane (off the road), or lane driven against.
         station: distance along it [m].
         x: of the car's middle [m]; `y` likewise.
         key: id of the signal, None where there is none.
@@ -69,10 +69,10 @@ class Breach:
 
 
 class InfractionWatch:
-    """Looks at the way of one car, stretch by stretch, and tells each breach of a rule once."""
+    """Watch over the trajectory of one car, which reports each breach of a rule once."""
 
     def __init__(self, network: TownNetwork, length: float) -> None:
-        """Begins to watch a car of a length [m] that has not been seen before."""
+        """Begins to watch a car of a length [m]."""
         self._network, self._town, self._length = network, network.town, length
         self._lines = _lines(network)
         town = town_arrays(network)
@@ -84,10 +84,10 @@ class InfractionWatch:
         )  # fmt: skip
 
     def look(self, poses: Array, frame: int) -> list[Breach]:
-        """Breaches on a stretch of way, in the order in which they happened.
+        """Returns the breaches on a stretch of the trajectory in the order in which they happened.
 
         Args:
-            poses: of the car at successive frames (n + 1, 6), C-contiguous, columns as in `kernel.rules`; the first
+            poses: of the car at successive frames (n + 1, 6), C-contiguous, columns `records.POSE`; the first
                 is the last one of the stretch before.
             frame: of the first pose.
         """
@@ -128,7 +128,7 @@ class InfractionWatch:
         ]  # fmt: skip
 
     def _beside_lanes(self, kind: Infraction, lane: int, station: float, frame: int, pose: Array) -> Breach:
-        """The breach of being off the road or against the traffic, at the nearest lane."""
+        """Returns the breach of being off the road or against the traffic, at the nearest lane."""
         x, y = float(pose[X]), float(pose[Y])
         if lane < 0:
             place = np.array([x, y])
@@ -152,7 +152,7 @@ _found_lines: weakref.WeakKeyDictionary[TownNetwork, _Lines] = weakref.WeakKeyDi
 
 
 def _lines(network: TownNetwork) -> _Lines:
-    """The lines of a town's network, looked for when they are asked for first."""
+    """Returns the lines of a town's network, found at their first use."""
     found = _found_lines.get(network)
     if found is None:
         found = _found_lines[network] = _look_for_lines(network)
@@ -178,11 +178,11 @@ def _look_for_lines(network: TownNetwork) -> _Lines:
     return _Lines(records, tuple(sorted(found)), tuple(found[lane] for lane in sorted(found)))
 
 
-# --- What the world reports of the car: hazard stops, and breaches of the rules of the road --------------------------
+# --- World events -----------------------------------------------------------------------------------------------------
 
 
 class WorldEventKind(enum.StrEnum):
-    """What the world reports of its own."""
+    """Kind of an event of the ego."""
 
     HAZARD_STOP = "hazard_stop"
     HAZARD_END = "hazard_end"
@@ -197,7 +197,7 @@ INFRACTION_KINDS = (
     WorldEventKind.COLLISION, WorldEventKind.RED_LIGHT, WorldEventKind.STOP_SIGN, WorldEventKind.OFF_ROAD,
     WorldEventKind.WRONG_WAY,
 )  # fmt: skip
-"""Reports of a breach of the rules of the road; their data tells place and counterpart (`WorldEventLog.infraction`)."""
+"""Kinds of infractions; their data names place and counterpart (`WorldEventLog.infraction`)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -250,12 +250,12 @@ class WorldEventLog:
         self.add(kind, frame, **place, key=key, other=None if other is None else other.label, **data)
 
     def close(self, poses: Array, frame: int, *, stood: bool = False) -> list[WorldEvent]:
-        """Looks for breaches on the car's way since the last call, and returns all that has been reported since.
+        """Looks for breaches since the last call, and returns all events since.
 
         Args:
-            poses: of the car before the way and after each of its frames (n + 1, 6), columns as in `kernel.rules`.
-            frame: that of the last of them.
-            stood: whether it stood all the time; then they are not looked at.
+            poses: of the ego before the stretch and after each of its frames (n + 1, 6), columns `records.POSE`.
+            frame: frame of the last of them.
+            stood: whether it stood all the time; then there is nothing to find.
         """
         first = frame - len(poses) + 1
         if stood:

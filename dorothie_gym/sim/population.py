@@ -1,4 +1,4 @@
-"""Bodies that come to a world and leave it, while it goes on."""
+"""Adding, moving and removing bodies of a world; initial traffic and pedestrians."""
 
 from __future__ import annotations
 
@@ -31,24 +31,24 @@ from dorothie_gym.sim.traffic.parameters import (
 from dorothie_gym.sim.traffic.respawn import is_clear_of_people, is_free, new_key, put_on_lane
 
 BESIDE = 1.0
-"""A way beside a street is walked on where it is this close [m]."""
+"""Distance to the way beside a street within which a pedestrian is placed on it [m]."""
 
 PROP_LEVEL = 2.0
-"""A prop is on the lanes of about its own height [m]."""
+"""Difference of height up to which a prop is on a lane [m]."""
 
 
 def add_vehicle(
     town: TownArrays, world: WorldArrays, lane: int, station: float, *, kind: Kind = Kind.CAR, desired: float
 ) -> int:
-    """Puts a vehicle on a lane, in the first place that is empty.
+    """Adds a vehicle on a lane, in the first free row.
 
     Args:
         town: arrays of the town.
         world: arrays of the world.
         lane: id of the lane.
         station: along it [m].
-        kind: what it is.
-        desired: speed that it likes [m/s].
+        kind: kind of vehicle.
+        desired: desired speed [m/s].
 
     Returns:
         Its number.
@@ -74,11 +74,11 @@ def add_vehicle(
 
 
 def add_car(town: TownArrays, world: WorldArrays, lane: int, station: float) -> None:
-    """Puts the session's car on a lane, as vehicle 0 of a world that was made for it (`driven`).
+    """Adds the ego on a lane, as vehicle 0 of a world that was made for it (`driven`).
 
     Args:
         town: arrays of the town.
-        world: arrays of the world, with nobody in it yet.
+        world: arrays of the world, still empty.
         lane: id of the lane.
         station: along it [m].
     """
@@ -87,20 +87,20 @@ def add_car(town: TownArrays, world: WorldArrays, lane: int, station: float) -> 
 
 
 def remove_vehicle(town: TownArrays, world: WorldArrays, number: int) -> None:
-    """Takes a vehicle away; its place is empty, and the others keep theirs."""
+    """Removes a vehicle; the others keep their rows."""
     world.vehicles[number].kind = Kind.EMPTY
     rebuild(town, world)
 
 
 def add_pedestrian(town: TownArrays, world: WorldArrays, walk: int, station: float, *, pace: float) -> int:
-    """Puts a pedestrian on a footway, in the first place that is empty.
+    """Adds a pedestrian on a footway, in the first free row.
 
     Args:
         town: arrays of the town.
         world: arrays of the world.
         walk: number of the footway; a pavement has its id in the town.
         station: along it [m].
-        pace: speed that it likes [m/s].
+        pace: desired speed [m/s].
 
     Returns:
         Its number.
@@ -126,9 +126,9 @@ def add_pedestrian(town: TownArrays, world: WorldArrays, walk: int, station: flo
 def add_street_walker(
     network: TownNetwork, town: TownArrays, world: WorldArrays, lane: int, station: float
 ) -> int | None:  # fmt: skip
-    """Puts a pedestrian beside a lane, or to the right of those beside it.
+    """Adds a pedestrian beside a lane, or to the right of those beside it.
 
-    Such pedestrians keep to the street where they are, and cross it anywhere but near junctions.
+    Such pedestrians stay at their street, and cross it anywhere but near junctions.
 
     Args:
         network: of the town.
@@ -138,8 +138,7 @@ def add_street_walker(
         station: along it [m].
 
     Returns:
-        Its number; None if nobody may walk there, if somebody or the car is there already, or if the world has room
-        for nobody else.
+        Its row; None if there is no way, if a pedestrian or the ego is there already, or if all rows are taken.
     """
     beside = network.town.lanes[rightmost(network.town, lane)]
     station = min(station, beside.length)
@@ -153,7 +152,7 @@ def add_street_walker(
 
 
 def remove_pedestrian(world: WorldArrays, number: int) -> None:
-    """Takes a pedestrian away; the place is empty, and the others keep theirs."""
+    """Removes a pedestrian; the others keep their rows."""
     walker = world.pedestrians[number]
     walker.state, walker.crashed, walker.crash_age, walker.speed = Walk.EMPTY, False, 0.0, 0.0
 
@@ -161,7 +160,7 @@ def remove_pedestrian(world: WorldArrays, number: int) -> None:
 def add_prop(
     network: TownNetwork, town: TownArrays, world: WorldArrays, kind: PropKind, lane: int, station: float
 ) -> int:
-    """Puts a prop on a lane, where it stands across it.
+    """Adds a prop on a lane, across it.
 
     Args:
         network: of the town.
@@ -192,7 +191,7 @@ def add_prop(
 def move_prop(
     network: TownNetwork, town: TownArrays, world: WorldArrays, number: int, lane: int, station: float
 ) -> None:  # fmt: skip
-    """Puts a prop on another place, where it stands across a lane; it keeps its key.
+    """Moves a prop to another place, across a lane; it keeps its key.
 
     Args:
         network: of the town.
@@ -215,13 +214,13 @@ def move_prop(
 
 
 def remove_prop(town: TownArrays, world: WorldArrays, number: int) -> None:
-    """Takes a prop away."""
+    """Removes a prop."""
     world.props[number].present = False
     rebuild(town, world)
 
 
 def _reached(network: TownNetwork, town: TownArrays, prop: PropRecord) -> list[tuple[int, float]]:
-    """Lanes on which a vehicle would touch a prop, the closest first, and where [m]."""
+    """Returns the lanes on which a vehicle would touch a prop, the closest first, and the stations [m]."""
     found = []
     half = 0.5 * max(prop.width, prop.length) + 0.5 * CAR_WIDTH
     lanes = town.lanes
@@ -237,15 +236,15 @@ def _reached(network: TownNetwork, town: TownArrays, prop: PropRecord) -> list[t
 
 
 def _random(world: WorldArrays, key: int) -> int:
-    """What the random numbers of a body begin with: a matter of the world's seed and the body's key alone."""
+    """Returns the first state of a body's random numbers: a function of the world's seed and the body's key."""
     return int(np.random.SeedSequence((int(world.clock[0].random), key)).generate_state(1)[0]) | 1
 
 
-# --- Where vehicles may appear ---------------------------------------------------------------------------------------
+# --- Spawning places --------------------------------------------------------------------------------------------------
 
 
 def free_places(town: Town, rng: np.random.Generator, count: int) -> list[tuple[int, float]]:
-    """Places on lanes outside junctions, drawn evenly along the road, candidates for spawning."""
+    """Draws places on lanes outside junctions evenly along the road, candidates for spawning."""
     lanes = [lane for lane in town.lanes if not lane.in_junction and lane.length > 12.0]
     weights = np.array([lane.length for lane in lanes])
     chosen = rng.choice(len(lanes), size=count, p=weights / weights.sum())
@@ -256,29 +255,29 @@ def free_places(town: Town, rng: np.random.Generator, count: int) -> list[tuple[
     ]
 
 
-# --- Traffic and people for an empty town ----------------------------------------------------------------------------
+# --- Initial population -----------------------------------------------------------------------------------------------
 
 SPEEDS = 6.5, 10.0
-"""Range of the speeds that drivers like [m/s]."""
+"""Range of the desired speeds of vehicles [m/s]."""
 
 PACES = 1.1, 1.6
-"""Range of the speeds that pedestrians like [m/s] (Knoblauch et al. 1996 measured 1.2 to 1.5 at crosswalks)."""
+"""Range of the desired speeds of pedestrians [m/s] (Knoblauch et al. 1996 measured 1.2 to 1.5 at crosswalks)."""
 
 TRIES = 40
-"""Places that are drawn for each vehicle and each pedestrian."""
+"""Places drawn for each vehicle and each pedestrian."""
 
 
 def populate(
     network: TownNetwork, town: TownArrays, world: WorldArrays, *, seed: int, vehicles: int, pedestrians: int,
     cyclists: float = CYCLIST_SHARE,
 ) -> None:  # fmt: skip
-    """Brings traffic and pedestrians to random places, as many as fit; none of them close to the car.
+    """Adds traffic and pedestrians at random places, as many as fit, none of them close to the ego.
 
     Args:
         network: of the town.
         town: its arrays.
-        world: arrays of the world; a car, if there is one, is the first of its vehicles.
-        seed: of the places and of what everybody likes.
+        world: arrays of the world; the ego, if there is one, is the first of its vehicles.
+        seed: of the places and the desired speeds.
         vehicles: how many, cyclists included.
         pedestrians: how many; on pavements, or in a town without them beside the streets.
         cyclists: share of the vehicles; they ride to the right on slow roads.

@@ -1,4 +1,4 @@
-"""The road of a town: what drives and stands on its network."""
+"""Roads of a town for highway-env: `TownRoad`, and `CompiledRoad`, whose traffic is stepped by the compiled loops."""
 
 from __future__ import annotations
 
@@ -125,14 +125,14 @@ class TownRoad(Road):
         sort: bool = True,
         vehicles_only: bool = False,
     ) -> list[Any]:
-        """Those close to a vehicle, as highway-env chooses them, with one call for all that has to be measured.
+        """Returns the objects close to a vehicle, as highway-env chooses them, with one call for all measurements.
 
         Args:
-            vehicle: who looks.
-            distance: nobody farther away is told of [m].
-            count: most that are told of; all by default.
+            vehicle: the observer.
+            distance: largest distance [m].
+            count: largest number; all by default.
             see_behind: whether vehicles behind are seen; objects there never are.
-            sort: whether those come first who are near along the vehicle's lane, before and behind.
+            sort: whether they are sorted by their distance along the vehicle's lane.
             vehicles_only: whether objects are left out.
         """
         others = [other for other in self.vehicles if other is not vehicle]
@@ -166,11 +166,11 @@ class TownRoad(Road):
     def neighbours(
         self, vehicle: Any, lane_index: LaneIndex | None = None
     ) -> tuple[tuple[Any | None, float], tuple[Any | None, float]]:
-        """Next thing ahead and behind of a vehicle with their distances along the lanes [m] (inf where nobody is).
+        """Returns the next objects ahead and behind of a vehicle, and their distances along the lanes [m] or inf.
 
         Looks on the whole lane as highway-env does, then up to `ahead.HORIZON` along the lanes ahead (those of the
-        vehicle's route or target lane where these tell, else all) and along all lanes behind. What is more than
-        `ahead.LEVEL` above or below the lane does not count.
+        vehicle's route or target lane if there is one, else all) and along all lanes behind. Objects more than
+        `ahead.LEVEL` above or below the lane do not count.
         """
         nobody = (None, math.inf), (None, math.inf)
         index = lane_index or vehicle.lane_index
@@ -225,19 +225,19 @@ def _is_landmark(kind: type) -> bool:
     return issubclass(kind, Landmark)
 
 
-# --- The road of a town whose traffic is stepped by the kernel, as highway-env uses a road ---------------------------
+# --- Road with compiled traffic ---------------------------------------------------------------------------------------
 
 
 class CompiledRoad(TownRoad):
-    """A road on which highway-env's own vehicles drive among those of the kernel's arrays.
+    """A road on which highway-env's own vehicles drive among those of the arrays.
 
-    `vehicles` and `objects` are plain lists, as everywhere in highway-env, and they say who is there: a view that is
-    taken out of them leaves the arrays, and a vehicle of highway-env's that is put into them, a guest, is seen, yielded
-    to and struck by everybody. Guests decide and move as their class does; all others do so in one call a substep.
-    Objects of highway-env's own are heeded by guests alone. A guest with a `height` [m] begins on a lane of it.
+    `vehicles` and `objects` are plain lists, as everywhere in highway-env. A view that is removed from them leaves the
+    arrays; a vehicle of highway-env that is added to them, a guest, is seen by all others, which yield to it and
+    collide with it. Guests decide and move as their class does; all others do so in one call a substep. Objects of
+    highway-env's own matter to guests alone. A guest with a `height` [m] begins on a lane of it.
 
     Attributes:
-        arrays: state of everybody; replaced by bigger ones where guests find no room.
+        arrays: state of all bodies; replaced by bigger ones where guests find no room.
     """
 
     def __init__(
@@ -279,7 +279,7 @@ class CompiledRoad(TownRoad):
         return town_arrays(self.network)
 
     def show(self) -> None:
-        """Lists everybody who is in the arrays, guests first; to be called after somebody was added to these."""
+        """Lists all bodies of the arrays, guests first; to be called after bodies were added to the arrays."""
         self._note_changes()
         self.vehicles[:] = [*self._guests, *self._bodies.vehicles()]
         self.objects[:] = [*self._things, *self._bodies.pedestrians(), *self._bodies.props()]
@@ -287,13 +287,13 @@ class CompiledRoad(TownRoad):
         rebuild(self.town_arrays, self.arrays)
 
     def act(self) -> None:
-        """Lets the guests decide; everybody else does so in `step`, on the same state."""
+        """Decides for the guests; all others decide in `step`, on the same state."""
         self._note_changes()
         for guest in self._guests:
             guest.act()
 
     def step(self, dt: float) -> None:
-        """Moves everybody by `dt` [s] and checks for collisions; see `kernel.stepping.step_around`."""
+        """Moves all bodies by `dt` [s] and checks for collisions; see `sim.step.step_around`."""
         self._note_changes()
         self.time += dt
         crashed = np.asarray(self.arrays.vehicles)["crashed"]
@@ -318,7 +318,7 @@ class CompiledRoad(TownRoad):
                     view.remember()
 
     def _level(self, guest: Any, record: Any) -> None:
-        """Tells a guest the closest lane of its height; highway-env would take one of a bridge below or above it."""
+        """Sets a guest's closest lane of its height; highway-env would take one of a bridge below or above it."""
         guest.height = float(record.height)
         guest.lane_index = self.network.index_of(record.lane)
         guest.lane = self.network.get_lane(guest.lane_index)
@@ -330,7 +330,7 @@ class CompiledRoad(TownRoad):
             prop.crashed = prop.crashed or boxes_touch(outline, OrientedBox.of(prop))
 
     def _note_changes(self) -> None:
-        """Heeds that somebody was put into the lists, or taken out of them."""
+        """Follows changes of the lists of vehicles and objects."""
         if self._listed == (self.vehicles, self.objects):
             return
         self._listed = list(self.vehicles), list(self.objects)
@@ -347,7 +347,7 @@ class CompiledRoad(TownRoad):
         rebuild(self.town_arrays, self.arrays)
 
     def _send_away(self, guests: set[int]) -> None:
-        """Empties the rows of those who are not in the lists any more; `guests` are rows of guests who stay."""
+        """Frees the rows of bodies that left the lists; `guests` are rows of guests that stay."""
         shown = {(view.RECORDS, view.row) for view in [*self.vehicles, *self.objects] if isinstance(view, BodyView)}
         arrays = self.arrays
         for row in range(len(arrays.vehicles)):
@@ -382,12 +382,12 @@ class CompiledRoad(TownRoad):
 
 
 def enlarged(town: TownArrays, arrays: WorldArrays, vehicles: int) -> WorldArrays:
-    """The same world with room for more vehicles.
+    """Returns the same world with room for more vehicles.
 
     Args:
         town: arrays of the town.
         arrays: of the world; they stay as they are.
-        vehicles: how many there will be room for.
+        vehicles: number of rows.
     """
     bigger = empty_world(
         town, vehicles=vehicles, pedestrians=len(arrays.pedestrians), props=len(arrays.props),

@@ -16,17 +16,17 @@ from dorothie_gym.maps.routing import CELL, Place, router
 from dorothie_gym.maps.town import Town
 
 STANDS_BEFORE = 17.0
-"""The middle of a car that stops for a prop stands about this far before the prop's [m]."""
+"""Distance of a car that stops for a prop to the prop, between their middles [m]."""
 
 TURNS_BEHIND = 16.0
-"""A car that turns round onto the lane of a prop lands no nearer behind it than this: it swings so far ahead first,
-`path.U_TURN_REACH` and half the length of a prop [m]."""
+"""Least distance behind a prop at which a U-turn onto its lane ends: `limits.U_TURN_REACH`, by which the car swings
+ahead first, and half the length of a prop [m]."""
 
 SIDE_BY_SIDE = 3.0
-"""Props on lanes beside one another stand no farther apart along the road than this, as a roadblock does, [m] ..."""
+"""Largest distance along the road of props on lanes beside one another that form one roadblock [m]."""
 
 APART = 22.0
-"""... or at least this far: a car that turns round before the one swings out onto the other lane [m]."""
+"""Least distance along the road of other props [m]: a U-turn before the one swings out onto the other lane."""
 
 
 def closed_by(place: Place) -> list[Place]:

@@ -1,4 +1,4 @@
-"""All substeps of a decision in one call."""
+"""Substeps of a world: all of a decision in one compiled call."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
 def step(
     town: TownArrays, world: WorldArrays, substeps: int, dt: float, acceleration: float = 0.0, steering: float = 0.0
 ) -> None:
-    """Lets a world go on.
+    """Steps a world.
 
-    As on a highway-env road, everybody decides on what is there at the beginning of a substep, then everybody moves.
+    As on a highway-env road, all bodies decide on the state at the beginning of a substep, then all move.
 
     Args:
         town: arrays of the town.
@@ -61,12 +61,12 @@ def step(
             trace(world)
 
 
-# Each phase is compiled on its own: woven into one function they would take the compiler twice as long.
+# Each phase is compiled on its own: inlined into one function they would take the compiler twice as long.
 
 
 @compiled
 def _decide(town: TownArrays, world: WorldArrays, dt: float) -> None:
-    """Lets everybody decide, and those on foot walk."""
+    """Decides for all vehicles, and moves the pedestrians."""
     for i in range(len(world.vehicles)):
         kind = world.vehicles[i].kind
         if kind == Kind.DRIVEN:
@@ -78,7 +78,7 @@ def _decide(town: TownArrays, world: WorldArrays, dt: float) -> None:
 
 @compiled
 def _move(town: TownArrays, world: WorldArrays, dt: float, egos: bool) -> None:
-    """Moves all vehicles; those of the kind `Kind.EGO` only if so wanted."""
+    """Moves all vehicles; those of the kind `Kind.EGO` only with `egos`."""
     for i in range(len(world.vehicles)):
         kind = world.vehicles[i].kind
         if kind != Kind.EMPTY and (egos or kind != Kind.EGO):
@@ -87,7 +87,7 @@ def _move(town: TownArrays, world: WorldArrays, dt: float, egos: bool) -> None:
 
 @compiled
 def _meet(town: TownArrays, world: WorldArrays, dt: float, tows: bool) -> None:
-    """Finds out who touches whom, tows away if so wanted, and lists who is where; then the substep is over."""
+    """Detects collisions, respawns with `tows`, makes the lane index anew, and ends the substep."""
     collide(world)
     if tows:
         tow(town, world, dt, bool(world.car[0].sweeping))
@@ -97,21 +97,21 @@ def _meet(town: TownArrays, world: WorldArrays, dt: float, tows: bool) -> None:
 
 @inlined
 def _go_on(town: TownArrays, vehicle: VehicleRecord, dt: float) -> None:
-    """Moves a vehicle and finds out where it is."""
+    """Moves a vehicle and updates its lane."""
     vehicle.timer += dt
     if vehicle.speed < STANDING:
         vehicle.standing += dt if vehicle.wait != Wait.LIGHT else 0.0
     else:
         vehicle.standing = 0.0
     if vehicle.speed == 0.0 and vehicle.acceleration <= 0.0:
-        return  # it stands, and stays where it was found
+        return  # it stands: its lane is unchanged
     move(vehicle, dt)
     update_lane(town, vehicle)
 
 
 @inlined
 def update_lane(town: TownArrays, vehicle: VehicleRecord) -> None:
-    """Finds the closest lane of a vehicle, and its place on the lane that it follows."""
+    """Updates the closest lane of a vehicle, and its place on the lane that it follows."""
     lane, station, lateral, segment = closest_lane(
         town, vehicle.x, vehicle.y, vehicle.heading, vehicle.cos, vehicle.sin, vehicle.height, vehicle.lane
     )
@@ -129,17 +129,17 @@ def update_lane(town: TownArrays, vehicle: VehicleRecord) -> None:
 
 @compiled
 def step_around(town: TownArrays, world: WorldArrays, dt: float, rows: NDArray[np.int64], poses: Array) -> None:
-    """One substep in which vehicles of the kind `Kind.EGO` are moved by somebody else, not by these loops.
+    """Steps a world by one substep in which vehicles of the kind `Kind.EGO` are moved from outside.
 
-    As in `step`, everybody decides on what was there before. Once one of them has crashed nobody is towed away, so that
-    those who were touched are found where it happened.
+    As in `step`, all bodies decide on the state before. Once one of those vehicles has crashed nothing is respawned, so
+    that the bodies it touched are found where it happened.
 
     Args:
         town: arrays of the town.
         world: arrays of the world, changed in place.
         dt: time of the substep [s].
         rows: (n,) rows of those vehicles.
-        poses: (n, 4) where they are at its end: x, y [m], heading [rad], and their speed [m/s].
+        poses: (n, 4) their state at its end: x, y [m], heading [rad], speed [m/s].
     """
     vehicles = world.vehicles
     _decide(town, world, dt)

@@ -27,10 +27,10 @@ from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.traffic.lane_index import rebuild
 
 CLEAR_OF_EGO = 25.0
-"""At the start nobody is closer to the vehicle than this [m]."""
+"""Least distance of others to the vehicle at the start [m]."""
 
 ROUNDS = 8
-"""So many times others are brought to places in lieu of those who were too close."""
+"""Most rounds in which vehicles and pedestrians that are too close are replaced."""
 
 SEEDS = 2**31
 """Seeds of what is drawn in the arrays are less than this."""
@@ -39,14 +39,14 @@ SEEDS = 2**31
 def populate_around(
     network: TownNetwork, world: WorldArrays, rng: np.random.Generator, *, vehicles: int, pedestrians: int
 ) -> None:
-    """Brings others to random places, as many as fit and none close to the first vehicle of a world.
+    """Adds others at random places, as many as fit and none close to the first vehicle of a world.
 
     Args:
         network: of the town.
         world: arrays of the world; its first vehicle is there already.
         rng: of the places.
-        vehicles: how many others.
-        pedestrians: how many people on foot.
+        vehicles: number of others.
+        pedestrians: number of pedestrians.
     """
     town = town_arrays(network)
     ego = world.vehicles[0]
@@ -67,18 +67,18 @@ def populate_around(
 
 
 def _counts(world: WorldArrays) -> NDArray[np.int64]:
-    """How many vehicles and pedestrians there are (2,)."""
+    """Returns the numbers of vehicles and pedestrians (2,)."""
     return np.array(((world.vehicles["kind"] != Kind.EMPTY).sum(), (world.pedestrians["state"] != Walk.EMPTY).sum()))
 
 
-# --- highway-env's `Kinematics` and `OccupancyGrid` without what takes most of the time of a step in a co ------------
+# --- Observations -----------------------------------------------------------------------------------------------------
 
 
 class Kinematics(KinematicObservation):
     """The same rows to the last bit: the observer, then those close to it, each feature scaled to [-1, 1]."""
 
     def observe(self) -> NDArray[np.float32]:
-        """Rows (`vehicles_count`, features); zeros where nobody is, NaN for what a foreign object does not tell."""
+        """Returns rows (`vehicles_count`, features); zeros for missing ones, NaN for features that an object lacks."""
         if not self.env.road:
             return np.zeros((self.vehicles_count, len(self.features)), dtype=np.float32)
         observer = self.observer_vehicle
@@ -115,7 +115,7 @@ class Kinematics(KinematicObservation):
 
 
 class OccupancyGrid(OccupancyGridObservation):
-    """The same cells; of those without a value images show 0, for which highway-env leaves it to the machine."""
+    """The same cells; images show 0 for those without a value, which highway-env leaves to the machine."""
 
     def observe(self) -> NDArray[Any]:
         """A grid (features, cells along, cells across) around the observer: float32, or uint8 for images."""
@@ -138,7 +138,7 @@ class OccupancyGrid(OccupancyGridObservation):
         return grid.astype(np.float32)
 
     def _cell(self, row: dict[str, float]) -> tuple[int, int] | None:
-        """Where a vehicle is in the grid, or None. highway-env takes it from scaled features and back."""
+        """Returns the cell of a vehicle, or None. highway-env takes it from scaled features and back."""
         place = [self._there_and_back(row[name], name) for name in ("x", "y")]
         along, across = self.pos_to_index(place, relative=True)
         if 0 <= along < self.grid.shape[-2] and 0 <= across < self.grid.shape[-1]:
@@ -203,7 +203,7 @@ _QUICK: dict[type[ObservationType], type[ObservationType]] = {
 }
 
 
-# --- `Town-v0`: a plain highway-env environment in a town, without roles, talk or tasks ------------------------------
+# --- Town-v0 ----------------------------------------------------------------------------------------------------------
 
 
 class TownEnv(AbstractEnv):

@@ -1,8 +1,8 @@
-"""Looks along a car's way for lines that it passed, for stretches off the road, and for those against the traffic.
+"""Detection of infractions on a trajectory: lines passed, stretches off the road or against the traffic.
 
-On most stretches there is nothing to find, and that is settled by the lines and lanes near the car: a car whose middle
-is on a lane that runs its way, or in a junction, is neither off the road nor against the traffic, and the lanes that a
-place may be on are listed by its cell. `world.infractions` tells what the rules are.
+Most stretches are settled by the lines and lanes near the car: a car whose middle is on a lane of its direction, or in
+a junction, is neither off the road nor against the traffic, and a cell lists the lanes that a place may be on. The
+rules themselves are described in `sim.infractions`.
 """
 
 from __future__ import annotations
@@ -30,53 +30,53 @@ from dorothie_gym.sim.state.records import (
 from dorothie_gym.sim.traffic.parameters import AT_LINE, STANDING
 
 OFF_ROAD = 0.5
-"""The car has left the road when its middle is farther than this outside of every lane, connectors included [m]."""
+"""Distance of the car's middle outside of all lanes, connectors included, from which on it is off the road [m]."""
 
 AGAINST = math.cos(math.radians(120.0))
 """Cosine of the angle to a lane from which on the car drives against it (CARLA's scenario runner, WrongLaneTest)."""
 
 LEVEL = 2.5
-"""Lanes and lines further above or below the car are another road's [m]."""
+"""Difference of height from which on lanes and lines belong to another road [m]."""
 
 NEARBY = 10.0
-"""How far around the car lanes are looked for to tell which is nearest [m]: more than half of any lane's width."""
+"""Range around the car for the nearest lane [m]: more than half of any lane's width."""
 
 OVER = FRAME_RATE
-"""Off the road, or against the traffic, is over when it has not been so for this long; then it counts anew [frames]."""
+"""Time without being off the road, or against the traffic, after which it counts anew [frames]."""
 
 FORGET = 12.0
-"""Who has stood at a stop sign and is this far from its line has to stand again [m]."""
+"""Distance from a stop line at which a stand there is forgotten [m]."""
 
 WIDE = 2.0 * (REACH - 2.0 * OFF_ROAD - SLACK)
-"""Of lanes wider than this a cell may not list all that a place is within `OFF_ROAD` of [m]."""
+"""Width up to which cells list all lanes that a place is within `OFF_ROAD` of [m]."""
 
 X, Y, HEADING, SPEED, HEIGHT, TURNING = range(len(POSE))
 """Columns of poses."""
 
 
 class FindingKind(enum.IntEnum):
-    """What is found along a way."""
+    """Kind of a finding."""
 
     LIGHT = 0
-    """A line with a light has been passed: whether that was a breach is for the light to tell."""
+    """A line with a light has been passed; its colour decides whether that is a breach."""
     STOP_SIGN = 1
     OFF_ROAD = 2
     WRONG_WAY = 3
 
 
 class WatchArrays(NamedTuple):
-    """What watching a car takes.
+    """Arrays for watching a car.
 
     Attributes:
         points: as in `TownArrays`; so `lanes`, `origin`, `cells` and `entries`.
-        lanes: `records.LANE`.
+        lanes: lanes of the town.
         origin: (2,).
         cells: (rows, columns, 2).
-        entries: `records.ENTRY`.
-        lines: `records.LINE` (m,), of the town.
-        marks: `records.MARK` (m,), of the car; written.
-        last: (2,) frames at which it was off the road, and against the traffic, last; written.
-        found: `records.FINDING`, room for three a pose; written.
+        entries: entries of the cells.
+        lines: (m,) lines of the town.
+        marks: (m,) marks of the car; written.
+        last: (2,) last frames off the road, and against the traffic; written.
+        found: findings, room for three a pose; written.
     """
 
     points: Array
@@ -92,7 +92,7 @@ class WatchArrays(NamedTuple):
 
 @compiled
 def watch(arrays: WatchArrays, poses: Array, frame: int, length: float, wide: bool) -> int:
-    """Looks at a stretch of way.
+    """Watches a stretch of a trajectory.
 
     Args:
         arrays: of the town and of the car.
@@ -102,7 +102,7 @@ def watch(arrays: WatchArrays, poses: Array, frame: int, length: float, wide: bo
         wide: whether some lane of the town is wider than `WIDE`.
 
     Returns:
-        How many findings there are, in the order in which things happened.
+        Number of findings, in the order in which they happened.
     """
     count = 0
     near = _lines_near(arrays, poses, length)
@@ -116,18 +116,18 @@ def watch(arrays: WatchArrays, poses: Array, frame: int, length: float, wide: bo
     return count
 
 
-# --- lines ------------------------------------------------------------------------------------------------------------
+# --- Lines ------------------------------------------------------------------------------------------------------------
 
 
 @inlined
 def _lines_near(arrays: WatchArrays, poses: Array, length: float) -> int:
-    """Lists the lines that the way may have passed; forgets stands at all others; returns how many are listed."""
+    """Lists the lines that may have been passed, and forgets stands at all others; returns the number of lines."""
     lines, marks = arrays.lines, arrays.marks
     x, y, extent2 = poses[0, X], poses[0, Y], 0.0
     for k in range(1, len(poses)):
         dx, dy = poses[k, X] - x, poses[k, Y] - y
         extent2 = max(extent2, dx * dx + dy * dy)
-    # of a line that is passed the front is no farther beyond than it has gone since the pose before
+    # the front is no farther beyond a passed line than its way since the pose before
     reach = 3.0 * math.sqrt(extent2) + 2.0 * length + FORGET
     near = 0
     for j in range(len(lines)):
@@ -162,7 +162,7 @@ def _at_lines(arrays: WatchArrays, poses: Array, k: int, length: float, near: in
         if turning or (x - line.x) * line.cos + (y - line.y) * line.sin <= 0.0:
             continue
         across = abs((y - line.y) * line.cos - (x - line.x) * line.sin)
-        # on the border of two lanes it is on the one whose middle is nearer
+        # on the border of two lanes the one with the nearer middle counts
         if across < best and _is_on(line, x, y, cos, sin, poses[k, HEIGHT]):
             passed, best = j, across
     if passed == NOBODY:
@@ -202,12 +202,12 @@ def _note(finding: FindingRecord, k: int, kind: int, number: int, station: float
     finding.pose, finding.kind, finding.number, finding.station = k, kind, number, station
 
 
-# --- lanes ------------------------------------------------------------------------------------------------------------
+# --- Lanes ------------------------------------------------------------------------------------------------------------
 
 
 @inlined
 def _beside_lanes(arrays: WatchArrays, poses: Array, k: int, frame: int, wide: bool, count: int) -> int:
-    """Finds out whether the car is off the road or against the traffic; returns the number of findings."""
+    """Notes a car off the road or against the traffic; returns the number of findings."""
     off_road, against = _state(arrays, poses, k, wide)
     if off_road:
         count = _tell(arrays, poses, k, frame, FindingKind.OFF_ROAD, count)
@@ -262,7 +262,7 @@ def _state(arrays: WatchArrays, poses: Array, k: int, wide: bool) -> tuple[bool,
 def _outside(
     points: Array, lane: LaneRecord, at: int, share: float, gap: float, poses: Array, k: int
 ) -> tuple[float, float, bool]:
-    """How far outside of a lane's area a pose is (negative inside, infinite at another height), and the station [m]."""
+    """Returns a pose's distance outside of a lane (negative inside, inf at another height), and its station [m]."""
     station, lateral = coordinates(points, lane, at, share, gap, poses[k, X], poses[k, Y])
     if abs(value_near(points, lane, at, 4, station) - poses[k, HEIGHT]) > LEVEL:
         return math.inf, station, False
@@ -278,7 +278,7 @@ def _is_with(points: Array, lane: LaneRecord, at: int, station: float, heading: 
 
 @compiled
 def _survey(arrays: WatchArrays, poses: Array, k: int) -> tuple[float, bool, int, float]:
-    """How far outside of all lanes a pose is [m], whether all lanes it is on run against it, and the nearest lane.
+    """Measures a pose against all lanes.
 
     Returns:
         Distance to the nearest lane's area (negative inside), whether it is on lanes and all of them run the other

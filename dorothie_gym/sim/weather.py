@@ -1,4 +1,4 @@
-"""Weather and light: the ten parameters, and what they do to grip, sight and the air's push.
+"""Weather and light: the ten parameters, and their effects on grip, sight and side wind.
 
 Cloudiness and the sun's altitude dim the light, fog and precipitation dim the air (`visibility`), water on the road
 takes grip, wind pushes the car (`wind`). The sun's azimuth only turns shadows. On a clear noon nothing has any effect.
@@ -43,7 +43,7 @@ _TEXTURE, _DRAINAGE, _SLOPE = 0.5, 5.0, 0.02
 
 
 class Weather:
-    """The ten weather parameters and what they do."""
+    """The ten weather parameters and their effects."""
 
     def __init__(self) -> None:
         self._values: dict[WeatherParameter, float] = {p: float(p.clear_noon) for p in WeatherParameter}
@@ -70,10 +70,10 @@ class Weather:
         self.set(parameter, value)
         return value
 
-    # --- sight ------------------------------------------------------------------------------------------------------
+    # --- Sight --------------------------------------------------------------------------------------------------------
 
     def visibility(self, *, lights: bool, clarity: float = 1.0) -> Visibility:
-        """What is between things and whoever looks at them.
+        """Returns the visibility in this weather.
 
         Args:
             lights: whether the car's head lights are on.
@@ -85,7 +85,7 @@ class Weather:
         return found
 
     def sight(self, *, lights: bool) -> float:
-        """How far bodies are perceived [m]; shorter with fog, rain and darkness, longer in the dark with lights on."""
+        """Returns the range of perception [m]: shorter with fog, rain and darkness, longer in the dark with lights."""
         return self.visibility(lights=lights).sight
 
     def _visibility(self, lights: bool, clarity: float) -> Visibility:
@@ -101,15 +101,15 @@ class Weather:
         )
 
     def above_clear(self, parameter: WeatherParameter) -> float:
-        """How far a parameter lies above a clear noon's value, as a share of the way to its highest, in [0, 1]."""
+        """Returns a parameter's excess over a clear noon, as a share of the largest possible, in [0, 1]."""
         clear = parameter.clear_noon
         return max(self._values[parameter] - clear, 0.0) / (parameter.high - clear)
 
-    # --- grip -------------------------------------------------------------------------------------------------------
+    # --- Grip ---------------------------------------------------------------------------------------------------------
 
     @property
     def water_film(self) -> float:
-        """Water on the road [mm]: what it is wet with, puddles, and what falls faster than it runs off."""
+        """Film of water on the road [mm]: wetness, puddles, and rain that falls faster than it runs off."""
         wet = self.above_clear(WeatherParameter.WETNESS)
         puddles = self.above_clear(WeatherParameter.PRECIPITATION_DEPOSITS)
         rain = CLOUDBURST * self.above_clear(WeatherParameter.PRECIPITATION)
@@ -121,7 +121,7 @@ class Weather:
         return 1.0 + WET_LOSS * math.expm1(-self.water_film / FILM_SCALE)
 
     def braking_distance(self, speed: float, deceleration: float) -> float:
-        """Way to a stand [m] from a speed [m/s] with brakes that give `deceleration` on a dry road [m/s^2]."""
+        """Returns the braking distance [m] from a speed [m/s] with a deceleration given for a dry road [m/s^2]."""
         return speed**2 / (2 * deceleration * self.friction)
 
 
@@ -134,7 +134,7 @@ def _running_film(rate: float) -> float:
     return float(max(depth - _TEXTURE, 0.0))
 
 
-# --- Wind from the side: a car drifts a little until it is steered against it ----------------------------------------
+# --- Side wind --------------------------------------------------------------------------------------------------------
 
 GALE = 20.0
 """Mean speed of the wind at intensity 100 % [m/s]: Beaufort 8."""
@@ -185,7 +185,7 @@ class Wind:
         return GALE * strength * max(1.0 + GUSTINESS * math.sqrt(2.0 / len(PERIODS)) * swing, 0.0)
 
     def drift(self, strength: float, time: float, *, heading: float, speed: float) -> float:
-        """Angle by which a car's course lies beside its heading, positive right [rad]; 0 without wind and for a stand.
+        """Returns the angle of a car's course to its heading, positive right [rad]; 0 without wind and for a stand.
 
         Args:
             strength: of the wind in [0, 1].
@@ -199,7 +199,7 @@ class Wind:
 
 
 def drift_angle(wind: float, angle: float, speed: float) -> float:
-    """Angle by which a car's course lies beside its heading, positive right [rad].
+    """Returns the angle of a car's course to its heading, positive right [rad].
 
     Args:
         wind: speed of the wind [m/s].

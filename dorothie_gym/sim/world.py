@@ -1,4 +1,4 @@
-"""The world of a session: a town, the car, what drives, walks and stands there, weather and faults."""
+"""World of a session: a town with the ego, traffic, pedestrians and props, weather and sensor faults."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ from dorothie_gym.sim.traffic_rules import HEIGHT
 from dorothie_gym.sim.weather import Weather, Wind
 
 FAULT_SECONDS = 30.0
-"""A sensor fault ends by itself after this long [s] (design)."""
+"""Duration of a sensor fault [s] (design)."""
 
 CLARITY = {Sensor.BLUR: 0.25, Sensor.VIEW: 0.0}
-"""Share of the signal that a fault of the view leaves: blur halves the sight."""
+"""Share of the signal left by a fault of the view: blur halves the sight."""
 
 
 class SensorArrays(NamedTuple):
-    """Arrays of a world that `kernel.seeing.see` takes, see `kernel.WorldArrays`."""
+    """Arrays of a world that `seeing.see` takes; see `WorldArrays`."""
 
     vehicles: RecordArray[VehicleRecord]
     pedestrians: RecordArray[PedestrianRecord]
@@ -59,27 +59,26 @@ class SensorArrays(NamedTuple):
 
 
 class World:
-    """A town in which a car drives among others.
+    """A town in which the ego drives among others.
 
-    All that moves is stepped by the compiled loops of `kernel`; this class lays the car's wishes before them, and
-    takes out what came of it.
+    All that moves is stepped by compiled loops (`sim.step`); this class writes their input and reads their results.
 
     Attributes:
         town: the map.
-        network: its lanes as highway-env's graph.
-        road: highway-env's road, with the car and all others on it.
-        car: the car.
+        network: its lanes as a graph of highway-env.
+        road: highway-env's road, with the ego and all others on it.
+        car: the ego as a vehicle of highway-env.
         planner: its local planner.
-        ego: its controller, which takes physical actions.
+        ego: controller of the ego, which takes physical actions.
         actors: traffic, pedestrians and props.
         weather: weather and light.
-        wind: where the wind blows, and its gusts.
+        wind: direction of the wind, and its gusts.
         faults: sensors that are faulty, and the frame at which each works again.
-        hazard: what the car is braking or standing for, or None.
+        hazard: cause of a hazard stop, or None.
         frame: physics frames since the start.
         frames: trajectory of the last call of `step` (n, 9), see `FRAME_COLUMNS`.
-        offsets: how far the car was to the right of its path at each of these frames (n,) [m].
-        reports: what has happened to the car, and how often it broke which rule.
+        offsets: offset of the ego to the right of its path at each of these frames (n,) [m].
+        reports: events of the ego, and the numbers of its infractions.
     """
 
     def __init__(
@@ -92,8 +91,8 @@ class World:
             town: the map.
             config: settings.
             seed: source of the generators of traffic, pedestrians, localisation, perception and wind, one each.
-            departure: lane and distance along it [m] where the car stands.
-            network: the town's network, if there is one already: it is never changed.
+            departure: lane and distance along it [m] of the ego.
+            network: the town's network, if it was built already; it is never changed.
         """
         chance_seed, crowd_seed, locate_seed, perceive_seed, wind_seed = seed.spawn(5)
         self.town, self.config = town, config
@@ -127,7 +126,7 @@ class World:
         self.offsets: Array = np.zeros(0)
         self.reports = WorldEventLog(self.network, self.car.LENGTH)
 
-    # --- time -------------------------------------------------------------------------------------------------------
+    # --- Time ---------------------------------------------------------------------------------------------------------
 
     @property
     def time(self) -> float:
@@ -135,7 +134,7 @@ class World:
         return self.frame / FRAME_RATE
 
     def step(self, frames: int) -> list[WorldEvent]:
-        """Lets the world run for a number of physics frames; returns what happened to the car."""
+        """Runs the world for a number of physics frames; returns the events of the ego."""
         if frames <= FRAMES:
             trace, poses = self._run(frames)
         else:
@@ -151,7 +150,7 @@ class World:
         return self.reports.close(poses, self.frame, stood=stood)
 
     def _run(self, frames: int) -> tuple[Array, Array]:
-        """Steps all bodies by no more than `FRAMES` substeps; returns the car's way and poses, see `WorldArrays`."""
+        """Steps all bodies by no more than `FRAMES` substeps; returns the ego's trace and poses, see `WorldArrays`."""
         arrays, record = self.actors.arrays, self._record
         self.planner.extend(self.car.speed)
         self.ego.brief(arrays, record)
@@ -167,20 +166,20 @@ class World:
 
     @property
     def _record(self) -> CarRecord:
-        """What drives the car."""
+        """Fields of the ego's record."""
         if self._record_of is not self.actors.arrays:
             self._record_of, self._own_record = self.actors.arrays, CarRecord(self.actors.arrays)
         return self._own_record
 
     def _tell_weather(self, arrays: WorldArrays) -> None:
-        """Writes what the weather does to grip, sight and course into the world's arrays, where it has changed."""
-        visibility = self.visibility  # another one after any change of the weather
+        """Writes the effects of the weather on grip, sight and course into the world's arrays after a change."""
+        visibility = self.visibility  # a new object after any change of the weather
         if self._perception.open(arrays.eye, visibility):
             wind = self.weather.above_clear(WeatherParameter.WIND_INTENSITY)
             self._record.air[()] = self.weather.friction, wind, self.wind.heading, tuple(self.wind.phases)
 
     def _report(self, events: RecordArray[EventRecord]) -> None:
-        """Takes over what happened to the car, `kernel.records.EVENT`."""
+        """Reports events of the compiled loops."""
         for event in events:
             frame, kind = int(event.frame), ObjectClass(int(event.kind))
             if event.code == EventCode.HAZARD_STOP:
@@ -198,27 +197,27 @@ class World:
 
     @property
     def hazard(self) -> Hazard | None:
-        """What the car is braking or standing for, or None."""
+        """Cause of a hazard stop, or None."""
         kind, gap = self._record.hazard.item()
         return Hazard(kind=ObjectClass(kind), gap=gap) if kind else None
 
     @property
     def collisions(self) -> int:
-        """Collisions of the car's own making."""
+        """Number of collisions by the ego's own fault."""
         _, collisions = self._record.outcome.item()
         return int(collisions)
 
     def find_path(self) -> None:
-        """Lays the path anew from the lane that the car is on, where somebody else has driven it off its path."""
+        """Lays the path anew from the ego's lane, after an outside driver has left it."""
         vehicle = plain(self.actors.arrays.vehicles)[0]
         lane, station, offset = (vehicle[name].item() for name in ("lane", "own_station", "own_lateral"))
         self.planner.restart(lane, min(max(station, 0.0), self.town.lanes[lane].length), offset)
 
-    # --- perception -------------------------------------------------------------------------------------------------
+    # --- Perception ---------------------------------------------------------------------------------------------------
 
     @property
     def visibility(self) -> Visibility:
-        """How well the car sees now, by weather, light and faults of the view."""
+        """Present visibility, by weather, light and faults of the view."""
         clarity = 1.0
         if self.faults:
             clarity = min((CLARITY[sensor] for sensor in CLARITY if self._is_faulty(sensor, self.frame)), default=1.0)
@@ -226,11 +225,11 @@ class World:
 
     @property
     def sight(self) -> float:
-        """How far the car perceives all bodies now [m]."""
+        """Distance up to which all bodies are perceived now [m]."""
         return self.visibility.sight
 
     def perceived(self) -> list[PerceivedBody]:
-        """Bodies that the car perceives, where it takes them to be, nearest first."""
+        """Returns the perceived bodies at their perceived places, nearest first."""
         return [
             PerceivedBody(
                 key=int(key), kind=ObjectClass(int(kind)), x=x, y=y, heading=heading, length=length, width=width,
@@ -241,31 +240,31 @@ class World:
 
     @property
     def senses(self) -> SensorArrays:
-        """What the car sees with now, and what there is to be seen."""
+        """Arrays for perception: bodies, visibility, and room for the result."""
         arrays = self.actors.arrays
         self._tell_weather(arrays)
         return SensorArrays(arrays.vehicles, arrays.pedestrians, arrays.props, arrays.seen, arrays.eye)
 
     def seen(self) -> Array:
-        """What `perceived` tells in numbers (n, 9), columns `perception.BODY` [m, rad, m/s]."""
+        """Returns the perceived bodies as numbers (n, 9), columns `perception.BODY` [m, rad, m/s]."""
         arrays = self.actors.arrays
         self._tell_weather(arrays)
         table = np.empty((len(arrays.seen), len(BODY)))
         return table[: look_around(arrays, self.frame, table)]
 
     def _props_seen(self) -> tuple[tuple[float, float, float], ...]:
-        """Where the props are that the car perceives: x, y and height [m]."""
+        """Returns places of the perceived props: x, y and height [m]."""
         if not self.actors.has_props:
             return ()
         return tuple((body.x, body.y, body.height) for body in self.perceived() if body.kind is ObjectClass.STATIC)
 
-    # --- faults -----------------------------------------------------------------------------------------------------
+    # --- Faults -------------------------------------------------------------------------------------------------------
 
     def _is_faulty(self, sensor: Sensor, frame: int) -> bool:
         return self.faults.get(sensor, frame) > frame
 
     def set_fault(self, sensor: Sensor, on: bool) -> str | None:
-        """Switches a sensor fault on or off; returns the reason if nothing changes."""
+        """Switches a sensor fault on or off; returns the reason of a refusal."""
         if on == (sensor in self.faults):
             return f"the fault of {sensor} is {'on' if on else 'off'} already"
         if on:

@@ -1,4 +1,4 @@
-"""Decisions of many egos at once, each the first vehicle of its world: they act, the worlds go on, they observe."""
+"""Decisions of many egos at once, each the first vehicle of its world: actions, substeps, observations."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ MIN_SPEED = float(Vehicle.MIN_SPEED)
 """[m/s]."""
 
 REACHABLE = 2.0
-"""A lane whose middle is farther to the side than this many of its widths is not changed to."""
+"""Distance to the middle of a lane, in its widths, up to which an ego changes to it."""
 
 NOTHING, LEFT, IDLE, RIGHT, FASTER, SLOWER = range(-1, 5)
 """Meta actions, as `DiscreteMetaAction.ACTIONS_ALL` numbers them, and none at all."""
@@ -64,7 +64,7 @@ def lanes_beside(network: TownNetwork) -> NDArray[np.int32]:
 
 @compiled
 def take_helm(vehicle: VehicleRecord, helm: HelmRecord, speeds: Array) -> None:
-    """Begins to drive: on the closest lane, at the possible speed that is closest to the present one."""
+    """Initialises the targets: the closest lane, and the possible speed that is closest to the present one."""
     helm.lane = vehicle.lane
     helm.acceleration, helm.steering = 0.0, 0.0
     helm.lowest, helm.highest = MIN_SPEED, MAX_SPEED
@@ -74,7 +74,7 @@ def take_helm(vehicle: VehicleRecord, helm: HelmRecord, speeds: Array) -> None:
 
 @compiled
 def speed_index(speeds: Array, speed: float) -> int:
-    """Which of some evenly spaced speeds is closest to one: `MDPVehicle.speed_to_index`."""
+    """Returns the index of the closest of some evenly spaced speeds: `MDPVehicle.speed_to_index`."""
     last = len(speeds) - 1
     share = (speed - speeds[0]) / (speeds[last] - speeds[0])
     return int(min(max(round(share * last), 0), last))
@@ -90,9 +90,9 @@ def decide(
         town: arrays of the town.
         beside: see `lanes_beside`.
         vehicle: the ego.
-        helm: what it has in mind.
+        helm: its targets.
         speeds: that it may hold, evenly spaced [m/s].
-        action: what it is to do.
+        action: the meta action.
     """
     if action == FASTER or action == SLOWER:
         index = speed_index(speeds, vehicle.speed) + (1 if action == FASTER else -1)
@@ -162,7 +162,7 @@ def speed_along(town: TownArrays, vehicle: VehicleRecord) -> float:
     return float(vehicle.speed * math.cos(value_near(town.points, lane, lane.first, 3, station) - vehicle.heading))
 
 
-# --- highway-env's `Kinematics` observation of a vehicle, written from the arrays ------------------------------------
+# --- Observation ------------------------------------------------------------------------------------------------------
 
 PRESENCE, X, Y, VX, VY, HEADING, COS, SIN = range(8)
 
@@ -172,18 +172,18 @@ FEATURES = {
 """Features by highway-env's names."""
 
 PERCEIVED = 5.0 * MAX_SPEED
-"""Who is farther away is not observed [m], `AbstractEnv.PERCEPTION_DISTANCE`."""
+"""Range of the observation [m], `AbstractEnv.PERCEPTION_DISTANCE`."""
 
 BEHIND = 2.0 * CAR_LENGTH
-"""Who is farther behind is not observed unless `see_behind` [m], `Road.close_objects_to`."""
+"""Range of the observation behind without `see_behind` [m], `Road.close_objects_to`."""
 
 
 class View(NamedTuple):
-    """What is observed, and how.
+    """Settings of the observation.
 
     Attributes:
         features: int32 (f,) codes of the columns.
-        absolute: whether others are seen where they are, not relative to the observer.
+        absolute: whether others are observed in absolute coordinates, not relative to the observer.
         ordered: whether the closest ones along the lane come first; otherwise in the order of their numbers.
         behind: whether those far behind are seen.
         clip: whether normalised values are kept in [-1, 1].
@@ -203,12 +203,12 @@ def observe(
     town: TownArrays, world: WorldArrays, view: View, ranges: Array, nearest: NDArray[np.int32], distances: Array,
     rows: NDArray[np.float32],
 ) -> None:  # fmt: skip
-    """Writes what the first vehicle of a world observes: itself in the first row, then others, then rows of zeros.
+    """Writes the observation of the first vehicle of a world: itself in the first row, then others, then zeros.
 
     Args:
         town: arrays of the town.
         world: arrays of the world.
-        view: what is observed.
+        view: settings of the observation.
         ranges: (f, 2) values of each feature that become -1 and 1; NaN where it is not normalised.
         nearest: int32 (n,) scratch, with `distances`.
         distances: (n,) see there.
@@ -238,9 +238,9 @@ def observe(
 def _find_nearest(
     town: TownArrays, world: WorldArrays, view: View, nearest: NDArray[np.int32], distances: Array, room: int
 ) -> int:
-    """Lists whom the first vehicle observes, as many as there is room for; returns how many.
+    """Lists the bodies that the first vehicle observes, as many as there is room for; returns their number.
 
-    `Road.close_objects_to`: vehicles before pedestrians where the order does not tell, and of these only those ahead.
+    `Road.close_objects_to`: vehicles before pedestrians where distances are equal, and of these only those ahead.
     """
     vehicles, walkers = world.vehicles, world.pedestrians
     count = 0
@@ -259,7 +259,7 @@ def _find_nearest(
 
 @inlined
 def _ahead(town: TownArrays, observer: VehicleRecord, other: PlacedBody) -> float:
-    """How far along the observer's lane another body is ahead of it [m]; NaN for those too far away."""
+    """Returns the distance along the observer's lane to another body [m]; NaN out of range."""
     dx, dy = other.x - observer.x, other.y - observer.y
     if dx * dx + dy * dy >= PERCEIVED * PERCEIVED:
         return math.nan
@@ -271,7 +271,7 @@ def _ahead(town: TownArrays, observer: VehicleRecord, other: PlacedBody) -> floa
 def _list(
     view: View, body: int, ahead: float, nearest: NDArray[np.int32], distances: Array, count: int, room: int
 ) -> int:
-    """Puts a body into the list, behind those that are as close; returns how many are in it."""
+    """Inserts a body into the list, behind those that are as close; returns the list's length."""
     if math.isnan(ahead):
         return count
     distance = abs(ahead) if view.ordered else 0.0
@@ -303,7 +303,7 @@ def _feature(vehicle: MovingBody, feature: int) -> float:
     return float(vehicle.sin) if feature == SIN else 1.0
 
 
-# --- Decisions of many egos at once, each the first vehicle of its world: they act, the worlds go on, the ------------
+# --- Decisions --------------------------------------------------------------------------------------------------------
 
 
 class OutcomeRecord:
@@ -318,12 +318,12 @@ class Egos(NamedTuple):
     """The egos of a batch of worlds; all but `beside`, `speeds` and `rows` have a row for each world.
 
     Attributes:
-        beside: see `meta.lanes_beside`.
-        speeds: that may be held [m/s]; empty for egos that are given acceleration and steering.
+        beside: see `lanes_beside`.
+        speeds: possible target speeds [m/s]; empty for egos with continuous actions.
         rows: int64 (1,) the row of an ego in its world.
-        poses: (worlds, 1, 4) scratch: where they will be.
+        poses: (worlds, 1, 4) scratch: their next poses.
         helms: `HelmRecord`.
-        ranges: (worlds, f, 2) see `kinematics.observe`.
+        ranges: (worlds, f, 2) see `observe`.
         nearest: int32 (worlds, n) scratch, with `distances`.
         distances: (worlds, n) see there.
         observations: float32 (worlds, n, f).
@@ -344,13 +344,13 @@ class Egos(NamedTuple):
 
 @concurrent
 def begin_one(number: int, town: TownArrays, batch: WorldArrays, view: View, egos: Egos) -> None:
-    """Gives an ego that was put into its world its helm, and observes.
+    """Initialises the targets of an ego in its world, and observes.
 
     Args:
         number: of the world.
         town: arrays of the town.
         batch: arrays of all worlds.
-        view: what is observed.
+        view: settings of the observation.
         egos: the egos of all worlds.
     """
     vehicle = world_of(batch, number).vehicles[0]
@@ -364,18 +364,18 @@ def play_share(
     turns: NDArray[np.int64], home: int, town: TownArrays, batch: WorldArrays, view: View, egos: Egos,
     actions: NDArray[np.int32], playing: NDArray[np.bool_], substeps: int, dt: float,
 ) -> None:  # fmt: skip
-    """Plays a decision in worlds, as long as there are any whose turn has not come.
+    """Plays a decision in worlds, until all worlds of the batch have been taken.
 
     Args:
-        turns: numbers of the worlds, see `turns.take`; shared by all threads that work on them.
+        turns: numbers of the worlds, see `work_queue.take`; shared by all threads that work on them.
         home: number of the block that is this thread's own.
         town: arrays of the town.
         batch: arrays of all worlds.
-        view: what is observed.
+        view: settings of the observation.
         egos: the egos of all worlds.
         actions: int32 (worlds,) meta actions.
-        playing: (worlds,) which worlds go on at all.
-        substeps: how many.
+        playing: (worlds,) worlds that are stepped at all.
+        substeps: number of substeps.
         dt: time of each [s].
     """
     number = take(turns, home)

@@ -1,4 +1,4 @@
-"""Threads that stand by for work which takes less time than waking a thread up is worth."""
+"""Pool of threads for work that is shorter than the time to wake a thread."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dorothie_gym.compilation import WITHOUT_COUNTS, concurrent
 
 LOOKS: Final = 20_000
-"""How often a gate is looked at before its thread sleeps: some 0.1 ms, as OpenMP's libraries wait before they sleep."""
+"""Number of polls of a gate before its thread sleeps: some 0.1 ms, as in OpenMP's libraries."""
 
 _SHUT, _OPEN, _SLEPT_AT = 0, 1, 2
 
@@ -23,10 +23,9 @@ _lock = threading.Lock()
 
 
 class Gate:
-    """One thread waits at it until another one opens it; it shuts behind who passes.
+    """Gate at which one thread waits until another one opens it; it shuts behind the thread that passes.
 
-    Who waits looks for a while, without Python's lock, and sleeps if nobody has come by then: a thread that sleeps is
-    awake again only 0.05 to 0.1 ms after it was called.
+    The waiting thread polls for a while, without Python's lock, and then sleeps: waking it again takes 0.05 to 0.1 ms.
     """
 
     def __init__(self) -> None:
@@ -47,7 +46,7 @@ class Gate:
 class Crew:
     """Threads that do the same work at the same time as the caller.
 
-    They end when the crew is closed or nobody has it any more.
+    They end when the crew is closed or no longer referenced.
     """
 
     def __init__(self, others: int) -> None:
@@ -86,7 +85,7 @@ class Crew:
 
 
 class _Hand:
-    """What a thread and its caller share."""
+    """State shared by a thread and its caller."""
 
     def __init__(self) -> None:
         self._called, self._done = Gate(), Gate()
@@ -166,5 +165,5 @@ def _find_open(state: NDArray[np.int64], looks: int) -> bool:
 
 @concurrent
 def _find_sleeper(state: NDArray[np.int64]) -> bool:
-    """Opens a gate; if somebody sleeps at it, leaves it shut, since the bell lets them pass."""
+    """Opens a gate; if a thread sleeps at it, leaves it shut, since the semaphore lets the thread pass."""
     return _change(state, _SHUT, _OPEN) == _SLEPT_AT and _change(state, _SLEPT_AT, _SHUT) == _SLEPT_AT

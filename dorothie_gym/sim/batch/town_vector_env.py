@@ -48,11 +48,11 @@ _CODES = {"LANE_LEFT": LEFT, "IDLE": IDLE, "LANE_RIGHT": RIGHT, "FASTER": FASTER
 
 
 class Actions:
-    """What egos are told.
+    """Actions of the egos.
 
     Attributes:
         space: of the actions of one.
-        speeds: that an ego of meta actions may hold [m/s]; empty for continuous actions.
+        speeds: possible target speeds with meta actions [m/s]; empty for continuous actions.
     """
 
     def __init__(self, config: Mapping[str, Any]) -> None:
@@ -109,17 +109,17 @@ class Actions:
         return np.full(len(actions), NOTHING, dtype=np.int32)
 
     def limit(self, helm: HelmRecord) -> None:
-        """Tells an ego of the range of its speeds."""
+        """Sets the range of an ego's speeds."""
         if not self._discrete and self._stock.speed_range:
             helm.lowest, helm.highest = self._stock.speed_range
 
 
 class Kinematics:
-    """What egos observe.
+    """Observation of the egos.
 
     Attributes:
         space: of the observations of one.
-        view: what its columns are, and how they are filled.
+        view: its columns and settings.
         shuffled: whether the rows of others are in random order.
     """
 
@@ -169,7 +169,7 @@ def _sync_only(setting: str, what: str) -> ValueError:
     )
 
 
-# --- `Town-v0` many times over: what `gymnasium.make_vec` makes of it ------------------------------------------------
+# --- Vector environment -----------------------------------------------------------------------------------------------
 
 
 class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
@@ -253,7 +253,7 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
             empty_records(OutcomeRecord, self.num_envs),
         )
 
-    # --- gymnasium's interface --------------------------------------------------------------------------------------
+    # --- Gymnasium's interface ----------------------------------------------------------------------------------------
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -329,7 +329,7 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
     def _begin_at_once(
         self, last: NDArray[np.float32], actions: NDArray[Any]
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Resets what is over, and tells of how it ended and began: observations and infos of mode `SAME_STEP`."""
+        """Resets environments that are over; returns observations and infos as in the mode `SAME_STEP`."""
         over = self._over.copy()
         final = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(over):
@@ -356,14 +356,14 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
 
     @property
     def threads(self) -> int:
-        """How many threads work."""
+        """Number of threads."""
         return self._worlds.threads
 
     def world(self, number: int) -> WorldArrays:
         """The world of an environment; its first vehicle is the ego."""
         return self._worlds.world(number)
 
-    # --- episodes ---------------------------------------------------------------------------------------------------
+    # --- Episodes -----------------------------------------------------------------------------------------------------
 
     def _play(self, codes: NDArray[np.int32], playing: NDArray[np.bool_]) -> None:
         frequency, decisions = self.config["simulation_frequency"], self.config["policy_frequency"]
@@ -408,7 +408,7 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         return found
 
     def _observe(self, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
-        """What all environments show; those of the mask anew."""
+        """Returns the observations of all environments; those of the mask anew."""
         self._shown[mask] = self._egos.observations[mask]
         if self._kinematics.shuffled:
             for i in np.flatnonzero(mask):
@@ -423,7 +423,7 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         }
 
     def _infos(self, mask: NDArray[np.bool_], actions: NDArray[Any]) -> dict[str, Any]:
-        """What `SyncVectorEnv` tells of plain environments, of those of a mask."""
+        """Returns the infos of `SyncVectorEnv`, for the environments of a mask."""
         outcomes = self._egos.outcomes
         values: dict[str, Any] = {"speed": outcomes["speed"], "crashed": outcomes["crashed"], "action": actions}
         infos: dict[str, Any] = {"rewards": _with_masks(self._terms(), mask), "_rewards": mask.copy()}
@@ -441,7 +441,7 @@ def _with_masks(values: dict[str, NDArray[Any]], mask: NDArray[np.bool_]) -> dic
 
 
 def _without(actions: NDArray[Any], mask: NDArray[np.bool_]) -> NDArray[Any]:
-    """A copy of the actions with zeros for those of a mask, who took none."""
+    """Returns a copy of the actions with zeros for the egos of a mask, which took none."""
     taken = actions.copy()
     taken[mask] = 0
     return taken

@@ -1,4 +1,4 @@
-"""Numbers that several threads take in turns, each of them once."""
+"""Work queue: numbers that several threads take, each of them once."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _lock = threading.Lock()
 
 
 def turns_of(count: int, threads: int) -> NDArray[np.int64]:
-    """The numbers 0 to `count` - 1 in as many blocks as there are threads, none of them taken.
+    """Returns the numbers 0 to `count` - 1 in as many blocks as there are threads, none of them taken.
 
     Returns:
         (threads, LINE): of each block the next number and the one behind its last.
@@ -31,14 +31,14 @@ def turns_of(count: int, threads: int) -> NDArray[np.int64]:
 
 
 def take(turns: NDArray[Any], home: int) -> int:
-    """The next number of one's own block, so that a thread gets again what is in its cache; then those of others.
+    """Takes the next number of the own block, whose worlds are in the thread's cache; then those of others.
 
     Args:
         turns: see `turns_of`.
-        home: number of one's own block.
+        home: number of the own block.
 
     Returns:
-        A number that nobody else gets, or -1 when there is none left.
+        A number that no other thread gets, or -1 when there is none left.
     """
     for k in range(len(turns)):
         block = turns[(home + k) % len(turns)]

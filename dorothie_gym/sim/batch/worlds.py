@@ -87,10 +87,10 @@ def step_share(
     acceleration: Array,
     steering: Array,
 ) -> None:
-    """Lets worlds of a batch go on, each as `step` does, as long as there are any whose turn has not come.
+    """Steps worlds of a batch, until all of them have been taken.
 
     Args:
-        turns: numbers of the worlds, see `turns.take`; shared by all threads that work on the batch.
+        turns: numbers of the worlds, see `work_queue.take`; shared by all threads that work on the batch.
         home: number of the block that is this thread's own.
         town: arrays of the town.
         batch: arrays of all worlds.
@@ -105,21 +105,21 @@ def step_share(
         number = take(turns, home)
 
 
-# --- Many worlds of one town, stepped by several threads -------------------------------------------------------------
+# --- Batch of worlds --------------------------------------------------------------------------------------------------
 
 
 class VectorWorld:
     """Worlds of one town in one set of arrays; every thread steps a share of them in one compiled call.
 
-    A thread has a block of worlds of its own, which stay in its processor's cache; when it is done with them it takes
-    those that others have not come to: who wakes up late, or gets worlds with much traffic, does fewer.
+    A thread has a block of worlds of its own, which stay in its processor's cache; then it takes worlds that other
+    threads have not reached yet, so that a late or busy thread does fewer.
     What happens in a world depends on its own arrays only: not on the other worlds, its place among them, or the
     threads. Threads share nothing that is written to, and hold the interpreter's lock between calls only.
 
     Attributes:
         town: arrays of the town.
         arrays: arrays of all worlds, those of a single one with a leading axis: `arrays.vehicles[b]`.
-        threads: how many threads work, the caller's included.
+        threads: number of threads, the caller's included.
     """
 
     def __init__(self, town: TownArrays, world: WorldArrays, worlds: int, *, threads: int | None = None) -> None:
@@ -155,7 +155,7 @@ class VectorWorld:
         put(self.arrays, range(len(self))[number], world)
 
     def step(self, substeps: int, dt: float, acceleration: Array | float = 0.0, steering: Array | float = 0.0) -> None:
-        """Lets all worlds go on, as `kernel.step` does with one.
+        """Steps all worlds, as `sim.step.step` does with one.
 
         Args:
             substeps: how many.
@@ -179,7 +179,7 @@ class VectorWorld:
         """Calls `work(turns, home, *arguments)` in every thread, and waits for all of them.
 
         Args:
-            work: works on the worlds whose numbers it takes (`kernel.turns`) until there is none left.
+            work: takes numbers of worlds from the queue (`work_queue`) until there is none left.
             arguments: for it.
         """
         turns = turns_of(len(self), self.threads)
@@ -191,7 +191,7 @@ class VectorWorld:
 
 
 def available_processors() -> int:
-    """How many processors this process may use."""
+    """Returns the number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

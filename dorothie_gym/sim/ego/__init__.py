@@ -1,1 +1,1 @@
-"""The car: path, local planner, controller, hazard stop."""
+"""The ego car: controller, local planner, path, motion control, hazards."""

@@ -1,4 +1,4 @@
-"""What the session's car has to brake for: bodies on its path, people on crosswalks, junctions, traffic."""
+"""Hazards of the ego: bodies on its path, pedestrians on crosswalks, junctions, traffic beside a manoeuvre."""
 
 from __future__ import annotations
 
@@ -22,43 +22,43 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 TURN_ROUND_SPEED = 4.0
-"""Whoever comes towards a car that turns round is taken to be at least this fast soon [m/s]."""
+"""Least speed assumed for oncoming vehicles before a U-turn [m/s]."""
 
 ASKING = 11.5
-"""The car asks for a junction this far before it would have to brake for it [m]."""
+"""Distance before the beginning of braking at which the ego requests a junction [m]."""
 
 UPSTREAM = 50.0
-"""How far before a lane's start vehicles that come towards it are looked for [m]."""
+"""Distance before a lane's start up to which vehicles that come towards it are considered [m]."""
 
 BEFORE_MANOEUVRE = 15.0
-"""How far before it would have to brake for a lane switch or U-turn it looks whether others are in its way [m]."""
+"""Distance before the beginning of braking for a lane switch or U-turn at which others are considered [m]."""
 
 REACHED = 0.2
-"""A car that switches lanes is in the way on the new one when it reaches into that so far [m]."""
+"""Overlap with the new lane from which on a switching ego is in the way there [m]."""
 
 BESIDE = 7.0
-"""Who is no farther before or behind the car than this is beside it [m], and who comes from behind in a second."""
+"""Distance ahead and behind within which vehicles are beside the ego [m]; those within a second behind, too."""
 
 BEFORE_IT = 0.5
-"""The car waits this far before the place where the manoeuvre begins [m]."""
+"""Distance before the beginning of a manoeuvre at which the ego waits [m]."""
 
 SLOWEST = 1.0
-"""Speed at which a car comes to a place at least [m/s]."""
+"""Least speed assumed for the ego's approach [m/s]."""
 
 IN_LINE, FACING = 2.0, 0.5
-"""Who is no farther beside a lane than this [m], and heads along it by this cosine, comes along it."""
+"""Distance from a lane [m], and cosine of the heading to it, up to which a vehicle comes along it."""
 
 TRAFFIC_LIGHT, TRAFFIC_SIGN = int(ObjectClass.TRAFFIC_LIGHT.value), int(ObjectClass.TRAFFIC_SIGN.value)
 
 
 @inlined
 def look(town: TownArrays, world: WorldArrays, seen: int) -> None:
-    """Finds what limits the car's speed most, and asks junctions for it; notes it in the record `car`.
+    """Finds what limits the ego's speed most, requests junctions, and notes the limit in the record `car`.
 
     Args:
         town: arrays of the town.
         world: arrays of the world.
-        seen: how many bodies are perceived.
+        seen: number of perceived bodies.
     """
     car = world.car[0]
     car.kind = 0
@@ -72,12 +72,12 @@ def look(town: TownArrays, world: WorldArrays, seen: int) -> None:
         offer(car, best, kind, way + (margin - BEFORE_IT), 0.0, other, False, False)
 
 
-# --- crosswalks and junctions -----------------------------------------------------------------------------------------
+# --- Crosswalks and junctions -----------------------------------------------------------------------------------------
 
 
 @compiled
 def _crosswalk(town: TownArrays, world: WorldArrays, best: float) -> float:
-    """Offers the next crosswalk on the path with people on it, whom the car sees and for whom it can still stop."""
+    """Offers the next crosswalk on the path with visible pedestrians for which the ego can still stop."""
     car, vehicle, path = world.car[0], world.vehicles[0], world.path
     braking = vehicle.speed * vehicle.speed
     reach = braking / (2.0 * PLANNED_BRAKING) + ASKING + 0.5 * vehicle.length
@@ -104,7 +104,7 @@ def _crosswalk(town: TownArrays, world: WorldArrays, best: float) -> float:
 
 @compiled
 def _walker_on(world: WorldArrays, passage: PassageRecord) -> int:
-    """Key of somebody in sight on a crosswalk who is about to pass a lane, or has only just passed it; or -1."""
+    """Returns the key of a visible pedestrian that is about to pass a lane, or has just passed it; or -1."""
     vehicle, sight = world.vehicles[0], world.eye[0].sight
     for p in range(len(world.pedestrians)):
         walker = world.pedestrians[p]
@@ -118,10 +118,10 @@ def _walker_on(world: WorldArrays, passage: PassageRecord) -> int:
 
 @compiled
 def _junction(town: TownArrays, world: WorldArrays, best: float) -> float:
-    """Offers the line before a junction that the car may not enter yet."""
+    """Offers the line before a junction that the ego may not enter yet."""
     car, vehicle, path = world.car[0], world.vehicles[0], world.path
     if car.held and vehicle.speed < EGO_STANDING:
-        return best  # asks for nothing that it does not use
+        return best  # requests nothing that it does not use
     asking = vehicle.speed * vehicle.speed / (2.0 * PLANNED_BRAKING) + ASKING
     half = 0.5 * vehicle.length
     last = point_at(world, car.s + max(asking, CRITICAL_GAP * vehicle.speed) + half)
@@ -147,7 +147,7 @@ def _junction(town: TownArrays, world: WorldArrays, best: float) -> float:
 
 @compiled
 def _holder(town: TownArrays, wait: int, lane: int) -> int:
-    """What holds the car before a junction, as a driver would say: an `ObjectClass`."""
+    """Returns the `ObjectClass` that holds the ego before a junction, as a driver would name it."""
     if wait == Wait.LIGHT:
         return TRAFFIC_LIGHT
     control = town.lanes[lane].control
@@ -160,21 +160,21 @@ def _holder(town: TownArrays, wait: int, lane: int) -> int:
     return VEHICLES
 
 
-# --- manoeuvres -------------------------------------------------------------------------------------------------------
+# --- Manoeuvres -------------------------------------------------------------------------------------------------------
 
 
 @compiled
 def _gap_to_others(town: TownArrays, world: WorldArrays, seen: int, blocked: bool) -> tuple[float, int, int]:
-    """Before a lane switch or U-turn: way to the place where it begins [m], while somebody or something is in its way.
+    """Returns the way to the beginning of a lane switch or U-turn [m] while a body is in its way.
 
     Args:
         town: arrays of the town.
         world: arrays of the world.
-        seen: how many bodies are perceived.
-        blocked: whether the car stands behind something: it may be waiting for the junction, which stays open then.
+        seen: number of perceived bodies.
+        blocked: whether the ego stands behind a body: it may be waiting for the junction, which stays open then.
 
     Returns:
-        The way, infinite if it may begin, the key of who is in the way, and of which class that is.
+        The way (infinite if the manoeuvre may begin), and key and class of the body in the way.
     """
     car, vehicle, path = world.car[0], world.vehicles[0], world.path
     turning = car.action == U_TURN
@@ -202,14 +202,14 @@ def _gap_to_others(town: TownArrays, world: WorldArrays, seen: int, blocked: boo
         if body.kind != VEHICLES:
             continue
         station = _place_towards(town, world, lanes, body)
-        if turning:  # it takes the car's length of time to get round, in which who stands now may have come up
+        if turning:  # until the U-turn is over, a vehicle that stands now may have come up
             behind = 8.0 + 5.0 * max(body.speed, TURN_ROUND_SPEED)
         else:
             behind = 8.0 + 3.0 * max(body.speed - vehicle.speed, 0.0)
             station += body.speed * ahead / max(vehicle.speed, SLOWEST)  # where it is when the car comes there
         if -behind < station - meeting < 9.0:
             return max(ahead, 0.0), int(body.key), VEHICLES
-    # asked for last: those who wait before the junction have to go first
+    # requested last: vehicles that wait before the junction go first
     if turning and not blocked and not _close_junctions(town, world, start):
         return max(ahead, 0.0), -2, VEHICLES
     return math.inf, 0, VEHICLES
@@ -217,14 +217,14 @@ def _gap_to_others(town: TownArrays, world: WorldArrays, seen: int, blocked: boo
 
 @compiled
 def _leads_to(town: TownArrays, world: WorldArrays, start: int, meeting: float, prop: SeenRecord) -> bool:
-    """Whether a lane switch would lead the car too close to a prop on the new lane to get away from it again.
+    """Whether a lane switch would lead the ego too close to a prop on the new lane to get away from it again.
 
     Args:
         town: arrays of the town.
         world: arrays of the world.
-        start: point of the path at which the switch begins.
-        meeting: where that is along the new lane [m].
-        prop: a `records.SEEN`.
+        start: first point of the switch on the path.
+        meeting: station of that point on the new lane [m].
+        prop: a perceived prop.
     """
     car, vehicle, path = world.car[0], world.vehicles[0], world.path
     target, end = int(path[start].lane), start
@@ -240,10 +240,10 @@ def _leads_to(town: TownArrays, world: WorldArrays, start: int, meeting: float, 
 
 @compiled
 def _gap_beside(town: TownArrays, world: WorldArrays, seen: int, target: int) -> tuple[float, int]:
-    """In a lane switch, as long as the car is not yet in the way on its target: whether somebody is beside it there.
+    """Looks for vehicles beside the ego in a lane switch, as long as it is not in the way on its target yet.
 
     Returns:
-        0 if so, else infinite, and the key of that one.
+        0 if there is one, else infinite, and its key.
     """
     vehicle, half_width = world.vehicles[0], town.lanes[target].half_width
     own, lateral, _ = project(town, target, vehicle.x, vehicle.y)
@@ -261,7 +261,7 @@ def _gap_beside(town: TownArrays, world: WorldArrays, seen: int, target: int) ->
 
 @compiled
 def _close_junctions(town: TownArrays, world: WorldArrays, start: int) -> bool:
-    """Keeps others out of junctions into which a U-turn reaches that begins at a point; tells if they are empty."""
+    """Closes the junctions that a U-turn from a point reaches into; returns whether they are empty."""
     x, y, free = world.path[start].x, world.path[start].y, True
     for j in range(len(town.junctions)):
         dx, dy = town.junctions[j, 0] - x, town.junctions[j, 1] - y
@@ -273,9 +273,9 @@ def _close_junctions(town: TownArrays, world: WorldArrays, start: int) -> bool:
 
 @compiled
 def _find_upstream(town: TownArrays, world: WorldArrays, target: int) -> int:
-    """Writes a lane, and those that lead to it within sight of a turning car, into the scratch arrays.
+    """Writes a lane, and those that lead to it within reach of a U-turn, into the scratch arrays.
 
-    `stack` holds the lanes, `starts` where they begin on the first [m]; returns how many there are.
+    `stack` holds the lanes, `starts` their beginnings on the first one [m]; returns their number.
     """
     stack, starts = world.stack, world.starts
     stack[0], starts[0] = target, 0.0
@@ -297,7 +297,7 @@ def _find_upstream(town: TownArrays, world: WorldArrays, target: int) -> int:
 
 @compiled
 def _place_towards(town: TownArrays, world: WorldArrays, lanes: int, body: SeenRecord) -> float:
-    """Where a body is along the lane that was looked upstream from, negative before it [m]; infinite if it is not."""
+    """Returns the station of a body on the lane of `_find_upstream`, negative before it [m]; inf if it is not there."""
     other = world.vehicles[body.body]
     for k in range(lanes):
         number = world.stack[k]

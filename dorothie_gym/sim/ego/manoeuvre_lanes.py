@@ -1,4 +1,4 @@
-"""From lanes to a path: which lanes a manoeuvre takes, and the pieces of path along them."""
+"""Lanes of a manoeuvre, and the pieces of path along them."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from dorothie_gym.sim.ego.limits import LEAD, MIN_SWITCH, SWITCH_TIME
 from dorothie_gym.sim.ego.path import PathPiece, follow, switch
 
 HORIZON = 120.0
-"""Length of path kept ahead [m]."""
+"""Least length of path ahead [m]."""
 
 LAID = 180.0
-"""Length of path that is laid ahead: so it has to be laid anew only now and then [m]."""
+"""Length of path that is laid ahead, so that it is laid anew only now and then [m]."""
 
 SWITCH_COST = 20.0
-"""Degrees by which an exit of the own lane may fit worse than that of a lane beside it and still be taken."""
+"""Misfit by which an exit of the own lane is preferred to that of a lane beside it [degrees]."""
 
 SETTLE = 15.0
-"""A lane that was just entered is followed for this long before it is changed, where there is room [m]."""
+"""Way along a newly entered lane before it is changed, where there is room [m]."""
 
 EXACT = 5.0
-"""An exit within this many degrees is the one that was meant."""
+"""Misfit within which an exit is the one that was asked for [degrees]."""
 
 ANOTHER_WAY = 15.0
-"""Exits whose angles differ by more than this are different turns [degrees]."""
+"""Difference of angle from which on exits are different turns [degrees]."""
 
 STOPPING = 3.0
-"""Deceleration of a car that finds somebody beside it before a lane switch [m/s^2]."""
+"""Deceleration with which the ego can stop before a lane switch if others are beside it [m/s^2]."""
 
 WAITING_ROOM = 4.5
-"""A lane switch ends this far before the end of a lane at which the car may have to wait [m]."""
+"""Distance between the end of a lane switch and a lane's end at which the ego may have to wait [m]."""
 
 MOST_CHANGES = 3
-"""Lane changes that a turn may take."""
+"""Most lane changes before a turn."""
 
 SIDES = (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT)
 
@@ -51,7 +51,7 @@ class LaneStep:
 
 
 class LaneChooser:
-    """Questions about the lanes of a town that plans ask."""
+    """Choice of lanes for plans: side lanes, successors, ways to an exit."""
 
     def __init__(self, town: Town) -> None:
         self._town = town
@@ -72,7 +72,7 @@ class LaneChooser:
         return self._choices[lane]
 
     def side_by_side(self, lane: int) -> list[int]:
-        """A lane and all that one comes to from it by lane changes."""
+        """Returns a lane and all that are reached from it by lane changes."""
         found = [lane]
         for known in found:
             for side in SIDES:
@@ -82,14 +82,14 @@ class LaneChooser:
         return found
 
     def default_successor(self, lane: int) -> int | None:
-        """The lane that follows without being asked: the only one, or outside junctions the straightest."""
+        """Returns the lane that follows by default: the only one, or outside junctions the straightest."""
         exits = self._town.exits(lane)
         if not exits or self.is_choice(lane):
             return None
         return min(exits, key=lambda way: (abs(way.angle), way.connector)).connector
 
     def through_junction(self, lane: int) -> list[LaneStep]:
-        """The lane, and where it crosses a junction those up to the lane behind it."""
+        """Returns the lane, and inside a junction those up to the lane behind it."""
         steps = [LaneStep(lane)]
         while self._town.lanes[steps[-1].lane].in_junction:
             on = self.default_successor(steps[-1].lane)
@@ -99,7 +99,7 @@ class LaneChooser:
         return steps
 
     def steps_along(self, lanes: Sequence[int]) -> list[LaneStep]:
-        """The steps that lead along lanes which follow, or lie beside, one another."""
+        """Returns the steps along lanes that follow, or lie beside, one another."""
         steps = [LaneStep(lane) for lane in lanes]
         for k in range(1, len(steps)):
             beside = [self._town.neighbour(steps[k - 1].lane, side) for side in SIDES]
@@ -108,24 +108,24 @@ class LaneChooser:
         return steps
 
     def find_turn(self, first: list[LaneStep], station: float, angle: int) -> tuple[list[LaneStep], Exit] | None:
-        """Steps to the exit that fits an angle best, changing lanes before the junction if that fits much better.
+        """Returns the steps to the exit that fits an angle best, with lane changes if that fits much better.
 
         Args:
             first: steps that are taken in any case.
-            station: where the car is on the first of them [m].
+            station: place of the ego on the first of them [m].
             angle: degrees, positive left.
         """
         town = self._town
         own = first[-1].lane
         if not self.offers_turns(own):
-            # where the lane itself leads on as asked, it is kept to its end: a lane is changed further on, if at all
+            # a lane that itself leads on as asked is kept to its end; lanes are changed further on, if at all
             fits = [way for way in town.exits(own) if abs(wrap_degrees(way.angle - angle)) <= EXACT]
             if fits:
                 first = [*first, LaneStep(fits[0].connector), *self._onward(fits[0])]
                 if fits[0].junction_id >= 0 and abs(fits[0].angle) > ANOTHER_WAY:
-                    return first, fits[0]  # everybody has to turn there: that is the turn which was asked for
+                    return first, fits[0]  # the only way on there: it is the turn that was asked for
         best: tuple[float, list[LaneStep], Exit] | None = None
-        # lanes that go on are looked at before lanes beside, so that a lane is changed as late as there is room for it
+        # successors come before lanes beside, so that lanes are changed as late as there is room
         queue: deque[tuple[list[LaneStep], int]] = deque([(first, 0)])
         seen = {first[-1].lane}
         while queue:
@@ -151,7 +151,7 @@ class LaneChooser:
         return None if best is None else (best[1], best[2])
 
     def _onward(self, way: Exit) -> list[LaneStep]:
-        """Connectors and lane from the entered one to the exit's lane."""
+        """Returns connectors and lane from the entered one to the exit's lane."""
         steps, lane = [], way.connector
         while lane != way.lane:
             lane = self._town.successors(lane)[0].target
@@ -169,15 +169,15 @@ class LaneChooser:
         start = station if first <= 0 else 0.0
         return lane.length - start >= changes * (MIN_SWITCH + LEAD) and not lane.in_junction
 
-    # --- pieces of path ---------------------------------------------------------------------------------------------
+    # --- Pieces of path -----------------------------------------------------------------------------------------------
 
     def lay(self, steps: list[LaneStep], station: float, speed: float) -> tuple[list[PathPiece], bool]:
-        """Pieces of path along steps, and on from there while nothing has to be chosen.
+        """Lays pieces of path along steps, and on from there up to the next choice.
 
         Args:
             steps: the lanes.
-            station: where the path begins on the first of them [m].
-            speed: of the car [m/s]: lane switches take their time.
+            station: beginning of the path on the first of them [m].
+            speed: of the ego [m/s], which the length of lane switches depends on.
 
         Returns:
             The pieces (none at the very end of a lane), and whether the path ends where a turn has to be chosen.
@@ -202,7 +202,7 @@ class LaneChooser:
             room = max((end - at) / changes - LEAD, 2.0)
             distance = min(max(MIN_SWITCH, SWITCH_TIME * speed), room)
             spare = (lane.length - at) - changes * (distance + LEAD)
-            if k == 0:  # announced in time to stop before it, should others be beside the car
+            if k == 0:  # begins late enough to stop before it if others are beside the ego
                 most = max(end - at - changes * (distance + LEAD), 0.0)
                 lead = LEAD + min(speed**2 / (2 * STOPPING), most)
             else:
@@ -215,7 +215,7 @@ class LaneChooser:
         return pieces, open_end
 
     def _grow(self, steps: list[LaneStep], ahead: float) -> bool:
-        """Adds the lanes that follow until there is path enough; tells whether the path has an open end."""
+        """Adds the lanes that follow until the path is long enough; returns whether it has an open end."""
         while ahead < LAID:
             on = self.default_successor(steps[-1].lane)
             if on is None:

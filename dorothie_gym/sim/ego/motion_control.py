@@ -1,4 +1,7 @@
-"""Drives the session's car along its path, no faster than curves, limits, goals and hazards allow."""
+"""Motion control of the ego: throttle, brake and steering along its path.
+
+The speed is limited by curves, speed limits, goals, sight and hazards. `guide` runs once a substep.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +52,7 @@ if TYPE_CHECKING:
 
 @inlined
 def drift(car: EgoRecord, time: float, heading: float, speed: float) -> float:
-    """Angle by which the car's course lies beside its heading, positive right [rad]: `Wind.drift`."""
+    """Returns the angle of the ego's course to its heading in wind, positive right [rad]; see `Wind.drift`."""
     swing = 0.0
     for k in range(len(PERIODS)):
         swing += math.sin(2.0 * math.pi * time / PERIODS[k] + car.wind_phase[k])
@@ -60,30 +63,30 @@ def drift(car: EgoRecord, time: float, heading: float, speed: float) -> float:
     return float(force / CORNERING_STIFFNESS)
 
 
-# --- Drives the session's car along its path, no faster than curves, limits, goals and hazards allow -----------------
+# --- Speed and steering -----------------------------------------------------------------------------------------------
 
 HARD = 3.5
-"""Braking harder than this for something ahead is a hazard stop [m/s^2]."""
+"""Deceleration for a body ahead from which on it is a hazard stop [m/s^2]."""
 
 SLOWLY = 1.0
-"""So is standing, or going more slowly than this, before what is as slow [m/s]."""
+"""Speed of ego and body below which standing before the body is a hazard stop, too [m/s]."""
 
 OVER = 15
-"""A hazard stop is over when nothing has been in the way for this long [substeps]."""
+"""Time without anything in the way after which a hazard stop is over [substeps]."""
 
 LIMITING = 0.5
-"""Something is in the way if it takes this much off the speed [m/s]."""
+"""Reduction of the speed from which on a body is in the way [m/s]."""
 
 CREEPING = 0.3
-"""Slower than this the distance from the path is not steered against [m/s]."""
+"""Speed below which the distance from the path is not corrected [m/s]."""
 
 BACK = 1.4
-"""From the answer of the lateral controller to a speed towards the path."""
+"""Factor from the output of the lateral controller to a speed towards the path."""
 
 
 @compiled
 def guide(town: TownArrays, world: WorldArrays, dt: float) -> None:
-    """Sets acceleration and slip angle of the car for a substep of `dt` [s]."""
+    """Sets acceleration and slip angle of the ego for a substep of `dt` [s]."""
     car, vehicle, clock = world.car[0], world.vehicles[0], world.clock[0]
     take_lanes(town, world, vehicle)
     note(town, vehicle, clock.time)
@@ -129,7 +132,7 @@ def guide(town: TownArrays, world: WorldArrays, dt: float) -> None:
 
 @inlined
 def _free_speed(world: WorldArrays) -> float:
-    """Speed that the path, the goals and the sight allow [m/s]."""
+    """Returns the speed that the path, the goals and the sight allow [m/s]."""
     car, vehicle = world.car[0], world.vehicles[0]
     s = car.s + 0.1
     speed = min(car.cruise, world.path[point_at(world, s)].speed)
@@ -149,7 +152,7 @@ def _free_speed(world: WorldArrays) -> float:
 
 @inlined
 def _control(world: WorldArrays, target: float, dt: float) -> None:
-    """Throttle, brake and steering wheel that keep the car on its path at a speed.
+    """Sets throttle, brake and steering that keep the ego on its path at a speed.
 
     Lateral: highway-env's bicycle moves along its heading plus the slip angle, and the slip angle follows the wheel at
     once. So its course can be laid along the path in every substep, also where the path's curvature jumps; a PID on the
@@ -179,7 +182,7 @@ def _control(world: WorldArrays, target: float, dt: float) -> None:
 
 @inlined
 def _brake_surely(world: WorldArrays) -> None:
-    """Applies the brake that stops the car before a hazard or line: the speed controller lags behind."""
+    """Applies the brake that stops the ego before a hazard or line, since the speed controller lags behind."""
     car, speed = world.car[0], world.vehicles[0].speed
     needed = 0.0
     if car.stop_at < math.inf:
@@ -194,7 +197,7 @@ def _brake_surely(world: WorldArrays) -> None:
 
 @inlined
 def _note_sweep(world: WorldArrays) -> None:
-    """Tells others which part of a U-turn is still to come: also while the car waits in it, they give way."""
+    """Notes the part of a U-turn that is still to come, to which others give way also while the ego waits in it."""
     car = world.car[0]
     at = int(car.at)
     car.sweeping = bool(car.action == U_TURN and world.path[at].manoeuvre and car.s >= BEGUN)
@@ -205,12 +208,12 @@ def _note_sweep(world: WorldArrays) -> None:
         car.sweep_last = at
 
 
-# --- what is logged ---------------------------------------------------------------------------------------------------
+# --- Event log --------------------------------------------------------------------------------------------------------
 
 
 @inlined
 def _note_hazard(world: WorldArrays, limiting: bool) -> None:
-    """Logs when the car begins to stop for something, and when it goes on."""
+    """Logs beginning and end of a hazard stop."""
     car, speed, frame = world.car[0], world.vehicles[0].speed, world.clock[0].frame
     if car.hazard == 0:
         stands = speed < SLOWLY and car.ahead_speed < SLOWLY

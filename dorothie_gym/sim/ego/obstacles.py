@@ -1,4 +1,4 @@
-"""What is in the way of the session's car: bodies on its path, and bodies about to be there."""
+"""Obstacles of the ego: bodies on its path, and bodies about to be there."""
 
 from __future__ import annotations
 
@@ -19,28 +19,28 @@ if TYPE_CHECKING:
 
 
 LOOKAHEAD = 45.0
-"""How far ahead the path is watched [m]."""
+"""Distance up to which the path is checked [m]."""
 
 SIDE_MARGIN = 0.35
-"""Room kept beside the car [m]."""
+"""Room kept beside the ego [m]."""
 
 CROSSING = 0.35
 """Sine of the angle to the path from which on a moving body counts as crossing it."""
 
 REACTION = 0.4
-"""Time until brakes bite, kept in hand [s]."""
+"""Time until the brakes act [s]."""
 
 STANDSTILL_GAP = 2.5
-"""Gap that is left to a body that stands [m]."""
+"""Gap left to a standing body [m]."""
 
 ROADBLOCK_GAP = 12.5
-"""Gap that is left to a prop [m]: room for a U-turn (`path.U_TURN_REACH` from the car's middle)."""
+"""Gap left to a prop [m]: room for a U-turn (`limits.U_TURN_REACH` from the ego's middle)."""
 
 LINE_GAP = 1.5
-"""Gap that is left to the line before a junction [m]."""
+"""Gap left to the line before a junction [m]."""
 
 TIGHT_GAP = 1.0
-"""Gap that is left to what stands, while the car turns or switches lanes [m]."""
+"""Gap left to a standing body during a U-turn or lane switch [m]."""
 
 HARD_BRAKING = 4.0
 """Deceleration that the safe speed counts on [m/s^2]."""
@@ -48,10 +48,10 @@ HARD_BRAKING = 4.0
 
 @dataclass(frozen=True, kw_only=True)
 class PerceivedBody:
-    """A thing that can be hit, as perceived.
+    """A perceived body.
 
     Attributes:
-        key: tells it apart from others, the same over time.
+        key: identifies the body, the same over time.
         kind: its object class.
         x: position of its middle [m]; `y` likewise.
         heading: [rad].
@@ -74,30 +74,30 @@ class PerceivedBody:
 
 @dataclass(frozen=True, kw_only=True)
 class Hazard:
-    """Something that the car stops for: its class, and the gap from the car's nose to it [m]."""
+    """Cause of a hazard stop: its class, and the gap from the ego's nose to it [m]."""
 
     kind: ObjectClass
     gap: float
 
 
-# --- What is in the way of the session's car: bodies on its path, and bodies about to be there -----------------------
+# --- Bodies on the path -----------------------------------------------------------------------------------------------
 
 INSTANTS, INSTANT = 4, 0.5
-"""Moving bodies are looked for on the path now and at three more times, so far apart [s]."""
+"""Number of times at which moving bodies are checked against the path, now the first, and their distance [s]."""
 
 MOVING = 0.2
-"""Slower than this a body is where it is [m/s]."""
+"""Speed below which a body counts as standing [m/s]."""
 
 SLOWLY = 0.5
-"""In a manoeuvre the car goes up closely to what is slower than this [m/s]."""
+"""Speed of a body below which the ego comes close to it in a manoeuvre [m/s]."""
 
 CLOSEST = 0.05
-"""Least way to a place where to stop that braking counts on [m]."""
+"""Least way to a stop that braking counts on [m]."""
 
 
 @inlined
 def room(kind: int, gap: float, speed: float, tight: bool, line: bool) -> float:
-    """Way that is left to the place where the car is to stop for something [m]."""
+    """Returns the way to the place where the ego stops for a body or line [m]."""
     if line:
         margin = LINE_GAP
     elif tight and speed < SLOWLY:
@@ -109,10 +109,10 @@ def room(kind: int, gap: float, speed: float, tight: bool, line: bool) -> float:
 
 @inlined
 def safe_speed(speed: float, left: float, friction: float) -> float:
-    """Speed from which one can still stop, see `car.hazards.Hazard.safe_speed`.
+    """Returns the speed from which the ego can still stop.
 
     Args:
-        speed: of what is ahead, along the path [m/s].
+        speed: of the body ahead, along the path [m/s].
         left: room to it [m].
         friction: share of the dry road's grip.
     """
@@ -122,7 +122,7 @@ def safe_speed(speed: float, left: float, friction: float) -> float:
 
 @inlined
 def offer(car: EgoRecord, best: float, kind: int, gap: float, speed: float, key: int, tight: bool, line: bool) -> float:
-    """Notes something as what limits the car if it asks for less speed than `best` [m/s]; returns the lesser one."""
+    """Notes a body or line as the ego's limit if it allows less speed than `best` [m/s]; returns the lesser speed."""
     safe = safe_speed(speed, room(kind, gap, speed, tight, line), 1.0)
     if safe >= best:
         return best
@@ -132,11 +132,11 @@ def offer(car: EgoRecord, best: float, kind: int, gap: float, speed: float, key:
 
 @inlined
 def bodies_ahead(world: WorldArrays, seen: int) -> float:
-    """Finds the body on the path, or soon there, that allows the least speed, and notes how far away a roadblock is.
+    """Finds the body on the path, or soon there, that allows the least speed, and notes the distance of a roadblock.
 
     Args:
         world: arrays of the world.
-        seen: how many bodies are perceived.
+        seen: number of perceived bodies.
 
     Returns:
         The speed that it allows [m/s], infinite if nothing is there.
@@ -166,12 +166,12 @@ def bodies_ahead(world: WorldArrays, seen: int) -> float:
 
 @compiled
 def _meet(world: WorldArrays, body: SeenRecord, last: int) -> tuple[int, float, float]:
-    """The first place of the path where the car would touch a body, now or where it is heading.
+    """Returns the first place of the path where the ego would touch a body, now or on the body's course.
 
-    The path is not longer than its points say: those that are closer together than the body is away are skipped.
+    Points that are nearer to one another than the body is away are skipped.
 
     Returns:
-        Number of the point (-1 for none), gap from the car's nose [m], and the body's speed along the path [m/s].
+        Number of the point (-1 for none), gap from the ego's nose [m], and the body's speed along the path [m/s].
     """
     car, vehicle, path = world.car[0], world.vehicles[0], world.path
     radius = 0.5 * math.sqrt(body.length * body.length + body.width * body.width)
@@ -196,7 +196,7 @@ def _meet(world: WorldArrays, body: SeenRecord, last: int) -> tuple[int, float, 
             across = dy * point.cos - dx * point.sin
             swept = half_width + (point.right if across > 0.0 else point.left)
             touches = abs(across) <= swept and abs(along) <= half_length + SPACING
-            # who goes along the path is where it is now
+            # bodies that move along the path are checked where they are now
             if touches and abs(point.height - body.height) <= HEIGHT_MARGIN and (instant == 0 or square >= CROSSING):
                 gap = point.s - car.s + along - half_length - 0.5 * vehicle.length
                 forward = body.speed * (body.cos * point.cos + body.sin * point.sin)
@@ -207,7 +207,7 @@ def _meet(world: WorldArrays, body: SeenRecord, last: int) -> tuple[int, float, 
 
 @inlined
 def _skip(world: WorldArrays, k: int, last: int, away: float) -> int:
-    """The next point of the path that is at least `away` [m] further along it."""
+    """Returns the next point of the path that is at least `away` [m] further along it."""
     path = world.path
     target = path[k].s + away
     step = int(away / SPACING)

@@ -1,4 +1,4 @@
-"""The line that the car is to drive: lanes joined end to end, with lane switches and U-turns cut in."""
+"""Path of the ego: lanes joined end to end, with lane switches and U-turns cut in."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class PathPiece:
     """A stretch of path that belongs to one lane.
 
     Attributes:
-        lane: lane that the car counts as being on.
+        lane: lane that the ego counts as being on.
         points: centre line (n, 2) [m].
         heights: (n,) [m].
         stations: distance along `lane` of each point (n,) [m]; during a U-turn that of its end.
@@ -40,7 +40,7 @@ class PathPiece:
 
 
 def follow(lane: Lane, start: float = 0.0, end: float | None = None) -> PathPiece:
-    """Stretch along the centre line of a lane."""
+    """Returns the stretch along the centre line of a lane."""
     end = lane.length if end is None else end
     count = max(2, math.ceil((end - start) / SPACING) + 1)
     s = np.linspace(start, end, count)
@@ -50,12 +50,12 @@ def follow(lane: Lane, start: float = 0.0, end: float | None = None) -> PathPiec
 
 
 def switch(source: Lane, target: Lane, start: float, distance: float) -> PathPiece:
-    """Stretch from one lane to the one beside it.
+    """Returns the stretch from one lane to the one beside it.
 
     The lateral shift follows 10 t^3 - 15 t^4 + 6 t^5, which has no jump in curvature at either end.
 
     Args:
-        source: lane the car is on.
+        source: lane of the ego.
         target: lane beside it, in the same direction.
         start: distance along `source` at which it begins [m].
         distance: length of the switch along `source` [m].
@@ -77,13 +77,13 @@ def switch(source: Lane, target: Lane, start: float, distance: float) -> PathPie
 
 
 def u_turn(source: Lane, target: Lane, start: float, radius: float = TURNING_RADIUS) -> PathPiece:
-    """Stretch from a lane to the oncoming one on its left.
+    """Returns the stretch from a lane to the oncoming one on its left.
 
-    Where the lanes are closer than two radii the car first swings out: arcs right, left by more than a half circle,
+    Where the lanes are closer than two radii the ego first swings out: arcs right, left by more than a half circle,
     right again, whose lateral shifts add up to the distance d of the lanes: cos(swing) = (d + 2 r) / (4 r).
 
     Args:
-        source: lane the car is on.
+        source: lane of the ego.
         target: oncoming lane.
         start: distance along `source` at which it begins [m].
         radius: radius of all arcs [m].
@@ -123,9 +123,9 @@ def u_turn(source: Lane, target: Lane, start: float, radius: float = TURNING_RAD
 
 
 class Path:
-    """Pieces joined to one line that a car can be steered along.
+    """Pieces joined to one line that the ego follows.
 
-    Only what is asked for in every decision is kept for each point.
+    Only what every decision needs is kept for each point.
 
     Attributes:
         s: distance along the path of each point (n,) [m].
@@ -160,7 +160,7 @@ class Path:
 
     @property
     def headings(self) -> Array:
-        """Of each point (n,) [rad], unwrapped."""
+        """Direction at each point (n,) [rad], unwrapped."""
         steps = np.diff(self.points, axis=0)
         segment = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
         middle = (self.s[:-1] + self.s[1:]) / 2
@@ -179,24 +179,24 @@ class Path:
 
     @property
     def curvatures(self) -> Array:
-        """Of each point (n,) [1/m], positive to the right."""
+        """Curvature at each point (n,) [1/m], positive to the right."""
         bends: Array = np.gradient(self.headings, self.s)
         return bends
 
     def index_at(self, s: float) -> int:
-        """Number of the point at or before a distance along the path."""
-        if s != self._asked:  # most ask where the car is, one after the other
+        """Returns the number of the point at or before a distance along the path."""
+        if s != self._asked:  # most calls in a row ask for the ego's place
             self._asked, self._answer = s, min(max(bisect_right(self.s, s) - 1, 0), len(self.s) - 1)
         return self._answer
 
     def project(self, x: float, y: float, near: float, window: float = 6.0) -> tuple[float, float]:
-        """Closest place of the path to a position, looked for around a known place.
+        """Returns the closest place of the path to a position, searched around a known place.
 
         Args:
             x: [m].
             y: [m].
             near: distance along the path close to the answer [m].
-            window: how far from `near` to look [m].
+            window: range of the search around `near` [m].
 
         Returns:
             Distance along the path [m], and signed distance from it, positive right [m].
@@ -221,11 +221,11 @@ class Path:
         return answer
 
     def heading_at(self, s: float) -> float:
-        """Direction of the path [rad]."""
+        """Returns the direction of the path [rad]."""
         return self._interpolate(self.headings, s)
 
     def position_at(self, s: float) -> tuple[float, float]:
-        """Point of the path [m]."""
+        """Returns a point of the path [m]."""
         return self._interpolate(self.points[:, 0], s), self._interpolate(self.points[:, 1], s)
 
     def _interpolate(self, values: Array, s: float) -> float:
@@ -236,7 +236,7 @@ class Path:
 
 
 def _sample(lane: Lane, stations: Array) -> Array:
-    """Points on the centre line (n, 2) [m]."""
+    """Returns points on the centre line (n, 2) [m]."""
     x = np.interp(stations, lane.stations, lane.points[:, 0])
     y = np.interp(stations, lane.stations, lane.points[:, 1])
     return np.column_stack((x, y))

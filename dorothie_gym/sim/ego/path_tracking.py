@@ -1,4 +1,4 @@
-"""The path of the session's car: where the car is on it, and which lanes it is going to take."""
+"""Place of the ego on its path, and the lanes that it is going to take (compiled)."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 WIDEST = 2.5
-"""No corner of the car comes farther from its path than this [m]: in a U-turn it is 2.4 m."""
+"""Largest distance of the ego's corners from its path [m]: in a U-turn it is 2.4 m."""
 
 WINDOW = 6.0
-"""The car is looked for this far before and behind the place where it was [m]."""
+"""Range before and behind the last place in which the ego is searched [m]."""
 
 
 @inlined
 def point_at(world: WorldArrays, s: float) -> int:
-    """Number of the point at or before a distance along the path [m]."""
+    """Returns the number of the point at or before a distance along the path [m]."""
     path, car = world.path, world.car[0]
     k, last = int(car.at), int(car.points) - 1
     while k < last and path[k + 1].s <= s:
@@ -35,7 +35,7 @@ def point_at(world: WorldArrays, s: float) -> int:
 
 @inlined
 def heading_at(world: WorldArrays, s: float) -> float:
-    """Direction of the path at a distance along it [rad]."""
+    """Returns the direction of the path at a distance along it [rad]."""
     path = world.path
     k = min(point_at(world, s), int(world.car[0].points) - 2)
     t = (s - path[k].s) / (path[k + 1].s - path[k].s)
@@ -45,7 +45,7 @@ def heading_at(world: WorldArrays, s: float) -> float:
 
 @compiled
 def advance(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> None:
-    """Finds the closest place of the path around the last one: distance along it, and from it (positive right)."""
+    """Updates the ego's place on the path: distance along it, and from it (positive right)."""
     path, car = world.path, world.car[0]
     last = int(car.points) - 1
     first = point_at(world, car.s - WINDOW)
@@ -71,15 +71,15 @@ def advance(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> Non
 
 @compiled
 def find_sides(path: RecordArray[PathPointRecord], count: int, length: float, width: float) -> None:
-    """Finds out how far a car comes to the left and to the right of its middle's path, by its corners.
+    """Computes the reach of a car's corners to the left and to the right of the path of its middle.
 
     highway-env's bicycle moves along its heading plus a slip angle, and turns by the sine of that over half its length:
     where the path begins to bend its heading follows by and by, and in a long bend its front points outwards. A corner
     that is `along` before or behind the middle is off a path of curvature k by k / 2 along^2 more.
 
     Args:
-        path: `records.POINT`, read and written; the car enters it along its direction.
-        count: of its points.
+        path: points, read and written; the car enters the path along its direction.
+        count: number of points.
         length: of the car [m].
         width: of the car [m].
     """
@@ -100,7 +100,7 @@ def find_sides(path: RecordArray[PathPointRecord], count: int, length: float, wi
 
 @inlined
 def take_lanes(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> None:
-    """The lanes of the path from the car's place on become the vehicle's plan, and it is found on the first of them."""
+    """Makes the lanes of the path ahead the vehicle's plan, and updates its place on the first of them."""
     car = world.car[0]
     r = 0
     while r + 1 < car.runs and car.run_first[r + 1] <= car.at:

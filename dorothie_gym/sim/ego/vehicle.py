@@ -1,4 +1,4 @@
-"""The car that the session is about, as a highway-env vehicle: a view on the arrays of its world."""
+"""The ego car as a highway-env vehicle: a view on the arrays of its world."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 
 class Car(Vehicle):
-    """Vehicle number 0 of a world (`kernel.Kind.DRIVEN`), as it was when the world was last stepped.
+    """The ego, vehicle number 0 of a world (`Kind.DRIVEN`), as of the last step of the world.
 
-    Whoever sets its position, heading or speed moves it.
+    Setting its position, heading or speed moves it.
     """
 
     MAX_SPEED = 40.0
@@ -34,7 +34,7 @@ class Car(Vehicle):
         super().__init__(road, self.position, self.heading, self.speed)
 
     def refresh(self) -> None:
-        """Looks again where the car is."""
+        """Reads place, heading, speed and height anew."""
         x, y, self._heading, self._speed, self._height = self._state.item()
         self._position = np.array((x, y))
 
@@ -52,7 +52,7 @@ class Car(Vehicle):
 
     @property
     def position(self) -> Array:
-        """Of its middle (2,) [m]."""
+        """Position of its middle (2,) [m]."""
         return self._position
 
     @position.setter
@@ -62,7 +62,7 @@ class Car(Vehicle):
 
     @property
     def heading(self) -> float:
-        """[rad]."""
+        """Heading [rad]."""
         return self._heading
 
     @heading.setter
@@ -73,7 +73,7 @@ class Car(Vehicle):
 
     @property
     def speed(self) -> float:
-        """[m/s]."""
+        """Speed [m/s]."""
         return self._speed
 
     @speed.setter
@@ -83,12 +83,12 @@ class Car(Vehicle):
 
     @property
     def height(self) -> float:
-        """Of the road under it [m]."""
+        """Height of the road under it [m]."""
         return self._height
 
     @property
     def control(self) -> VehicleControl:
-        """What the actuators were told last."""
+        """Last input of the actuators."""
         car = plain(self._holder.arrays.car)[0]
         return VehicleControl(throttle=float(car["throttle"]), steer=float(car["steer"]), brake=float(car["brake"]))
 
@@ -99,19 +99,19 @@ class Car(Vehicle):
         self.lane = network.get_lane(self.lane_index)
 
 
-# --- What drives the session's car, `kernel.records.CAR`, as Python reads and writes it: some fields at a ------------
+# --- Fields of the ego's record ---------------------------------------------------------------------------------------
 
 
 class CarRecord:
-    """Groups of fields: ``.item()`` of one is a tuple of numbers, and ``[()] = numbers`` writes one (`fields`).
+    """Groups of fields of the ego's record; ``.item()`` reads one as a tuple, ``[()] = numbers`` writes one (`fields`).
 
     Attributes:
-        orders: action, action_end, cruise, held and manual: what the car is to do.
-        pedals: throttle, steer and brake, where it is driven by hand.
-        place: s, offset and roadblock: where it is on its path, and how far ahead a roadblock is.
-        hazard: hazard and hazard_gap: what it stops for.
-        outcome: events and collisions: how many.
-        air: friction, wind, wind_heading and wind_phase: what the weather does to it.
+        orders: action, action_end, cruise, held and manual: the ego's task.
+        pedals: throttle, steer and brake of an outside driver.
+        place: s, offset and roadblock: its place on the path, and the distance of a roadblock.
+        hazard: hazard and hazard_gap: the cause of a hazard stop.
+        outcome: numbers of events and collisions.
+        air: friction, wind, wind_heading and wind_phase: effects of the weather.
     """
 
     def __init__(self, arrays: WorldArrays) -> None:

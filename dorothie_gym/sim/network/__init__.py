@@ -1,1 +1,1 @@
-"""The town's lanes as highway-env roads: lanes, network, the index for the closest lane, and the road on it."""
+"""Lanes of a town as a road network of highway-env, with indexes for the closest lane."""

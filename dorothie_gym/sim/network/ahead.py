@@ -1,4 +1,4 @@
-"""Which lanes lie ahead of and behind a lane, and who is next on them."""
+"""Lanes ahead of and behind a lane, and the next bodies on them."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from dorothie_gym.maps.polyline import WIDTH, IntArray, LaneTable, local_coordin
 from dorothie_gym.sim.network.network import LaneIndex, TownNetwork
 
 HORIZON = 80.0
-"""How far ahead and behind neighbours are searched beyond one's own lane [m]."""
+"""Range ahead and behind, beyond the own lane, in which neighbours are searched [m]."""
 LEVEL = 2.5
-"""Things this far apart in height [m] neither meet nor follow one another: a bridge leaves more room to a car."""
+"""Difference of height from which on bodies neither meet nor follow one another [m]; a bridge leaves more."""
 MARGIN = 1.0
-"""How far outside of a lane a thing still counts as on it [m], as in highway-env."""
+"""Distance outside of a lane up to which a body counts as on it [m], as in highway-env."""
 OVERHANG = 5.0
-"""How far before the start and after the end of a lane a thing still counts as on it [m], as in highway-env."""
+"""Distance before the start and after the end of a lane up to which a body counts as on it [m], as in highway-env."""
 
 
 _Rest: TypeAlias = tuple[tuple[str, str, int | None], ...]
@@ -42,14 +42,14 @@ class Chain(NamedTuple):
 
 
 class LaneChains:
-    """The lanes around each lane; remembers what it was asked last, for a vehicle keeps its route for a while."""
+    """Lanes around each lane, with a cache of the last answers, since a vehicle keeps its route for a while."""
 
     def __init__(self, network: TownNetwork) -> None:
         self._network = network
         self._remembered = functools.lru_cache(maxsize=4096)(self._find)
 
     def around(self, index: LaneIndex, route: Sequence[tuple[str, str, int | None]] | None) -> Chain:
-        """The lane itself, the lanes ahead along a route (or all, where it does not tell) and the lanes behind.
+        """Returns the lane itself, the lanes ahead along a route (or all, where it has ended) and the lanes behind.
 
         Args:
             index: lane to start from.
@@ -114,7 +114,7 @@ class LaneChains:
 
 
 class Neighbours(NamedTuple):
-    """Who is next: positions in the list of candidates (-1: nobody), and distances along the lanes [m] (infinite)."""
+    """Next bodies: positions in the list of candidates (-1: none), and distances along the lanes [m] (infinite)."""
 
     front: int
     front_distance: float

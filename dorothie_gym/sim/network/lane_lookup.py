@@ -1,7 +1,7 @@
-"""Where a body is on a lane, and which lane is closest to it: exactly `TownNetwork.get_closest_lane_index`.
+"""Place of a body on a lane, and the closest lane (compiled), exactly as `TownNetwork.get_closest_lane_index`.
 
-The functions give the same bits as those of `network.polyline` and `network.grid`, but look at the few segments that a
-cell lists. A cell that does not settle the question (off the road) is answered by looking at all lanes.
+The functions give the same bits as those of `maps.polyline` and `network.grid`, but consider only the few segments that
+a cell lists. Where a cell has no answer (off the road), all lanes are considered.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class LaneCells(NamedTuple):
     Attributes:
         origin: (2,) corner of the first cell [m].
         bounds: (rows, columns, 2) int32: first entry of each cell, and the one after its last.
-        entries: `records.ENTRY`, those of a cell in the order of the lanes' ranks.
+        entries: lanes in the lists, those of a cell in the order of the lanes' ranks.
     """
 
     origin: Array
@@ -51,11 +51,11 @@ class LaneCells(NamedTuple):
 
 
 def build_cells(points: Array, lanes: RecordArray[LaneRecord]) -> LaneCells:
-    """Lists the lanes of a town.
+    """Builds the lists of lanes of all cells of a town.
 
     Args:
         points: (p, 6) as in `polyline.LaneTable`.
-        lanes: `records.LANE`.
+        lanes: lanes of the town.
     """
     order = np.argsort(lanes["rank"]).astype(np.int64)
     low = np.array([lanes["left_edge"].min(), lanes["low_edge"].min()]) - REACH - CELL
@@ -145,14 +145,14 @@ def _write(entry: CellEntryRecord, points: Array, lane: int, first: int, last: i
         entry.across_low, entry.across_high = min(entry.across_low, across), max(entry.across_high, across)
 
 
-# --- Where a body is on a lane, and which lane is closest to it: exactly `TownNetwork.get_closest_lane_in ------------
+# --- Lookup -----------------------------------------------------------------------------------------------------------
 
 TURN = 2.0 * math.pi
 
 
 @inlined
 def wrap_radians(angle: float) -> float:
-    """The same angle in [-pi, pi) [rad], as `highway_env.utils.wrap_to_pi` gives it."""
+    """Returns the same angle in [-pi, pi) [rad], as `highway_env.utils.wrap_to_pi` does."""
     turned = angle + math.pi
     # a remainder takes longer than all the rest, and within two turns a sum is the same to the last bit
     if turned < 0.0:
@@ -164,7 +164,7 @@ def wrap_radians(angle: float) -> float:
 
 @inlined
 def value_near(points: Array, lane: LaneRecord, segment: int, column: int, station: float) -> float:
-    """A column of a lane's points at a station, linear between them: `polyline.value_at`, searched from a segment."""
+    """Interpolates a column of a lane's points at a station, as `polyline.value_at`, with a search from a segment."""
     k, last = segment, lane.last
     if station <= 0.0:
         return float(points[lane.first, column])
@@ -201,7 +201,7 @@ def closest_segment(points: Array, first: int, last: int, x: float, y: float) ->
 def coordinates(
     points: Array, lane: LaneRecord, at: int, share: float, gap: float, x: float, y: float
 ) -> tuple[float, float]:
-    """Station and lateral distance [m] by the closest segment: `polyline.local_coordinates`."""
+    """Returns station and lateral distance [m] by the closest segment, as `polyline.local_coordinates`."""
     if at == lane.first and share == 0.0:
         rx, ry = x - points[at, 0], y - points[at, 1]
         along = rx * lane.cos_first + ry * lane.sin_first

@@ -57,7 +57,7 @@ def _end(lane: Lane) -> int:
 
 
 def _offset(lane: Lane, other: Lane, end: int) -> tuple[float, float]:
-    """How far ahead and how far to the right of a lane's end (0 or -1) the other one's is [m]."""
+    """Returns the offset of another lane's end (0 or -1) ahead and to the right of a lane's end [m]."""
     dx, dy = (float(d) for d in other.points[end, :2] - lane.points[end, :2])
     c, n = math.cos(lane.headings[end]), math.sin(lane.headings[end])
     return dx * c + dy * n, dy * c - dx * n
@@ -100,7 +100,7 @@ class _Nodes:
         return [numbers.setdefault(self.find(end), str(len(numbers))) for end in range(len(self._parent))]
 
 
-# --- A town as a highway-env road network ----------------------------------------------------------------------------
+# --- Network ----------------------------------------------------------------------------------------------------------
 
 LaneIndex: TypeAlias = tuple[str, str, int]
 Route: TypeAlias = list[tuple[str, str, int | None]]
@@ -152,7 +152,7 @@ class TownNetwork(RoadNetwork):
     # Lanes of the town and lanes of the graph
 
     def index_of(self, lane_id: int) -> LaneIndex:
-        """Where the graph lists a lane of the town."""
+        """Returns the index of a lane of the town in the graph."""
         return self._indexes[self._row_of[lane_id]]
 
     def lane_of(self, lane_id: int) -> PolylineLane:
@@ -167,7 +167,7 @@ class TownNetwork(RoadNetwork):
         """Row in the table of the lane at an index."""
         return int(self.get_lane(index).row)
 
-    # Where is this?
+    # Closest lane
 
     def get_closest_lane_index(
         self, position: Array, heading: float | None = None, height: float | None = None
@@ -209,7 +209,7 @@ class TownNetwork(RoadNetwork):
         """An index drawn uniformly from all lanes."""
         return self._indexes[int(np_random.choice(len(self._indexes)))]
 
-    # What comes next?
+    # Successors
 
     def successors(self, index: tuple[str, str, int | None]) -> list[LaneIndex]:
         """Lanes in which a lane goes on by the town's links."""

@@ -1,4 +1,4 @@
-"""Where somebody is on a footway, and what lies a little ahead."""
+"""Footways: the place of a pedestrian on one, and the ways beside streets without a pavement."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
 
 ASIDE = 0.4
-"""How far to the right of the middle one walks [m]: those who come towards one pass by."""
+"""Offset to the right of the middle at which pedestrians walk [m], so that they pass each other."""
 
 FROM_EDGE = 0.4
-"""But no closer to the edge than this [m]."""
+"""Least distance to the edge of the way [m]."""
 
 
 @inlined
 def side_kept(way: WalkwayRecord) -> float:
-    """How far to the right of the middle of a way one walks [m]."""
+    """Returns the offset to the right of the middle of a way at which pedestrians walk [m]."""
     return float(min(ASIDE, max(way.half_width - FROM_EDGE, 0.0)))
 
 
@@ -36,7 +36,7 @@ def locate(town: TownArrays, walker: PedestrianRecord) -> float:
     """Finds the station, segment and height of a pedestrian on its footway.
 
     Returns:
-        How far to the right of the middle it is, seen along the way's own direction [m].
+        Its offset to the right of the middle, along the way's own direction [m].
     """
     way, points = town.walks[walker.walk], town.walk_points
     k = min(max(walker.segment, way.first), way.last - 1)
@@ -58,7 +58,7 @@ def locate(town: TownArrays, walker: PedestrianRecord) -> float:
 
 @inlined
 def _along(points: Array, k: int, x: float, y: float) -> float:
-    """How far along a segment a place is [m]."""
+    """Returns the distance of a place along a segment [m]."""
     dx, dy = points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
     return float(((x - points[k, 0]) * dx + (y - points[k, 1]) * dy) / (points[k + 1, 2] - points[k, 2]))
 
@@ -77,9 +77,9 @@ def find_segment(town: TownArrays, walker: PedestrianRecord) -> None:
 def place_beside(
     town: TownArrays, walker: PedestrianRecord, station: float, aside: float
 ) -> tuple[float, float, float, float]:
-    """A place on a pedestrian's footway, to the right of its middle as it walks [m], and the direction there.
+    """Returns a place on a pedestrian's footway, to the right of its middle as it walks [m], and the direction there.
 
-    Beyond its ends the way goes straight on.
+    Beyond its ends the way continues straight.
     """
     way, points = town.walks[walker.walk], town.walk_points
     k = min(max(walker.segment, way.first), way.last - 1)
@@ -97,7 +97,7 @@ def place_beside(
 
 @inlined
 def enter_next(town: TownArrays, walker: PedestrianRecord) -> None:
-    """Goes over to the next footway at the end of one, or turns round where there is none."""
+    """Moves a pedestrian to the next footway at the end of one, or turns it round where there is none."""
     way = town.walks[walker.walk]
     end = 1 if walker.direction > 0.0 else 0
     if way.next_walk[end] < 0:
@@ -111,7 +111,7 @@ def enter_next(town: TownArrays, walker: PedestrianRecord) -> None:
 
 @compiled
 def closest_walk(town: TownArrays, kind: int, x: float, y: float, reach: float) -> tuple[int, float, int]:
-    """The footway of a kind that is closest to a place: its number (-1 for none in reach), station [m] and segment."""
+    """Returns number (-1 for none in reach), station [m] and segment of the footway of a kind closest to a place."""
     found, at, segment, best = -1, 0.0, 0, reach * reach
     points = town.walk_points
     for number in range(len(town.walks)):
@@ -128,19 +128,19 @@ def closest_walk(town: TownArrays, kind: int, x: float, y: float, reach: float) 
     return found, at, segment
 
 
-# --- Ways beside the lanes, where people walk that are no pavement's: in towns without them, and whom a w ------------
+# --- Ways beside streets ----------------------------------------------------------------------------------------------
 
 WIDEST = 45.0
-"""Nobody crosses a wider road [m]."""
+"""Width of the widest road that pedestrians cross [m]."""
 
 NARROWEST = 3.0
-"""A narrower one is none [m]."""
+"""Width of the narrowest road [m]."""
 
 STRAIGHT = 0.01
-"""Points are left out where the heading changes by less than this [rad] ..."""
+"""Change of heading below which points are left out [rad]."""
 
 EVEN = 0.05
-"""... and the way across by less than this [m]."""
+"""Change of the way across below which points are left out [m]."""
 
 
 class StreetWalk(NamedTuple):
@@ -148,8 +148,8 @@ class StreetWalk(NamedTuple):
 
     Attributes:
         lane: its id, the rightmost one of its direction.
-        points: (n, 6) x, y, station, heading, height, and how far it is to the kerb across the road, at a right angle
-            to the left, or 0 where nobody crosses [m].
+        points: (n, 6) x, y, station, heading, height, and the distance to the kerb across the road, at a right angle
+            to the left, or 0 where the road is not crossed [m].
     """
 
     lane: int
@@ -157,13 +157,13 @@ class StreetWalk(NamedTuple):
 
 
 def street_walks(points: Array, lanes: RecordArray[LaneRecord], town: Town, edges: LaneEdges) -> list[StreetWalk]:
-    """All ways beside lanes outside junctions, as long as no other lane is in their way.
+    """Returns all ways beside lanes outside junctions, cut where another lane is in their way.
 
     Args:
         points: (p, 6) of the lanes' centre lines, as in `TownArrays`.
         lanes: `records.LANE`.
         town: the town.
-        edges: where its lanes are.
+        edges: edges of its lanes.
     """
     beside = [_beside(points, lanes[lane.id]) for lane in town.lanes]
     rows = [(k, row) for k, row in enumerate(beside) if row is not None]
@@ -189,7 +189,7 @@ def street_walks(points: Array, lanes: RecordArray[LaneRecord], town: Town, edge
 
 
 def _beside(points: Array, lane: LaneRecord) -> Array | None:
-    """x, y, station on the lane, heading, height, 0 at the kerb of a lane; None if nobody walks beside it."""
+    """Returns x, y, station on the lane, heading, height, 0 at the kerb of a lane; None where there is no way."""
     count = int((lane.length - 2.0 * FROM_ENDS) / WALK_STEP) + 1
     if lane.right >= 0 or lane.junction >= 0 or (count - 1) * WALK_STEP < SHORTEST_WALK:
         return None
@@ -197,7 +197,7 @@ def _beside(points: Array, lane: LaneRecord) -> Array | None:
 
 
 def _offset(points: Array, lane: LaneRecord, stations: Array, side: float) -> Array:
-    """As `_beside` at some stations, to the right of a lane (side 1) or to the left (-1)."""
+    """Returns the rows of `_beside` at some stations, to the right of a lane (side 1) or to the left (-1)."""
     own = points[lane.first : lane.last + 1]
     x, y, heading, height, width = (np.interp(stations, own[:, 2], own[:, k]) for k in (0, 1, 3, 4, 5))
     lateral = side * (width / 2 + KERB)
@@ -207,7 +207,7 @@ def _offset(points: Array, lane: LaneRecord, stations: Array, side: float) -> Ar
 
 
 def _across(points: Array, lanes: RecordArray[LaneRecord], town: Town, walk: StreetWalk) -> Array:
-    """How far it is straight to the left over all lanes of both directions (n,) [m], 0 where nobody crosses."""
+    """Returns the distance to the left over all lanes of both directions (n,) [m], 0 where the road is not crossed."""
     row, own = walk.points, town.lanes[walk.lane]
     far, side = leftmost(town, walk.lane), -1.0
     middle = own.position(float(row[len(row) // 2, 2]))
@@ -227,12 +227,12 @@ def _across(points: Array, lanes: RecordArray[LaneRecord], town: Town, walk: Str
 
 
 def _far(row: Array, across: Array) -> Array:
-    """Places across the road (n, 3) [m]."""
+    """Returns the places across the road (n, 3) [m]."""
     return np.column_stack((row[:, 0] + across * np.sin(row[:, 3]), row[:, 1] - across * np.cos(row[:, 3]), row[:, 4]))
 
 
 def _finished(row: Array, across: Array) -> Array:
-    """The points that are needed of a way, with stations along itself and the ways across."""
+    """Returns the points of a way that are needed, with stations along itself and the distances across."""
     kept = [0]
     for k in range(1, len(row) - 1):
         last = kept[-1]

@@ -1,4 +1,4 @@
-"""Who walks beside a street without a pavement crosses it anywhere, away from junctions, when nobody drives close."""
+"""Jaywalking: pedestrians beside streets without a pavement cross anywhere, away from junctions and close vehicles."""
 
 from __future__ import annotations
 
@@ -28,27 +28,27 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 OVER, BACK, THERE = 0, 1, 2
-"""What `mouth` says of who strays: on the way over, on the way back, or at the far kerb, where no way leads on."""
+"""Values of `mouth` while straying: on the way over, on the way back, at a far kerb without a way."""
 
 REST = 5.0
-"""Who has come over to where no way leads on comes back after this time [s]."""
+"""Time at a far kerb without a way before a pedestrian returns [s]."""
 
 JOINED = 2.5
-"""A way this close to where one comes over is walked on [m]."""
+"""Distance to a way at the far kerb within which a pedestrian walks on there [m]."""
 
 CORRIDOR = 2.0
-"""Half the width that one uses on the way over [m]."""
+"""Half the width of the way over [m]."""
 
 COMING, BEYOND = 5.0, 0.5
-"""Vehicles stop for who will be within their lane, or this close to it, after so much more of its way [m]."""
+"""Way of a straying pedestrian, and distance from the lane at its end, within which vehicles stop for it [m]."""
 
 GAP = 2.0
-"""Room that they leave [m]."""
+"""Room left before a straying pedestrian [m]."""
 
 
 @inlined
 def steps_out(town: TownArrays, world: WorldArrays, walker: PedestrianRecord, time: float) -> bool:
-    """Whether somebody beside a street begins to cross it, who wants to now and then."""
+    """Makes a pedestrian beside a street cross it now and then; returns whether it begins to."""
     points = town.walk_points
     far = min(points[walker.segment, 5], points[walker.segment + 1, 5])
     if draw(walker) >= CROSSING_RATE * time or far <= 0.0 or not _is_clear(world, walker):
@@ -60,7 +60,7 @@ def steps_out(town: TownArrays, world: WorldArrays, walker: PedestrianRecord, ti
 
 @compiled
 def _is_clear(world: WorldArrays, walker: PedestrianRecord) -> bool:
-    """Whether nobody drives close by."""
+    """Whether no vehicle is close."""
     for i in range(len(world.vehicles)):
         vehicle = world.vehicles[i]
         if vehicle.kind == Kind.EMPTY or abs(vehicle.height - walker.height) > LEVEL:
@@ -109,7 +109,7 @@ def stray(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
 
 @inlined
 def _arrive(town: TownArrays, walker: PedestrianRecord) -> None:
-    """Walks on beside the other side of the road, or stands there for a while where no way is."""
+    """Walks on at the other side of the road, or stands there for a while where there is no way."""
     found, station, segment = closest_walk(town, Footway.STREET, walker.x, walker.y, JOINED)
     walker.waited, walker.speed = 0.0, 0.0
     if found < 0:
@@ -121,7 +121,7 @@ def _arrive(town: TownArrays, walker: PedestrianRecord) -> None:
 
 @compiled
 def give_way_to_strayers(town: TownArrays, world: WorldArrays, i: int) -> float:
-    """Acceleration that stops a vehicle before people in its way where there is no crosswalk [m/s^2], inf for none."""
+    """Returns the acceleration that stops a vehicle before straying pedestrians [m/s^2]; inf for none."""
     vehicle = world.vehicles[i]
     found = math.inf
     reach = CRITICAL_GAP * vehicle.speed + ASKING + 0.5 * vehicle.length
@@ -139,7 +139,7 @@ def give_way_to_strayers(town: TownArrays, world: WorldArrays, i: int) -> float:
 
 @inlined
 def _way_to(town: TownArrays, vehicle: VehicleRecord, walker: PedestrianRecord, reach: float) -> float:
-    """From a vehicle's front along its lanes to somebody who is in its way, or comes into it [m]; inf for nobody."""
+    """Returns the way from a vehicle's front to a pedestrian in its way, or about to be [m]; inf for none."""
     begin = -vehicle.station
     for k in range(int(vehicle.planned)):
         if begin > reach:

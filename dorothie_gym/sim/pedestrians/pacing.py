@@ -1,4 +1,4 @@
-"""Steps of people on foot: past one another, and not into anybody or anything."""
+"""Steps of pedestrians: towards a place, past one another, clear of vehicles and props."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ WALKING_SPEED = 1.3
 """[m/s], the usual design value for pedestrians (MUTCD takes 1.1)."""
 
 KERB = 1.6
-"""Distance from the lane's edge at which they walk [m]."""
+"""Distance from the lane's edge at which pedestrians walk [m]."""
 
 FROM_ENDS = 4.0
-"""How far from the ends of a lane they turn back [m]."""
+"""Distance from the ends of a lane at which pedestrians turn back [m]."""
 
 FROM_JUNCTION = 12.0
-"""How far from the ends of a lane they cross, so that they do not walk into a junction [m]."""
+"""Least distance from the ends of a lane at which pedestrians stray, so that they stay out of junctions [m]."""
 
 WALK_STEP = 2.0
 """Step in which a walkway is looked for [m]."""
@@ -32,63 +32,63 @@ SHORTEST_WALK = 8.0
 """Shortest walkway [m]."""
 
 CROSSING_RATE = 1 / 45
-"""How often a pedestrian wants to cross [1/s]."""
+"""Rate at which a pedestrian begins to stray [1/s]."""
 
 PERSONAL_SPACE = 0.7
-"""How close to a vehicle they step [m]."""
+"""Least distance of a step to a vehicle [m]."""
 
 PATIENCE = 2.0
-"""How long they stand before a vehicle, a prop or somebody else that does not move before they turn back [s]."""
+"""Time for which a pedestrian stands before an obstacle that does not move before it turns back [s]."""
 
 ELBOW_ROOM = 0.3
-"""How close to a prop or to somebody else they step [m]."""
+"""Least distance of a step to a prop [m]."""
 
 SAFE_TIME = 5.0
-"""Time gap to vehicles that they want before stepping out [s]."""
+"""Time gap to vehicles before stepping out [s]."""
 
 SAFE_DISTANCE = 14.0
-"""And distance [m]."""
+"""Distance to vehicles before stepping out [m]."""
 
 
-# --- Steps of people on foot: past one another, and not into anybody or anything -------------------------------------
+# --- Steps ------------------------------------------------------------------------------------------------------------
 
 AHEAD = 1.0
-"""People walk towards a place on their way this far ahead [m]."""
+"""Distance of the place on the way that a pedestrian walks towards [m]."""
 
 ARRIVED = 0.05
-"""Who is this close to where it walks is there [m]."""
+"""Distance to that place at which it is reached [m]."""
 
 AVOIDING = 1.6
-"""Within this distance people step out of each other's way [m] ..."""
+"""Distance within which pedestrians step out of each other's way [m]."""
 
 BESIDE = 0.05
-"""... to the right, unless the other one is further than this to the right of the middle of the way [m]."""
+"""Offset of another pedestrian to the right from which on it is passed on the left [m]."""
 
 SPACE = 0.55
-"""And never come closer than this, from middle to middle [m]."""
+"""Least distance between pedestrians, from middle to middle [m]."""
 
 SIZE = 0.5
-"""Length and width of somebody [m], `Pedestrian.LENGTH`."""
+"""Length and width of a pedestrian [m], `Pedestrian.LENGTH`."""
 
 MARGIN = 0.4
-"""Nobody steps aside beyond this distance from the edge of the way [m]: cars that turn cut corners."""
+"""Distance from the edge of the way beyond which pedestrians do not step aside [m]: cars that turn cut corners."""
 
 SIGHT = 4.0
-"""Others who are further away are not looked at [m]."""
+"""Distance up to which other pedestrians matter [m]."""
 
 FORESIGHT = 0.3
-"""Room that one looks ahead beyond a step for vehicles [m]."""
+"""Room beyond a step that is checked for vehicles [m]."""
 
 LEVEL = 2.5
-"""Who is further above or below is on another way [m]."""
+"""Difference of height from which on a body is on another way [m]."""
 
 PLACE = 3.0
-"""Who stays within this distance does not get on [m]."""
+"""Distance within which a pedestrian makes no progress [m]."""
 
 
 @inlined
 def note_progress(walker: PedestrianRecord, time: float) -> None:
-    """Counts for how long somebody has not got on [s]."""
+    """Counts the time without progress of a pedestrian [s]."""
     walker.staying += time
     dx, dy = walker.x - walker.left_x, walker.y - walker.left_y
     if dx * dx + dy * dy > PLACE * PLACE:
@@ -99,21 +99,21 @@ def note_progress(walker: PedestrianRecord, time: float) -> None:
 def walk_towards(
     world: WorldArrays, p: int, x: float, y: float, cos: float, sin: float, lateral: float, half: float, time: float
 ) -> bool:
-    """Sets direction and speed of a pedestrian so as to come towards a place, if others leave room.
+    """Sets direction and speed of a pedestrian towards a place, if others leave room.
 
     Args:
         world: arrays of the world.
         p: the pedestrian.
         x: place [m].
         y: place [m].
-        cos: direction of the way on which it walks.
+        cos: direction of its way.
         sin: see there.
-        lateral: how far to the right of the middle of that way it is [m].
+        lateral: offset to the right of the middle of that way [m].
         half: half the width of that way [m].
         time: until the next decision [s].
 
     Returns:
-        Whether it walks on, or is there; else it stands.
+        Whether it walks on, or has arrived; else it stands.
     """
     walker = world.pedestrians[p]
     walker.speed = 0.0
@@ -142,10 +142,10 @@ def walk_towards(
 def _past_others(
     world: WorldArrays, p: int, cos: float, sin: float, way_cos: float, way_sin: float, lateral: float
 ) -> tuple[float, float]:
-    """Direction that leads past those who are in the way, on the side of the way on which there is more room.
+    """Returns the direction that leads past others in the way, on the side with more room.
 
-    So those who come towards one, who keep to their right, are passed on the right, and those who are slower on the
-    left. The arguments are as of `walk_towards`, the first direction is the one to the place.
+    Oncoming pedestrians, which keep to their right, are passed on the right, slower ones on the left. The arguments are
+    as of `walk_towards`; the first direction is the one to the place.
     """
     walker = world.pedestrians[p]
     x, y = cos, sin
@@ -167,13 +167,13 @@ def _past_others(
         if lateral + dy * way_cos - dx * way_sin > BESIDE:
             push = -push
         x, y = x - push * sin, y + push * cos
-    length = math.sqrt(x * x + y * y)  # at least 1: whoever is avoided is avoided sideways
+    length = math.sqrt(x * x + y * y)  # at least 1: others are avoided sideways
     return x / length, y / length
 
 
 @inlined
 def _push(dx: float, dy: float, radius: float, cos: float, sin: float) -> float:
-    """How much something in the way makes one step aside, 0 to 1."""
+    """Returns the weight of stepping aside for a body in the way, 0 to 1."""
     gap = math.sqrt(dx * dx + dy * dy) - radius
     if gap > AVOIDING or dx * cos + dy * sin < 0.0:
         return 0.0
@@ -182,7 +182,7 @@ def _push(dx: float, dy: float, radius: float, cos: float, sin: float) -> float:
 
 @inlined
 def _bumps(world: WorldArrays, p: int, cos: float, sin: float, step: float, time: float) -> bool:
-    """Whether a step leads closer to somebody, where it is or goes, or to a prop, than one comes."""
+    """Whether a step leads too close to another pedestrian, where it is or goes, or to a prop."""
     walker = world.pedestrians[p]
     x, y = walker.x + step * cos, walker.y + step * sin
     for q in range(len(world.pedestrians)):
@@ -211,7 +211,7 @@ def _bumps(world: WorldArrays, p: int, cos: float, sin: float, step: float, time
 
 @inlined
 def _touches_vehicle(world: WorldArrays, walker: PedestrianRecord, x: float, y: float) -> bool:
-    """Whether a step leads closer to a vehicle that is close: nobody walks into the side of a car."""
+    """Whether a step leads closer to a vehicle that is close."""
     for i in range(len(world.vehicles)):
         vehicle = world.vehicles[i]
         if abs(walker.x - vehicle.x) > 6.0 or abs(walker.y - vehicle.y) > 6.0 or vehicle.kind == Kind.EMPTY:
@@ -226,7 +226,7 @@ def _touches_vehicle(world: WorldArrays, walker: PedestrianRecord, x: float, y: 
 
 @inlined
 def _room_beside(body: SizedBody, x: float, y: float) -> float:
-    """How far outside of a body's outline a place is, along its length or its width [m]; negative inside."""
+    """Returns the distance of a place from a body's outline, along its length or its width [m]; negative inside."""
     dx, dy = x - body.x, y - body.y
     along = abs(dx * body.cos + dy * body.sin) - 0.5 * body.length
     return float(max(along, abs(dy * body.cos - dx * body.sin) - 0.5 * body.width))

@@ -1,7 +1,7 @@
-"""People on foot: they walk along footways, round corners, and now and then over a road.
+"""Pedestrians: along footways, round corners, over crosswalks.
 
-They walk towards a place a little ahead on their way, past one another, and keep their distance from everything.
-Everybody decides anew every `PACE` substeps, in turns, and walks straight on in between.
+A pedestrian walks towards a place a little ahead on its way and decides anew every `PACE` substeps, not all of them in
+the same substep; in between it walks straight on.
 """
 
 from __future__ import annotations
@@ -25,48 +25,48 @@ if TYPE_CHECKING:
 
 
 REACTION = 1.0
-"""People count on drivers to brake after this time [s] ..."""
+"""Reaction time of drivers that pedestrians count on [s]."""
 
 BRAKING = 3.0
-"""... no harder than this [m/s^2] ..."""
+"""Deceleration of vehicles that pedestrians count on [m/s^2]."""
 
 ROOM = 4.0
-"""... and to stop this far before the crosswalk's middle line at the latest, measured from the front [m]."""
+"""Distance from the front to the crosswalk's middle line at which vehicles are expected to stop [m]."""
 
 VEHICLES_SIGHT = 60.0
-"""How far people look for those who drive [m]."""
+"""Distance up to which pedestrians look for vehicles [m]."""
 
 CROSSING_SHARE = 0.35
-"""How often somebody who passes a crosswalk wants to cross."""
+"""Probability of crossing for a pedestrian that passes a crosswalk."""
 
 GIVES_UP = 40.0
-"""Who has not been able to cross for this long walks on [s]."""
+"""Wait at a crosswalk after which a pedestrian walks on [s]."""
 
 REST = 5.0
-"""Who leaves a crosswalk wants to cross none for this long [s]."""
+"""Time after leaving a crosswalk without crossing again [s]."""
 
 PLACES, PLACES_APART = 3, 0.7
-"""People wait beside one another in so many places, this far apart [m] ..."""
+"""Number of places beside one another for those that wait, and the distance between them [m]."""
 
 FROM_KERB = 0.9
-"""... this far from the kerb [m] ..."""
+"""Distance of those places from the kerb [m]."""
 
 FROM_PAINT = 2.0
-"""... and no further than this beside the middle of the paint [m]."""
+"""Largest distance of those places beside the middle of the paint [m]."""
 
 READY = 1.0
-"""Who waits steps onto the crosswalk from this close to its place [m]."""
+"""Distance to its place from which a waiting pedestrian steps onto the crosswalk [m]."""
 
 HALF_DEPTH = 1.5
-"""Half of what a crosswalk measures along the road [m]."""
+"""Half the extent of a crosswalk along the road [m]."""
 
 OVER = 0.1
-"""Who is this close to the end of a crosswalk has crossed [m]."""
+"""Distance to the end of a crosswalk at which a pedestrian has crossed [m]."""
 
 
 @inlined
 def comes_to_crosswalk(town: TownArrays, walker: PedestrianRecord, way: WalkwayRecord, time: float) -> bool:
-    """Whether one stops at a crosswalk that is passed within some time [s], to wait there."""
+    """Makes a pedestrian stop at a crosswalk that it passes within some time [s]; returns whether it stops."""
     step = walker.pace * time
     for m in range(way.mouth, way.mouth + way.mouths):
         mouth = town.mouths[m]
@@ -81,10 +81,10 @@ def comes_to_crosswalk(town: TownArrays, walker: PedestrianRecord, way: WalkwayR
 
 @inlined
 def wait(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
-    """Stands at the kerb until one may step onto the crosswalk, or goes on when that takes too long.
+    """Waits at the kerb until the crosswalk may be entered, or walks on after too long a wait.
 
-    That is where the pavement ends, also beside the paint, if not too far from it: further on cars that turn cut the
-    corner.
+    The place is where the pavement ends, also beside the paint, if not too far from it: further on, turning cars cut
+    the corner.
     """
     walker = world.pedestrians[p]
     crossing = town.crossings[walker.crossing]
@@ -111,7 +111,7 @@ def wait(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
 
 @inlined
 def cross(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
-    """Walks over a crosswalk; back again if a vehicle does not leave the way."""
+    """Walks over a crosswalk, and back if a vehicle stays in the way."""
     walker = world.pedestrians[p]
     crossing = town.crossings[walker.crossing]
     lateral = _advance(crossing, walker)
@@ -133,7 +133,7 @@ def cross(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
 
 @inlined
 def _advance(crossing: CrossingRecord, walker: PedestrianRecord) -> float:
-    """Finds out how far along a crosswalk somebody is; returns how far to the right of its line [m]."""
+    """Updates the place of a pedestrian along a crosswalk; returns its offset to the right of the line [m]."""
     dx, dy = walker.x - crossing.x[0], walker.y - crossing.y[0]
     walker.station = dx * crossing.cos + dy * crossing.sin
     walker.height = crossing.height
@@ -142,7 +142,7 @@ def _advance(crossing: CrossingRecord, walker: PedestrianRecord) -> float:
 
 @inlined
 def _leave(town: TownArrays, walker: PedestrianRecord) -> None:
-    """Walks on along the pavement where one has been waiting, or come to."""
+    """Walks on along the pavement at the end of a crosswalk."""
     crossing = town.crossings[walker.crossing]
     walker.walk, walker.station = crossing.walk[walker.mouth], crossing.station[walker.mouth]
     find_segment(town, walker)
@@ -152,10 +152,10 @@ def _leave(town: TownArrays, walker: PedestrianRecord) -> None:
 
 @compiled
 def _may_step(town: TownArrays, world: WorldArrays, crossing: CrossingRecord, time: float) -> bool:
-    """Whether one may step onto a crosswalk that takes some time to cross [s].
+    """Whether a pedestrian may step onto a crosswalk that takes some time to cross [s].
 
-    Not while a lane with a light leads onto it whose light is not red, or will not be until one is across; nor while
-    somebody drives towards it who could not stop with ease, or stands on it.
+    All lights before it must be red until the pedestrian is across, and no vehicle may stand on it or come towards it
+    too fast to stop with ease.
     """
     now = world.clock[0].time
     for k in range(crossing.light, crossing.light + crossing.lights):
@@ -187,21 +187,21 @@ def _is_danger(vehicle: VehicleRecord, crossing: CrossingRecord) -> bool:
     return bool(front < ROOM + REACTION * vehicle.speed + vehicle.speed * vehicle.speed / (2.0 * BRAKING))
 
 
-# --- People on foot: they walk along footways, round corners, and now and then over a road ---------------------------
+# --- Walking ----------------------------------------------------------------------------------------------------------
 
 PACE = 5
 """Substeps between two decisions of a pedestrian."""
 
 BLOCKED = 3.0
-"""Who has been kept from walking on for this long turns round [s]."""
+"""Time without a step after which a pedestrian turns round [s]."""
 
 CORNER = 0.5
-"""One turns the corner this far before the end of a footway [m]."""
+"""Distance before the end of a footway at which a pedestrian turns the corner [m]."""
 
 
 @inlined
 def walk(town: TownArrays, world: WorldArrays, dt: float) -> None:
-    """Moves all pedestrians on by `dt` [s], and counts who is on which crosswalk, and who strays."""
+    """Moves all pedestrians on by `dt` [s], and counts those on each crosswalk and those that stray."""
     clock, busy = world.clock[0], world.busy
     clock.straying = 0
     for c in range(len(busy)):
@@ -226,7 +226,7 @@ def walk(town: TownArrays, world: WorldArrays, dt: float) -> None:
 
 @compiled
 def _decide(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
-    """What a pedestrian does for some time [s]."""
+    """Decides on the steps of a pedestrian for some time [s]."""
     walker = world.pedestrians[p]
     note_progress(walker, time)
     if walker.state == Walk.WALKING:
@@ -265,7 +265,7 @@ def _stroll(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
 
 @compiled
 def place_walker(town: TownArrays, walker: PedestrianRecord) -> None:
-    """Puts a pedestrian where its footway and station say, with nothing of its past but its random numbers."""
+    """Places a pedestrian at its station on its footway and resets all but its random numbers."""
     walker.state, walker.crossing, walker.crashed, walker.mouth = Walk.WALKING, NOBODY, False, 0
     walker.waited, walker.staying, walker.crash_age, walker.far = 0.0, 0.0, 0.0, 0.0
     way = town.walks[walker.walk]

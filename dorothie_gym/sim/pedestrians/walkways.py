@@ -1,4 +1,4 @@
-"""Where people walk: along the pavements of a town, from one to the next, over its crosswalks, and beside its lanes."""
+"""Arrays of the footways of a town: pavements, ways round corners, crosswalks, ways beside streets."""
 
 from __future__ import annotations
 
@@ -29,28 +29,28 @@ from dorothie_gym.sim.state.records import (
 )
 
 JOINT = 0.5
-"""Ends of pavements that are this close are one place [m]."""
+"""Distance within which ends of pavements are one place [m]."""
 
 CORNER = 45.0
-"""People walk on from the end of one pavement to one of another that is this close [m], if no lane lies between."""
+"""Longest way from the end of one pavement to one of another, if no lane lies between [m]."""
 
 CORNER_WIDTH = 1.4
-"""Width of the ways between them [m]."""
+"""Width of such ways round corners [m]."""
 
 BOWS = 0.0, 2.0, -2.0, 4.0, -4.0, 6.0, -6.0
-"""How far to a side of the straight line such ways are tried [m]: round the outside of a bend they lead in a bow."""
+"""Offsets from the straight line at which such ways are tried [m]: round the outside of a bend they lead in a bow."""
 
 CLEARANCE = 0.8
-"""How far from the lanes' edges the middles of these ways keep [m]."""
+"""Least distance of their middles from the lanes' edges [m]."""
 
 STREET_HALF_WIDTH = 0.8
-"""Half the width of a way beside a street without a pavement [m]: half of `pedestrians.KERB`."""
+"""Half the width of a way beside a street without a pavement [m]: half of `pacing.KERB`."""
 
 HEEDED = 8.0
-"""Lights are heeded on a crosswalk whose lanes end this close to its line [m], and not across the junction."""
+"""Distance from a crosswalk's line within which lanes end whose lights are heeded there [m]."""
 
 KERB_REACH = 6.0
-"""A crosswalk belongs to a pavement that comes this close to its end [m]."""
+"""Distance from a crosswalk's end to its pavement, at most [m]."""
 
 SAMPLE = 0.5
 """Step in which lanes are searched for crosswalks [m]."""
@@ -59,7 +59,7 @@ CROSSWALK_DEPTH = 3.0
 """Along the road (MUTCD 2009, section 3B.18: at least 6 feet) [m]."""
 
 LEVEL = 2.5
-"""Lanes further above or below a crosswalk do not pass it [m]."""
+"""Difference of height from which on lanes do not pass a crosswalk [m]."""
 
 
 _End: TypeAlias = tuple[int, int]
@@ -78,7 +78,7 @@ class Walkways(NamedTuple):
 
 
 def build_walkways(network: TownNetwork, lanes: RecordArray[LaneRecord]) -> Walkways:
-    """All ways along which people walk, and the crosswalks; notes passages in `lanes`.
+    """Builds all footways and crosswalks, and notes passages in `lanes`.
 
     Args:
         network: of the town.
@@ -232,9 +232,10 @@ def _ends(network: TownNetwork, crosswalk: Crosswalk) -> Array:
 
 
 def _as_far_as(ends: Array, places: Array) -> Array:
-    """Where the middle line of a crosswalk (2, 2) comes beside places on the two pavements (2, 3) [m].
+    """Extends the middle line of a crosswalk (2, 2) to places on the two pavements (2, 3) [m].
 
-    One walks from pavement to pavement, not from kerb to kerb, and on the paint also where the pavement ends before it.
+    Pedestrians walk from pavement to pavement, not from kerb to kerb, on the paint also where a pavement ends before
+    it.
     """
     middle, across = ends.mean(axis=0), ends[1] - ends[0]
     reach = (places[:, :2] - middle) @ across / (across @ across)
@@ -268,7 +269,7 @@ def _at(walk: Sidewalk, station: float) -> Array:
 def _passages(
     town: Town, lanes: RecordArray[LaneRecord], crossings: RecordArray[CrossingRecord]
 ) -> RecordArray[PassageRecord]:
-    """Where lanes pass crosswalks: within half a crosswalk's depth of the line on which one walks."""
+    """Returns the passages of lanes over crosswalks, within half a crosswalk's depth of its middle line."""
     found: list[tuple[float, float, float, int]] = []
     reach = crossings["length"] / 2 + CROSSWALK_DEPTH
     middles = np.column_stack((crossings["x"].mean(axis=1), crossings["y"].mean(axis=1)))
@@ -283,7 +284,7 @@ def _passages(
 
 
 def _passage(lane: Lane, crossing: CrossingRecord) -> tuple[float, float, float] | None:
-    """First and last station of a lane on a crosswalk [m], and where along the crosswalk that is [m]."""
+    """Returns first and last station of a lane on a crosswalk [m], and the distance along the crosswalk [m]."""
     stations = np.linspace(0.0, lane.length, int(lane.length / SAMPLE) + 2)
     x, y, z = (np.interp(stations, lane.stations, lane.points[:, column]) for column in range(3))
     dx, dy = x - crossing.x[0], y - crossing.y[0]

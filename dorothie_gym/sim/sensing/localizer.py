@@ -1,4 +1,4 @@
-"""Where the car believes it is: odometry and GPS through an extended Kalman filter.
+"""Localization of the ego: odometry and GPS through an extended Kalman filter.
 
 State: x, y, heading, scale of the odometer, bias of the gyro. Without GPS the two errors add up and the covariance
 grows; with it they are learnt (Thrun, Burgard and Fox, Probabilistic Robotics, chapters 3 and 5).
@@ -15,7 +15,7 @@ from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.config import FRAME_RATE
 
 SCALE_SIGMA = 0.02
-"""Relative error of the wheels' way, constant for a car (tyre wear, pressure)."""
+"""Relative error of the odometer, constant for a car (tyre wear, pressure)."""
 
 SLIP = 0.02
 """Error of the way by slip [m per root of m]."""
@@ -27,13 +27,13 @@ BIAS_SIGMA = math.radians(0.15)
 """Bias of the gyro when it is switched on [rad/s]."""
 
 BIAS_WALK = math.radians(0.008)
-"""And how it wanders [rad/s per root of s]."""
+"""Random walk of that bias [rad/s per root of s]."""
 
 GYRO_NOISE = math.radians(0.05)
 """Angle random walk of the gyro [rad per root of s], that of a cheap micromechanical one."""
 
 STANDS = 1e-3
-"""A car that moves less in a frame stands [m]: it then knows that it does not turn."""
+"""Movement in a frame below which the car stands [m], and is known not to turn."""
 
 DRAWS = 4
 """Normal numbers that a frame takes: of the bias, the gyro, the slip and the skid."""
@@ -44,14 +44,14 @@ STATES = 5
 
 @compiled
 def measure(track: Array, draws: Array, k: int, dt: float, truth: Array) -> tuple[float, float, float]:
-    """What the sensors tell of a frame.
+    """Returns the measurements of a frame.
 
     Args:
         track: true poses, x, y, heading and whatever else, of successive frames (n + 1, 3 or more) [m, m, rad].
         draws: normal numbers (n, DRAWS or more).
         k: number of the frame: from pose k to k + 1.
         dt: time of a frame [s].
-        truth: (2,) true scale of the odometer and true bias of the gyro [rad/s], which wanders on.
+        truth: (2,) true scale of the odometer and true bias of the gyro [rad/s], whose random walk is continued.
 
     Returns:
         Way ahead and to the right [m] and turn [rad]; all of them 0 if the car stands.
@@ -70,7 +70,7 @@ def measure(track: Array, draws: Array, k: int, dt: float, truth: Array) -> tupl
 
 @compiled
 def reckon(mean: Array, covariance: Array, ahead: float, right: float, turn: float, dt: float) -> None:
-    """Moves an estimate on by what the sensors tell of a frame: the prediction of an extended Kalman filter.
+    """Moves an estimate on by the measurements of a frame: the prediction of an extended Kalman filter.
 
     With F the derivatives of the new state by the old one, P becomes F P F^T + Q. Of F only seven numbers outside the
     diagonal are not 0, so that it is applied row by row, then column by column.
@@ -113,7 +113,7 @@ def reckon(mean: Array, covariance: Array, ahead: float, right: float, turn: flo
     mean[2] += turn - mean[4] * dt
 
 
-# --- Where the car believes it is: odometry and GPS through an extended Kalman filter --------------------------------
+# --- Localizer --------------------------------------------------------------------------------------------------------
 
 GPS_SIGMA = 0.5
 """Standard deviation of a GPS fix along each axis [m]: a receiver with satellite-based augmentation."""
@@ -122,11 +122,11 @@ FIX_EVERY = FRAME_RATE // 2
 """Frames between two fixes."""
 
 DEPARTURE_SIGMAS = (0.1, 0.1, 0.01)
-"""How well the place of departure is known [m, m, rad]."""
+"""Standard deviations of the place of departure [m, m, rad]."""
 
 
 class Localizer:
-    """Estimates where the car is from what its sensors measure; their errors are made here, by the seed."""
+    """Estimator of the ego's pose from its sensors, whose errors are drawn here by the seed."""
 
     def __init__(self, x: float, y: float, heading: float, rng: np.random.Generator) -> None:
         self._mean = np.array([x, y, heading, 1.0, 0.0])

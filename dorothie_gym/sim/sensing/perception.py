@@ -1,4 +1,4 @@
-"""The face of `kernel.seeing` for Python: whose eyes they are, and how well they see."""
+"""Perception of the ego in Python: visibility and seed of the compiled functions in `sensing.seeing`."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from dorothie_gym.sim.state.records import EyeRecord, RecordArray
 
 
 class Perception:
-    """Sees bodies as well as visibility allows."""
+    """Perception with the errors of one seed."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._seed = int(rng.integers(1 << 63))
         self._opened: tuple[RecordArray[EyeRecord], Visibility] | None = None
 
     def open(self, eyes: RecordArray[EyeRecord], visibility: Visibility) -> bool:
-        """Lets eyes see as well as visibility allows now, with this one's errors.
+        """Writes the visibility and the seed into the record of a world.
 
         Args:
-            eyes: `records.EYE` (1,), written.
+            eyes: (1,) record of the visibility, written.
             visibility: air and light.
 
         Returns:
-            Whether that was anything new.
+            Whether anything has changed.
         """
         if self._opened is not None and self._opened[0] is eyes and self._opened[1] is visibility:
             return False
@@ -38,17 +38,17 @@ class Perception:
 
 
 BODY = "key", "kind", "x", "y", "heading", "length", "width", "speed", "height"
-"""Columns of a table of what is seen."""
+"""Columns of a table of perceived bodies."""
 
 
 def detection_probability(visibility: Visibility, distance: float) -> float:
-    """Chance that something at a distance [m] is perceived: 1 within sight, then falling with its signal."""
+    """Returns the probability to perceive a body at a distance [m]: 1 within sight, then falling with its signal."""
     if distance <= visibility.sight:
         return 1.0
     return float(detection_chance(visibility.signal(distance)))
 
 
 def position_error(visibility: Visibility, distance: float) -> tuple[float, float]:
-    """Standard deviations of the place of something at a distance [m], away from the car and across [m]."""
+    """Returns the standard deviations of a perceived place at a distance [m], along the line of sight and across."""
     away, aside = errors_of_place(visibility.gain(distance), distance * distance)
     return float(away), float(aside)

@@ -1,6 +1,6 @@
-"""What of all bodies is perceived, and how exactly: glimpses beyond the sight, and errors of place.
+"""Perception of bodies (compiled): misses beyond the range of sight, and errors of place.
 
-All chance is a hash of the seed, the body and the time: it does not depend on who asks, how often, or in what order.
+All chance is a hash of the seed, the body and the time: it does not depend on the number or order of calls.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 GLANCE = FRAME_RATE // 2
-"""Errors and misses stay the same for so long [frames]."""
+"""Time for which errors and misses stay the same [frames]."""
 
 RANGE_SCALE = 900.0
 """A camera's error of range is distance^2 / RANGE_SCALE: 5 % at 45 m, 10 % at 90 m (Stein, Mano and Shashua, IEEE
@@ -37,13 +37,13 @@ Intelligent Vehicles Symposium 2003) [m]."""
 
 BEARING_ERROR = math.radians(0.25)
 """Error of bearing in poor sight [rad]: at 38 m, the sight at night with lights on, twice that is less than the room
-that the car leaves beside others (`hazards.SIDE_MARGIN`)."""
+that the ego leaves beside others (`obstacles.SIDE_MARGIN`)."""
 
 MOST_ERROR = 1.0
 """Bound of the loss that scales errors: poor sight at most adds the camera's own error once more."""
 
 MOST_SIGMAS = 2.0
-"""Errors are cut off here: what is within sight is never far from where it is thought to be."""
+"""Bound of the errors in standard deviations."""
 
 _VEHICLE, _PEDESTRIAN = int(ObjectClass.VEHICLES.value), int(ObjectClass.PEDESTRIAN.value)
 _STATIC = int(ObjectClass.STATIC.value)
@@ -67,22 +67,22 @@ def see(
 ) -> int:  # fmt: skip
     """Looks at all bodies within `visibility.CLEAR_SIGHT`.
 
-    What is within sight is always perceived; beyond it, now and then. On a clear noon all is seen where it is.
+    Bodies within the range of sight are always perceived, those beyond it now and then. A clear noon has no errors.
 
     Args:
-        vehicles: `records.VEHICLE` (n,).
-        pedestrians: `records.PEDESTRIAN` (m,).
-        props: `records.PROP` (k,).
-        seen: `records.SEEN`, filled with what is perceived, nearest first, by key where that is equal; if it is too
-            short the farthest are left out.
-        eye: a `records.EYE`.
-        x: position of whoever looks [m].
+        vehicles: (n,) vehicles.
+        pedestrians: (m,) pedestrians.
+        props: (k,) props.
+        seen: filled with the perceived bodies, nearest first, by key where that is equal; if it is too short the
+            farthest are left out.
+        eye: the visibility.
+        x: position of the observer [m].
         y: [m].
         frame: present frame.
-        skip: place of whoever looks among the vehicles, -1 if it is none of them.
+        skip: row of the observer among the vehicles, -1 if it is none of them.
 
     Returns:
-        How many are perceived.
+        Number of perceived bodies.
     """
     count = 0
     for i in range(len(vehicles)):
@@ -104,7 +104,7 @@ def see(
 
 @compiled
 def look_around(world: WorldArrays, frame: int, table: Array) -> int:
-    """Looks at all bodies from the session's car and writes what is perceived into a table.
+    """Looks at all bodies from the ego and writes the perceived ones into a table.
 
     Args:
         world: arrays of the world.
@@ -112,7 +112,7 @@ def look_around(world: WorldArrays, frame: int, table: Array) -> int:
         table: (n, 9) columns `perception.BODY`, written; as long as `world.seen`.
 
     Returns:
-        How many rows were written.
+        Number of rows written.
     """
     car = world.vehicles[0]
     count = see(
@@ -128,17 +128,17 @@ def look_around(world: WorldArrays, frame: int, table: Array) -> int:
 
 @compiled
 def detection_chance(signal: float) -> float:
-    """Chance that what lies beyond the sight is perceived, by its signal: its square, at most 1."""
+    """Returns the probability to perceive a body beyond the range of sight: the square of its signal, at most 1."""
     bounded = min(signal, 1.0)
     return bounded * bounded
 
 
 @compiled
 def errors_of_place(gain: float, distance2: float) -> tuple[float, float]:
-    """Standard deviations of the place of something [m], away from the one who looks and across.
+    """Returns the standard deviations of a perceived place [m], along the line of sight and across.
 
-    Errors go with one over the root of the signal, as the Cramer-Rao bound has it; what a clear noon has of them is
-    left out, so that there they are exactly 0. Within the range of the radar places are known.
+    Errors go with one over the root of the signal, as in the Cramer-Rao bound, less those of a clear noon, where they
+    are exactly 0. Within the range of the radar places are known.
 
     Args:
         gain: share of a clear noon's signal.
@@ -167,7 +167,7 @@ def _look_at(
     number: int,
     group: int,
 ) -> int:
-    """Adds a body to those that are seen if it is; returns how many they are."""
+    """Adds a body to the list if it is perceived; returns the list's length."""
     key, found_x, found_y, is_seen = int(body.key), float(body.x), float(body.y), True
     if not eye.clear:
         found_x, found_y, is_seen = _glimpse(eye, key, found_x, found_y, x, y, frame)
@@ -181,7 +181,7 @@ def _look_at(
 def _glimpse(
     eye: EyeRecord, key: int, body_x: float, body_y: float, x: float, y: float, frame: int
 ) -> tuple[float, float, bool]:
-    """Where a body seems to be, and whether it is perceived at all."""
+    """Returns the perceived place of a body, and whether it is perceived at all."""
     dx, dy = body_x - x, body_y - y
     distance2 = dx * dx + dy * dy
     if distance2 <= _RADAR:  # never out of sight, and no errors
@@ -206,7 +206,7 @@ def _glimpse(
 def _insert(
     seen: RecordArray[SeenRecord], count: int, distance2: float, key: int, x: float, y: float, number: int, group: int
 ) -> int:
-    """Puts a body where it belongs in the list by distance and key; returns the list's length."""
+    """Inserts a body into the list by distance and key; returns the list's length."""
     at = count
     if count == len(seen):
         at = count - 1
@@ -237,7 +237,7 @@ def _describe(
     pedestrians: RecordArray[PedestrianRecord],
     props: RecordArray[PropRecord],
 ) -> None:
-    """Fills in what is not in error."""
+    """Fills in the fields that have no errors."""
     if thing.group == Group.VEHICLES:
         vehicle = vehicles[thing.body]
         thing.kind, thing.speed, thing.length, thing.width = _VEHICLE, vehicle.speed, vehicle.length, vehicle.width
@@ -252,7 +252,7 @@ def _describe(
         thing.heading, thing.cos, thing.sin, thing.height = prop.heading, prop.cos, prop.sin, prop.height
 
 
-# --- chance -----------------------------------------------------------------------------------------------------------
+# --- Random numbers ---------------------------------------------------------------------------------------------------
 
 
 @inlined

@@ -1,6 +1,6 @@
-"""How far and how well things are seen: air, light, and the eye or camera that looks.
+"""Visibility: air, light, and the eye or camera.
 
-Something of a road user's size is seen while its signal is at least that at the edge of sight on a clear day:
+A body of a road user's size is seen while its signal is at least that at the edge of sight on a clear day:
 
     S(d) = (CLEAR_SIGHT / d)^2 * G(d),    G(d) = clarity * exp(-tau(d)) * min(1, sqrt(E(d) / FULL_LIGHT))
 
@@ -9,7 +9,7 @@ Something of a road user's size is seen while its signal is at least that at the
   range M leaves 5 % of it, so the extinction is ln(20) / M (WMO Guide to Instruments, no. 8, chapter 9);
 - sqrt(E): below daylight the threshold contrast rises with the root of the light (Rose, J. Opt. Soc. Am. 38, 1948, and
   de Vries 1943), above it is constant (Weber's law);
-- clarity: what a blurred or covered view leaves.
+- clarity: share that a blurred or covered view leaves.
 
 G is the share of a clear noon's signal, exactly 1 there. S falls with d, and with every one of its causes.
 """
@@ -25,10 +25,10 @@ import numpy as np
 from dorothie_gym.compilation import allocating
 
 CLEAR_SIGHT = 80.0
-"""How far bodies are perceived on a clear day [m]."""
+"""Range of perception on a clear day [m]."""
 
 SHORTEST_SIGHT = 16.5
-"""How far they are perceived at worst [m]: by short-range radar, which neither weather nor darkness hinders; room to
+"""Shortest range of perception [m]: that of short-range radar, which neither weather nor darkness hinders; room to
 stop from walking pace and to turn round before a roadblock."""
 
 FIVE_PERCENT = math.log(20.0)
@@ -132,7 +132,7 @@ def signal(gain: float, distance: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Visibility:
-    """What is between a thing and whoever looks at it.
+    """Visibility between an observer and a body.
 
     Attributes:
         fog: extinction by fog [1/m].
@@ -164,7 +164,7 @@ class Visibility:
 
     @functools.cached_property
     def sight(self) -> float:
-        """How far everything is perceived [m], in [SHORTEST_SIGHT, CLEAR_SIGHT]."""
+        """Range within which all bodies are perceived [m], in [SHORTEST_SIGHT, CLEAR_SIGHT]."""
         if self.signal(CLEAR_SIGHT) >= 1.0:
             return CLEAR_SIGHT
         near, far = 0.0, CLEAR_SIGHT

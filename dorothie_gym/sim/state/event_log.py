@@ -1,4 +1,4 @@
-"""What happens to the session's car, taken down in arrays."""
+"""Event log of the ego: trajectory, poses and events in arrays."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @inlined
 def trace(world: WorldArrays) -> None:
-    """Takes down where the car is after a substep, see `records.TRACE` and `records.POSE`."""
+    """Logs the ego's state after a substep, see `records.TRACE` and `records.POSE`."""
     car, vehicle = world.car[0], world.vehicles[0]
     rows, k = world.trace, int(car.frames)
     car.frames += 1
@@ -26,7 +26,7 @@ def trace(world: WorldArrays) -> None:
 
 @inlined
 def note_pose(world: WorldArrays, k: int) -> None:
-    """Takes down the pose of the car in a row of its poses."""
+    """Logs the pose of the ego in a row of its poses."""
     car, vehicle, rows = world.car[0], world.vehicles[0], world.poses
     rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = vehicle.x, vehicle.y, vehicle.heading, vehicle.speed
     rows[k, 4], rows[k, 5] = vehicle.height, 1.0 if car.action == U_TURN and world.path[car.at].manoeuvre else 0.0
@@ -34,7 +34,7 @@ def note_pose(world: WorldArrays, k: int) -> None:
 
 @compiled
 def log(world: WorldArrays, code: int, kind: int, key: int, value: float) -> int:
-    """Takes down something that happened to the car; returns its row in `events`."""
+    """Logs an event of the ego; returns its row in `events`."""
     car, vehicle = world.car[0], world.vehicles[0]
     if car.events == len(world.events):
         raise ValueError("more happened to the car in one call than can be taken down")

@@ -1,4 +1,4 @@
-"""Rows of the kernel's arrays as objects: attributes that are read and written where the compiled loops do.
+"""Rows of the arrays as objects, with attributes that read and write the records.
 
 A view keeps its holder, which has the arrays, and the number of its row. Its memory is looked up once, and again
 whenever the holder has other arrays: reading a field then takes a fifth of a microsecond, a tenth of what it takes by
@@ -18,13 +18,13 @@ from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 
 class ArrayHolder(Protocol):
-    """Who has the arrays of a world, and may replace them by bigger ones with the same bodies in the same rows."""
+    """Owner of the arrays of a world, which it may replace by bigger ones with the same bodies in the same rows."""
 
     arrays: WorldArrays
 
 
 CASTS = {"f8": (0, "d"), "i4": (1, "i"), "b1": (2, "?")}
-"""Types of fields: in which of a row's memory views they are, and its format."""
+"""Types of fields: the memory view of the row that holds them, and its format."""
 
 
 def field_offset(dtype: np.dtype[np.void], name: str) -> int:
@@ -34,7 +34,7 @@ def field_offset(dtype: np.dtype[np.void], name: str) -> int:
 
 
 def field(dtype: np.dtype[np.void], name: str, cast: Callable[[Any], Any] | None = None) -> Any:
-    """A property that reads and writes a field of the view's row; `cast` changes what is read."""
+    """Returns a property that reads and writes a field of the view's row; `cast` converts the value that is read."""
     kind = dtype[name].base
     which, _ = CASTS[kind.str[1:]]
     at = field_offset(dtype, name) // kind.itemsize
@@ -61,7 +61,7 @@ class BodyView:
     RECORDS: ClassVar[str]
     DTYPE: ClassVar[np.dtype[np.void]]
 
-    # what `RoadObject.__init__` sets and the kernel has no field for
+    # set by `RoadObject.__init__`; the records have no field for them
     collidable = True
     solid = True
     check_collisions = True
@@ -121,7 +121,7 @@ class BodyView:
 
     @property
     def direction(self) -> Array:
-        """Where it looks (2,), of length 1."""
+        """Unit vector of its heading (2,)."""
         return np.array((self.cos, self.sin))
 
     @property
@@ -146,11 +146,11 @@ class BodyView:
         return found
 
     def to_dict(self, origin_vehicle: Any = None, observe_intentions: bool = True) -> dict[str, float]:
-        """What highway-env observes of a vehicle, with its own definitions; of pedestrians and props, too.
+        """Returns the features that highway-env observes of a vehicle; those of pedestrians and props likewise.
 
         Args:
             origin_vehicle: position and velocity are given relative to it.
-            observe_intentions: whether to tell the direction to the destination.
+            observe_intentions: whether the direction to the destination is included.
         """
         x, y = self.position.tolist()
         cos, sin, speed, heading = self.cos, self.sin, self.speed, self.heading
@@ -168,7 +168,7 @@ class BodyView:
 
 
 def heading_field(dtype: np.dtype[np.void]) -> Any:
-    """The direction in which a body looks [rad]; its cosine and sine change with it."""
+    """Returns a property for the heading of a body [rad]; its cosine and sine change with it."""
     plain = field(dtype, "heading")
 
     def write(view: BodyView, value: float) -> None:

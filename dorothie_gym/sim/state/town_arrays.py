@@ -1,4 +1,4 @@
-"""A town as the compiled loops read it: built once, shared by all worlds, never written to."""
+"""Arrays of a town for the compiled loops: built once, shared by all worlds, read only."""
 
 from __future__ import annotations
 
@@ -53,25 +53,25 @@ class TownArrays(NamedTuple):
 
     Attributes:
         points: (p, 6) x, y, station, heading, height, width of all points of centre lines, the network's own table.
-        lanes: `records.LANE`.
-        neighbours: int32 lists of lanes that follow and precede others, and of those whose lights one heeds on foot.
-        relations: uint8 rows of `records.Relation` of each connector to those of its junction.
-        siblings: `records.SIBLING`.
-        programmes: `records.PROGRAMME`.
+        lanes: lanes by their ids.
+        neighbours: int32 lists of lanes that follow and precede others, and of those whose lights pedestrians heed.
+        relations: uint8 rows of `codes.Relation` of each connector to those of its junction.
+        siblings: lanes with a common beginning.
+        programmes: light programmes.
         phase_ends: ends of the phases within the cycle [s].
-        colours: uint8 `records.Colour` by programme, phase and light.
+        colours: uint8 `codes.Colour` by programme, phase and light.
         origin: (2,) corner of the cells [m].
-        cells: (rows, columns, 2) int32, see `cells.Cells`.
-        entries: `records.ENTRY`.
-        walk_points: (q, 6) points of the footways, as `points`; of those beside streets the last column tells how far
-            it is to the kerb across, 0 where nobody crosses [m].
-        walks: `records.WALKWAY`: the pavements with the town's own ids, the ways between their ends, the ways beside
+        cells: (rows, columns, 2) int32, see `lane_lookup.LaneCells`.
+        entries: lanes in the lists of the cells.
+        walk_points: (q, 6) points of the footways, as `points`; of those beside streets the last column is the
+            distance to the kerb across, 0 where the road is not crossed [m].
+        walks: footways: the pavements with the town's own ids, the ways between their ends, the ways beside
             the rightmost lanes.
-        mouths: `records.MOUTH`, those of a pavement in the order of their stations.
-        crossings: `records.CROSSING`.
-        passages: `records.PASSAGE`, those of a lane in the order of their stations.
+        mouths: mouths of crosswalks, those of a pavement in the order of their stations.
+        crossings: crosswalks.
+        passages: passages of lanes over crosswalks, those of a lane in the order of their stations.
         junctions: (j, 3) middle [m] of each junction's connectors, and the radius in which they lie [m].
-        flat: whether all lanes are so level that heights need not be looked at.
+        flat: whether all lanes are so level that heights do not matter.
     """
 
     points: Array
@@ -103,7 +103,7 @@ _built: weakref.WeakKeyDictionary[TownNetwork, TownArrays] = weakref.WeakKeyDict
 
 
 def town_arrays(network: TownNetwork) -> TownArrays:
-    """The arrays of a town's network, built when they are asked for first."""
+    """Returns the arrays of a town's network, built at their first use."""
     found = _built.get(network)
     if found is None:
         found = _built[network] = _build(network)

@@ -1,4 +1,4 @@
-"""The state of one world as the compiled loops read and write it."""
+"""Arrays of a world: the state that the compiled loops read and write."""
 
 from __future__ import annotations
 
@@ -35,35 +35,35 @@ PROPS = 16
 """Most props in a world."""
 
 CAR_KEY = 0
-"""Key of the session's car."""
+"""Key of the ego."""
 
 STACK = 32
-"""Most lanes that a search along lanes keeps in mind."""
+"""Size of the stack of searches along lanes."""
 
 
 class WorldArrays(NamedTuple):
     """A world in arrays; copying the arrays copies the world.
 
     Attributes:
-        vehicles: `records.VEHICLE`.
-        pedestrians: `records.PEDESTRIAN`.
-        props: `records.PROP`.
-        nodes: `records.NODE`: two for each vehicle and four for each prop, in the lists of the lanes.
+        vehicles: vehicles, the ego the first.
+        pedestrians: pedestrians.
+        props: props.
+        nodes: nodes of the lanes' lists: two for each vehicle and four for each prop, in the lists of the lanes.
         heads: int32 first node of each lane, or -1.
         order: int32 bodies (vehicles, pedestrians, props) as `collisions` sorts them, by `keys` [m].
         keys: see there.
-        lamps: `records.LAMP`, one for each light programme.
-        busy: int32 how many walk on each crosswalk.
+        lamps: one for each light programme.
+        busy: int32 number of pedestrians on each crosswalk.
         stack: int32 scratch of searches along lanes, with `starts` [m].
         starts: see there.
-        clock: one `records.CLOCK`.
-        car: one `records.CAR`: what drives the session's car, if vehicle 0 is of the kind `Kind.DRIVEN`.
-        path: `records.POINT`: the way that it follows.
-        eye: one `records.EYE`: how well it sees.
-        seen: `records.SEEN`: what it sees, nearest first.
-        trace: (f, 10) its way in the last call of `step`, see `records.TRACE`.
+        clock: (1,) time and counters.
+        car: (1,) control of the ego, if vehicle 0 is of the kind `Kind.DRIVEN`.
+        path: points of the path that it follows.
+        eye: (1,) its visibility.
+        seen: bodies that it perceives, nearest first.
+        trace: (f, 10) its trajectory in the last call of `step`, see `records.TRACE`.
         poses: (f + 1, 6) its poses before that call and after each of its substeps, see `records.POSE`.
-        events: `records.EVENT`: what happened to it then.
+        events: its events in that call.
     """
 
     vehicles: RecordArray[VehicleRecord]
@@ -100,12 +100,12 @@ class WorldArrays(NamedTuple):
         return WorldArrays(*(_copy_of(array) for array in self))
 
     def tobytes(self) -> bytes:
-        """The state byte by byte, to compare worlds."""
+        """Returns the state byte by byte, to compare worlds."""
         return b"".join(array.tobytes() for array in self)
 
 
 def _copy_of(array: Any) -> Any:
-    """A copy with all bytes, also those between the fields of records, which NumPy leaves out."""
+    """Returns a copy with all bytes, also those between the fields of records, which NumPy leaves out."""
     copied = np.frombuffer(bytearray(array.tobytes()), dtype=array.dtype).reshape(array.shape)
     return copied.view(np.recarray) if isinstance(array, np.recarray) else copied
 
@@ -119,15 +119,15 @@ def empty_world(
     seed: int | np.random.SeedSequence = 0,
     driven: bool = False,
 ) -> WorldArrays:
-    """A world with room for some bodies and nobody in it.
+    """Returns an empty world with room for some bodies.
 
     Args:
         town: arrays of the town.
         vehicles: most vehicles.
         pedestrians: most pedestrians.
         props: most props.
-        seed: of all that is drawn at random in it.
-        driven: whether vehicle 0 will be a car that follows a path, `Kind.DRIVEN`.
+        seed: seed of all random numbers in it.
+        driven: whether vehicle 0 will be an ego that follows a path, `Kind.DRIVEN`.
     """
     world = WorldArrays(
         vehicles=empty_records(VehicleRecord, vehicles),
@@ -164,7 +164,7 @@ def empty_world(
 
 
 def grown(town: TownArrays, world: WorldArrays, *, vehicles: int, pedestrians: int, props: int) -> WorldArrays:
-    """The same world with more room: everybody keeps the place in the arrays, and does what they would have done.
+    """Returns the same world with more room: all bodies keep their rows and their behaviour.
 
     Args:
         town: arrays of the town.

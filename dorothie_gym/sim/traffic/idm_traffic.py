@@ -1,4 +1,4 @@
-"""What a vehicle of the traffic does: it looks along the lanes that it plans, and accelerates and steers."""
+"""Background traffic: acceleration and steering of a vehicle along its planned lanes (IDM, MOBIL, junction rules)."""
 
 from __future__ import annotations
 
@@ -40,27 +40,27 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 NO_ROOM_PATIENCE = 5.0
-"""Who has been waiting for room behind a junction for this long goes elsewhere, if the lot falls so [s]."""
+"""Wait for room behind a junction after which a vehicle draws its route anew [s]."""
 
 SLOWEST = 0.5
-"""Speed that no bend keeps a vehicle from [m/s]."""
+"""Least speed in a bend [m/s]."""
 
 CURVES_SIGHT = 40.0
-"""Bends further ahead ask for no braking yet: from 14 m/s to 5 m/s it takes 43 m [m]."""
+"""Distance up to which bends limit the speed [m]: braking from 14 m/s to 5 m/s takes 43 m."""
 
 CROSSWALK_GAP = 1.0
 """Room that is left before a crosswalk [m]."""
 
 STEP_AHEAD = 5.0
-"""A pedestrian who is to come this close to the middle of a lane keeps vehicles off the crosswalk [m]."""
+"""Distance of a coming pedestrian to the middle of a lane within which vehicles stop before the crosswalk [m]."""
 
 STEP_PAST = 2.5
-"""And one who has passed it by no more than this [m]."""
+"""Distance of a pedestrian past the middle of a lane within which vehicles still stop [m]."""
 
 
 @inlined
 def drive(town: TownArrays, world: WorldArrays, i: int) -> None:
-    """Sets acceleration and slip angle of a vehicle from what it sees."""
+    """Sets acceleration and slip angle of a vehicle."""
     vehicle = world.vehicles[i]
     if vehicle.crashed:
         return
@@ -77,7 +77,7 @@ def drive(town: TownArrays, world: WorldArrays, i: int) -> None:
 
 @inlined
 def _acceleration(town: TownArrays, world: WorldArrays, i: int) -> float:
-    """Acceleration by everything that is ahead on the planned lanes [m/s^2], not yet limited."""
+    """Returns the acceleration by all that is ahead on the planned lanes [m/s^2], not limited yet."""
     vehicle = world.vehicles[i]
     target, stop = vehicle.desired, math.inf
     front, gap = NOBODY, math.inf
@@ -118,7 +118,7 @@ def _acceleration(town: TownArrays, world: WorldArrays, i: int) -> float:
 
 @compiled
 def _give_way_to_turning(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> float:
-    """Acceleration that stops a vehicle before the way of the car that turns round [m/s^2]; inf where it is clear."""
+    """Returns the acceleration that stops a vehicle before the ego's U-turn [m/s^2]; inf where the way is clear."""
     car, other = world.car[0], world.vehicles[0]
     if not car.sweeping:
         return math.inf
@@ -135,7 +135,7 @@ def _give_way_to_turning(town: TownArrays, world: WorldArrays, vehicle: VehicleR
                 gap = min(gap, start + station - vehicle.station)
         start += lane.length
     gap -= 0.5 * (vehicle.length + other.length)
-    # whoever is in its way already had better go on
+    # a vehicle that is in its way already goes on
     return brake_to(vehicle.speed, gap) if -1.0 < gap < math.inf else math.inf
 
 
@@ -148,7 +148,7 @@ def _held_up(world: WorldArrays, vehicle: VehicleRecord, front: int, gap: float)
 
 @compiled
 def _held_up_beside(town: TownArrays, world: WorldArrays, i: int) -> float:
-    """What the next body on the lane that a vehicle is leaving takes off its acceleration [m/s^2]."""
+    """Returns the loss of acceleration by the next body on the lane that a vehicle is leaving [m/s^2]."""
     vehicle = world.vehicles[i]
     lane = town.lanes[vehicle.lane]
     if lane.left != vehicle.plan[0] and lane.right != vehicle.plan[0]:
@@ -159,9 +159,9 @@ def _held_up_beside(town: TownArrays, world: WorldArrays, i: int) -> float:
 
 @inlined
 def _first_on(town: TownArrays, world: WorldArrays, i: int, k: int, lane: LaneRecord) -> tuple[int, float]:
-    """The first body ahead on the `k`-th lane of a plan: its node (-1 for nobody), and its station [m].
+    """Returns node (-1 for none) and station [m] of the first body ahead on the `k`-th lane of a plan.
 
-    Who is still near the start of a lane that begins where this one does is in the way, too.
+    A body near the start of a lane that begins where this one does is in the way, too.
     """
     vehicle, nodes = world.vehicles[i], world.nodes
     own = vehicle.station if k == 0 else -math.inf
@@ -184,13 +184,13 @@ def _first_on(town: TownArrays, world: WorldArrays, i: int, k: int, lane: LaneRe
 
 @inlined
 def _approach(town: TownArrays, world: WorldArrays, i: int, k: int, line: float, front: int, gap: float) -> float:
-    """Acceleration that stops a vehicle before a junction that it may not enter [m/s^2]; inf where it may.
+    """Returns the acceleration that stops a vehicle before a junction that it may not enter [m/s^2]; inf where it may.
 
     Args:
         town: arrays of the town.
         world: arrays of the world.
         i: the vehicle.
-        k: which lane of its plan enters the junction, -1 for none.
+        k: index of the lane in its plan that enters the junction, -1 for none.
         line: from its front to the start of that lane [m].
         front: node of the body in front, or -1.
         gap: to its middle [m].
@@ -207,7 +207,7 @@ def _approach(town: TownArrays, world: WorldArrays, i: int, k: int, line: float,
     if line > stopping:
         return math.inf
     if front >= 0 and gap < line + 0.5 * vehicle.length and not _is_let_in(world, front):
-        return math.inf  # somebody in front waits, too: it is their turn to ask
+        return math.inf  # a vehicle in front waits, too, and asks first
     wait = request(town, world, i, k)
     if wait == Wait.NOT:
         return math.inf
@@ -218,9 +218,9 @@ def _approach(town: TownArrays, world: WorldArrays, i: int, k: int, line: float,
 
 @compiled
 def _choose_another_way(town: TownArrays, vehicle: VehicleRecord, k: int, now: float) -> None:
-    """Draws anew what follows the first `k` planned lanes, when there has long been no room where they lead.
+    """Draws the route beyond the first `k` planned lanes anew after a long wait for room behind the junction.
 
-    So no ring of full lanes lasts for ever in which everybody waits for the next one.
+    This resolves gridlocks: rings of full lanes in which every vehicle waits for the next one.
     """
     if vehicle.standing > NO_ROOM_PATIENCE and now - vehicle.rerouted > NO_ROOM_PATIENCE:
         vehicle.rerouted, vehicle.planned = now, k
@@ -237,7 +237,7 @@ def _is_let_in(world: WorldArrays, front: int) -> bool:
 def _give_way_to_walkers(
     town: TownArrays, world: WorldArrays, vehicle: VehicleRecord, lane: LaneRecord, begin: float
 ) -> float:
-    """Acceleration that stops a vehicle before crosswalks of a lane on which somebody walks in its way [m/s^2]."""
+    """Returns the acceleration that stops a vehicle before crosswalks of a lane with pedestrians in its way [m/s^2]."""
     found = math.inf
     for p in range(lane.passage, lane.passage + lane.passages):
         passage = town.passages[p]
@@ -247,7 +247,7 @@ def _give_way_to_walkers(
         if left < 0.0 or left > CRITICAL_GAP * vehicle.speed + ASKING:
             continue
         if vehicle.speed * vehicle.speed > 2.0 * HARDEST_BRAKING * left:
-            continue  # too late: who steps out makes sure that this does not happen
+            continue  # too late to stop: pedestrians step out only where this does not happen
         if _is_walked(world, passage):
             found = min(found, brake_to(vehicle.speed, left - CROSSWALK_GAP))
     return found
@@ -255,7 +255,7 @@ def _give_way_to_walkers(
 
 @compiled
 def _is_walked(world: WorldArrays, passage: PassageRecord) -> bool:
-    """Whether somebody on a crosswalk is about to pass a lane, or has only just passed it."""
+    """Whether a pedestrian on a crosswalk is about to pass a lane, or has just passed it."""
     for p in range(len(world.pedestrians)):
         walker = world.pedestrians[p]
         if walker.state == Walk.CROSSING and walker.crossing == passage.crossing:

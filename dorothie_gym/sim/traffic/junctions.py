@@ -1,7 +1,7 @@
-"""Who may enter a junction: the rules of `world.junctions`, on arrays.
+"""Admission to junctions: lights, signs, right of way, order of arrival, room behind the junction.
 
-Lights and signs come first, then priority, then whoever came first. Those whose paths cross are never let in together:
-who is on its way across clears the junction first.
+Lights and signs come first, then priority, then the order of arrival. Vehicles with crossing paths are never admitted
+together: one that is on its way across clears the junction first.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ if TYPE_CHECKING:
 
 
 EARLY = 1e-6
-"""A phase is looked up anew this long before it ends, lest rounding matters [s]."""
+"""Time before the end of a phase at which it is looked up anew, so that rounding does not matter [s]."""
 
 
 @compiled
 def phase_at(town: TownArrays, number: int, time: float) -> tuple[int, float]:
-    """Phase of a programme at a time [s], and how long it still lasts [s]."""
+    """Returns the phase of a programme at a time [s], and its remaining duration [s]."""
     programme = town.programmes[number]
     now = (time - programme.offset) % programme.cycle
     for k in range(programme.phases):
@@ -57,7 +57,7 @@ def phase_at(town: TownArrays, number: int, time: float) -> tuple[int, float]:
 
 @compiled
 def light(town: TownArrays, world: WorldArrays, number: int, time: float) -> int:
-    """`Colour` of the light at the end of a lane at the present time or later; green where there is none."""
+    """Returns the `Colour` of the light at the end of a lane at a time from now on; green where there is none."""
     lane = town.lanes[number]
     if lane.programme < 0:
         return 0  # Colour.GREEN
@@ -73,15 +73,15 @@ def light(town: TownArrays, world: WorldArrays, number: int, time: float) -> int
     return int(town.colours[programme.colour + phase * programme.slots + lane.slot])
 
 
-# --- Who may enter a junction: the rules of `world.junctions`, on arrays ---------------------------------------------
+# --- Admission --------------------------------------------------------------------------------------------------------
 
 CLEAR = 0.5
-"""A vehicle has left a junction when its rear is this far behind it [m]."""
+"""Distance of a vehicle's rear behind a junction at which the vehicle has left it [m]."""
 
 
 @inlined
 def announce(vehicle: VehicleRecord, lane: int, connector: int, distance: float, now: float) -> None:
-    """Tells that a vehicle comes along a lane to a connector, its front `distance` [m] before it."""
+    """Announces a vehicle on a lane to a connector, its front `distance` [m] before it."""
     if vehicle.approach != connector or vehicle.approach_lane != lane:
         if vehicle.approach < 0 or vehicle.approach_lane != lane:
             vehicle.stood = False
@@ -94,17 +94,17 @@ def announce(vehicle: VehicleRecord, lane: int, connector: int, distance: float,
 
 @inlined
 def forget(vehicle: VehicleRecord) -> None:
-    """The vehicle comes to no junction any more."""
+    """Withdraws the announcement of a vehicle."""
     vehicle.approach, vehicle.approach_lane, vehicle.stood, vehicle.wait = NOBODY, NOBODY, False, Wait.NOT
 
 
 @compiled
 def request(town: TownArrays, world: WorldArrays, i: int, k: int) -> int:
-    """Asks to enter the connector that was announced, the `k`-th lane of the plan; repeated until it is entered.
+    """Requests the connector that was announced, the `k`-th lane of the plan; repeated until it is entered.
 
     Returns:
-        `Wait`: why it has to wait, or `Wait.NOT`; then nobody is let in whose path crosses its own until it has
-        crossed, loses its green light, or does not use the permission.
+        The reason to wait, or `Wait.NOT`. Then no vehicle with a crossing path is admitted until this one has crossed,
+        loses its green light, or does not use the permission.
     """
     vehicle = world.vehicles[i]
     now = world.clock[0].time
@@ -128,7 +128,7 @@ def request(town: TownArrays, world: WorldArrays, i: int, k: int) -> int:
 
 @inlined
 def note(town: TownArrays, vehicle: VehicleRecord, now: float) -> None:
-    """Takes note of where a vehicle is: enters or leaves its connector, or does not use what it was granted."""
+    """Updates the connector of a vehicle: entered, left, or granted and not used."""
     followed = vehicle.plan[0]
     if vehicle.claim >= 0:
         if followed == vehicle.claim:
@@ -163,7 +163,7 @@ def _reason_to_wait(town: TownArrays, world: WorldArrays, i: int, k: int, now: f
 
 @inlined
 def _is_closed(town: TownArrays, world: WorldArrays, i: int, now: float) -> bool:
-    """Whether the car turns round in the junction, and a vehicle is not that car."""
+    """Whether the ego turns round in the junction that a vehicle other than the ego approaches."""
     if world.vehicles[i].kind == Kind.DRIVEN:
         return False
     car, junction = world.car[0], town.lanes[world.vehicles[i].approach].junction
@@ -175,10 +175,10 @@ def _is_closed(town: TownArrays, world: WorldArrays, i: int, now: float) -> bool
 
 @compiled
 def close(town: TownArrays, world: WorldArrays, junction: int) -> bool:
-    """Asks for a whole junction for the car, to turn round in its mouth; to be repeated as long as it is needed.
+    """Requests a whole junction for a U-turn of the ego in its mouth; repeated as long as it is needed.
 
     Returns:
-        Whether it is empty; then nobody else is let in while this is repeated.
+        Whether it is empty; then no other vehicle is admitted while this is repeated.
     """
     car, slot = world.car[0], 0
     for c in range(CLOSED):
@@ -201,7 +201,7 @@ def close(town: TownArrays, world: WorldArrays, junction: int) -> bool:
 
 @compiled
 def _others(town: TownArrays, world: WorldArrays, i: int, now: float) -> int:
-    """Whether others let a vehicle enter: those on its way, those who waited for longer, those with priority."""
+    """Returns the reason to wait for other vehicles: on a crossing path, waiting for longer, or with priority."""
     own = world.vehicles[i]
     connector = town.lanes[own.approach]
     patient = now - own.since > GIVING_WAY_PATIENCE
@@ -248,7 +248,7 @@ def _light_stops(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord, n
 
 @compiled
 def _may_sneak(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord, now: float, let_in: bool) -> bool:
-    """Whether who gave way at the line all the green time may use the yellow: it must not last into the red."""
+    """Whether a vehicle that gave way during green may use the yellow, of which enough must be left."""
     if now - vehicle.since <= SNEAKING or vehicle.distance >= AT_LINE:
         return False
     if let_in:
@@ -265,12 +265,12 @@ def _has_to_stop(town: TownArrays, vehicle: VehicleRecord) -> bool:
 
 @compiled
 def _comes_first(town: TownArrays, other: VehicleRecord, own: VehicleRecord, meeting: int, now: float) -> bool:
-    """Whether one who waits goes before another by the time of waiting; priority is none of it, but patience is."""
+    """Whether a waiting vehicle goes before another one by its waiting time, priority aside."""
     if other.since >= own.since or now - other.asked >= LAPSE:
         return False
     if other.wait == Wait.LIGHT or other.wait == Wait.STOP_SIGN:
         return False
-    if other.wait == Wait.NO_ROOM:  # keeps nobody waiting but those who would take the room that it waits for
+    if other.wait == Wait.NO_ROOM:  # delays only those that would take the room it waits for
         return _have_one_exit(town, other, own)
     if now - other.since > GIVING_WAY_PATIENCE:
         return True
@@ -281,14 +281,14 @@ def _comes_first(town: TownArrays, other: VehicleRecord, own: VehicleRecord, mee
 
 @inlined
 def _have_one_exit(town: TownArrays, one: VehicleRecord, other: VehicleRecord) -> bool:
-    """Whether two who announced themselves leave the junction on the same lane."""
+    """Whether two announced vehicles leave the junction on the same lane."""
     exit = town.lanes[one.approach].exit
     return bool(exit >= 0 and exit == town.lanes[other.approach].exit)
 
 
 @compiled
 def _is_coming(town: TownArrays, world: WorldArrays, j: int, now: float) -> bool:
-    """Whether one who has priority would be in the junction within the critical gap."""
+    """Whether a vehicle with priority would be in the junction within the critical gap."""
     other = world.vehicles[j]
     if _light_stops(town, world, other, now, False) or _has_to_stop(town, other):
         return False
@@ -296,7 +296,7 @@ def _is_coming(town: TownArrays, world: WorldArrays, j: int, now: float) -> bool
         return False  # it waits for others itself
     if other.wait == Wait.CLOSED or other.wait == Wait.NO_ROOM:
         return False
-    if other.speed < STANDING:  # about to start, unless somebody is in its way
+    if other.speed < STANDING:  # about to start, unless its way is occupied
         return bool(other.distance < AT_LINE) and not _is_occupied(town, world, j)
     return bool(other.distance < CRITICAL_GAP * other.speed)
 
@@ -314,16 +314,15 @@ def _is_occupied(town: TownArrays, world: WorldArrays, i: int) -> bool:
 
 @compiled
 def has_room(town: TownArrays, world: WorldArrays, i: int, k: int) -> bool:
-    """Whether there is room behind a junction for a vehicle and all who are on their way there.
+    """Whether there is room behind a junction for a vehicle and all others that are on their way there.
 
-    It has to fit behind the first that is slow, with all those between; and before the next junction, with all those
-    who are on the way there.
+    They have to fit behind the first slow vehicle, and before the next junction.
 
     Args:
         town: arrays of the town.
         world: arrays of the world.
         i: the vehicle.
-        k: which lane of its plan is the connector.
+        k: index of the connector in its plan.
     """
     own = world.vehicles[i]
     while k < own.planned and town.lanes[own.plan[k]].junction >= 0:
@@ -364,7 +363,7 @@ def _is_listed(world: WorldArrays, j: int, lane: int) -> bool:
 
 @compiled
 def _heading_to(town: TownArrays, world: WorldArrays, i: int, exit: int) -> int:
-    """How many others were let into the junction who will leave it on a lane."""
+    """Returns the number of other vehicles that were admitted to the junction and leave it on a lane."""
     count = 0
     for j in range(len(world.vehicles)):
         other = world.vehicles[j]

@@ -1,8 +1,8 @@
-"""Who is on which lane: for every lane the list of bodies on it, ordered by station, made anew each substep.
+"""Lane index: for every lane the list of bodies on it, ordered by station and made anew each substep.
 
 A vehicle is in the list of the lane that is closest and, where that is another one, of the lane that it follows; while
-it changes lanes, of that one as soon as highway-env counts it as on it. One that follows the closest lane, but stands
-or drives so far askew or aside that nobody could pass it on the lane beside, is in the list of that one. A prop is in
+it changes lanes, of that one as soon as highway-env counts it as on it. A vehicle that follows the closest lane,
+but so far askew or aside that it blocks the lane beside, is in the list of that one. A prop is in
 the lists of all lanes that it reaches into.
 """
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 PASSING = 0.5 * CAR_WIDTH + 0.2
-"""Whoever reaches closer to the middle of a lane than this is in the way of cars there [m]."""
+"""Distance to the middle of a lane within which a body is in the way of cars there [m]."""
 
 
 @inlined
@@ -71,7 +71,7 @@ def _is_on_followed(town: TownArrays, vehicle: VehicleRecord) -> bool:
 def _list_beside(
     town: TownArrays, nodes: RecordArray[NodeRecord], heads: NDArray[np.int32], vehicle: VehicleRecord, body: int
 ) -> None:
-    """Lists a vehicle on the lane beside into which it reaches so far that nobody passes it there."""
+    """Lists a vehicle on the lane beside that it blocks."""
     lane = town.lanes[vehicle.lane]
     if lane.left < 0 and lane.right < 0:
         return
@@ -92,7 +92,7 @@ def _list_astride(
     body: int,
     turned: float,
 ) -> None:
-    """See `_list_beside`; `turned` is the sine of the vehicle's angle to its lane."""
+    """Does the work of `_list_beside`; `turned` is the sine of the vehicle's angle to its lane."""
     reach = 0.5 * (vehicle.width * math.sqrt(max(1.0 - turned * turned, 0.0)) + vehicle.length * turned)
     lane = town.lanes[vehicle.lane]
     for side in (lane.left, lane.right):
@@ -137,7 +137,7 @@ def _insert(nodes: RecordArray[NodeRecord], heads: NDArray[np.int32], n: int) ->
 
 @inlined
 def next_on_lane(nodes: RecordArray[NodeRecord], n: int, body: int) -> int:
-    """The first node from `n` on along its lane that is not of a body, or -1."""
+    """Returns the first node from `n` on along its lane that is not of a body, or -1."""
     while n >= 0 and nodes[n].body == body:
         n = nodes[n].next
     return n
@@ -147,17 +147,17 @@ def next_on_lane(nodes: RecordArray[NodeRecord], n: int, body: int) -> int:
 def around(
     town: TownArrays, world: WorldArrays, number: int, station: float, body: int
 ) -> tuple[int, float, int, float]:
-    """Who is next ahead and behind of a place, looked for along all lanes that follow and precede.
+    """Returns the next bodies ahead of and behind a place, along all lanes that follow and precede.
 
     Args:
         town: arrays of the town.
         world: arrays of the world.
         number: lane of the place.
-        station: where on it [m].
-        body: is not looked for.
+        station: of the place [m].
+        body: a body that is left out.
 
     Returns:
-        Nodes (-1 for nobody within `HORIZON`) and their distances [m]: ahead, then behind.
+        Nodes (-1 for none within `HORIZON`) and their distances [m]: ahead, then behind.
     """
     nodes = world.nodes
     front, rear = NOBODY, NOBODY
@@ -183,7 +183,7 @@ def around(
 
 @compiled
 def _beyond(town: TownArrays, world: WorldArrays, number: int, station: float, body: int) -> tuple[int, float]:
-    """The nearest body on the lanes that follow, and its distance from a place on a lane [m]."""
+    """Returns the nearest body on the lanes that follow, and its distance from a place on a lane [m]."""
     lanes, nodes, stack, starts = town.lanes, world.nodes, world.stack, world.starts
     found, best = NOBODY, HORIZON
     stack[0], starts[0] = number, lanes[number].length - station
@@ -205,7 +205,7 @@ def _beyond(town: TownArrays, world: WorldArrays, number: int, station: float, b
 
 @compiled
 def _before(town: TownArrays, world: WorldArrays, number: int, station: float, body: int) -> tuple[int, float]:
-    """The nearest body on the lanes that precede, and its distance from a place on a lane [m]."""
+    """Returns the nearest body on the lanes that precede, and its distance from a place on a lane [m]."""
     lanes, nodes, stack, starts = town.lanes, world.nodes, world.stack, world.starts
     found, best = NOBODY, HORIZON
     stack[0], starts[0] = number, station

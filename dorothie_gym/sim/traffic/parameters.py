@@ -1,4 +1,4 @@
-"""Numbers that the compiled loops use: highway-env's own, read off its classes, and those of the town's traffic."""
+"""Parameters of the traffic: highway-env's own, read off its classes, cyclists, junctions, respawning."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ ACC_MAX = float(IDMVehicle.ACC_MAX)
 """Greatest acceleration and deceleration [m/s^2]."""
 
 COMFORT = float(IDMVehicle.COMFORT_ACC_MAX)
-"""Acceleration that is wanted [m/s^2]."""
+"""Desired acceleration [m/s^2]."""
 
 CLOSING = 2.0 * math.sqrt(-IDMVehicle.COMFORT_ACC_MAX * IDMVehicle.COMFORT_ACC_MIN)
-"""Twice the root of wanted acceleration and wanted deceleration [m/s^2]."""
+"""Twice the root of the product of desired acceleration and deceleration [m/s^2]."""
 
 STANDING_GAP = float(IDMVehicle.DISTANCE_WANTED - IDMVehicle.LENGTH)
 """Room between two vehicles that stand [m]; stock counts it from middle to middle of vehicles of 5 m."""
 
 TIME_WANTED = float(IDMVehicle.TIME_WANTED)
-"""Time gap that is wanted [s]."""
+"""Desired time gap [s]."""
 
 if IDMVehicle.DELTA != 4.0:  # the kernel writes the power as products
     raise ImportError(f"the kernel is written for highway-env's exponent 4 of IDM, not {IDMVehicle.DELTA}")
@@ -34,7 +34,7 @@ LANE_CHANGE_BRAKING = float(IDMVehicle.LANE_CHANGE_MAX_BRAKING_IMPOSED)
 """Braking that a lane change may impose [m/s^2]."""
 
 LANE_CHANGE_DELAY = float(IDMVehicle.LANE_CHANGE_DELAY)
-"""Time between two thoughts of changing lanes [s]."""
+"""Time between two considerations of a lane change [s]."""
 
 KP_LATERAL = float(IDMVehicle.KP_LATERAL)
 """Gain from the lateral distance to the lateral speed [1/s]."""
@@ -43,7 +43,7 @@ KP_HEADING = float(IDMVehicle.KP_HEADING)
 """Gain from the error of heading to the rate of turning [1/s]."""
 
 TAU_PURSUIT = float(IDMVehicle.TAU_PURSUIT)
-"""How far ahead the lane's heading is taken [s]."""
+"""Look-ahead time for the lane's heading [s]."""
 
 LARGEST_HEADING = math.pi / 4
 """Largest angle to the lane that is steered for [rad], `ControlledVehicle.steering_control`."""
@@ -58,35 +58,35 @@ CAR_LENGTH, CAR_WIDTH = float(Vehicle.LENGTH), float(Vehicle.WIDTH)
 """Size of a car [m]."""
 
 AFTER_END = CAR_LENGTH / 2
-"""This far before the end of a lane [m] the next one is followed, `AbstractLane.after_end`."""
+"""Distance before the end of a lane from which on the next one is followed [m], `AbstractLane.after_end`."""
 
-# --- lanes ----------------------------------------------------------------------------------------------------------
+# --- Sizes of arrays, lanes -------------------------------------------------------------------------------------------
 
 PLANNED = 24
 """Most lanes that a vehicle plans ahead, its own one included."""
 
 GOALS = 16
-"""Most places on the car's path that it comes up to slowly."""
+"""Most goals on the ego's path."""
 
 CLOSED = 4
-"""Most junctions that a car turns round in at once."""
+"""Most junctions that one U-turn reaches into."""
 
 POINTS = 208
-"""Most points of the car's path that the loops look at: 1 m apart, half a metre in U-turns."""
+"""Most points of the ego's path in the arrays: 1 m apart, half a metre in U-turns."""
 
 EVENTS = 32
-"""Most things that happen to the car within a call."""
+"""Most events of the ego within a call."""
 
 FRAMES = 15
-"""Most substeps within a call of a world with a driven car: its path is lengthened in between."""
+"""Most substeps within a call of a world with a driven ego, whose path is lengthened in between."""
 
 STOPPED = 0.05
-"""Who brakes at less than this stands [m/s]."""
+"""Speed below which a braking vehicle comes to a stand [m/s]."""
 
 CHANGE_TIME = 3.0
-"""A lane change takes about this long; where less is left before the lane ends none is begun [s]."""
+"""Duration of a lane change [s]; none begins where the lane ends sooner."""
 
-# --- cyclists -------------------------------------------------------------------------------------------------------
+# --- Cyclists ---------------------------------------------------------------------------------------------------------
 
 CYCLIST_LENGTH, CYCLIST_WIDTH = 1.8, 0.7
 """Size of a bicycle with its rider [m] (AASHTO, Guide for the Development of Bicycle Facilities, 2012: 70 x 30 in)."""
@@ -101,88 +101,86 @@ CYCLIST_SHARE = 1 / 8
 """Share of cyclists among the vehicles of a town."""
 
 CYCLIST_ROADS = 60.5 / 3.6
-"""Where more is allowed than this, nobody rides a bicycle [m/s]."""
+"""Highest speed limit of lanes with cyclists [m/s]."""
 
 CYCLIST_BEFORE, CYCLIST_BEHIND = 6.0, 15.0
-"""Gaps to those before and behind on the lane to the right [m] for which a cyclist moves over to it."""
+"""Gaps ahead and behind on the lane to the right with which a cyclist moves over to it [m]."""
 
 CYCLIST_FROM_EDGE = 0.9
 """Distance of a cyclist from the right edge of the lane [m]."""
 
-# --- towing ---------------------------------------------------------------------------------------------------------
+# --- Respawning -------------------------------------------------------------------------------------------------------
 
 TOW_CRASHED = 3.0
-"""A crashed vehicle is towed away after this long [s]."""
+"""Time after which a crashed vehicle is respawned [s]."""
 
 TOW_BLOCKED = 15.0
-"""A vehicle that stands before a prop gives up after this long [s]."""
+"""Time after which a vehicle that stands before a prop is respawned [s]."""
 
 TOW_FACING = 6.0
-"""A vehicle that stands before a car that stands in the middle of a U-turn gives way to it after this long [s]."""
+"""Time after which a vehicle is respawned that stands before the ego while the ego stands in a U-turn [s]."""
 
 TOW_STUCK = 60.0
-"""Any vehicle that stands for this long, not for a red light, is towed away: no knot lasts for ever [s]."""
+"""Time after which any vehicle that stands, not for a red light, is respawned, which resolves gridlocks [s]."""
 
 GOES_HOME = 45.0
-"""A pedestrian who has not got on for this long goes home [s]; longer than one waits at a crosswalk."""
+"""Time without progress after which a pedestrian is respawned [s]; longer than the wait at a crosswalk."""
 
 CLEAR_OF_CAR = 25.0
-"""Nobody is brought to a town closer to the car than this [m]."""
+"""Least distance to the ego at which vehicles are added to a town [m]."""
 
 CLEAR_OF_WALKER = 8.0
-"""No pedestrian is brought closer to the car than this [m], nor than `CLEAR_OF_PEOPLE` to another one."""
+"""Least distance to the ego at which pedestrians are added [m]; to one another it is `CLEAR_OF_PEOPLE`."""
 
 CLEAR_OF_PEOPLE = 1.5
-"""See there [m]."""
+"""Least distance between pedestrians that are added [m]."""
 
 OUT_OF_SIGHT = 60.0
-"""Who comes back elsewhere does so no closer to the car than this [m]."""
+"""Least distance to the ego at which bodies respawn [m]."""
 
 CLEAR_OF_OTHERS, CLEAR_BESIDE = 14.0, 2.5
-"""Nobody appears closer to others before or behind it than this [m] who are no farther aside than that [m], ..."""
+"""Least distance ahead and behind to others, no farther aside than `CLEAR_BESIDE`, for new vehicles [m]."""
 
 CLEAR_OF_BODIES = 6.0
-"""... nor this close to the middle of any, half of it aside [m]."""
+"""Least distance to the middle of others at which vehicles appear, half of it aside [m]."""
 
 
-# --- How people drive, in numbers: gaps, braking, patience at junctions ----------------------------------------------
-
-# --- at junctions ----------------------------------------------------------------------------------------------------
+# --- Junctions --------------------------------------------------------------------------------------------------------
 
 COMFORTABLE_BRAKING = 3.0
-"""Who can stop before a yellow light no harder than this does so (ITE's 10 ft/s^2 for yellow times) [m/s^2]."""
+"""Deceleration up to which a vehicle stops before a yellow light [m/s^2] (ITE's 10 ft/s^2 for yellow times)."""
 
 HARDEST_BRAKING = 6.0
-"""Who cannot stop before a red light with this any more goes on [m/s^2]."""
+"""Deceleration beyond which a vehicle no longer stops before a red light [m/s^2]."""
 
 CRITICAL_GAP = 4.5
-"""Who gives way goes if nobody with priority comes sooner (Highway Capacity Manual 2010, permitted left turns) [s]."""
+"""Least time gap to vehicles with priority [s] (Highway Capacity Manual 2010, permitted left turns)."""
 
 GIVING_WAY_PATIENCE = 30.0
-"""Who has been giving way for longer than this has its turn like anybody else [s]."""
+"""Longest time an actor yields before it competes by arrival order [s]."""
 
 SNEAKING = 2.0
-"""Who has been giving way at a green light for this long may go when it turns yellow (HCM's sneakers) [s]."""
+"""Time of giving way at a green light after which a vehicle may use the yellow [s] (HCM's sneakers)."""
 
 START = 0.3
-"""Who uses the yellow takes this long to start, and then as long as it takes to reach the line [s]."""
+"""Time to start for a vehicle that uses the yellow, the way to the line not included [s]."""
 
 AT_LINE = 3.5
-"""Who stands with its front this close before the line stands at it [m]."""
+"""Distance of the front to the line within which a vehicle stands at it [m]."""
 
 OVER_LINE = 0.5
-"""Who is this far over the line does not stop for its light any more [m]."""
+"""Distance over the line from which on a vehicle no longer stops for its light [m]."""
 
 STANDING = 0.3
-"""Slower than this a vehicle stands [m/s]."""
+"""Speed below which a vehicle of the traffic counts as standing [m/s]."""
 
 UNUSED = 3.0
-"""Who was let in and stands before the junction for this long has to ask again [s]."""
+"""Stand before the junction after which a permission lapses [s]."""
 
 LAPSE = 1.0
-"""Who was let in, or waits, and asks no more (it goes elsewhere) has lost its place after this long [s]."""
+"""Time without a request after which a permission or a place in the order of arrival lapses [s]."""
 
-# --- on the road ------------------------------------------------------------------------------------------------------
+# --- Driving ----------------------------------------------------------------------------------------------------------
 
 CURVE_ACCELERATION = 2.5
 """Lateral acceleration in curves [m/s^2]."""
@@ -194,26 +192,26 @@ STOP_BRAKING = 3.0
 """Deceleration towards a junction [m/s^2]."""
 
 ASKING = 9.5
-"""A vehicle asks for a junction this far before it would have to brake for it [m]."""
+"""Distance before the beginning of braking at which a vehicle requests a junction [m]."""
 
 LINE_GAP = 1.0
-"""Room that is left before a line [m]."""
+"""Room left before a line [m]."""
 
 ROOM_BEHIND = 10.5
 """Free lane that a vehicle wants behind a junction before it enters: its length, the distance that it keeps when it
 stands, and what it takes to have left the junction [m]."""
 
 ROOM_SIGHT = 60.0
-"""How far from the start of the lane behind a junction others count who may come to a stand on it [m]."""
+"""Distance behind a junction within which slow vehicles count against its room [m]."""
 
 ROOM_EACH = 10.0
 """Lane that a vehicle takes up in a queue: its length and the distance that stock's IDM keeps [m]."""
 
 SLOW = 4.0
-"""Slower than this a vehicle behind a junction may be in the way: a car that turns round does 3.5 [m/s]."""
+"""Speed below which a vehicle behind a junction may be in the way [m/s]; in a U-turn the ego does 3.5 m/s."""
 
 CROSSING_SIGHT = 40.0
-"""How far a car is seen that turns round [m]."""
+"""Distance within which traffic gives way to a U-turn of the ego [m]."""
 
 CROSSING_MARGIN = 0.5
-"""Room that is left beside it [m]."""
+"""Room left beside that U-turn [m]."""

@@ -1,4 +1,4 @@
-"""Who crashed, or does not get on, comes back elsewhere, out of the car's sight; so do pedestrians."""
+"""Respawning of crashed or stuck vehicles and pedestrians, out of the ego's sight."""
 
 from __future__ import annotations
 
@@ -35,30 +35,30 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 USUAL_LENGTH = 100.0
-"""Lanes and footways up to this long are drawn in proportion to their lengths [m]."""
+"""Length up to which lanes and footways are drawn in proportion to their lengths [m]."""
 
 SHORTEST = 12.0
-"""Nobody appears on a shorter lane [m]."""
+"""Length of the shortest lane on which vehicles appear [m]."""
 
 DRAWS = 200
-"""Places that are drawn for who comes back; where none of them is free, a vehicle is gone, a pedestrian tries again."""
+"""Places drawn for a respawn; where none of them is free, a vehicle is removed, a pedestrian tries again."""
 
 LOOK_EVERY = 6
-"""Substeps between two looks at whether a vehicle that stands does so for its light."""
+"""Substeps between two checks whether a standing vehicle waits for its light."""
 
 FACING = 6.0
-"""From a vehicle's outline to the middle of the car before which it stands [m]."""
+"""Distance from a vehicle's outline to the middle of the ego within which it stands before the ego [m]."""
 
 
 @inlined
 def tow(town: TownArrays, world: WorldArrays, dt: float, turning: bool = False) -> None:
-    """Counts for how long everybody has been crashed or stuck, and brings back those whose time is over.
+    """Counts the time for which bodies have been crashed or stuck, and respawns those whose time is over.
 
     Args:
         town: arrays of the town.
         world: arrays of the world.
         dt: time that has passed [s].
-        turning: whether the car is in the middle of a U-turn; see `faces_turning_car`.
+        turning: whether the ego is in a U-turn; see `faces_turning_car`.
     """
     frame = world.clock[0].frame
     for i in range(len(world.vehicles)):
@@ -82,7 +82,7 @@ def tow(town: TownArrays, world: WorldArrays, dt: float, turning: bool = False) 
 
 @compiled
 def _may_go(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> bool:
-    """Whether no light holds a vehicle up: neither itself nor in a queue, which may reach back through junctions."""
+    """Whether no light holds a vehicle up, at the line or in a queue, which may reach back through junctions."""
     now = world.clock[0].time
     # a short one follows its connector before its front is over the line
     if vehicle.approach >= 0 and town.lanes[vehicle.approach_lane].programme >= 0:
@@ -95,7 +95,7 @@ def _may_go(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> boo
 
 @compiled
 def _tow_away(town: TownArrays, world: WorldArrays, i: int, turning: bool) -> None:
-    """Brings a vehicle back elsewhere if it is time for that."""
+    """Respawns a vehicle if it is time for that."""
     vehicle = world.vehicles[i]
     late = vehicle.crash_age > TOW_CRASHED or vehicle.stuck > TOW_STUCK
     late = late or (vehicle.blocked and vehicle.stuck > TOW_BLOCKED)
@@ -105,12 +105,12 @@ def _tow_away(town: TownArrays, world: WorldArrays, i: int, turning: bool) -> No
 
 @compiled
 def faces_turning_car(world: WorldArrays, vehicle: VehicleRecord, turning: bool) -> bool:
-    """Whether a vehicle is right before the car which stands in the middle of a U-turn, in each other's way.
+    """Whether a vehicle and the ego, which stands in a U-turn, block each other.
 
     Args:
-        world: arrays of the world; the car is the first of its vehicles.
+        world: arrays of the world; the ego is the first of its vehicles.
         vehicle: of the traffic.
-        turning: whether the car is in the middle of a U-turn.
+        turning: whether the ego is in a U-turn.
     """
     car = world.vehicles[0]
     if not turning or car.kind != Kind.DRIVEN or car.speed >= EGO_STANDING:
@@ -163,14 +163,14 @@ def _come_back(town: TownArrays, world: WorldArrays, p: int) -> None:
 
 @compiled
 def new_key(world: WorldArrays) -> int:
-    """A key that no body of the world has had."""
+    """Returns a key that no body of the world has had."""
     world.clock[0].keys += 1
     return int(world.clock[0].keys)
 
 
 @compiled
 def is_clear_of_car(world: WorldArrays, x: float, y: float, distance: float) -> bool:
-    """Whether a place is at a distance [m] from the car, the first of the vehicles; true where there is none."""
+    """Whether a place is at a distance [m] from the ego, the first of the vehicles; true where there is none."""
     if len(world.vehicles) == 0:
         return True
     car = world.vehicles[0]
@@ -182,7 +182,7 @@ def is_clear_of_car(world: WorldArrays, x: float, y: float, distance: float) -> 
 
 @compiled
 def is_clear_of_people(world: WorldArrays, x: float, y: float, body: int, distance: float) -> bool:
-    """Whether no pedestrian but one is close to a place, and the car is at a distance [m]."""
+    """Whether no pedestrian but one is close to a place, and the ego is at a distance [m]."""
     for p in range(len(world.pedestrians)):
         other = world.pedestrians[p]
         dx, dy = other.x - x, other.y - y
@@ -203,7 +203,7 @@ def is_free(
         number: lane.
         station: along it [m].
         body: vehicle that does not count.
-        distance: to the car [m].
+        distance: to the ego [m].
     """
     lane, points = town.lanes[number], town.points
     x = value_near(points, lane, lane.first, 0, station)
@@ -229,7 +229,7 @@ def _is_close(dx: float, dy: float, cos: float, sin: float) -> bool:
 
 @compiled
 def put_on_lane(town: TownArrays, vehicle: VehicleRecord, number: int, station: float) -> None:
-    """Puts a vehicle that stands at a station of a lane [m], with nothing of its past but its random numbers."""
+    """Places a standing vehicle at a station of a lane [m] and resets all but its random numbers."""
     lane, points = town.lanes[number], town.points
     heading = value_near(points, lane, lane.first, 3, station)
     vehicle.lane = number

@@ -1,4 +1,4 @@
-"""The lanes that a vehicle is going to drive: followed, and drawn at random from the vehicle's own numbers."""
+"""Route of a vehicle: its planned lanes, drawn from the vehicle's own random numbers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @inlined
 def follow_road(town: TownArrays, vehicle: VehicleRecord) -> None:
-    """Goes on to the next planned lane at the end of the present one, and plans on."""
+    """Moves on to the next planned lane at the end of the present one, and extends the plan."""
     while vehicle.planned > 1 and vehicle.station > town.lanes[vehicle.plan[0]].length - AFTER_END:
         for k in range(1, vehicle.planned):
             vehicle.plan[k - 1] = vehicle.plan[k]
@@ -30,7 +30,7 @@ def follow_road(town: TownArrays, vehicle: VehicleRecord) -> None:
 
 @inlined
 def keep_side(vehicle: VehicleRecord, lane: LaneRecord) -> None:
-    """A cyclist keeps to the right edge of its lane, cars to its middle."""
+    """Sets the offset in a lane: cyclists keep to the right edge, cars to the middle."""
     if vehicle.kind == Kind.CYCLIST:
         vehicle.to_right = max(lane.half_width - CYCLIST_FROM_EDGE, 0.0)
 
@@ -43,7 +43,7 @@ def locate(town: TownArrays, vehicle: VehicleRecord) -> None:
 
 @compiled
 def take(town: TownArrays, vehicle: VehicleRecord, lane: int) -> None:
-    """Follows a lane and plans on from there."""
+    """Makes a vehicle follow a lane, and extends the plan."""
     vehicle.plan[0], vehicle.planned = lane, 1
     keep_side(vehicle, town.lanes[lane])
     locate(town, vehicle)
@@ -70,7 +70,7 @@ def extend(town: TownArrays, vehicle: VehicleRecord) -> None:
 
 @compiled
 def _drawn(town: TownArrays, vehicle: VehicleRecord, last: LaneRecord) -> int:
-    """One of the ways on from a lane; for cyclists of those that lead along streets where they may ride, if any do."""
+    """Draws one of the successors of a lane; for cyclists one on which they may ride, if there is any."""
     streets = 0
     if vehicle.kind == Kind.CYCLIST:
         for k in range(last.successor, last.successor + last.successors):

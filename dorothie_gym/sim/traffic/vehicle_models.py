@@ -1,4 +1,8 @@
-"""Keeping one's distance: highway-env's Intelligent Driver Model (Treiber, Hennecke and Helbing 2000) on numbers."""
+"""Models of a single vehicle: car following (IDM), lane keeping, motion, lane changes (MOBIL).
+
+They follow highway-env's: the Intelligent Driver Model (Treiber, Hennecke and Helbing 2000), its lateral controller and
+kinematic bicycle, and MOBIL (Kesting, Treiber and Helbing 2007) without politeness.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +46,7 @@ if TYPE_CHECKING:
 
 @inlined
 def not_zero(x: float) -> float:
-    """The number, kept away from 0 as by `highway_env.utils.not_zero`."""
+    """Returns a number kept away from 0, as `highway_env.utils.not_zero` does."""
     if abs(x) > 1e-2:
         return x
     return 1e-2 if x >= 0.0 else -1e-2
@@ -50,7 +54,7 @@ def not_zero(x: float) -> float:
 
 @inlined
 def free_acceleration(speed: float, target: float, limit: float) -> float:
-    """Acceleration towards a target speed on a free road, on a lane with a speed limit [m/s^2]."""
+    """Returns the acceleration towards a target speed on a free road, on a lane with a speed limit [m/s^2]."""
     share = max(speed, 0.0) / abs(not_zero(min(max(target, 0.0), limit)))
     square = share * share
     return COMFORT * (1.0 - square * square)
@@ -58,11 +62,11 @@ def free_acceleration(speed: float, target: float, limit: float) -> float:
 
 @inlined
 def following_acceleration(speed: float, other: float, gap: float, lengths: float) -> float:
-    """What is taken off the free acceleration behind another vehicle [m/s^2].
+    """Returns the loss of acceleration behind another vehicle [m/s^2].
 
     Args:
         speed: [m/s].
-        other: speed of the one in front along one's own heading [m/s].
+        other: speed of the vehicle in front along the own heading [m/s].
         gap: from middle to middle [m].
         lengths: half of both lengths together [m].
     """
@@ -73,13 +77,13 @@ def following_acceleration(speed: float, other: float, gap: float, lengths: floa
 
 @compiled
 def wanted_gap(speed: float, other: float, lengths: float) -> float:
-    """Distance that is wanted to the one in front, from middle to middle [m]."""
+    """Returns the desired distance to the vehicle in front, from middle to middle [m]."""
     return STANDING_GAP + lengths + TIME_WANTED * speed + speed * (speed - other) / CLOSING
 
 
 @inlined
 def brake_to(speed: float, distance: float) -> float:
-    """Acceleration that stops at a place [m/s^2]; inf as long as it is not yet time to brake."""
+    """Returns the acceleration that stops at a place [m/s^2]; inf as long as it is too early to brake."""
     if distance <= 0.3:
         return -ACC_MAX if speed > 0.0 else 0.0
     needed = speed * speed / (2.0 * distance)
@@ -88,14 +92,14 @@ def brake_to(speed: float, distance: float) -> float:
     return -needed
 
 
-# --- Lane keeping and motion: highway-env's lateral controller and its bicycle, written with the sine of  ------------
+# --- Lane keeping and motion ------------------------------------------------------------------------------------------
 
 STEEP = math.sin(LARGEST_HEADING)
 
 
 @inlined
 def slip_towards_lane(points: Array, lane: LaneRecord, vehicle: VehicleRecord) -> float:
-    """Sine of the slip angle that keeps a vehicle on the lane that it follows (where `station` and `lateral` are)."""
+    """Returns the sine of the slip angle that keeps a vehicle on the lane that it follows."""
     return slip_towards(points, lane, vehicle, vehicle.segment, vehicle.station, vehicle.lateral - vehicle.to_right)
 
 
@@ -103,7 +107,7 @@ def slip_towards_lane(points: Array, lane: LaneRecord, vehicle: VehicleRecord) -
 def slip_towards(
     points: Array, lane: LaneRecord, vehicle: VehicleRecord, segment: int, station: float, off: float
 ) -> float:
-    """Sine of the slip angle that brings a vehicle to a lane.
+    """Returns the sine of the slip angle that brings a vehicle to a lane.
 
     Args:
         points: of all lanes.
@@ -160,10 +164,10 @@ def move(vehicle: VehicleRecord, dt: float) -> None:
     vehicle.speed = speed + acceleration * dt
 
 
-# --- Changing lanes: highway-env's MOBIL (Kesting, Treiber and Helbing 2007) without politeness, as there ------------
+# --- Lane changes -----------------------------------------------------------------------------------------------------
 
 GIVING_UP = 1.0
-"""Who changes lanes and has to stand for this long before it is over there gives it up [s]: by now others may come."""
+"""Stand during a lane change after which the vehicle gives it up [s]: by then others may come."""
 
 
 @inlined
@@ -222,7 +226,7 @@ def _move_over(town: TownArrays, world: WorldArrays, i: int, lane: LaneRecord) -
 
 @compiled
 def mobil(town: TownArrays, world: WorldArrays, i: int, side: int, station: float, must: bool) -> bool:
-    """Whether to change to a lane beside: it brings more acceleration and makes nobody brake hard.
+    """Whether to change to a lane beside: it brings acceleration, and makes no other vehicle brake hard.
 
     Args:
         town: arrays of the town.
@@ -230,7 +234,7 @@ def mobil(town: TownArrays, world: WorldArrays, i: int, side: int, station: floa
         i: the vehicle.
         side: lane beside.
         station: where the vehicle is along that lane [m].
-        must: whether it has to leave its lane, whatever that brings.
+        must: whether it has to leave its lane in any case.
     """
     vehicle = world.vehicles[i]
     front, ahead, rear, behind = around(town, world, side, station, i)
@@ -250,7 +254,7 @@ def mobil(town: TownArrays, world: WorldArrays, i: int, side: int, station: floa
 
 @compiled
 def _held_up(world: WorldArrays, vehicle: VehicleRecord, front: int, gap: float) -> float:
-    """What a body in front takes off the acceleration [m/s^2]."""
+    """Returns the loss of acceleration by a body in front [m/s^2]."""
     if front < 0:
         return 0.0
     node = world.nodes[front]
@@ -260,7 +264,7 @@ def _held_up(world: WorldArrays, vehicle: VehicleRecord, front: int, gap: float)
 
 @compiled
 def _is_taken(world: WorldArrays, i: int) -> bool:
-    """Whether somebody close in front changes into the same lane."""
+    """Whether a vehicle close in front changes into the same lane."""
     vehicle = world.vehicles[i]
     for j in range(len(world.vehicles)):
         other = world.vehicles[j]
