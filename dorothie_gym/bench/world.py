@@ -77,14 +77,14 @@ def measure(
         progress,
     )
     kernel, stock = timings[KERNEL], timings[STOCK]
-    kinds = world.vehicles.kind
+    kinds = world.vehicles["kind"]
     return {
         "town": network.town.name,
         "lanes": len(network.town.lanes),
         "vehicles": int((kinds != Kind.EMPTY).sum()),
         "cyclists": int((kinds == Kind.CYCLIST).sum()),
-        "pedestrians": int((world.pedestrians.state != Walk.EMPTY).sum()),
-        "props": int(world.props.present.sum()),
+        "pedestrians": int((world.pedestrians["state"] != Walk.EMPTY).sum()),
+        "props": int(world.props["present"].sum()),
         "seed": seed,
         "substeps_per_second": rounded(kernel.rate),
         "best": rounded(kernel.best),
@@ -113,7 +113,7 @@ def crowd(
             break
         station = 0.5 * lanes[lane].length
         x, y = lanes[lane].position(station)
-        if np.hypot(world.vehicles.x - x, world.vehicles.y - y).min(initial=np.inf) > FROM_PROPS:
+        if np.hypot(world.vehicles["x"] - x, world.vehicles["y"] - y).min(initial=np.inf) > FROM_PROPS:
             add_prop(network, arrays, world, PropKind.TRAFFIC_CONE, lane, station)
             placed += 1
     return world

@@ -6,18 +6,11 @@ decides exactly (`LocalPlanner`); its mask differs where the pose is inaccurate 
 
 from __future__ import annotations
 
-from typing import Final
-
 from dorothie_gym.maps import LinkType, Town
 from dorothie_gym.maps.lane_neighbours import oncoming_lanes
 from dorothie_gym.policies.route_progress import SWITCH_ROOM, U_TURN_SPEED_SQUARED
-from dorothie_gym.sim.ego.obstacles import BRAKING
-
-MOVING_SPEED: Final = 0.5
-"""Speed above which the path of a manoeuvre begins some way ahead of the car [m/s]."""
-
-LEAD: Final = 1.0
-"""Distance from a moving car to the beginning of the path of a manoeuvre [m]."""
+from dorothie_gym.sim.ego.feasibility import u_turn_braking
+from dorothie_gym.sim.ego.limits import EGO_MOVING, LEAD
 
 
 def slowing_distance(speed: float, target_squared: float = U_TURN_SPEED_SQUARED) -> float:
@@ -27,12 +20,12 @@ def slowing_distance(speed: float, target_squared: float = U_TURN_SPEED_SQUARED)
         speed: present speed [m/s].
         target_squared: square of the speed of the U-turn [m^2/s^2].
     """
-    return max(speed**2 - target_squared, 0.0) / (2 * BRAKING)
+    return u_turn_braking(speed, target_squared)
 
 
 def u_turn_start(station: float, speed: float, target_squared: float = U_TURN_SPEED_SQUARED) -> float:
     """Returns the station at which a U-turn commanded now would begin [m]; arguments as of `slowing_distance`."""
-    return station + slowing_distance(speed, target_squared) + LEAD * (speed > MOVING_SPEED)
+    return station + slowing_distance(speed, target_squared) + LEAD * (speed > EGO_MOVING)
 
 
 def can_turn_round(town: Town, lane: int, start: float) -> bool:

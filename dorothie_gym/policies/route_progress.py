@@ -16,7 +16,7 @@ from dorothie_gym.maps.routing import LaneEntry, Leg, Place, Route, router
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import StreetName
 from dorothie_gym.policies.observation_parser import street_of
-from dorothie_gym.sim.ego.obstacles import BRAKING
+from dorothie_gym.sim.ego.limits import PLANNED_BRAKING
 
 PASSED = 3.0
 """Distance behind the car from which on a goal has been passed [m]."""
@@ -101,7 +101,7 @@ class RouteJunction:
 
 def stopping_distance(speed: float) -> float:
     """Returns the distance driven after a Stop command at a speed [m/s], in metres."""
-    return LAG * speed + speed**2 / (2 * BRAKING)
+    return LAG * speed + speed**2 / (2 * PLANNED_BRAKING)
 
 
 def direction_of(way: Exit) -> Direction:

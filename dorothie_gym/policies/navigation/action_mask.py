@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 
 from dorothie_gym.maps import LinkType, Town
 from dorothie_gym.ontology import PhysicalAction
-from dorothie_gym.policies.feasibility import MOVING_SPEED, can_switch_lane, can_turn_round, u_turn_start
+from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, u_turn_start
 from dorothie_gym.policies.navigation.actions import ACTIONS, FIRST_TURN, UNDER_WAY, NavigationAction, prepares
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits
-from dorothie_gym.sim.ego.ego_controller import MAX_CRUISE, MIN_CRUISE
-from dorothie_gym.sim.ego.manoeuvre_lanes import LEAD, MIN_SWITCH
-from dorothie_gym.sim.ego.obstacles import HALF_LENGTH
-from dorothie_gym.sim.ego.planner import HARD_STOP, U_TURN_SPEED
+from dorothie_gym.sim.ego.feasibility import is_past_stopping
+from dorothie_gym.sim.ego.limits import HALF_LENGTH, LEAD, MAX_CRUISE, MIN_CRUISE, MIN_SWITCH, U_TURN_SPEED
 from dorothie_gym.spaces import ExitColumn, Motion
 
 END_TOLERANCE = 0.5
@@ -73,4 +71,4 @@ class EstimatedActionMask:
         if self._town.lanes[int(observation["lane"])].in_junction:
             return False
         left = float(first[ExitColumn.DISTANCE]) - HALF_LENGTH
-        return speed > MOVING_SPEED and speed**2 / (2.0 * HARD_STOP) > left
+        return is_past_stopping(speed, left)

@@ -25,7 +25,7 @@ from dorothie_gym.policies.observation_parser import (
     street_of,
 )
 from dorothie_gym.policies.route_progress import RouteJunction, RouteProgress, RouteState
-from dorothie_gym.sim.ego.planner import U_TURN_SPEED
+from dorothie_gym.sim.ego.limits import U_TURN_SPEED
 from dorothie_gym.spaces import ObjectColumn, Observation
 
 
