@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from highway_env.vehicle.behavior import IDMVehicle
@@ -33,6 +33,9 @@ from dorothie_gym.sim.step import update_lane
 from dorothie_gym.sim.traffic.parameters import PLANNED
 from dorothie_gym.sim.traffic.route import extend, take
 from dorothie_gym.sim.traffic.vehicle_models import slip_of, steering_angle
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.road import TownRoad
 
 VEHICLE, PEDESTRIAN, PROP = (record_dtype(kind) for kind in (VehicleRecord, PedestrianRecord, PropRecord))
 
@@ -76,15 +79,15 @@ class TrafficVehicle(BodyView, IDMVehicle):
     station, lateral = field(VEHICLE, "own_station"), field(VEHICLE, "own_lateral")
     _followed, _planned = field(VEHICLE, "plan"), field(VEHICLE, "planned")
 
-    def __init__(self, road: Any, holder: ArrayHolder, row: int) -> None:
+    def __init__(self, road: TownRoad, holder: ArrayHolder, row: int) -> None:
         """Looks at a row of `holder.arrays.vehicles`; `road` is a `TownRoad` of the same town."""
         super().__init__(road, holder, row)
-        self.log: list[Any] = []
-        self.history: deque[Any] = deque(maxlen=self.HISTORY_SIZE)
+        self.log: list[object] = []
+        self.history: deque[IDMVehicle] = deque(maxlen=self.HISTORY_SIZE)
         self._history_of = -1
 
     @classmethod
-    def create_from(cls, vehicle: Any) -> IDMVehicle:
+    def create_from(cls, vehicle: IDMVehicle) -> IDMVehicle:
         """A vehicle of highway-env's own in the same state, which owns it."""
         twin = IDMVehicle.create_from(vehicle)
         twin.LENGTH, twin.WIDTH, twin.diagonal = vehicle.LENGTH, vehicle.WIDTH, vehicle.diagonal
@@ -260,7 +263,7 @@ class Pedestrian(_Thing, RoadObject):
     key = field(PEDESTRIAN, "key")
     state = field(PEDESTRIAN, "state", Walk)
 
-    def __init__(self, road: Any, holder: ArrayHolder, row: int) -> None:
+    def __init__(self, road: TownRoad, holder: ArrayHolder, row: int) -> None:
         """Looks at a row of `holder.arrays.pedestrians`; `road` is a `TownRoad` of the same town."""
         super().__init__(road, holder, row)
 
@@ -298,7 +301,7 @@ class Prop(_Thing, Obstacle):
     key = field(PROP, "key")
     lane_id, station = field(PROP, "lane"), field(PROP, "station")
 
-    def __init__(self, road: Any, holder: ArrayHolder, row: int) -> None:
+    def __init__(self, road: TownRoad, holder: ArrayHolder, row: int) -> None:
         """Looks at a row of `holder.arrays.props`; `road` is a `TownRoad` of the same town."""
         super().__init__(road, holder, row)
 
@@ -311,7 +314,7 @@ class Prop(_Thing, Obstacle):
 class Bodies:
     """Views of a world, each made at its first use."""
 
-    def __init__(self, road: Any, holder: ArrayHolder) -> None:
+    def __init__(self, road: TownRoad, holder: ArrayHolder) -> None:
         """Shows the arrays of a holder on a road of the same town."""
         self._road, self._holder = road, holder
         self._made: dict[tuple[type[BodyView], int], Any] = {}

@@ -8,7 +8,7 @@ share a coordinate.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.sim.network.ahead import LEVEL
@@ -17,6 +17,8 @@ from dorothie_gym.sim.state.event_log import log
 from dorothie_gym.sim.state.records import PlacedBody, VehicleRecord
 
 if TYPE_CHECKING:
+    from highway_env.vehicle.objects import RoadObject
+
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 
@@ -220,7 +222,7 @@ class OrientedBox(NamedTuple):
     width: float
 
     @classmethod
-    def of(cls, thing: Any) -> OrientedBox:
+    def of(cls, thing: RoadObject) -> OrientedBox:
         """Returns the outline of a highway-env object."""
         x, y = thing.position
         return cls(float(x), float(y), float(thing.heading), float(thing.LENGTH), float(thing.WIDTH))

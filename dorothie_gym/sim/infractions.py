@@ -12,7 +12,6 @@ import weakref
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -206,7 +205,7 @@ class WorldEvent:
 
     frame: int
     kind: WorldEventKind
-    data: Mapping[str, Any] = field(default_factory=dict)
+    data: Mapping[str, object] = field(default_factory=dict)
 
 
 class WorldEventLog:
@@ -222,13 +221,13 @@ class WorldEventLog:
         self._events: list[WorldEvent] = []
         self.infractions: Counter[WorldEventKind] = Counter()
 
-    def add(self, kind: WorldEventKind, frame: int, **data: Any) -> None:
+    def add(self, kind: WorldEventKind, frame: int, **data: object) -> None:
         """Reports something that happened at a frame."""
         self._events.append(WorldEvent(frame=frame, kind=kind, data=data))
 
     def infraction(
         self, kind: WorldEventKind, frame: int, *, lane: int, station: float, x: float, y: float,
-        key: int | None, other: ObjectClass | None, **data: Any,
+        key: int | None, other: ObjectClass | None, **data: object,
     ) -> None:  # fmt: skip
         """Reports a breach of the rules.
 

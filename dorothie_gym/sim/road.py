@@ -7,11 +7,11 @@ import functools
 import itertools
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from highway_env.road.road import Road
-from highway_env.vehicle.objects import Landmark
+from highway_env.vehicle.kinematics import Vehicle
+from highway_env.vehicle.objects import Landmark, RoadObject
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
@@ -21,6 +21,7 @@ from dorothie_gym.sim.network.ahead import LEVEL, LaneChains, Neighbours, lane_z
 from dorothie_gym.sim.network.network import LaneIndex, Route, TownNetwork
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.record_views import BodyView
+from dorothie_gym.sim.state.records import VehicleRecord
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.step import step_around, update_lane
@@ -40,8 +41,8 @@ class TownRoad(Road):
     def __init__(
         self,
         network: TownNetwork,
-        vehicles: list[Any] | None = None,
-        road_objects: list[Any] | None = None,
+        vehicles: list[Vehicle] | None = None,
+        road_objects: list[RoadObject] | None = None,
         np_random: np.random.Generator | None = None,
         record_history: bool = False,
         neighbour_vehicles_connected_lanes: bool = True,
@@ -74,7 +75,7 @@ class TownRoad(Road):
     def _zones(self) -> Array:
         return lane_zones(self.network.table)
 
-    def height_of(self, thing: Any) -> float:
+    def height_of(self, thing: RoadObject) -> float:
         """Height of a vehicle or object [m]: its own `height` if it has one, else its lane's; NaN without a lane."""
         own = getattr(thing, "height", None)
         if own is not None:
@@ -83,7 +84,7 @@ class TownRoad(Road):
             return math.nan
         return float(thing.lane.height_at(thing.lane.local_coordinates(thing.position)[0]))
 
-    def at_one_level(self, one: Any, other: Any) -> bool:
+    def at_one_level(self, one: RoadObject, other: RoadObject) -> bool:
         """Whether two things can meet: no more than `ahead.LEVEL` apart in height, as far as that is known."""
         low, high = self.network.height_range
         own_heights = getattr(one, "height", None) is not None or getattr(other, "height", None) is not None
@@ -104,7 +105,7 @@ class TownRoad(Road):
             if self.at_one_level(things[i], things[j]):
                 things[i].handle_collisions(things[j], dt)
 
-    def _near_pairs(self, things: Sequence[Any], dt: float) -> list[tuple[int, int]]:
+    def _near_pairs(self, things: Sequence[RoadObject], dt: float) -> list[tuple[int, int]]:
         """Pairs of a vehicle and what comes after it in `things` that may touch within `dt`, in highway-env's order."""
         count = len(self.vehicles)
         if not count:
@@ -118,13 +119,13 @@ class TownRoad(Road):
 
     def close_objects_to(
         self,
-        vehicle: Any,
+        vehicle: Vehicle,
         distance: float,
         count: int | None = None,
         see_behind: bool = True,
         sort: bool = True,
         vehicles_only: bool = False,
-    ) -> list[Any]:
+    ) -> list[RoadObject]:
         """Returns the objects close to a vehicle, as highway-env chooses them, with one call for all measurements.
 
         Args:
@@ -150,7 +151,9 @@ class TownRoad(Road):
             chosen = chosen[np.argsort(np.abs(along[chosen]), kind="stable")]
         return [things[k] for k in chosen[: count or None].tolist()]
 
-    def neighbour_vehicles(self, vehicle: Any, lane_index: LaneIndex | None = None) -> tuple[Any | None, Any | None]:
+    def neighbour_vehicles(
+        self, vehicle: Vehicle, lane_index: LaneIndex | None = None
+    ) -> tuple[RoadObject | None, RoadObject | None]:
         """Next thing ahead and behind of a vehicle; see `neighbours`.
 
         Args:
@@ -164,8 +167,8 @@ class TownRoad(Road):
         return front, rear
 
     def neighbours(
-        self, vehicle: Any, lane_index: LaneIndex | None = None
-    ) -> tuple[tuple[Any | None, float], tuple[Any | None, float]]:
+        self, vehicle: Vehicle, lane_index: LaneIndex | None = None
+    ) -> tuple[tuple[RoadObject | None, float], tuple[RoadObject | None, float]]:
         """Returns the next objects ahead and behind of a vehicle, and their distances along the lanes [m] or inf.
 
         Looks on the whole lane as highway-env does, then up to `ahead.HORIZON` along the lanes ahead (those of the
@@ -210,7 +213,7 @@ class TownRoad(Road):
         rear = others[found.rear] if found.rear >= 0 else None
         return (front, float(found.front_distance)), (rear, float(found.rear_distance))
 
-    def _route(self, vehicle: Any, index: LaneIndex) -> Route | None:
+    def _route(self, vehicle: Vehicle, index: LaneIndex) -> Route | None:
         """The vehicle's route; without one, the lane it steers for if that follows the lane in question."""
         route: Route | None = getattr(vehicle, "route", None)
         target = getattr(vehicle, "target_lane_index", None)
@@ -259,14 +262,14 @@ class CompiledRoad(TownRoad):
         super().__init__(network=network, np_random=np_random, record_history=record_history)
         self.arrays = arrays
         self._bodies = Bodies(self, self)
-        self._guests: list[Any] = []
+        self._guests: list[Vehicle] = []
         self._rows: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
         self._poses: Array = np.zeros((0, 4))
-        self._things: list[Any] = []
-        self._listed: tuple[list[Any], list[Any]] = [], []
+        self._things: list[RoadObject] = []
+        self._listed: tuple[list[Vehicle], list[RoadObject]] = [], []
         self.show()
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> CompiledRoad:
+    def __deepcopy__(self, memo: dict[int, object]) -> CompiledRoad:
         twin = self.__class__.__new__(self.__class__)
         memo[id(self)] = twin
         for name, value in self.__dict__.items():
@@ -317,13 +320,13 @@ class CompiledRoad(TownRoad):
                 if isinstance(view, TrafficVehicle):
                     view.remember()
 
-    def _level(self, guest: Any, record: Any) -> None:
+    def _level(self, guest: Vehicle, record: VehicleRecord) -> None:
         """Sets a guest's closest lane of its height; highway-env would take one of a bridge below or above it."""
         guest.height = float(record.height)
         guest.lane_index = self.network.index_of(record.lane)
         guest.lane = self.network.get_lane(guest.lane_index)
 
-    def _mark_props(self, guest: Any) -> None:
+    def _mark_props(self, guest: Vehicle) -> None:
         """Marks the props that a guest has run into, as highway-env does; the kernel keeps no such mark."""
         outline = OrientedBox.of(guest)
         for prop in self._bodies.props():
@@ -360,7 +363,7 @@ class CompiledRoad(TownRoad):
             if ("props", row) not in shown:
                 arrays.props[row].present = False
 
-    def _seat(self, guest: Any) -> int:
+    def _seat(self, guest: Vehicle) -> int:
         """Gives a guest a row, and returns its number; the first guest of a world has the key 0."""
         town = self.town_arrays
         empty = np.flatnonzero(self.arrays.vehicles["kind"] == Kind.EMPTY)

@@ -183,7 +183,7 @@ class OccupancyGrid(OccupancyGridObservation):
             self.grid[layer_index, cells[inside, 0], cells[inside, 1]] = 1
 
 
-def quicken(kind: Any) -> None:
+def quicken(kind: ObservationType) -> None:
     """Lets highway-env's observation type, and those that it consists of, observe in the quick ways of this module."""
     for part in parts_of(kind):
         quick = _QUICK.get(type(part))
@@ -191,7 +191,7 @@ def quicken(kind: Any) -> None:
             part.__class__ = quick  # they differ in what they do, not in what they keep
 
 
-def parts_of(kind: Any) -> list[Any]:
+def parts_of(kind: ObservationType) -> list[ObservationType]:
     """A type of observation and those that it consists of."""
     parts = [*getattr(kind, "observation_types", ()), *getattr(kind, "agents_observation_types", ())]
     return [kind, *(found for part in parts for found in parts_of(part))]
@@ -251,7 +251,7 @@ class TownEnv(AbstractEnv):
 
     def __init__(self, config: dict[str, Any] | None = None, render_mode: str | None = None) -> None:
         self._network: TownNetwork | None = None
-        self._network_of: Any = None
+        self._network_of: str | None = None
         super().__init__(config, render_mode)
 
     @classmethod
@@ -316,10 +316,10 @@ class TownEnv(AbstractEnv):
         populate_around(network, arrays, self.np_random, vehicles=vehicles, pedestrians=pedestrians)
         self.road.show()
 
-    def _reward(self, action: Any) -> float:
+    def _reward(self, action: object) -> float:
         return float(sum(self._rewards(action).values()))
 
-    def _rewards(self, action: Any) -> dict[str, float]:
+    def _rewards(self, action: object) -> dict[str, float]:
         vehicle = self.vehicle
         station, _ = vehicle.lane.local_coordinates(vehicle.position)
         along = vehicle.speed * np.cos(vehicle.lane.heading_at(station) - vehicle.heading)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -26,6 +25,7 @@ from dorothie_gym.sim.ego.path_tracking import find_sides
 from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.ego.vehicle import Car, CarRecord
 from dorothie_gym.sim.state.records import plain
+from dorothie_gym.sim.state.world_arrays import WorldArrays
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CAR_WIDTH
 
 END_GAP = 0.8
@@ -65,7 +65,7 @@ def speed_profile(path: Path, stop_at: float | None) -> Array:
     return speeds
 
 
-def write_path(arrays: Any, path: Path, s: float, speeds: Array) -> float:
+def write_path(arrays: WorldArrays, path: Path, s: float, speeds: Array) -> float:
     """Writes the stretch of a path around a place into the arrays of a world.
 
     Args:
@@ -151,7 +151,7 @@ class EgoController:
         self.goals = tuple(goals)
         self._written = None
 
-    def brief(self, arrays: Any, record: CarRecord) -> None:
+    def brief(self, arrays: WorldArrays, record: CarRecord) -> None:
         """Writes path, manoeuvre, cruise speed and pedals into the arrays of a world, before it is stepped.
 
         Args:
@@ -181,7 +181,7 @@ class EgoController:
         path = self._written
         return float(np.interp(s, path.s, self._speeds)) if path is not None else self.cruise * KMH
 
-    def _write(self, arrays: Any, *, anew: bool) -> None:
+    def _write(self, arrays: WorldArrays, *, anew: bool) -> None:
         """Writes the stretch of path around the ego, and for a new path its speeds, goals and end."""
         path, s, car = self.planner.path, self.planner.s, plain(arrays.car)[0]
         if anew:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from highway_env.vehicle.kinematics import Vehicle
+from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.ego.limits import VehicleControl
 from dorothie_gym.sim.road import TownRoad
+from dorothie_gym.sim.state.record_views import ArrayHolder
 from dorothie_gym.sim.state.records import fields, plain
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 
@@ -23,10 +24,10 @@ class Car(Vehicle):
 
     MAX_SPEED = 40.0
 
-    def __init__(self, road: TownRoad, holder: Any) -> None:
+    def __init__(self, road: TownRoad, holder: ArrayHolder) -> None:
         """Shows the first vehicle of `holder.arrays`, which may be replaced by others with more room."""
         self._holder = holder
-        self._state_of: Any = None
+        self._state_of: WorldArrays | None = None
         self._heading: float
         self._speed: float
         self._height: float
@@ -39,7 +40,7 @@ class Car(Vehicle):
         self._position = np.array((x, y))
 
     @property
-    def _state(self) -> Any:
+    def _state(self) -> NDArray[np.void]:
         """Place, heading, speed and height in the arrays, see `fields`."""
         arrays: WorldArrays = self._holder.arrays
         if arrays is not self._state_of:
@@ -47,8 +48,9 @@ class Car(Vehicle):
         return self._own_state
 
     @property
-    def _row(self) -> Any:
-        return plain(self._holder.arrays.vehicles)[0]
+    def _row(self) -> np.void:
+        row: np.void = plain(self._holder.arrays.vehicles)[0]
+        return row
 
     @property
     def position(self) -> Array:

@@ -71,7 +71,7 @@ class PolylineLane(AbstractLane):
         self._value = functools.partial(polyline.value_at, self._points, self._offsets, row)
         self._distance = functools.partial(polyline.distance, *shape)
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> PolylineLane:
+    def __deepcopy__(self, memo: dict[int, object]) -> PolylineLane:
         return self
 
     def position(self, longitudinal: float, lateral: float = 0.0) -> Array:

@@ -142,7 +142,7 @@ class TownNetwork(RoadNetwork):
         heights = self.table.points[:, HEIGHT]
         self.height_range = float(heights.min()), float(heights.max())
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> TownNetwork:
+    def __deepcopy__(self, memo: dict[int, object]) -> TownNetwork:
         return self
 
     def add_lane(self, _from: str, _to: str, lane: object) -> None:
@@ -228,7 +228,7 @@ class TownNetwork(RoadNetwork):
         current_index: LaneIndex,
         route: Route | None = None,
         position: Array | None = None,
-        np_random: Any = np.random,
+        np_random: np.random.Generator = np.random,  # type: ignore[assignment]  # highway-env's default
     ) -> LaneIndex:
         """Lane to be followed after the current one.
 

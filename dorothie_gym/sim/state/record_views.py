@@ -9,12 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.state.world_arrays import WorldArrays
+
+if TYPE_CHECKING:
+    from highway_env.vehicle.objects import RoadObject
+
+    from dorothie_gym.sim.road import TownRoad
 
 
 class ArrayHolder(Protocol):
@@ -66,7 +71,7 @@ class BodyView:
     solid = True
     check_collisions = True
     hit = False
-    impact: Any = None
+    impact: Array | None = None
 
     cos: Any
     sin: Any
@@ -76,7 +81,7 @@ class BodyView:
     lane_id: Any
     station: Any
 
-    def __init__(self, road: Any, holder: ArrayHolder, row: int) -> None:
+    def __init__(self, road: TownRoad, holder: ArrayHolder, row: int) -> None:
         """Looks at a row; `road` is a `TownRoad` of the same town."""
         self.road = road
         self._holder = holder
@@ -145,7 +150,7 @@ class BodyView:
         found: tuple[float, float] = self.lane.local_coordinates(self.position)
         return found
 
-    def to_dict(self, origin_vehicle: Any = None, observe_intentions: bool = True) -> dict[str, float]:
+    def to_dict(self, origin_vehicle: RoadObject | None = None, observe_intentions: bool = True) -> dict[str, float]:
         """Returns the features that highway-env observes of a vehicle; those of pedestrians and props likewise.
 
         Args:
