@@ -204,7 +204,9 @@ TWO_SECONDS = """
 import hashlib
 from highway_env.vehicle.kinematics import Vehicle
 from dorothie_gym.sim.road import CompiledRoad
-from dorothie_gym.sim.state import empty_world, populate, town_arrays
+from dorothie_gym.sim.population import populate
+from dorothie_gym.sim.state.town_arrays import town_arrays
+from dorothie_gym.sim.state.world_arrays import empty_world
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.maps import load_town
 network = TownNetwork(load_town("brookside"))

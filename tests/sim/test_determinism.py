@@ -22,7 +22,11 @@ from tests.sim.state.states import DT
 TEN_SECONDS = """
 import hashlib
 from dorothie_gym.ontology import PropKind
-from dorothie_gym.sim.state import Walk, add_prop, add_street_walker, empty_world, populate, step, town_arrays
+from dorothie_gym.sim.population import add_prop, add_street_walker, populate
+from dorothie_gym.sim.state.codes import Walk
+from dorothie_gym.sim.state.town_arrays import town_arrays
+from dorothie_gym.sim.state.world_arrays import empty_world
+from dorothie_gym.sim.step import step
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.maps import load_town
 network = TownNetwork(load_town("brookside"))
