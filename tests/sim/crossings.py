@@ -34,7 +34,7 @@ def across(start: str, end: str) -> int:
 
 
 def _place(arm: str, outward: float, right: float) -> tuple[float, float]:
-    """A place on an arm: so far from the middle, and to the right of who comes in [m]."""
+    """Returns a place on an arm: distance from the middle, and offset to the right of incoming vehicles [m]."""
     x, y = OUTWARD[arm]
     return outward * x + right * y, outward * y - right * x
 

@@ -1,4 +1,4 @@
-"""Perfect instructions: whoever gives them knows the map, the route and where the car is."""
+"""Perfect instructions for the ego, from the map, the route and the true pose."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ STRAIGHT = {LaneEntry.CHANGE_LEFT: 90, LaneEntry.CHANGE_RIGHT: -90}
 
 
 def guided_trip(roads: TownNetwork, start: Site, goal: Site, *, most: float = 1200.0) -> Trip:
-    """Drives from one site to another without anybody else; it has arrived when the car stands beside the goal.
+    """Drives from one site to another without others; the ego has arrived when it stands beside the goal.
 
     Args:
         roads: the town.
-        start: where the car stands.
-        goal: where it is to go.
-        most: seconds after which it is given up.
+        start: departure of the ego.
+        goal: destination.
+        most: longest duration [s].
     """
     town = roads.town
     world = on_lane(roads, start.lane, start.station)
@@ -59,7 +59,7 @@ def guided_trip(roads: TownNetwork, start: Site, goal: Site, *, most: float = 12
 
 
 def _next(town: Town, planner: LocalPlanner, goal: Site, speed: float) -> Instruction | None:
-    """What a guide says now, if anything."""
+    """Returns the next instruction, if there is one."""
     if planner.held or town.lanes[planner.lane].in_junction:
         return None
     left = goal.station - planner.station

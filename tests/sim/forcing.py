@@ -1,4 +1,4 @@
-"""Situations into which nobody gets by driving with care, brought about in the arrays of the world."""
+"""Situations that careful driving avoids, forced in the arrays of the world."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from dorothie_gym.sim.world import World
 from tests.sim.network.towns import lane, town
 
 TOO_LATE = 6.0
-"""Who comes at 12 m/s, its middle this far before a line, cannot stop before it [m]."""
+"""Distance from the middle to a line at which a vehicle at 12 m/s cannot stop before the line [m]."""
 
 
 def blind(world: World) -> None:
-    """From now on the car sees nobody and nothing: what it sees is listed where there is no room. None may be added."""
+    """Makes the ego blind: its list of perceived bodies has no room. No body may be added afterwards."""
     arrays = world.actors.arrays
     world.actors.arrays = arrays._replace(seen=arrays.seen[:0])
 
 
 def park(world: World, station: float, *, lateral: float = 0.0, speed: float = 0.0) -> TrafficVehicle:
-    """Puts a vehicle on the car's lane in which nobody sits: it keeps its speed [m/s] and direction."""
+    """Adds a vehicle without a driver on the ego's lane: it keeps its speed [m/s] and direction."""
     lane = world.town.lanes[world.planner.lane]
     assert world.actors.add_vehicle(lane.id, station, distance=5.0)
     vehicle = world.actors.vehicles[-1]
     assert vehicle.kind is Kind.CAR
-    vehicle.kind = Kind.EGO  # whom the world lets roll as it is told: neither faster nor slower
+    vehicle.kind = Kind.EGO  # moved at its speed, neither faster nor slower
     vehicle.position, vehicle.speed = lane.position(station, lateral), speed
     vehicle.on_state_update()
     return vehicle

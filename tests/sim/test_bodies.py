@@ -39,7 +39,7 @@ def brookside() -> TownNetwork:
 
 
 def crowd(network: TownNetwork, *, seconds: float = 8.0) -> tuple[Any, TownRoad, Bodies]:
-    """Traffic, people and a prop that have been about for a while: who has the arrays, a road and the views."""
+    """Traffic, pedestrians and a prop after a while: holder of the arrays, road and views."""
     town = town_arrays(network)
     world = empty_world(town, vehicles=14, pedestrians=8, seed=2)
     populate(network, town, world, seed=2, vehicles=12, pedestrians=6, cyclists=0.4)

@@ -95,7 +95,7 @@ def test_who_touches_has_crashed_on_both_sides_and_in_the_same_substep() -> None
     assert guest.crashed
     keys = [vehicle.key for vehicle in road.vehicles[1:]]
     go(road, 6.0)
-    assert [vehicle.key for vehicle in road.vehicles[1:]] == keys  # nobody is towed from beneath the guest's eyes
+    assert [vehicle.key for vehicle in road.vehicles[1:]] == keys  # no body respawns near the guest
     assert guest.speed < 1.0
 
 

@@ -98,7 +98,7 @@ def run(disabled, hash_seed):
 
 @pytest.fixture(scope="module")
 def digests():
-    """What three processes at once find: two compiled ones, and one in plain Python."""
+    """Results of three processes at once: two compiled ones, and one in plain Python."""
     with ThreadPoolExecutor(3) as pool:
         return dict(zip(("one", "other", "plain"), pool.map(run, "001", "121"), strict=True))
 

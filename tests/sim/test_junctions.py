@@ -1,4 +1,4 @@
-"""How the session's car goes through junctions among others; the traffic's own ways are in `kernel`."""
+"""The ego at junctions among others; the traffic itself is tested in `tests/sim/traffic`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ROOM = 4
 
 
 def world_in(town: Town, arm: str = "s", station: float = 20.0) -> World:
-    """The car on an arm, on its way to the crossing, nobody else, and room for `ROOM` others."""
+    """Returns a world with the ego on an arm, on its way to the crossing, and room for `ROOM` others."""
     world = World(town, ALONE, seed=np.random.SeedSequence(1), departure=(way_in(arm), station))
     state = world.actors.arrays
     world.actors.arrays = grown(
@@ -254,7 +254,7 @@ def drive_about(world: World, rng: np.random.Generator) -> None:
 
 
 def connectors_in_use(arrays: WorldArrays) -> list[int]:
-    """Connectors on which somebody is who has not left the junction, or for which it was let in and has begun."""
+    """Returns the connectors with a vehicle that has not left the junction, or that was admitted and has begun."""
     there = arrays.vehicles[arrays.vehicles.kind != Kind.EMPTY]
     return [int(lane) for lane in there.inside if lane >= 0]
 

@@ -1,4 +1,4 @@
-"""What a world takes of memory beside the others of its town."""
+"""Memory of a world beside the others of its town."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ def test_rows_are_highway_envs_to_the_last_bit(env: TownEnv, config: dict[str, A
 
 
 def test_one_row_is_the_observer_alone(env: TownEnv) -> None:
-    alone = Kinematics(env, vehicles_count=1, normalize=False).observe()  # highway-env would tell of everybody here
+    alone = Kinematics(env, vehicles_count=1, normalize=False).observe()  # highway-env would list all of them here
     np.testing.assert_array_equal(alone, Kinematics(env, normalize=False).observe()[:1])
 
 

@@ -1,4 +1,4 @@
-"""A crowd for ten minutes: nobody gets lost, stuck, or runs into anybody."""
+"""A crowd for ten minutes: no body gets lost or stuck, and none collide."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def soak(name, *, minutes, seed, vehicles=60, pedestrians=40, strollers=20, ever
     walkers = world.pedestrians[world.pedestrians.state != Walk.EMPTY]
     assert len(walkers) == 0 or walkers.odometer.min() > 50.0
     assert runs == 0
-    assert world.clock[0].towed <= 1 + world.clock[0].collisions * 2  # no knots, and hardly anybody loses patience
+    assert world.clock[0].towed <= 1 + world.clock[0].collisions * 2  # no gridlock, and few lose patience
     return int(world.clock[0].collisions), int(world.clock[0].run_over)
 
 

@@ -66,7 +66,7 @@ def test_car_gives_way_to_people_on_a_crosswalk_and_then_goes_on(which: int, end
 
 
 def passage_of(arrays, connector: int, crossing: int) -> float:  # type: ignore[no-untyped-def]
-    """How far along a crosswalk a lane crosses it [m]."""
+    """Returns the distance along a crosswalk at which a lane crosses it [m]."""
     lane = arrays.lanes[connector]
     passages = arrays.passages[lane.passage : lane.passage + lane.passages]
     return float(next(passage.across for passage in passages if passage.crossing == crossing))

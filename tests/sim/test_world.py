@@ -133,12 +133,12 @@ def test_car_stops_behind_a_standing_vehicle() -> None:
 
 
 def across(world: World, walker: Pedestrian) -> float:
-    """How far it is from a pedestrian's kerb to the one on the other side [m]."""
+    """Returns the distance from a pedestrian's kerb to the opposite one [m]."""
     return float(town_arrays(world.network).walk_points[walker.record.segment, 5])
 
 
 def step_out(world: World, walker: Pedestrian) -> None:
-    """Lets somebody beside a street cross it at once, whoever comes."""
+    """Makes a pedestrian beside a street cross it at once, whatever is coming."""
     record = walker.record
     record.state, record.far = Walk.STRAYING, across(world, walker)
     assert record.far > 6.0
@@ -189,8 +189,8 @@ def test_pedestrians_walk_on_no_lane() -> None:
         assert min(walker.odometer for walker in world.actors.pedestrians) > 20.0
 
 
-def car_that_stands_beside_somebody(behind: float) -> tuple[World, Pedestrian]:
-    """A car by command at a stand, and somebody at the kerb `behind` its nose [m] who crosses the road now."""
+def ego_beside_a_pedestrian(behind: float) -> tuple[World, Pedestrian]:
+    """Returns a world with the ego stopped, and a pedestrian `behind` its nose [m] that crosses the road now."""
     world = world_at("brookside", long_lane(network("brookside").town), 40.0)
     world.planner.command(PhysicalAction.STOP, 0, 0.0)
     lane = world.town.lanes[world.planner.lane]
@@ -204,7 +204,7 @@ def car_that_stands_beside_somebody(behind: float) -> tuple[World, Pedestrian]:
 
 @pytest.mark.parametrize("behind", [-1.0, 1.0, 3.0])
 def test_pedestrian_does_not_walk_into_a_car(behind: float) -> None:
-    world, walker = car_that_stands_beside_somebody(behind)
+    world, walker = ego_beside_a_pedestrian(behind)
     lane = world.town.lanes[world.planner.lane]
     kerb = nearest = float(lane.project(walker.position)[1])
     for _ in range(40):
@@ -243,7 +243,7 @@ def test_who_crosses_a_road_comes_to_its_far_kerb(name: str) -> None:
 
 
 def test_pedestrian_who_stands_close_to_a_car_steps_away_from_it() -> None:
-    world, walker = car_that_stands_beside_somebody(-0.6)
+    world, walker = ego_beside_a_pedestrian(-0.6)
     lane = world.town.lanes[world.planner.lane]
     station = lane.project(walker.position)[0]
     walker.position = lane.position(station)  # 0.35 m before the car's nose

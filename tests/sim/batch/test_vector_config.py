@@ -1,4 +1,4 @@
-"""Which of highway-env's settings many towns at once understand."""
+"""Settings of highway-env that the vector environment supports."""
 
 from __future__ import annotations
 

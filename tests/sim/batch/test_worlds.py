@@ -50,7 +50,7 @@ def throttle(seed: int) -> float:
 
 @functools.cache
 def alone(seed: int) -> bytes:
-    """What becomes of a world that is stepped by itself."""
+    """State of a world that is stepped by itself."""
     world = crowd(seed)
     step(town(), world, SUBSTEPS, DT, throttle(seed), 0.01 * seed)
     return world.tobytes()

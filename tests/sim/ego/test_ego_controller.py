@@ -42,7 +42,7 @@ def test_car_comes_slowly_to_a_goal_and_can_be_stopped_within_two_metres(cruise:
     ego.set_goals([GoalAhead(lane=lane, station=80.0)])
     drive(world, lambda: ego.planner.station > 80.0 - 15.0)
     assert car.speed <= 16.0 * KMH
-    # twice a second somebody decides whether to stop now
+    # twice a second it is decided whether to stop now
     while True:
         speed = float(car.speed)
         if 80.0 - ego.planner.station < speed**2 / 6.0 + 0.56 * speed + 0.5 * speed / 2:

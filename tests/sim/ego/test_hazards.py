@@ -21,7 +21,7 @@ ROAD: Lane = lane(0, [(0.0, 0.0), (100.0, 0.0)])
 
 
 class Found(NamedTuple):
-    """What is in the way: class, gap [m], its speed [m/s], and the speed that it allows [m/s]."""
+    """Obstacle: class, gap [m], its speed [m/s], and the speed that it allows [m/s]."""
 
     kind: ObjectClass
     gap: float
@@ -35,7 +35,7 @@ def body(x: float, y: float = 0.0, *, kind: ObjectClass = ObjectClass.VEHICLES, 
 
 
 def ahead(*bodies: dict[str, Any], road: Lane = ROAD, speed: float = 0.0) -> Found | None:
-    """What a car 10 m from the start of a road, in whose lane it keeps, finds in its way."""
+    """Returns the obstacle of a car that keeps its lane 10 m from the start of a road."""
     town = town_arrays(network("brookside"))
     world = empty_world(town, vehicles=4, pedestrians=0, driven=True)
     add_car(town, world, 0, 5.0)

@@ -1,4 +1,4 @@
-"""Whoever knows the way gets there: in every town, between any two sites."""
+"""Guided trips arrive in every town, between any two sites."""
 
 from __future__ import annotations
 

@@ -118,7 +118,7 @@ def at_cell_borders(network: TownNetwork, rng: np.random.Generator, count: int) 
 
 
 def at_overpasses(network: TownNetwork, rng: np.random.Generator, count: int) -> Points:
-    """Where lanes pass over others; anywhere on the roads in a town without bridges."""
+    """Returns places where lanes pass over others; any places on the roads in a town without bridges."""
     points = network.table.points
     some = points[rng.choice(len(points), size=min(len(points), 1500), replace=False)]
     over = np.array(

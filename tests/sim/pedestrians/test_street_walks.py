@@ -92,7 +92,7 @@ def test_who_drives_stops_for_somebody_who_is_crossing(speed):
     network = two_way_network()
     arrays = town_arrays(network)
     world = empty_world(arrays, vehicles=1, pedestrians=1)
-    number = add_street_walker(network, arrays, world, 1, 80.0)  # comes from the left of who drives on lane 0
+    number = add_street_walker(network, arrays, world, 1, 80.0)  # comes from the left of vehicles on lane 0
     walker = world.pedestrians[number]
     walker.state, walker.far, walker.pace = Walk.STRAYING, 8.0 + 2 * KERB, 0.6
     add_vehicle(arrays, world, 0, 66.0 - 5.0 * speed, desired=speed)

@@ -1,4 +1,4 @@
-"""Where crosswalks are, which pavements they join, and where lanes cross them."""
+"""Crosswalks: their places, the pavements that they join, and the lanes that cross them."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""How well the filter knows where the car is, over many drives by chance."""
+"""Accuracy and consistency of the localizer over many random drives."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the car senses is the same, byte by byte, compiled and in plain Python."""
+"""Perception is the same, byte by byte, compiled and in plain Python."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is seen in bad weather, and that a car that sees badly still stops in time."""
+"""Perception in bad weather, in which the ego still stops in time."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def body(x: float, y: float = 0.0, key: int = 7) -> PerceivedBody:
 
 
 class Eyes:
-    """Somebody at the origin who looks at vehicles."""
+    """An observer on the x axis that looks at vehicles."""
 
     def __init__(self, seed: int = 0) -> None:
         self._perception = Perception(np.random.default_rng(seed))
@@ -45,7 +45,7 @@ class Eyes:
     def look(
         self, bodies: Sequence[PerceivedBody], view: Visibility, frame: int, x: float = 0.0
     ) -> list[PerceivedBody]:
-        """What is perceived of bodies from a place on the x axis."""
+        """Returns the perceived bodies from a place on the x axis."""
         vehicles, seen = empty_records(VehicleRecord, len(bodies)), empty_records(SeenRecord, len(bodies))
         for vehicle, thing in zip(vehicles, bodies, strict=True):
             vehicle.kind, vehicle.key, vehicle.x, vehicle.y = Kind.CAR, thing.key, thing.x, thing.y

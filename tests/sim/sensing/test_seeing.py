@@ -1,4 +1,4 @@
-"""What the compiled eyes see, against the same rules in plain Python."""
+"""Compiled perception against the same rules in plain Python."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def weather_of(sky: str) -> Weather:
 
 
 class Street:
-    """Bodies at random around a place, the first vehicle being whoever looks."""
+    """Random bodies around a place, the first vehicle being the observer."""
 
     def __init__(self, seed: int, vehicles: int = 30, pedestrians: int = 20, props: int = 4) -> None:
         rng = np.random.default_rng(seed)
@@ -108,7 +108,7 @@ class Street:
 
 
 def bodies_seen(seen: RecordArray[SeenRecord]) -> list[PerceivedBody]:
-    """What has been seen, as objects."""
+    """Returns the perceived bodies as objects."""
     return [
         PerceivedBody(**{name: thing[name].item() for name in BODY} | {"kind": ObjectClass(int(thing.kind))})
         for thing in seen

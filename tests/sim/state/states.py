@@ -21,7 +21,7 @@ DT = 1.0 / 30.0
 
 
 class Pose(NamedTuple):
-    """Where a vehicle is on a lane [m], how it stands there [rad], how fast it is and likes to be [m/s]."""
+    """State of a vehicle on a lane: station [m], angle [rad], speed and desired speed [m/s]."""
 
     lane: int
     station: float

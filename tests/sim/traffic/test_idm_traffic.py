@@ -1,4 +1,4 @@
-"""What the kernel's vehicles and pedestrians do beyond stock: bends, cyclists, props, crosswalks."""
+"""Vehicles and pedestrians beyond highway-env's: bends, cyclists, props, crosswalks."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Who is let into a crossing, asked for one by one: lights, priority, patience, room, turns and claims."""
+"""Admission to a crossing, request by request: lights, priority, patience, room, order of arrival, permissions."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_left_turn_lets_go_first_who_starts_at_the_same_green_light() -> None:
 
 
 def stream(askers: Askers, now: float) -> None:
-    """Somebody with priority is always at most two seconds away from the line: vehicles 1 and 2 in turns."""
+    """Keeps a vehicle with priority at most two seconds away from the line: vehicles 1 and 2 in turns."""
     askers.come(1 + int(now / 2.0) % 2, now, distance=8.0 * (2.0 - now % 2.0), speed=8.0)
 
 

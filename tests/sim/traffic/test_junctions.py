@@ -148,7 +148,7 @@ def test_no_more_are_let_in_than_have_room_behind_the_junction():
     entered: list[set[int]] = []
     for _ in range(round(14.0 / DT)):
         world.vehicles[0].desired = world.vehicles[0].speed = 0.0
-        world.vehicles.standing = 0.0  # nobody looks for another way
+        world.vehicles.standing = 0.0  # no vehicle draws another route
         step(arrays, world, 1, DT)
         entered.append({i for i in (1, 2, 3) if arrays.lanes[world.vehicles[i].plan[0]].junction >= 0})
         assert not world.vehicles.crashed.any()

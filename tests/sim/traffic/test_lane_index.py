@@ -1,4 +1,4 @@
-"""Who counts as being on a lane: also who sticks out into it, and who changes lanes and has to stand."""
+"""Bodies that count as on a lane, those that reach into it or stand in a lane change included."""
 
 import math
 
@@ -51,7 +51,7 @@ def test_who_comes_along_stops_behind_somebody_who_stands_askew_on_the_lane_besi
         two_lanes(),
         [Pose(1, 20.0, speed=8.0), Pose(0, 90.0, lateral=1.2, turned=math.pi / 4), Pose(0, 24.0, speed=8.0)],
     )
-    world.vehicles.timer = -1e9  # nobody thinks of changing lanes
+    world.vehicles.timer = -1e9  # no vehicle considers a lane change
     for _ in range(600):
         askew = world.vehicles[1]
         askew.speed, askew.desired = 0.0, 0.0
@@ -61,7 +61,7 @@ def test_who_comes_along_stops_behind_somebody_who_stands_askew_on_the_lane_besi
 
 
 def test_who_has_to_stand_before_it_is_over_gives_the_change_up():
-    """Else it would begin to move just when somebody comes along the other lane."""
+    """Otherwise it would begin to move just when a vehicle comes along the other lane."""
     town, world = kernel_world(two_lanes(), [Pose(1, 50.0, target=0), Pose(1, 58.0)])
     for _ in range(round((GIVING_UP + 0.5) / DT)):
         world.vehicles[1].speed = world.vehicles[1].desired = 0.0

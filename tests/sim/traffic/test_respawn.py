@@ -1,4 +1,4 @@
-"""Who is towed, and where it comes back."""
+"""Respawning: the vehicles concerned, and their new places."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def with_car(network, others):
 
 
 def tow_for(arrays, world, seconds, **options):
-    """Only time passes and towing goes on: nobody moves."""
+    """Steps time and respawning only: no body moves."""
     for _ in range(round(seconds / DT)):
         tow(arrays, world, DT, **options)
         world.clock[0].frame += 1
