@@ -167,7 +167,7 @@ def test_a_lane_that_is_steered_for_is_followed() -> None:
     assert view.target_lane_index == view.route[0] == network.index_of(WEST_SOUTH)
 
 
-def test_what_is_told_of_vehicles_is_what_highway_env_tells(brookside: TownNetwork) -> None:
+def test_features_of_vehicles_are_those_of_highway_env(brookside: TownNetwork) -> None:
     _, road, bodies = crowd(brookside)
     origin = Vehicle(road, [10.0, 20.0], 0.3, 4.0)
     for vehicle in bodies.vehicles():

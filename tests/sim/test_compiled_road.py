@@ -79,7 +79,7 @@ def test_traffic_stops_behind_a_guest_that_stands() -> None:
     assert not guest.crashed and not follower.crashed
 
 
-def test_who_touches_has_crashed_on_both_sides_and_in_the_same_substep() -> None:
+def test_touching_bodies_crash_on_both_sides_in_the_same_substep() -> None:
     road = empty_road(TownNetwork(straight_town(lanes=1, roads=3)))
     guest = guest_on(road, 0, 40.0, 12.0)
     road.act()
@@ -99,7 +99,7 @@ def test_who_touches_has_crashed_on_both_sides_and_in_the_same_substep() -> None
     assert guest.speed < 1.0
 
 
-def test_who_runs_somebody_over_has_crashed(brookside: TownNetwork) -> None:
+def test_guest_that_touches_a_pedestrian_has_crashed(brookside: TownNetwork) -> None:
     road = empty_road(brookside)
     walk = int(np.argmax(road.town_arrays.walks.length))
     add_pedestrian(road.town_arrays, road.arrays, walk, 5.0, pace=1.2)
@@ -135,7 +135,7 @@ def test_objects_of_highway_envs_own_are_struck_by_guests() -> None:
     assert guest.crashed and obstacle.crashed and road.objects == [obstacle]
 
 
-def test_the_lists_say_who_is_there(brookside: TownNetwork) -> None:
+def test_lists_hold_the_present_bodies(brookside: TownNetwork) -> None:
     road = empty_road(brookside, vehicles=10, pedestrians=4)
     populate(brookside, road.town_arrays, road.arrays, seed=1, vehicles=10, pedestrians=4)
     add_prop(brookside, road.town_arrays, road.arrays, PropKind.TREE, 2, 10.0)

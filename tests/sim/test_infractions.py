@@ -44,7 +44,7 @@ def too_late_for_the_line(town: Town) -> World:
 # --- lights and signs ---------------------------------------------------------------------------------------------
 
 
-def test_running_a_red_light_is_told_once_with_place_and_light() -> None:
+def test_running_a_red_light_is_reported_once_with_place_and_light() -> None:
     world = too_late_for_the_line(lit_crossing("ew"))
     events = infractions(run(world, 20.0))
     assert [event.kind for event in events] == [WorldEventKind.RED_LIGHT]
@@ -77,7 +77,7 @@ def test_stop_sign_asks_for_a_stand(obeys: bool) -> None:
 
 
 @pytest.mark.parametrize("kind", [SignalKind.YIELD, SignalKind.SPEED])
-def test_nobody_has_to_stand_at_other_signs(kind: SignalKind) -> None:
+def test_other_signs_require_no_stand(kind: SignalKind) -> None:
     world = world_in(crossing({"s": kind}), way_in("s"), 60.0)
     world.planner.command(PhysicalAction.J_TURN, 0, 0.0)
     world.car.speed = slowest = 8.0
@@ -124,7 +124,7 @@ def test_light_counts_at_the_frame_at_which_the_front_passes() -> None:
         assert all(breach.frame == frame + 3 for breach in found)
 
 
-def test_line_is_not_passed_by_who_turns_round_or_comes_from_the_other_side() -> None:
+def test_line_is_not_passed_in_a_u_turn_or_from_the_other_side() -> None:
     town = lit_crossing("ew")
     watch = watch_in(town)
     places = northwards(15.0, 8)
@@ -135,7 +135,7 @@ def test_line_is_not_passed_by_who_turns_round_or_comes_from_the_other_side() ->
 
 
 @pytest.mark.parametrize(("stands_at", "broken"), [(1.0, False), (3.0, False), (5.0, True), (None, True)])
-def test_who_stands_too_far_before_the_line_has_not_stood(stands_at: float | None, broken: bool) -> None:
+def test_stand_too_far_before_the_line_does_not_count(stands_at: float | None, broken: bool) -> None:
     town = crossing({"s": SignalKind.STOP})
     watch = watch_in(town)
     places = northwards(24.5, 60)
@@ -174,7 +174,7 @@ def test_road_ends_half_a_metre_outside_of_its_lanes(beside: float, off: bool) -
         assert breach.key is None
 
 
-def test_driving_into_the_field_is_told_once_and_anew_after_coming_back() -> None:
+def test_leaving_the_road_is_reported_once_and_anew_after_a_return() -> None:
     town = straight_street()
     world = world_in(town, 0, 30.0)
     for _ in range(2):
@@ -273,7 +273,7 @@ def test_running_into_a_prop_is_the_cars_fault_and_names_the_prop(kind: PropKind
     assert world.collisions == 1
 
 
-def test_running_into_what_appears_too_close_is_told_though_the_car_brakes() -> None:
+def test_collision_with_a_body_that_appears_too_close_is_reported() -> None:
     world = world_in(straight_street(), 0, 30.0)
     world.car.speed = 10.0
     prop = world.actors.add_prop(PropKind.STREET_BARRIER, 0, 38.0)  # 10 m/s need 6 m to stop at the very best
@@ -301,7 +301,7 @@ def test_running_into_a_vehicle_names_it_and_stops_both() -> None:
     assert vehicle.crashed
 
 
-def test_who_is_touched_on_foot_is_told_once() -> None:
+def test_touched_pedestrian_is_reported_once() -> None:
     world = world_at("brookside", long_lane(network("brookside").town), 2.0)
     assert world.actors.add_pedestrian(world.planner.lane, 30.0)
     (walker,) = world.actors.pedestrians

@@ -208,7 +208,7 @@ def test_others_stay_out_of_a_junction_into_which_the_cars_u_turn_reaches() -> N
 
 
 @pytest.mark.parametrize("away", [25.0, 40.0])
-def test_who_comes_along_gives_way_to_the_car_that_turns_round(away: float) -> None:
+def test_traffic_gives_way_to_a_u_turn_of_the_ego(away: float) -> None:
     world = world_in(crossing(), station=40.0)
     assert world.planner.command(PhysicalAction.U_TURN, 0, 0.0) is None
     assert watch(world, 20.0, lambda: bool(world.actors.arrays.car[0].sweeping)) < 20.0

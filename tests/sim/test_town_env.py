@@ -234,7 +234,7 @@ def test_the_same_seed_and_actions_give_the_same_bytes() -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_nobody_is_close_at_the_start_and_all_who_were_asked_for_are_there(seed: int) -> None:
+def test_all_others_are_present_and_none_is_close_at_the_start(seed: int) -> None:
     env = TownEnv({"vehicles": 20, "pedestrians": 15})
     env.reset(seed=seed)
     others = [*env.road.vehicles[1:], *env.road.objects]
@@ -254,7 +254,7 @@ def test_a_town_that_is_too_small_for_all_takes_as_many_as_fit() -> None:
     env.step(1)
 
 
-def test_running_into_somebody_is_a_crash_that_is_seen() -> None:
+def test_touching_a_pedestrian_is_an_observed_crash() -> None:
     env = TownEnv({"vehicles": 1, "pedestrians": 1, "action": {"type": "ContinuousAction"}, "policy_frequency": 5})
     for thing in (lambda: env.road.vehicles[1], lambda: env.road.objects[0]):
         env.reset(seed=2)

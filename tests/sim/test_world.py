@@ -107,7 +107,7 @@ def test_car_that_switched_lanes_before_a_roadblock_can_switch_back(ahead: float
         assert world.collisions == 0
 
 
-def test_hazard_stop_and_its_end_are_each_told_once_with_their_reason() -> None:
+def test_hazard_stop_and_its_end_are_each_reported_once_with_their_reason() -> None:
     town = network("brookside").town
     world = world_at("brookside", long_lane(town), 2.0)
     prop = world.actors.add_prop(PropKind.DUMPSTER, world.planner.lane, 60.0)
@@ -222,7 +222,7 @@ def test_pedestrian_does_not_walk_into_a_car(behind: float) -> None:
 
 
 @pytest.mark.parametrize("name", ["brookside", "Town05"])
-def test_who_crosses_a_road_comes_to_its_far_kerb(name: str) -> None:
+def test_straying_pedestrian_reaches_the_far_kerb(name: str) -> None:
     roads = network(name)
     town = town_arrays(roads)
     crossings = 0
@@ -242,7 +242,7 @@ def test_who_crosses_a_road_comes_to_its_far_kerb(name: str) -> None:
     assert crossings > 100
 
 
-def test_pedestrian_who_stands_close_to_a_car_steps_away_from_it() -> None:
+def test_pedestrian_close_to_a_car_steps_away_from_it() -> None:
     world, walker = ego_beside_a_pedestrian(-0.6)
     lane = world.town.lanes[world.planner.lane]
     station = lane.project(walker.position)[0]

@@ -86,7 +86,7 @@ def test_faster_car_looks_farther() -> None:
     assert ahead(body(90.0), speed=25.0) is not None
 
 
-def test_who_is_about_to_cross_is_a_hazard() -> None:
+def test_body_about_to_cross_is_a_hazard() -> None:
     walker = body(30.0, 3.0, kind=ObjectClass.PEDESTRIAN, heading=-math.pi / 2, speed=1.4, length=0.5, width=0.5)
     leaving = body(30.0, 3.0, kind=ObjectClass.PEDESTRIAN, heading=math.pi / 2, speed=1.4, length=0.5, width=0.5)
     assert ahead(walker) is not None

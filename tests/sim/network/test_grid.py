@@ -51,7 +51,7 @@ def test_first_of_several_equally_close_lanes_wins():
     assert wide.get_closest_lane_index(halfway) == stock(wide, halfway, None)
 
 
-def test_height_tells_the_bridge_from_the_road_below():
+def test_height_separates_the_bridge_from_the_road_below():
     network = TownNetwork(overpass_town())
     crossing = np.array([0.0, 0.0])
     assert network.lane_id(network.get_closest_lane_index(crossing, height=0.0)) == 0

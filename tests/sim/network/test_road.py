@@ -79,7 +79,7 @@ def test_neighbours_are_found_across_lane_ends_with_distances_along_the_lanes():
     assert on_other_lane == ((None, math.inf), (None, math.inf))
 
 
-def test_nobody_is_a_neighbour_beyond_the_horizon():
+def test_no_vehicle_is_a_neighbour_beyond_the_horizon():
     road = TownRoad(TownNetwork(straight_town(lanes=1, roads=3)))
     ego = on(road, 0, 10.0)
     on(road, 1, 20.0)
@@ -93,7 +93,7 @@ def test_distance_round_a_corner_is_measured_along_it():
     assert road.neighbours(ego) == ((front, pytest.approx(along)), (None, math.inf))
 
 
-def test_route_tells_whom_one_follows():
+def test_route_decides_which_vehicle_is_followed():
     network = TownNetwork(t_junction_town())
     road = TownRoad(network)
     right, straight = on(road, SOUTH_OUT, 8.0), on(road, EAST_OUT, 8.0)

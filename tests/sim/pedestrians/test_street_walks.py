@@ -74,7 +74,7 @@ def test_people_cross_the_street_and_walk_on_over_there():
     assert walker.odometer == pytest.approx(3000 * 5 * DT * 1.3, rel=0.05)
 
 
-def test_nobody_steps_out_while_somebody_drives_close():
+def test_no_pedestrian_steps_out_while_a_vehicle_is_close():
     network = two_way_network()
     arrays = town_arrays(network)
     world = empty_world(arrays, vehicles=1, pedestrians=20)
@@ -88,7 +88,7 @@ def test_nobody_steps_out_while_somebody_drives_close():
 
 
 @pytest.mark.parametrize("speed", [4.0, 8.0, 12.0])
-def test_who_drives_stops_for_somebody_who_is_crossing(speed):
+def test_vehicle_stops_for_a_straying_pedestrian(speed):
     network = two_way_network()
     arrays = town_arrays(network)
     world = empty_world(arrays, vehicles=1, pedestrians=1)
@@ -109,7 +109,7 @@ def test_who_drives_stops_for_somebody_who_is_crossing(speed):
     assert world.vehicles[0].x > 85.0 and not walker.crashed
 
 
-def test_no_street_walker_where_nobody_may_walk_or_somebody_is():
+def test_no_street_walker_without_a_way_or_at_a_taken_place():
     network = TownNetwork(find_town("brookside"))
     arrays = town_arrays(network)
     world = empty_world(arrays, vehicles=1, pedestrians=2)

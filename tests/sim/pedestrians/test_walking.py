@@ -74,7 +74,7 @@ def test_ways_between_pavements_keep_off_the_lanes_and_join_their_ends(name):
                 assert abs(lateral) > lane.width / 2 + 0.5 or not 0.0 < station < lane.length
 
 
-def test_who_comes_to_the_end_of_a_pavement_walks_on_round_the_corner():
+def test_pedestrian_walks_round_the_corner_at_the_end_of_a_pavement():
     network = TownNetwork(find_town("brookside"))
     arrays = town_arrays(network)
     world = empty_world(arrays, **ALONE)
@@ -93,7 +93,7 @@ def test_who_comes_to_the_end_of_a_pavement_walks_on_round_the_corner():
 
 
 @pytest.mark.parametrize("name", ["brookside", "Town02.xodr"])
-def test_nobody_walks_through_anybody(name):
+def test_pedestrians_do_not_walk_through_each_other(name):
     network = TownNetwork(find_town(name))
     arrays = town_arrays(network)
     world = empty_world(arrays, vehicles=0, pedestrians=80, seed=4)
@@ -108,7 +108,7 @@ def test_nobody_walks_through_anybody(name):
     assert world.pedestrians.odometer.min() > 60.0
 
 
-def test_two_who_meet_head_on_pass_each_other():
+def test_two_oncoming_pedestrians_pass_each_other():
     network = TownNetwork(find_town("brookside"))
     arrays = town_arrays(network)
     world = empty_world(arrays, vehicles=0, pedestrians=2)
@@ -160,7 +160,7 @@ def at_a_crosswalk(arrays, lights):
     return world, crossing
 
 
-def test_people_cross_while_the_lights_of_those_who_drive_are_red():
+def test_pedestrians_cross_while_the_lights_of_vehicles_are_red():
     town = find_town("midtown")
     arrays = town_arrays(TownNetwork(town))
     crossed = 0
@@ -177,7 +177,7 @@ def test_people_cross_while_the_lights_of_those_who_drive_are_red():
     assert crossed > 100
 
 
-def test_people_who_may_not_cross_for_long_walk_on():
+def test_pedestrians_walk_on_after_a_long_wait_at_a_crosswalk():
     arrays = town_arrays(TownNetwork(find_town("brookside")))
     world, crossing = at_a_crosswalk(arrays, lights=False)
     add_vehicle(arrays, world, 0, 20.0, desired=8.0)
@@ -192,7 +192,7 @@ def test_people_who_may_not_cross_for_long_walk_on():
     assert seen == {Walk.WAITING, Walk.WALKING}
 
 
-def test_who_does_not_get_on_goes_home_and_comes_back_elsewhere():
+def test_stuck_pedestrian_respawns_elsewhere():
     network = TownNetwork(find_town("brookside"))
     arrays = town_arrays(network)
     world = empty_world(arrays, **ALONE)
@@ -206,7 +206,7 @@ def test_who_does_not_get_on_goes_home_and_comes_back_elsewhere():
     assert arrays.walks.kind[walker.walk] == Footway.PAVEMENT
 
 
-def test_who_is_touched_lies_for_three_seconds_and_comes_back_out_of_the_cars_sight():
+def test_touched_pedestrian_respawns_after_three_seconds_out_of_sight():
     network = TownNetwork(find_town("brookside"))
     arrays = town_arrays(network)
     world = empty_world(arrays, vehicles=1, pedestrians=1)

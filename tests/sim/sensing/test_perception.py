@@ -71,7 +71,7 @@ def test_on_a_clear_noon_everything_is_seen_where_it_is() -> None:
     assert Eyes().look(bodies, Weather().visibility(lights=False), 0) == bodies
 
 
-def test_what_is_seen_does_not_depend_on_who_asks_or_how_often() -> None:
+def test_perception_does_not_depend_on_the_number_of_calls() -> None:
     bodies = [body(x, key=int(x)) for x in (20.0, 33.0, 50.0, 70.0)]
     eyes = Eyes()
     first = eyes.look(bodies, FOG, 400)
@@ -107,7 +107,7 @@ def test_errors_of_place_have_the_spread_of_the_formula_and_are_cut_off() -> Non
     assert (np.abs(errors).max(axis=0) <= 2.0 * np.array([away, aside]) + 1e-9).all()
 
 
-def test_things_are_told_by_where_they_seem_to_be_nearest_first() -> None:
+def test_bodies_are_listed_by_perceived_place_nearest_first() -> None:
     bodies = [body(x, key=int(10 * x)) for x in np.arange(20.0, 78.0, 0.5)]
     seen = Eyes().look(bodies, FOG, 0)
     distances = [math.hypot(thing.x, thing.y) for thing in seen]

@@ -190,7 +190,7 @@ def test_records_tell_where_the_body_is_and_how_far_it_seems() -> None:
             assert thing.distance2 == pytest.approx((thing.x - street.x) ** 2 + (thing.y - street.y) ** 2)
 
 
-def test_who_looks_does_not_see_itself() -> None:
+def test_observer_does_not_see_itself() -> None:
     street, clear = Street(1), Visibility()
     keys = [thing.key for thing in street.seen(clear, 0)]
     assert street.vehicles[0].key not in keys

@@ -118,7 +118,7 @@ class PlainWatch:
         return bool(abs(lane.height_at(station) - height) <= LEVEL)
 
     def _on(self, lane: PolylineLane, x: float, y: float, heading: float) -> tuple[float, float, bool]:
-        """Returns a place's distance outside of a lane, the station, and whether the heading is not against the lane."""
+        """Returns distance outside of a lane, station, and whether the heading is not against the lane."""
         station, lateral = lane.local_coordinates(np.array([x, y]))
         out = max(abs(lateral) - 0.5 * lane.width_at(station), -station, station - lane.length)
         runs_with = lane.town_lane.in_junction or math.cos(heading - lane.heading_at(station)) > AGAINST

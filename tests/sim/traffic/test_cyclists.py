@@ -37,7 +37,7 @@ def test_cyclist_keeps_right_and_speeds_up_gently():
     assert cyclist.own_lateral == pytest.approx(2.0 - CYCLIST_FROM_EDGE, abs=0.1)
 
 
-def test_cyclist_moves_over_to_the_right_and_overtakes_nobody():
+def test_cyclist_moves_over_to_the_right_and_does_not_overtake():
     network = TownNetwork(straight_town(lanes=3, roads=6))
     arrays, world = with_cyclist(network, 0, 20.0)
     add = empty_world(arrays, vehicles=2, pedestrians=0)

@@ -47,7 +47,7 @@ def test_traffic_stops_before_a_prop_on_a_single_lane_until_it_is_gone():
     assert world.vehicles[0].x > 130.0
 
 
-def test_who_stands_before_a_roadblock_for_long_goes_elsewhere():
+def test_vehicle_before_a_roadblock_is_respawned():
     network = TownNetwork(straight_town(lanes=1))
     arrays, world = kernel_world(network, [Pose(0, 20.0, speed=8.0), Pose(0, 5.0, speed=8.0)])
     add_prop(network, arrays, world, PropKind.DUMPSTER, 1, 20.0)
@@ -78,7 +78,7 @@ def crosswalks_ahead(network, arrays):
                 break
 
 
-def test_vehicles_stop_for_somebody_on_a_crosswalk():
+def test_vehicles_stop_for_a_pedestrian_on_a_crosswalk():
     network = TownNetwork(find_town("brookside"))
     arrays = town_arrays(network)
     tested = 0
@@ -104,7 +104,7 @@ def test_vehicles_stop_for_somebody_on_a_crosswalk():
     assert tested >= 2
 
 
-def test_nobody_steps_in_front_of_a_vehicle_that_cannot_stop_with_ease():
+def test_no_pedestrian_steps_in_front_of_a_vehicle_that_cannot_stop_with_ease():
     network = TownNetwork(find_town("brookside"))
     arrays = town_arrays(network)
     number, length, passage = next(crosswalks_ahead(network, arrays))

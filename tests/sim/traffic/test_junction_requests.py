@@ -64,7 +64,7 @@ class Askers:
 # --- lights -------------------------------------------------------------------------------------------------------
 
 
-def test_who_is_in_the_junction_at_red_clears_it_and_green_waits_for_that() -> None:
+def test_vehicle_in_the_junction_at_red_clears_it_first() -> None:
     askers = Askers(lit_crossing("ns", green=5.0), "sn", "ew")
     assert askers.ask(0, 4.0, distance=5.0, speed=8.0) is Wait.NOT
     for now in np.arange(4.5, 12.0, 0.5):  # 5 s green, 3 s yellow, 1 s red for all, then green for the others
@@ -74,7 +74,7 @@ def test_who_is_in_the_junction_at_red_clears_it_and_green_waits_for_that() -> N
     assert askers.ask(1, 12.0) is Wait.NOT
 
 
-def test_permission_is_withdrawn_from_who_can_still_stop_for_the_light() -> None:
+def test_permission_is_withdrawn_if_the_vehicle_can_still_stop_for_the_light() -> None:
     askers = Askers(lit_crossing("ns", green=5.0), "sn", "sn")
     assert askers.ask(0, 4.0, distance=20.0, speed=8.0) is Wait.NOT
     assert askers.ask(1, 4.0, distance=6.0, speed=8.0) is Wait.NOT
@@ -87,7 +87,7 @@ def test_permission_is_withdrawn_from_who_can_still_stop_for_the_light() -> None
 
 
 @pytest.mark.parametrize("oncoming", ["far", "red", "blocked"])
-def test_left_turn_does_not_wait_for_who_is_far_away_stands_or_has_red(oncoming: str) -> None:
+def test_left_turn_does_not_wait_for_far_standing_or_stopped_vehicles(oncoming: str) -> None:
     phases = [LightPhase(duration=60.0, green=(2,) if oncoming == "red" else (0, 2))]
     askers = Askers(crossing(dict.fromkeys(ARMS, SignalKind.TRAFFIC_LIGHT), phases), "ns", "sw", "en")
     if oncoming == "blocked":
@@ -98,13 +98,13 @@ def test_left_turn_does_not_wait_for_who_is_far_away_stands_or_has_red(oncoming:
     assert askers.ask(1, 1.0, distance=2.0, speed=2.0) is Wait.NOT
 
 
-def test_left_turn_waits_for_who_is_close_and_has_green() -> None:
+def test_left_turn_waits_for_a_close_vehicle_with_green() -> None:
     askers = Askers(lit_crossing("ns", green=60.0), "ns", "sw")
     askers.come(0, 1.0, distance=30.0, speed=8.0)
     assert askers.ask(1, 1.0, distance=2.0, speed=2.0) is Wait.GIVING_WAY
 
 
-def test_left_turn_lets_go_first_who_starts_at_the_same_green_light() -> None:
+def test_left_turn_yields_to_a_vehicle_that_starts_at_the_same_light() -> None:
     askers = Askers(lit_crossing("ew", green=5.0), "sw", "ns")
     for now in (8.5, 8.9, 9.1):  # all stand; green from 9 s on; the left turn happens to ask first
         for i in (0, 1):
@@ -118,7 +118,7 @@ def stream(askers: Askers, now: float) -> None:
     askers.come(1 + int(now / 2.0) % 2, now, distance=8.0 * (2.0 - now % 2.0), speed=8.0)
 
 
-def test_left_turn_may_use_the_yellow_when_nobody_comes() -> None:
+def test_left_turn_may_use_the_yellow_without_oncoming_vehicles() -> None:
     askers = Askers(lit_crossing("ns", green=15.0), "sw", "ns", "ns", "ns")
     entered = math.inf
     for now in np.arange(0.0, 19.0, DT):
@@ -132,7 +132,7 @@ def test_left_turn_may_use_the_yellow_when_nobody_comes() -> None:
 
 
 @pytest.mark.parametrize("sign", [None, SignalKind.YIELD])
-def test_who_gives_way_to_an_endless_stream_has_its_turn_after_a_while(sign: SignalKind | None) -> None:
+def test_vehicle_that_yields_to_an_endless_stream_is_admitted_after_a_while(sign: SignalKind | None) -> None:
     askers = Askers(crossing({"s": sign} if sign else {}), "sw", "ns", "ns")
     entered = math.inf
     for now in np.arange(0.0, 60.0, DT):
@@ -145,7 +145,7 @@ def test_who_gives_way_to_an_endless_stream_has_its_turn_after_a_while(sign: Sig
 # --- room and turns -----------------------------------------------------------------------------------------------
 
 
-def test_who_has_no_room_lets_in_who_came_later() -> None:
+def test_vehicle_without_room_does_not_block_later_ones() -> None:
     askers = Askers(crossing(), "sn", "ew", "we")
     askers.block(2, "n")
     assert askers.ask(0, 0.0) is Wait.NO_ROOM
@@ -157,7 +157,7 @@ def test_who_has_no_room_lets_in_who_came_later() -> None:
     assert askers.ask(0, 0.4) is Wait.NOT
 
 
-def test_who_waits_for_room_keeps_its_turn() -> None:
+def test_vehicle_that_waits_for_room_keeps_its_turn() -> None:
     askers = Askers(crossing({"s": SignalKind.YIELD}), "sn", "ew", "ew", "we")
     askers.block(3, "n")
     for now in np.arange(0.0, GIVING_WAY_PATIENCE + 1.0, 0.5):
@@ -168,7 +168,7 @@ def test_who_waits_for_room_keeps_its_turn() -> None:
     assert askers.ask(0, now + DT) is Wait.NOT  # as if it had given way to them all the time
 
 
-def test_room_goes_to_who_waited_for_it_first_whoever_asks_first() -> None:
+def test_room_goes_to_the_vehicle_that_waited_first() -> None:
     askers = Askers(crossing(), "wn", "sn", "ns")
     askers.block(2, "n")
     for now in (0.0, 0.1, 0.2):
@@ -180,7 +180,7 @@ def test_room_goes_to_who_waited_for_it_first_whoever_asks_first() -> None:
     assert askers.ask(1, 0.3) is Wait.NOT
 
 
-def test_who_takes_another_way_for_want_of_room_keeps_its_turn() -> None:
+def test_vehicle_that_reroutes_for_lack_of_room_keeps_its_turn() -> None:
     askers = Askers(crossing({"s": SignalKind.YIELD}), "sn", "ew", "ew", "we")
     askers.block(3, "n")
     for now in np.arange(0.0, GIVING_WAY_PATIENCE + 1.0, 0.5):
@@ -192,7 +192,7 @@ def test_who_takes_another_way_for_want_of_room_keeps_its_turn() -> None:
 
 
 @pytest.mark.parametrize("on_its_way", [0.3, 2.6, 4.0])
-def test_who_is_on_the_way_to_a_lane_takes_up_room_there_all_the_time(on_its_way: float) -> None:
+def test_vehicle_on_its_way_to_a_lane_takes_up_room_there(on_its_way: float) -> None:
     """Also in the moment in which it begins to follow the lane, but is not in the lane's list yet."""
     askers = Askers(crossing(), "sn", "wn", "ns")
     askers.block(2, "n")
@@ -234,7 +234,7 @@ def test_unused_permission_lapses() -> None:
 # --- U-turns ------------------------------------------------------------------------------------------------------
 
 
-def test_closed_junction_lets_nobody_in_but_the_car_that_turns_round() -> None:
+def test_closed_junction_admits_only_the_ego() -> None:
     askers = Askers(crossing(), "ns", "sn", "sn")
     askers.world.vehicles[0].kind = Kind.DRIVEN
     junction = int(askers.town.lanes[across("s", "n")].junction)

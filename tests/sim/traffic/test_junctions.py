@@ -59,7 +59,7 @@ def test_vehicle_waits_at_red_and_goes_at_green():
 
 
 @pytest.mark.parametrize(("before", "stops"), [(35.0, True), (6.0, False)])
-def test_yellow_stops_who_can_stop_comfortably_and_lets_the_others_through(before, stops):
+def test_yellow_stops_vehicles_that_can_stop_comfortably(before, stops):
     phases = [LightPhase(duration=4.0, yellow=(0, 2)), LightPhase(duration=40.0)]
     town = crossing(dict.fromkeys(ARMS, SignalKind.TRAFFIC_LIGHT), phases)
     arrays, world = going(town, ("s", "n", before + 2.5))
@@ -69,7 +69,7 @@ def test_yellow_stops_who_can_stop_comfortably_and_lets_the_others_through(befor
 
 
 @pytest.mark.parametrize("kind", [Kind.CAR, Kind.CYCLIST])
-def test_who_waits_at_a_long_red_light_is_not_towed(kind):
+def test_vehicle_at_a_long_red_light_is_not_respawned(kind):
     phases = [LightPhase(duration=100.0, green=(1, 3)), LightPhase(duration=20.0, green=(0, 2))]
     town = crossing(dict.fromkeys(ARMS, SignalKind.TRAFFIC_LIGHT), phases)
     arrays = town_arrays(TownNetwork(town))
@@ -101,7 +101,7 @@ def test_vehicle_stands_at_a_stop_sign_before_it_goes():
     assert crossed(world, 0) and min(slowest) < 0.3
 
 
-def test_vehicle_passes_a_yield_sign_without_standing_when_nobody_comes():
+def test_vehicle_passes_a_yield_sign_without_standing_on_a_free_road():
     arrays, world = going(crossing({"s": SignalKind.YIELD}), ("s", "n", 40.0))
     slowest = []
     run(arrays, world, 30.0, lambda: slowest.append(float(world.vehicles[0].speed)) or crossed(world, 0))
@@ -115,7 +115,7 @@ def test_vehicle_passes_a_yield_sign_without_standing_when_nobody_comes():
         ({}, ("n", "s"), ("s", "w")),  # a left turn waits for the oncoming
     ],
 )
-def test_who_has_no_priority_lets_the_other_pass(controls, first, second):
+def test_vehicle_without_priority_lets_the_other_pass(controls, first, second):
     arrays, world = going(crossing(controls), (*first, 38.0), (*second, 30.0))
     order = []
     run(arrays, world, 30.0, lambda: order.extend(i for i in (0, 1) if crossed(world, i) and i not in order) or False)
@@ -159,7 +159,7 @@ def test_no_more_are_let_in_than_have_room_behind_the_junction():
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_paths_that_cross_are_never_driven_at_once_and_nobody_waits_for_ever(seed):
+def test_crossing_paths_are_never_driven_at_once_and_no_vehicle_waits_for_ever(seed):
     town = crossing()
     rules, rng = right_of_way(town), np.random.default_rng(seed)
     ways = []
@@ -180,7 +180,7 @@ def test_paths_that_cross_are_never_driven_at_once_and_nobody_waits_for_ever(see
     assert len(through) == len(ways)
 
 
-def test_who_finds_no_room_behind_the_junction_waits_and_then_goes_elsewhere():
+def test_vehicle_without_room_behind_the_junction_waits_and_then_reroutes():
     network = TownNetwork(crossing())
     arrays, world = kernel_world(network, [Pose(way_in("e"), LENGTH - 40.0, speed=8.0), Pose(way_out("w"), 4.0)])
     own, other = world.vehicles

@@ -30,13 +30,13 @@ def on_lane(world, lane):
     ("lateral", "turned", "beside"),
     [(0.0, 0.0, False), (0.9, 0.1, False), (0.3, math.pi / 4, False), (0.9, math.pi / 4, True), (1.9, 0.0, True)],
 )
-def test_who_sticks_out_into_the_lane_beside_is_on_it_too(lateral, turned, beside):
+def test_vehicle_that_reaches_into_the_lane_beside_is_on_it_too(lateral, turned, beside):
     town, world = kernel_world(two_lanes(), [Pose(0, 50.0, lateral=lateral, turned=turned)])
     assert on_lane(world, 0) == [0]
     assert on_lane(world, 1) == ([0] if beside else [])
 
 
-def test_lists_are_in_the_order_of_the_stations_also_with_those_who_stick_out():
+def test_lists_are_ordered_by_station_with_vehicles_askew():
     poses = [Pose(1, 70.0), Pose(0, 50.0, lateral=0.9, turned=math.pi / 4), Pose(1, 20.0)]
     town, world = kernel_world(two_lanes(), poses)
     assert on_lane(world, 1) == [2, 1, 0]
@@ -46,7 +46,7 @@ def test_lists_are_in_the_order_of_the_stations_also_with_those_who_stick_out():
     assert on_lane(world, 1) == [2, 0]
 
 
-def test_who_comes_along_stops_behind_somebody_who_stands_askew_on_the_lane_beside():
+def test_vehicle_stops_behind_one_askew_on_the_lane_beside():
     town, world = kernel_world(
         two_lanes(),
         [Pose(1, 20.0, speed=8.0), Pose(0, 90.0, lateral=1.2, turned=math.pi / 4), Pose(0, 24.0, speed=8.0)],
@@ -60,7 +60,7 @@ def test_who_comes_along_stops_behind_somebody_who_stands_askew_on_the_lane_besi
     assert world.vehicles[0].x < 87.0 and world.vehicles[0].speed < 0.3
 
 
-def test_who_has_to_stand_before_it_is_over_gives_the_change_up():
+def test_vehicle_that_stands_in_a_lane_change_gives_it_up():
     """Otherwise it would begin to move just when a vehicle comes along the other lane."""
     town, world = kernel_world(two_lanes(), [Pose(1, 50.0, target=0), Pose(1, 58.0)])
     for _ in range(round((GIVING_UP + 0.5) / DT)):
@@ -69,7 +69,7 @@ def test_who_has_to_stand_before_it_is_over_gives_the_change_up():
     assert world.vehicles[0].plan[0] == 1
 
 
-def test_who_has_come_over_when_it_has_to_stand_stays_there():
+def test_vehicle_that_has_changed_lanes_stays_there_when_it_stands():
     town, world = kernel_world(two_lanes(), [Pose(1, 50.0, lateral=-2.3, target=0), Pose(0, 58.0)])
     vehicle = world.vehicles[0]
     update_lane(town, vehicle)

@@ -105,7 +105,7 @@ def test_queue_before_a_red_light_that_reaches_back_through_another_junction_is_
 
 
 @pytest.mark.parametrize(("turning", "towed"), [(True, True), (False, False)])
-def test_who_stands_before_the_car_that_turns_round_gives_way_to_it(turning, towed):
+def test_vehicle_before_the_turning_ego_is_respawned(turning, towed):
     arrays, world = with_car(straight_network(), [(4, 58.0), (4, 90.0)])
     world.vehicles[0].kind = Kind.DRIVEN
     keys = world.vehicles.key.copy()
@@ -114,7 +114,7 @@ def test_who_stands_before_the_car_that_turns_round_gives_way_to_it(turning, tow
     assert world.vehicles[2].key == keys[2]
 
 
-def test_nobody_comes_back_close_to_others():
+def test_no_body_respawns_close_to_others():
     network = TownNetwork(straight_town(lanes=2, roads=3, length=100.0))
     for seed in range(20):
         arrays = town_arrays(network)
@@ -140,7 +140,7 @@ def test_vehicle_for_which_there_is_no_room_is_gone():
     step(arrays, world, 30, DT)
 
 
-def test_nobody_is_brought_close_to_the_car():
+def test_no_body_is_added_close_to_the_ego():
     network = TownNetwork(find_town("brookside"))
     arrays = town_arrays(network)
     for seed in range(5):
