@@ -68,8 +68,8 @@ def test_session_is_shown_in_a_window_as_long_as_it_is_open(recorded: Path, monk
     assert json.loads(result.stdout)["pictures"] == 20
 
 
-def test_window_that_nobody_would_see_is_refused(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dorothie_gym.cli.replay._is_unseen", lambda: True)
+def test_invisible_window_is_refused(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dorothie_gym.cli.replay._is_invisible", lambda: True)
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     result = call("replay", recorded)
     assert result.exit_code == 2 and "--video FILE.mp4" in result.stderr

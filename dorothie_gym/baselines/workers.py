@@ -14,7 +14,7 @@ from dorothie_gym.baselines.material import Material
 from dorothie_gym.baselines.rows import SIZES
 from dorothie_gym.baselines.runs import Job, run
 from dorothie_gym.baselines.training.trainer import Epoch
-from dorothie_gym.rollout.processes import share_out
+from dorothie_gym.rollout.processes import run_tasks
 
 OnEpoch: TypeAlias = Callable[[Job, Epoch], None]
 """Is told of each epoch of each job that runs in the calling process."""
@@ -46,7 +46,7 @@ def run_jobs(
     trainer = _Trainer(jobs[0].corpus, jobs[0].encoder)
     if not alone:
         _ = trainer.load().vectors  # the others find them in the cache
-        yield from share_out(trainer.prepare, jobs, workers=min(workers, len(jobs)))
+        yield from run_tasks(trainer.prepare, jobs, workers=min(workers, len(jobs)))
         return
     material = trainer.load()
     try:

@@ -1,131 +1,112 @@
-"""`dorothie-gym replay`: a recorded session once more, to look at or to check."""
+"""`dorothie-gym replay`: playback and replay check of recorded sessions."""
 
 from __future__ import annotations
 
 import os
-import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dorothie_gym.cli.options import AsJson
+from dorothie_gym.cli.options import AsJson, Maps, Players
 from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
+from dorothie_gym.cli.progress import processors
 from dorothie_gym.cli.video import check_video, video_writer
 
 if TYPE_CHECKING:
-    from dorothie_gym.maps import Town
-    from dorothie_gym.recording import Session
+    from dorothie_gym.rendering.playback import Playback
+    from dorothie_gym.rollout.replay_check import ReplayCheck, ReplaySources
 
 _DIFFERENT = 1
-"""Exit code where a session is not what comes out when it is played again."""
+"""Exit code where a session differs from its replay."""
 
 
 def replay(
     path: Annotated[
-        Path, typer.Argument(metavar="SESSION", help="A session of any layout; with --check also a folder of them.")
+        Path, typer.Argument(metavar="SESSION", help="A session of any layout, or with --check a folder of sessions.")
     ],
-    fps: Annotated[float, typer.Option(min=0.5, max=30.0, help="Pictures a second.")] = 10.0,
+    fps: Annotated[float, typer.Option(min=0.5, max=30.0, help="Frames per second.")] = 10.0,
     video: Annotated[
         Path | None,
-        typer.Option(metavar="F.mp4", help="Write a film instead of opening a window (needs dorothie-gym[video])."),
+        typer.Option(metavar="F.mp4", help="Write a video instead of opening a window (needs dorothie-gym[video])."),
     ] = None,
     check: Annotated[
-        bool, typer.Option("--check", help="Play it again from seed and actions, and compare frame by frame.")
+        bool,
+        typer.Option("--check", help="Simulate the session again from seed and actions; compare all frames."),
     ] = False,
     town: Annotated[
-        str | None, typer.Option(metavar="NAME|FILE", help="Its town, where that is not shipped (.xodr, .yaml).")
+        str | None, typer.Option(metavar="NAME|FILE", help="Town of the session, if it is not shipped (.xodr, .yaml).")
     ] = None,
-    maps: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder with maps of towns (Town01.xodr).")] = None,
+    maps: Maps = None,
     storyboard: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Its storyboard, where that is not shipped (.json).")
+        Path | None, typer.Option(metavar="FILE", help="Storyboard of the session, if it is not shipped (.json).")
     ] = None,
+    workers: Players = None,
     as_json: AsJson = False,
 ) -> None:
-    """Show a recorded session, with the talk beside the town; or --check that it comes out the same again.
+    """Play back a recorded session in a window or video, or --check that its replay is equal.
 
-    With --check the exit code is 1 if anything differs; the first frame and field that do are told.
+    With --check the exit code is 1 if a replay differs; the first differing frame and field are printed.
     """
     if check and video is not None:
         fail("--check and --video exclude each other; give one of them")
     if video is not None:
         check_video(video)
+    from dorothie_gym.rollout.replay_check import ReplaySources
+
+    sources = ReplaySources(town=town, maps=maps, storyboard=storyboard)
     try:
         with told_plainly():
             if check:
-                _check(path, town, maps, storyboard, as_json=as_json)
+                _check(path, sources, workers, as_json=as_json)
             else:
-                _show(path, town, maps, fps, video, as_json=as_json)
+                _show(path, sources, fps, video, as_json=as_json)
     except KeyboardInterrupt:
         stderr().print("Interrupted.")
         raise typer.Exit(INTERRUPTED) from None
 
 
-def _check(path: Path, town: str | None, maps: Path | None, storyboard: Path | None, *, as_json: bool) -> None:
+def _check(path: Path, sources: ReplaySources, workers: int | None, *, as_json: bool) -> None:
     from dorothie_gym.recording import Corpus
-    from dorothie_gym.tasks import load_template
+    from dorothie_gym.rollout.replay_check import check_replays
 
-    template = None if storyboard is None else load_template(storyboard)
-    rows = []
-    for entry in Corpus.load(path, maps=maps).entries:
-        session = entry.load()
-        rows.append(_compare(session, _town(session, town, maps), template))
+    checks = []
+    for check in check_replays(Corpus.load(path, maps=sources.maps).entries, sources, workers=workers or processors()):
+        checks.append(check)
         if not as_json:
-            _tell(rows[-1])
-    equal = all(row["equal"] for row in rows)
+            stdout().print(_in_words(check), markup=False, soft_wrap=True)
+    equal = all(check.equal for check in checks)
     if as_json:
-        print_json({"checked": len(rows), "equal": equal, "sessions": rows})
-    elif len(rows) > 1:
-        stdout().print(f"{sum(row['equal'] for row in rows)} of {len(rows)} sessions come out the same")
+        print_json({"checked": len(checks), "equal": equal, "sessions": [check.to_json() for check in checks]})
+    elif len(checks) > 1:
+        stdout().print(f"{sum(check.equal for check in checks)} of {len(checks)} replays are equal")
     if not equal:
         raise typer.Exit(_DIFFERENT)
 
 
-def _compare(session: Session, town: Town, template: Any) -> dict[str, Any]:
-    """Plays a session again; returns what --json writes of it."""
-    from dataclasses import asdict
-
+def _in_words(check: ReplayCheck) -> str:
     from dorothie_gym._version import __version__
-    from dorothie_gym.recording import first_difference
-    from dorothie_gym.rollout import resimulate
 
-    begun = time.perf_counter()
-    difference = first_difference(session, resimulate(session, town, storyboard=template))
-    return {
-        "session": session.name,
-        "equal": difference is None,
-        "complete": session.complete,
-        "frames": len(session.trajectory),
-        "decisions": len(session.decisions or ()),
-        "recorded_by": session.header.package_version,
-        "replayed_by": __version__,
-        "difference": None if difference is None else asdict(difference),
-        "wall_seconds": round(time.perf_counter() - begun, 3),
-    }
+    found = check.difference
+    if found is None:
+        until = "" if check.complete else ", as far as it was recorded"
+        return f"{check.session}: equal in all {check.frames} frames{until}"
+    text = (
+        f"{check.session}: differs first at frame {found.frame}, {found.field}: "
+        f"recorded {found.recorded}, now {found.replayed}"
+    )
+    if check.recorded_by != __version__:
+        text += f" (recorded by version {check.recorded_by}, this is {__version__})"
+    return text
 
 
-def _tell(row: dict[str, Any]) -> None:
-    until = "" if row["complete"] else ", as far as it was recorded"
-    if row["equal"]:
-        text = f"{row['session']}: the same in all {row['frames']} frames{until}"
-    else:
-        found = row["difference"]
-        text = (
-            f"{row['session']}: differs first at frame {found['frame']}, {found['field']}: "
-            f"recorded {found['recorded']}, now {found['replayed']}"
-        )
-        if row["recorded_by"] != row["replayed_by"]:
-            text += f" (recorded by version {row['recorded_by']}, this is {row['replayed_by']})"
-    stdout().print(text, markup=False, soft_wrap=True)
-
-
-def _show(path: Path, town: str | None, maps: Path | None, fps: float, video: Path | None, *, as_json: bool) -> None:
+def _show(path: Path, sources: ReplaySources, fps: float, video: Path | None, *, as_json: bool) -> None:
     from dorothie_gym.recording import read_session
-    from dorothie_gym.rollout import Playback
+    from dorothie_gym.rendering.playback import Playback
 
-    session = read_session(path, maps=maps)
-    playback = Playback(session, _town(session, town, maps))
-    shown = _film(playback, fps, video) if video is not None else _window(playback, fps)
+    session = read_session(path, maps=sources.maps)
+    playback = Playback(session, sources.town_of(session))
+    shown = _write_video(playback, fps, video) if video is not None else _show_window(playback, fps)
     facts = {
         "session": session.name,
         "town": session.header.town,
@@ -143,7 +124,7 @@ def _show(path: Path, town: str | None, maps: Path | None, fps: float, video: Pa
         )
 
 
-def _film(playback: Any, fps: float, video: Path) -> int:
+def _write_video(playback: Playback, fps: float, video: Path) -> int:
     from rich.progress import track
 
     from dorothie_gym.rendering.frames import SceneRenderer
@@ -152,7 +133,7 @@ def _film(playback: Any, fps: float, video: Path) -> int:
     writer = video_writer(video, fps)
     try:
         scenes = track(
-            playback.scenes(fps), "Filming", total=playback.count(fps), console=console, transient=True,
+            playback.scenes(fps), "Writing video", total=playback.count(fps), console=console, transient=True,
             disable=not console.is_terminal,
         )  # fmt: skip
         for scene in scenes:
@@ -163,18 +144,18 @@ def _film(playback: Any, fps: float, video: Path) -> int:
     return shown
 
 
-def _window(playback: Any, fps: float) -> int:
+def _show_window(playback: Playback, fps: float) -> int:
     from dorothie_gym.rendering.frames import HumanWindow, SceneRenderer
 
     renderer = SceneRenderer()
     try:
         window = HumanWindow(renderer.size, "dorothie_gym")
     except RuntimeError:
-        fail("no window can be opened here; write a film instead: --video FILE.mp4")
+        fail("no window can be opened here; write a video instead: --video FILE.mp4")
     shown = 0
     try:
-        if _is_unseen():
-            fail("there is no screen to open a window on; write a film instead: --video FILE.mp4")
+        if _is_invisible():
+            fail("there is no screen to open a window on; write a video instead: --video FILE.mp4")
         for scene in playback.scenes(fps):
             window.show(renderer.draw(scene), fps)
             if window.closed:
@@ -185,21 +166,8 @@ def _window(playback: Any, fps: float) -> int:
     return shown
 
 
-def _is_unseen() -> bool:
-    """Whether windows are open where nobody sees them, though nobody asked for that: so SDL does without a screen."""
+def _is_invisible() -> bool:
+    """Returns whether SDL opened an invisible window although the user did not choose its driver."""
     import pygame
 
     return pygame.display.get_driver() in ("offscreen", "dummy") and "SDL_VIDEODRIVER" not in os.environ
-
-
-def _town(session: Session, town: str | None, maps: Path | None) -> Town:
-    """The town of a session."""
-    from dorothie_gym.maps import load_town
-    from dorothie_gym.recording.towns import find_town
-
-    if town is not None:
-        return load_town(town)
-    found = find_town(session.header.town, maps)
-    if found is None:
-        fail(f"{session.name}: its town {session.header.town!r} is not shipped; give --town FILE, or --maps DIR")
-    return found

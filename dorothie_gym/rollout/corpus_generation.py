@@ -1,13 +1,12 @@
-"""A corpus of sessions of the scripted roles, made by several processes, which may be stopped and gone on with."""
+"""Generation of corpora: sessions of the scripted roles, divided into folds, with resume."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
@@ -15,10 +14,7 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS
 from dorothie_gym.policies import ALL_SCRIPTED
 from dorothie_gym.recording import FOLDS, Fold, SessionState, manifest_row, session_state, write_manifest
-from dorothie_gym.rollout.folder import making_in
-from dorothie_gym.rollout.on_ray import share_out_on_ray
-from dorothie_gym.rollout.play import SessionMaker
-from dorothie_gym.rollout.processes import share_out
+from dorothie_gym.rollout.runner import PlayedSession, SessionJob, run_sessions
 
 PAPER_FOLDS: Final[Mapping[Fold, int]] = MappingProxyType(
     {Fold.TRAIN: 123, Fold.VAL_SEEN: 14, Fold.VAL_UNSEEN: 6, Fold.TEST_SEEN: 25, Fold.TEST_UNSEEN: 15}
@@ -27,18 +23,21 @@ PAPER_FOLDS: Final[Mapping[Fold, int]] = MappingProxyType(
 
 PAPER_SESSIONS: Final = sum(PAPER_FOLDS.values())
 
+ManifestRow: TypeAlias = Mapping[str, Any]
+"""Row of a session in the manifest of a corpus (`manifest_row`)."""
+
 _UNSEEN: Final = frozenset((Fold.VAL_UNSEEN, Fold.TEST_UNSEEN))
 
 
 @dataclass(frozen=True, kw_only=True)
 class SessionPlan:
-    """A session that a corpus is to have.
+    """Session of a corpus to be played.
 
     Attributes:
-        number: its number in the corpus, from 0.
-        fold: where it belongs.
-        town: name of its town.
-        seed: everything in it follows from this.
+        number: number of the session in the corpus, from 0.
+        fold: fold of the session.
+        town: name of the town.
+        seed: seed of the session, which determines it.
     """
 
     number: int
@@ -48,19 +47,19 @@ class SessionPlan:
 
     @property
     def path(self) -> str:
-        """Its folder within the corpus."""
+        """Folder of the session within the corpus."""
         return f"{self.fold}/{self.number:04d}-{self.town}"
 
 
 def plan_corpus(sessions: int, seed: int) -> tuple[SessionPlan, ...]:
-    """Returns the sessions of a corpus; towns take turns within a fold.
+    """Returns the plans of the sessions of a corpus; the towns of a fold take turns.
 
     Args:
-        sessions: how many; they are shared out among the folds as the paper's 183.
-        seed: the seed of a session follows from it and from the session's number only.
+        sessions: number of sessions, divided among the folds in the proportions of the paper's 183.
+        seed: seed of the corpus; with the number of a session it gives the seed of the session.
 
     Raises:
-        ValueError: there is to be no session, or the seed is negative.
+        ValueError: `sessions` is below 1, or `seed` is negative.
     """
     if sessions < 1:
         raise ValueError(f"sessions is {sessions}; it must be at least 1")
@@ -76,7 +75,7 @@ def plan_corpus(sessions: int, seed: int) -> tuple[SessionPlan, ...]:
 
 
 def fold_sizes(sessions: int) -> dict[Fold, int]:
-    """Returns how many of so many sessions each fold has: the paper's shares, by largest remainders."""
+    """Returns the number of sessions of each fold: the shares of the paper, rounded by largest remainders."""
     shares = {fold: sessions * PAPER_FOLDS[fold] for fold in FOLDS}
     sizes = {fold: share // PAPER_SESSIONS for fold, share in shares.items()}
     by_remainder = sorted(FOLDS, key=lambda fold: -(shares[fold] % PAPER_SESSIONS))
@@ -89,26 +88,26 @@ def _seed(seed: int, number: int) -> int:
     return int(np.random.SeedSequence([seed, number]).generate_state(1)[0] >> 1)
 
 
-# --- A corpus of sessions of the scripted roles, made by several processes, which may be stopped and gone ------------
+# --- generation -----------------------------------------------------------------------------------------------------
 
 GENERATION_FILE: Final = "generation.json"
-"""What a corpus is made from: a folder with another one of these is not gone on with."""
+"""Settings of a corpus; a folder with other settings is refused."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Generated:
-    """How the making of a corpus ended.
+    """Generated corpus.
 
     Attributes:
-        root: its folder.
-        manifest: its manifest.
-        rows: the manifest's row of each session, by number.
-        played: how many sessions were played now; the others were there already.
+        root: folder of the corpus.
+        manifest: file of the manifest.
+        rows: row of each session in the manifest, by number.
+        played: number of sessions played in this run; the others were finished before.
     """
 
     root: Path
     manifest: Path
-    rows: tuple[Mapping[str, Any], ...]
+    rows: tuple[ManifestRow, ...]
     played: int
 
 
@@ -122,70 +121,49 @@ def generate_corpus(
     ray: str | None = None,
     on_session: Callable[[int, int], None] | None = None,
 ) -> Generated:
-    """Plays the sessions of a corpus and writes its manifest.
+    """Plays the sessions of a corpus with the scripted roles and writes its manifest.
 
-    What lies in the folder depends on neither who plays nor how often the making was interrupted and begun again: a
-    session appears in its fold when it is finished, and one that is there is not played again.
+    The bytes in the folder depend neither on the number of workers nor on interruptions: a session appears in its fold
+    when it is finished, and a finished session is not played again.
 
     Args:
-        root: folder of the corpus, made if need be.
-        sessions: how many, shared out among the folds as the paper's 183.
-        seed: of the corpus.
-        workers: processes that play; with more than one the caller's main module must be importable.
-        config: of the environment.
-        ray: address of a Ray cluster that plays, instead of `workers`; see `on_ray`.
-        on_session: called with the number of sessions that are there, and of those to be, at first and after each.
+        root: folder of the corpus, created if missing.
+        sessions: number of sessions, divided among the folds in the proportions of the paper's 183.
+        seed: seed of the corpus.
+        workers: number of processes; more than one needs an importable main module of the caller.
+        config: settings of the engine.
+        ray: address of a Ray cluster that replaces the workers; see `on_ray`.
+        on_session: called with the numbers of finished and of planned sessions, first with 0 and after each session.
 
     Raises:
         ValueError: no sessions or no workers, or a negative seed.
-        SessionError: the folder holds something else, or another process is at work in it.
+        SessionError: the folder holds something else, or another process holds its lock.
         ProcessError: a session failed in another process, or there is no such cluster.
         OSError: the folder cannot be written.
     """
-    if workers < 1:
-        raise ValueError(f"workers is {workers}; it must be at least 1")
     plans, root, config = plan_corpus(sessions, seed), Path(root), config or EnvConfig()
-    with making_in(root, GENERATION_FILE, {"sessions": sessions, "seed": seed, "config": asdict(config)}):
-        rows: dict[int, Mapping[str, Any]] = {}
-        played = 0
-        if on_session is not None:
-            on_session(0, sessions)
-        prepare = partial(_CorpusMaker, config=config)
-        for number, row, is_new in (
-            share_out(partial(prepare, root), plans, workers=workers)
-            if ray is None
-            else share_out_on_ray(prepare, plans, root, address=ray)
-        ):
-            rows[number] = row
-            played += is_new
-            if on_session is not None:
-                on_session(len(rows), sessions)
+    job = SessionJob(
+        settings_file=GENERATION_FILE,
+        settings={"sessions": sessions, "seed": seed, "config": asdict(config)},
+        config=config,
+        cast=ALL_SCRIPTED,
+        evaluate=_manifest_row,
+    )
+    rows: dict[int, ManifestRow] = {}
+    played = 0
+    with run_sessions(job, plans, root, workers=workers, ray=ray, on_session=on_session) as outcomes:
+        for outcome in outcomes:
+            assert outcome.result is not None
+            rows[outcome.plan.number] = outcome.result
+            played += outcome.played
         manifest = write_manifest(root, list(rows.values()))
     return Generated(root=root, manifest=manifest, rows=tuple(rows[plan.number] for plan in plans), played=played)
 
 
-@dataclass
-class _CorpusMaker:
-    """Makes sessions of a corpus, and their rows of the manifest.
-
-    Attributes:
-        root: folder of the corpus.
-        config: of the environment.
-    """
-
-    root: Path
-    config: EnvConfig
-
-    def __post_init__(self) -> None:
-        """Prepares the making of sessions."""
-        self._maker = SessionMaker(self.root, self.config, ALL_SCRIPTED)
-
-    def __call__(self, plan: SessionPlan) -> tuple[int, dict[str, Any], bool]:
-        """Returns the number of a session, its row of the manifest, and whether it was played now."""
-        session, folder, is_new = self._maker(plan)
-        return plan.number, manifest_row(session, folder, self.root), is_new
+def _manifest_row(played: PlayedSession) -> ManifestRow:
+    return manifest_row(played.session, played.folder, played.root)
 
 
 def finished_sessions(root: Path | str, *, sessions: int, seed: int) -> int:
-    """Returns how many sessions of a corpus are finished."""
+    """Returns the number of finished sessions of a corpus."""
     return sum(session_state(Path(root) / plan.path) is SessionState.FINISHED for plan in plan_corpus(sessions, seed))

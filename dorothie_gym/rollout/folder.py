@@ -1,4 +1,4 @@
-"""A folder that sessions are made in: by one process at a time, from the same settings each time it is gone on with."""
+"""Folder of a series of sessions: locked by one process at a time, and tied to the settings of the series."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import shutil
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Final, Protocol
 
 from dorothie_gym._version import __version__
 from dorothie_gym.errors import SessionError
@@ -20,34 +20,50 @@ if sys.platform != "win32":
     import fcntl
 
 PARTS: Final = ".parts"
-"""Folder within it of sessions that are not finished yet; gone when all are."""
+"""Folder of unfinished sessions within the folder of a series; removed when all sessions are finished."""
+
+
+class PlannedSession(Protocol):
+    """Session to be played; it follows from town and seed."""
+
+    @property
+    def town(self) -> str:
+        """Name or file of the town."""
+
+    @property
+    def seed(self) -> int:
+        """Seed of the session."""
+
+    @property
+    def path(self) -> str:
+        """Folder of the session within the folder of all sessions."""
 
 
 @contextlib.contextmanager
-def making_in(root: Path, file: str, wanted: Mapping[str, Any]) -> Iterator[None]:
-    """Holds a folder, made if need be, as long as the block lasts, with an empty `PARTS` in it.
+def locked_folder(root: Path, file: str, settings: Mapping[str, object]) -> Iterator[None]:
+    """Locks a folder as long as the block lasts, and creates the folder and an empty `PARTS` in it.
 
     Args:
         root: the folder.
-        file: name of the file in it that tells what is made there.
-        wanted: what that is (JSON types); a folder with another one is not gone on with.
+        file: name of the file in it that states the settings.
+        settings: what the sessions follow from, in JSON types; a folder with other settings is refused.
 
     Raises:
-        SessionError: the folder holds something else, or another process is at work in it.
+        SessionError: the folder holds something else, or another process holds its lock.
         OSError: the folder cannot be written.
     """
-    with _alone_in(root):
-        _claim(root / file, wanted)
+    with _lock(root):
+        _check_settings(root / file, settings)
         shutil.rmtree(root / PARTS, ignore_errors=True)
         (root / PARTS).mkdir()
         yield
         shutil.rmtree(root / PARTS)
 
 
-def _claim(path: Path, wanted: Mapping[str, Any]) -> None:
-    """Notes what is made; raises `SessionError` where the folder holds something that was made from something else."""
+def _check_settings(path: Path, settings: Mapping[str, object]) -> None:
+    """Writes the settings into a new folder; raises `SessionError` if the folder has others or holds other files."""
     root = path.parent
-    page = json.dumps({"package_version": __version__, "format_version": FORMAT_VERSION, **wanted}, indent=1) + "\n"
+    page = json.dumps({"package_version": __version__, "format_version": FORMAT_VERSION, **settings}, indent=1) + "\n"
     if not path.exists():
         others = [entry.name for entry in root.iterdir() if entry.name != path.name + PART]
         if others:
@@ -62,14 +78,13 @@ def _claim(path: Path, wanted: Mapping[str, Any]) -> None:
         if not isinstance(found, dict) or found.get(name) != value:
             there = found.get(name) if isinstance(found, dict) else found
             raise SessionError(
-                f"{path}: what is in this folder has {name} {there!r}, not {value!r}; "
-                "choose another folder, or go on with the same settings"
+                f"{path}: has {name} {there!r}, not {value!r}; choose another folder, or resume with the same settings"
             )
 
 
 @contextlib.contextmanager
-def _alone_in(root: Path) -> Iterator[None]:
-    """Holds a folder, made if need be, as long as the block lasts; raises `SessionError` where another process does."""
+def _lock(root: Path) -> Iterator[None]:
+    """Creates a folder and locks it as long as the block lasts; raises `SessionError` if another process holds it."""
     root.mkdir(parents=True, exist_ok=True)
     if sys.platform == "win32":
         yield
@@ -79,7 +94,7 @@ def _alone_in(root: Path) -> Iterator[None]:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         os.close(descriptor)
-        raise SessionError(f"{root}: another process is at work in it; wait for it, or stop it") from None
+        raise SessionError(f"{root}: another process writes to this folder; wait for it, or stop it") from None
     try:
         yield
     finally:

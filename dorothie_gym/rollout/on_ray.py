@@ -1,4 +1,4 @@
-"""Sessions played by a Ray cluster: each is a task, and comes back as files, so that no folder has to be shared."""
+"""Sessions on a Ray cluster: each session is a task that returns its files, so that no folder has to be shared."""
 
 from __future__ import annotations
 
@@ -10,42 +10,41 @@ from typing import Any, Final, TypeVar
 
 from dorothie_gym.errors import ProcessError
 from dorothie_gym.recording import SessionState, session_state
-from dorothie_gym.rollout.folder import PARTS
-from dorothie_gym.rollout.play import Planned
+from dorothie_gym.rollout.folder import PARTS, PlannedSession
 
-Plan = TypeVar("Plan", bound=Planned)
+Plan = TypeVar("Plan", bound=PlannedSession)
 Result = TypeVar("Result")
 
 RETRIES: Final = 8
-"""So often a session is begun anew whose process or machine was lost; after that it is taken to be its own fault."""
+"""Number of times that a session is restarted whose process or machine was lost; then the session counts as failed."""
 
-KNOCK: Final = 10.0
-"""So long it is waited for a cluster to answer [s]."""
+CONNECT_TIMEOUT: Final = 10.0
+"""Longest wait for the cluster to accept a connection [s]."""
 
 
-def share_out_on_ray(
+def run_on_ray(
     prepare: Callable[[Path], Callable[[Plan], Result]], plans: Sequence[Plan], root: Path, *, address: str
 ) -> Iterator[Result]:
-    """Plays sessions on a cluster, keeps them in a folder here, and yields what comes of them as it comes.
+    """Plays sessions on a cluster, stores them in a local folder, and yields each result when it arrives.
 
-    Sessions that are in the folder already are dealt with here. One whose process or machine is lost is begun anew on
-    another. The cluster's machines need this package in the same version, and files of learned players at the same
-    path.
+    Finished sessions of the folder are evaluated locally. A session whose process or machine is lost is restarted on
+    another. The machines of the cluster need the same version of this package, and model files at the same path.
 
     Args:
-        prepare: called with the folder of all sessions, there a temporary one, returns what makes a session in it.
+        prepare: called with the folder of all sessions (on the cluster a temporary one); returns the function that
+            plays a session in it.
         plans: the sessions.
-        root: folder of all sessions here, held by `making_in`.
-        address: of the cluster: "auto", "HOST:PORT", "ray://HOST:PORT"; "local" begins one on this machine.
+        root: local folder of all sessions, locked by `locked_folder`.
+        address: address of the cluster: "auto", "HOST:PORT", "ray://HOST:PORT"; "local" starts one on this machine.
 
     Raises:
         ProcessError: Ray is not installed, there is no cluster at the address, or a session failed there.
     """
     here = [plan for plan in plans if session_state(root / plan.path) is SessionState.FINISHED]
     if here:
-        deal_with = prepare(root)
+        evaluate = prepare(root)
         for plan in here:
-            yield deal_with(plan)
+            yield evaluate(plan)
     there = {plan.path: plan for plan in plans if plan not in here}
     if not there:
         return
@@ -60,17 +59,17 @@ def share_out_on_ray(
                 result, files = ray.get(done)
             except ray.exceptions.RayError as error:
                 raise ProcessError(f"{plan}: {reason(error)}") from None
-            _keep(root, plan.path, files)
+            _store(root, plan.path, files)
             yield result
     finally:
         ray.shutdown()
 
 
-def connect(address: str) -> Any:
-    """Returns Ray, connected to a cluster; whoever asks for it shuts it down.
+def connect(address: str) -> Any:  # Ray is optional and has no types for mypy
+    """Returns the module `ray`, connected to a cluster; the caller shuts it down.
 
     Args:
-        address: of the cluster, see `share_out_on_ray`.
+        address: address of the cluster, see `run_on_ray`.
 
     Raises:
         ProcessError: Ray is not installed, or there is no cluster at the address.
@@ -80,22 +79,22 @@ def connect(address: str) -> Any:
     except ImportError:
         raise ProcessError("Ray is not installed; install dorothie-gym[ray]") from None
     try:
-        _knock(address)
+        _check_address(address)
         ray.init(address=address, log_to_driver=False, logging_level="error")
     except (OSError, ValueError, RuntimeError) as error:
         raise ProcessError(f"there is no Ray cluster at {address!r} ({error}); see `ray start --help`") from None
     return ray
 
 
-def _knock(address: str) -> None:
-    """Raises `OSError` where nobody listens at HOST:PORT: Ray itself would go on trying for minutes."""
+def _check_address(address: str) -> None:
+    """Raises `OSError` where HOST:PORT accepts no connection: Ray itself would retry for minutes."""
     host, separator, port = address.removeprefix("ray://").rpartition(":")
     if separator:
-        socket.create_connection((host, int(port)), timeout=KNOCK).close()
+        socket.create_connection((host, int(port)), timeout=CONNECT_TIMEOUT).close()
 
 
 def _play(prepare: Callable[[Path], Callable[[Plan], Result]], plan: Plan) -> tuple[Result, dict[str, bytes]]:
-    """What a machine of the cluster does: a session in a temporary folder; returns what came of it and its files."""
+    """Plays a session in a temporary folder on a machine of the cluster; returns its result and its files."""
     with tempfile.TemporaryDirectory(prefix="dorothie_gym-") as folder:
         root = Path(folder)
         (root / PARTS).mkdir()
@@ -105,8 +104,8 @@ def _play(prepare: Callable[[Path], Callable[[Plan], Result]], plan: Plan) -> tu
         return result, {path.relative_to(session).as_posix(): path.read_bytes() for path in files}
 
 
-def _keep(root: Path, path: str, files: Mapping[str, bytes]) -> None:
-    """Writes a session's files; it appears in its folder whole or not at all. One that failed has none."""
+def _store(root: Path, path: str, files: Mapping[str, bytes]) -> None:
+    """Writes the files of a session, whose folder appears in one step; a failed session has no files."""
     if not files:
         return
     part, folder = root / PARTS / Path(path).name, root / path
@@ -118,7 +117,7 @@ def _keep(root: Path, path: str, files: Mapping[str, bytes]) -> None:
 
 
 def reason(error: BaseException) -> str:
-    """The error of the session itself, where it is known."""
+    """Returns the error of the session itself if Ray reports it, otherwise the last line of Ray's message."""
     cause = getattr(error, "cause", None)
     lines = [line for line in str(error).splitlines() if line.strip()]
     return f"{type(cause).__name__}: {cause}" if cause is not None else lines[-1] if lines else type(error).__name__

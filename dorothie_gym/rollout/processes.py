@@ -1,4 +1,8 @@
-"""Work shared out among processes that end when the one that started them does, however it dies."""
+"""Pool of worker processes that end with the process that started them.
+
+`concurrent.futures.ProcessPoolExecutor` was tried: when a worker dies, it reports neither the task nor the exit code,
+and before Python 3.14 it cannot end a running task without private attributes, so that Ctrl-C would wait for a session.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from dorothie_gym.errors import ProcessError
 
@@ -18,17 +22,17 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 
-def share_out(
+def run_tasks(
     prepare: Callable[[], Callable[[Task], Result]], tasks: Iterable[Task], *, workers: int
 ) -> Iterator[Result]:
-    """Does tasks in so many processes, and yields what comes of them as it comes.
+    """Runs tasks in worker processes, and yields each result when its task is done, in any order.
 
-    Tasks and results travel through pipes. When the caller stops before the end, the processes are killed.
+    Tasks and results travel through pipes. When the iterator is closed before the end, the processes are killed.
 
     Args:
-        prepare: called once in each process, returns what does a task there; an object that can be sent to a process.
-        tasks: what is to be done.
-        workers: how many processes; 1 does the work in this one.
+        prepare: called once in each process; returns the function that runs a task. It must be picklable.
+        tasks: tasks to run.
+        workers: number of processes; 1 runs the tasks in the calling process.
 
     Raises:
         ProcessError: a task failed in another process, or its process died.
@@ -39,87 +43,88 @@ def share_out(
         while waiting:
             yield work(waiting.pop())
         return
-    crew = [_Worker(prepare) for _ in range(min(workers, len(waiting)))]
+    pool = [_Worker(prepare) for _ in range(min(workers, len(waiting)))]
     try:
-        for worker in crew:
-            worker.give(waiting.pop())
-        busy: dict[Any, _Worker[Task, Result]] = {worker.connection: worker for worker in crew}
+        for worker in pool:
+            worker.submit(waiting.pop())
+        busy = {worker.connection: worker for worker in pool}
         while busy:
-            for connection in wait(list(busy)):
+            for connection in [found for found in wait(list(busy)) if isinstance(found, Connection)]:
                 worker = busy[connection]
-                result = worker.take()
+                result = worker.result()
                 if waiting:
-                    worker.give(waiting.pop())
+                    worker.submit(waiting.pop())
                 else:
                     del busy[connection]
                 yield result
     finally:
-        for worker in crew:
-            worker.end()
+        for worker in pool:
+            worker.kill()
 
 
 class _Worker(Generic[Task, Result]):
-    """A process that does one task after the other.
+    """Process that runs one task after another.
 
     Attributes:
-        connection: has something to read when the task is done, or the process dead.
+        connection: readable when the task is done or the process is dead.
     """
 
     def __init__(self, prepare: Callable[[], Callable[[Task], Result]]) -> None:
-        context = get_context("spawn")  # a fork would copy whatever threads and locks the caller has
+        context = get_context("spawn")  # a fork would copy the threads and locks of the caller
         self.connection, theirs = context.Pipe()
         self._process: BaseProcess = context.Process(target=_serve, args=(theirs, prepare), daemon=True)
         self._process.start()
         theirs.close()
         self._task: Task | None = None
 
-    def give(self, task: Task) -> None:
+    def submit(self, task: Task) -> None:
         self._task = task
         try:
             self.connection.send(task)
         except BrokenPipeError:
-            self._fail()
+            self._raise_death()
 
-    def take(self) -> Result:
+    def result(self) -> Result:
         try:
             done, result = self.connection.recv()
         except (EOFError, ConnectionResetError):
-            self._fail()
+            self._raise_death()
         if not done:
             raise ProcessError(f"{self._task}: {result}")
         found: Result = result
         return found
 
-    def end(self) -> None:
+    def kill(self) -> None:
         self._process.kill()
         self._process.join()
         self.connection.close()
 
-    def _fail(self) -> None:
+    def _raise_death(self) -> None:
         self._process.join()
-        raise ProcessError(f"{self._task}: the process that did it died with code {self._process.exitcode}")
+        raise ProcessError(f"{self._task}: the worker process died with code {self._process.exitcode}")
 
 
-def _serve(connection: Connection, prepare: Callable[[], Callable[[Any], Any]]) -> None:
-    """What a process does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the caller decides what it means
-    threading.Thread(target=_die_with_parent, daemon=True).start()
-    work: Callable[[Any], Any] | None = None
+def _serve(connection: Connection, prepare: Callable[[], Callable[[Task], Result]]) -> None:
+    """Runs the tasks of a connection until it is closed; the main function of a worker process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole process group; the caller handles it
+    threading.Thread(target=_exit_with_parent, daemon=True).start()
+    work: Callable[[Task], Result] | None = None
     while True:
         try:
             task = connection.recv()
         except EOFError:
             return
+        answer: tuple[bool, Result | str]
         try:
             work = work or prepare()
             answer = True, work(task)
-        except Exception as error:  # whatever it is, the caller is told
+        except Exception as error:  # any error is reported to the caller
             where = traceback.extract_tb(error.__traceback__)[-1]
             answer = False, f"{type(error).__name__}: {error} ({os.path.basename(where.filename)}, line {where.lineno})"
         connection.send(answer)
 
 
-def _die_with_parent() -> None:
+def _exit_with_parent() -> None:
     parent = parent_process()
     if parent is not None:
         wait([parent.sentinel])

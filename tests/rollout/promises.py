@@ -20,7 +20,7 @@ from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
 from dorothie_gym.rollout import SessionPlan, plan_corpus, play_session
-from dorothie_gym.rollout.processes import share_out
+from dorothie_gym.rollout.processes import run_tasks
 from dorothie_gym.spaces import NO_MOVE, ActionDict
 
 
@@ -78,7 +78,7 @@ def success(promise: Promise, *, sessions: int, seed: int = 0, workers: int = 1)
         workers: processes that play.
     """
     plans = plan_corpus(sessions, seed)
-    played = list(share_out(partial(_same, promise), plans, workers=workers))
+    played = list(run_tasks(partial(_same, promise), plans, workers=workers))
     failed = [
         {"town": town, "subgoals": ended["subgoals"], "collisions": ended["collisions"], "seconds": ended["seconds"]}
         for town, ended in played

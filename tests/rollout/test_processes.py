@@ -3,25 +3,25 @@ from __future__ import annotations
 import pytest
 
 from dorothie_gym.errors import ProcessError
-from dorothie_gym.rollout.processes import share_out
+from dorothie_gym.rollout.processes import run_tasks
 from tests.rollout import workshop
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_every_task_is_done_once(workers: int) -> None:
-    assert sorted(share_out(workshop.squares, range(10), workers=workers)) == [k * k for k in range(10)]
+    assert sorted(run_tasks(workshop.squares, range(10), workers=workers)) == [k * k for k in range(10)]
 
 
 def test_no_more_processes_are_started_than_there_are_tasks() -> None:
-    assert list(share_out(workshop.squares, [7], workers=50)) == [49]
-    assert list(share_out(workshop.squares, [], workers=2)) == []
+    assert list(run_tasks(workshop.squares, [7], workers=50)) == [49]
+    assert list(run_tasks(workshop.squares, [], workers=2)) == []
 
 
 def test_failure_tells_task_and_reason() -> None:
     with pytest.raises(ProcessError, match="3: ValueError: three is too much"):
-        list(share_out(workshop.refusing, range(5), workers=2))
+        list(run_tasks(workshop.refusing, range(5), workers=2))
 
 
 def test_death_of_a_process_is_told_instead_of_waited_for() -> None:
     with pytest.raises(ProcessError, match="died with code -9"):
-        list(share_out(workshop.dying, range(5), workers=2))
+        list(run_tasks(workshop.dying, range(5), workers=2))

@@ -22,7 +22,7 @@ from dorothie_gym.rollout.closed_loop.metrics import (
     Success,
     UtterancesPerSubgoal,
 )
-from dorothie_gym.rollout.closed_loop.results import RolloutResult, Row, read_result
+from dorothie_gym.rollout.closed_loop.results import RolloutResult, RolloutRow, read_result
 from dorothie_gym.rollout.closed_loop.running import RolloutPlan, RolloutSettings, parse_towns, roll_out
 from dorothie_gym.rollout.closed_loop.session_record import (
     MetException,
@@ -55,7 +55,7 @@ __all__ = [
     "RolloutResult",
     "RolloutSettings",
     "RouteCompletion",
-    "Row",
+    "RolloutRow",
     "SPL",
     "Seconds",
     "SessionRecord",

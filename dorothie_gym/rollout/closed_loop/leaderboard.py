@@ -13,7 +13,8 @@ from dorothie_gym.ontology import Role
 from dorothie_gym.rendering.charts import INK, dress_percent_axes, empty_figure
 from dorothie_gym.rollout.closed_loop.metrics import Metric, RecoverySeconds
 from dorothie_gym.rollout.closed_loop.results import ALL_METRICS, RESULT_FILE, RolloutResult, figure_text, read_result
-from dorothie_gym.rollout.closed_loop.running import COST_FILE, command_of, fold_of_towns
+from dorothie_gym.rollout.closed_loop.running import command_of, fold_of_towns
+from dorothie_gym.rollout.runner import COST_FILE
 
 OTHER: Final = "other"
 """Part of the rollouts in towns of both folds, or of none."""

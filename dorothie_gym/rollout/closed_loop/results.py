@@ -27,7 +27,7 @@ NO_EXCEPTION: Final = "none"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row:
+class RolloutRow:
     """One session of a rollout.
 
     Attributes:
@@ -60,7 +60,7 @@ class RolloutResult:
     """
 
     settings: Mapping[str, Any]
-    rows: tuple[Row, ...]
+    rows: tuple[RolloutRow, ...]
 
     @property
     def complete(self) -> bool:
@@ -107,7 +107,7 @@ class RolloutResult:
         free = [row for row in self.rows if row.record is not None and not row.record.exceptions]
         return {**found, NO_EXCEPTION: _table(free)} if free else found
 
-    def _parts(self, names: Iterable[str], belongs: Callable[[Row, str], bool]) -> dict[str, Any]:
+    def _parts(self, names: Iterable[str], belongs: Callable[[RolloutRow, str], bool]) -> dict[str, Any]:
         return {name: _table([row for row in self.rows if belongs(row, name)]) for name in names}
 
 
@@ -119,7 +119,7 @@ def result_from_json(page: Any, where: str) -> RolloutResult:
         settings = dict(page["settings"])
         int(settings["sessions_planned"])
         rows = [
-            Row(
+            RolloutRow(
                 number=int(row["number"]),
                 town=str(row["town"]),
                 seed=int(row["seed"]),
@@ -155,7 +155,7 @@ def read_result(path: Path | str) -> RolloutResult:
     return result_from_json(page, str(file))
 
 
-def _table(rows: Iterable[Row]) -> dict[str, Any]:
+def _table(rows: Iterable[RolloutRow]) -> dict[str, Any]:
     rows = list(rows)
     records = [row.record for row in rows if row.record is not None]
     return {
@@ -166,17 +166,17 @@ def _table(rows: Iterable[Row]) -> dict[str, Any]:
     }
 
 
-def _figures(rows: Iterable[Row]) -> dict[str, Interval]:
+def _figures(rows: Iterable[RolloutRow]) -> dict[str, Interval]:
     rows = list(rows)
     records = [row.record for row in rows if row.record is not None]
     return figures_of(records, len(rows) - len(records))
 
 
-def _kinds(row: Row) -> frozenset[ExceptionKind]:
+def _kinds(row: RolloutRow) -> frozenset[ExceptionKind]:
     return frozenset() if row.record is None else frozenset(each.kind for each in row.record.exceptions)
 
 
-def _only(row: Row, kind: ExceptionKind) -> Row:
+def _only(row: RolloutRow, kind: ExceptionKind) -> RolloutRow:
     """The same session with the exceptions of one kind."""
     assert row.record is not None
     kept = tuple(each for each in row.record.exceptions if each.kind is kind)

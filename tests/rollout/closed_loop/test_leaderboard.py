@@ -13,7 +13,7 @@ from dorothie_gym.errors import RolloutError
 from dorothie_gym.maps import SEEN_TOWNS
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED, Player
-from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutSettings, Row
+from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutRow, RolloutSettings
 from dorothie_gym.rollout.closed_loop.leaderboard import leaderboard_page, read_entries
 from tests.rollout.closed_loop.drives import record
 
@@ -22,7 +22,7 @@ def write(folder: Path, name: str, successes: int, **settings: Any) -> Path:
     """The result of four sessions of a Co-Wizard."""
     player = Player(name=name, training={"steps": 50_000, "seconds": 1200.0} if name == "ppo" else {})
     made = RolloutSettings(cast={**ALL_SCRIPTED, Role.CO_WIZARD: player}, sessions=4, **settings)
-    rows = tuple(Row(number=k, town="brookside", seed=k, record=record(success=k < successes)) for k in range(4))
+    rows = tuple(RolloutRow(number=k, town="brookside", seed=k, record=record(success=k < successes)) for k in range(4))
     folder.mkdir(parents=True)
     result = RolloutResult(settings=made.to_json(), rows=rows)
     (folder / "rollout.json").write_text(json.dumps(result.to_json()))

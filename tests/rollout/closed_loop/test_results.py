@@ -8,7 +8,7 @@ import pytest
 
 from dorothie_gym.errors import RolloutError
 from dorothie_gym.ontology import ExceptionKind
-from dorothie_gym.rollout.closed_loop import MetException, RolloutResult, RolloutSettings, Row, read_result
+from dorothie_gym.rollout.closed_loop import MetException, RolloutResult, RolloutRow, RolloutSettings, read_result
 from tests.rollout.closed_loop.drives import record
 
 WEATHER = MetException(kind=ExceptionKind.WEATHER, met=1.0, seconds=4.0)
@@ -17,9 +17,9 @@ PROP = MetException(kind=ExceptionKind.PLACE_PROP, met=1.0)
 
 def result(**changes: Any) -> RolloutResult:
     rows = (
-        Row(number=0, town="midtown", seed=1, record=record(exceptions=(WEATHER, PROP))),
-        Row(number=1, town="brookside", seed=2, record=record(success=False)),
-        Row(number=2, town="midtown", seed=3, error="RuntimeError: faint"),
+        RolloutRow(number=0, town="midtown", seed=1, record=record(exceptions=(WEATHER, PROP))),
+        RolloutRow(number=1, town="brookside", seed=2, record=record(success=False)),
+        RolloutRow(number=2, town="midtown", seed=3, error="RuntimeError: faint"),
     )
     return RolloutResult(settings=RolloutSettings(sessions=3, **changes).to_json(), rows=rows)
 
