@@ -188,6 +188,7 @@ class LaneEdges:
 
     def free(self, places: Array, margin: float) -> NDArray[np.bool_]:
         """Returns which positions (n, 3) keep a margin [m] to all lanes at their height (n,)."""
+        # Any: the stubs of scipy describe the result for a single point only
         near: Any = self._tree.query_ball_point(places[:, :2], self._widest + margin, return_sorted=False)
         counts = np.fromiter((len(discs) for discs in near), dtype=np.int64, count=len(places))
         free = np.ones(len(places), dtype=bool)

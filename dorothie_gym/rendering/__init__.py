@@ -1,8 +1,8 @@
-"""Pictures of towns, drawn with pygame on surfaces that need no display."""
+"""Pictures of towns and sessions, drawn with pygame on surfaces that need no display."""
 
 import os
 
-# Before anybody imports pygame: its greeting on standard output would spoil what commands print for programs.
+# before the first import of pygame: its greeting would spoil machine-readable output
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 
 from dorothie_gym.rendering.map_sheet import town_picture  # noqa: E402

@@ -1,9 +1,9 @@
-"""The town from above, with everybody on it: all of it, or a window that goes with the car."""
+"""Aerial view of a town with all actors: the whole town, or a window that follows the car."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,9 @@ from dorothie_gym.rendering.scene import Pin, Scene
 from dorothie_gym.rendering.text import font
 from dorothie_gym.rendering.town_map import draw_scale_bar
 
+if TYPE_CHECKING:
+    import pygame
+
 _NIGHT = (126, 138, 184)
 _OVERCAST = (226, 230, 236)
 _FOG = (222, 226, 230)
@@ -30,13 +33,13 @@ _RAIN = (176, 194, 222)
 
 
 def darkness(weather: Mapping[str, float]) -> float:
-    """How dark it is in [0, 1]: none with the sun 12 degrees above the horizon, all with it 6 degrees below."""
+    """Returns the darkness, from 0 with the sun 12 degrees above the horizon to 1 with it 6 degrees below."""
     altitude = _value(weather, WeatherParameter.SUN_ALTITUDE_ANGLE)
     return float(np.clip((12.0 - altitude) / 18.0, 0.0, 1.0))
 
 
 def weather_summary(weather: Mapping[str, float]) -> str:
-    """The weather in a few words, such as "night, heavy rain, fog"."""
+    """Returns the weather in a few words, such as "night, heavy rain, fog"."""
     dark = darkness(weather)
     parts = ["night" if dark > 0.85 else "dusk" if dark > 0.15 else "day"]
     rain = _value(weather, WeatherParameter.PRECIPITATION)
@@ -56,13 +59,13 @@ def weather_summary(weather: Mapping[str, float]) -> str:
     return ", ".join(parts)
 
 
-def apply_weather(picture: Any, weather: Mapping[str, float], time: float) -> None:
-    """Tints a picture in place, lightly enough that everything on it is still read.
+def apply_weather(picture: pygame.Surface, weather: Mapping[str, float], time: float) -> None:
+    """Tints a picture in place, lightly enough to remain legible.
 
     Args:
-        picture: a `pygame.Surface`.
-        weather: the parameters by name; those absent are as on a clear noon.
-        time: what moves the rain [s].
+        picture: surface to tint.
+        weather: parameters by name; missing ones have their values of a clear noon.
+        time: time that animates the rain [s].
     """
     import pygame
 
@@ -84,7 +87,7 @@ def apply_weather(picture: Any, weather: Mapping[str, float], time: float) -> No
         _draw_rain(picture, rain, _value(weather, WeatherParameter.WIND_INTENSITY) / 100.0, time)
 
 
-def _draw_rain(picture: Any, strength: float, wind: float, time: float) -> None:
+def _draw_rain(picture: pygame.Surface, strength: float, wind: float, time: float) -> None:
     import pygame
 
     width, height = picture.get_size()
@@ -100,9 +103,9 @@ def _value(weather: Mapping[str, float], parameter: WeatherParameter) -> float:
     return float(weather.get(parameter.value, parameter.clear_noon))
 
 
-# --- The town from above, with everybody on it: all of it, or a window that goes with the car ------------------------
+# --- View ------------------------------------------------------------------------------------------------------------
 
-_WINDOW = 160.0  # [m] seen across the shorter side when the view follows the car
+_WINDOW = 160.0  # [m] across the shorter side when the view follows the car
 _AROUND = 30.0  # [m] of country around the base map of that view
 _PIN_TYPE = 13  # [px]
 _PIN_HEIGHT = 31  # [px] from the tip to the top
@@ -110,7 +113,7 @@ _TOWNS_KEPT = 2
 
 
 class AerialView:
-    """Draws the map of a scene. Base maps are painted once for each town and kept.
+    """Draws the map of a scene. Base maps are painted once for each town and cached.
 
     Attributes:
         size: width and height [px].
@@ -121,8 +124,8 @@ class AerialView:
         self._canvas = Canvas(size)
         self._painters: dict[tuple[object, ...], MapPainter] = {}
 
-    def draw(self, scene: Scene, follow: bool) -> Any:
-        """A new `pygame.Surface` with the whole town, or with some 160 m of it around the car."""
+    def draw(self, scene: Scene, follow: bool) -> pygame.Surface:
+        """Returns a new surface with the whole town, or with about 160 m of it around the car."""
         painter = self._painter(scene, follow)
         car = np.array([scene.car.x, scene.car.y])
         if follow:
@@ -143,7 +146,7 @@ class AerialView:
 
     def _painter(self, scene: Scene, follow: bool) -> MapPainter:
         names = None if scene.street_names is None else tuple(scene.street_names)
-        # A town is kept alive by its painter, so that its id names it as long as the entry lives.
+        # the painter keeps its town alive, so that its id stays unique as long as the entry
         key = (id(scene.town), names, follow)
         if key not in self._painters:
             while len(self._painters) >= 2 * _TOWNS_KEPT:
@@ -198,7 +201,7 @@ class AerialView:
                 self._point_to(canvas, pin, taken)
 
     def _write_name(self, canvas: Canvas, pin: Pin, taken: list[_Box], names: list[_Box]) -> None:
-        """The pin's name on the side where it covers least."""
+        """Draws the name of a pin on the side where it covers least."""
         x, y = canvas.pixel((pin.x, pin.y)).tolist()
         width, height = font(_PIN_TYPE, True).size(pin.label)[0] + 14, 22
         head = y - 19 - height / 2
@@ -215,7 +218,7 @@ class AerialView:
         canvas.text(pin.label, box[0] + 7, box[1] + height / 2, _PIN_TYPE, colour, bold=True)
 
     def _point_to(self, canvas: Canvas, pin: Pin, taken: list[_Box]) -> None:
-        """A note at the edge of the picture that tells where a landmark lies that cannot be seen."""
+        """Draws a note at the edge of the picture with the direction of a landmark outside it."""
         centre = np.array(self.size) / 2.0
         direction = canvas.pixel((pin.x, pin.y)) - centre
         metres = float(np.hypot(*direction)) / canvas.scale
@@ -242,7 +245,7 @@ class AerialView:
         canvas.text(text, box[0] + 25, box[1] + height / 2, _PIN_TYPE - 1, colour)
 
     def _lost(self, box: _Box) -> float:
-        """What of a box lies outside the picture [px2], counted double."""
+        """Returns twice the area of a box outside the picture [px2]."""
         x, y, width, height = box
         inside = _overlap(box, (0.0, 0.0, float(self.size[0]), float(self.size[1])))
         return 2.0 * (width * height - inside)
@@ -252,13 +255,13 @@ _Box = tuple[float, float, float, float]
 
 
 def _around(path: NDArray[np.float64]) -> _Box:
-    """The box around a path (n, 2) [px] on which a name is set."""
+    """Returns the box around the path (n, 2) [px] of a label."""
     (left, top), (right, bottom) = (path.min(axis=0) - 7.0).tolist(), (path.max(axis=0) + 7.0).tolist()
     return left, top, right - left, bottom - top
 
 
 def _overlap(a: _Box, b: _Box) -> float:
-    """Area that two boxes (x, y, width, height) share."""
+    """Returns the common area of two boxes (x, y, width, height)."""
     wide = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
     high = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
     return max(0.0, wide) * max(0.0, high)

@@ -1,4 +1,4 @@
-"""What lies at the sides of the lanes: another lane, the oncoming traffic, a median or the edge of the road."""
+"""Borders at the sides of lanes: another lane, oncoming traffic, a median or the edge of the road."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering.shapes import TownSamples, right_of
 
 NARROWEST_MEDIAN = 1.2
-"""Less than this between the two directions is paint, not a median [m]."""
+"""Smallest width of a median between the two directions [m]; below it there is only paint."""
 
 _WIDEST_MEDIAN = 14.0  # [m]
 _TOUCH = 1.0  # [m] between the edges of lanes side by side, at most
 _SAME_LEVEL = 1.5  # [m]
-_THIN = 1.6  # [m] a lane narrower than this is still opening: the line beside it would make a wedge
-_INSIDE = 0.4  # [m] an edge this deep inside another lane is no edge
-_SHORTEST = 4.0  # [m] of line
-_JOIN = 0.8  # [m] between the ends of two lines that are one
+_THIN = 1.6  # [m] a narrower lane is still opening: the line beside it would form a wedge
+_INSIDE = 0.4  # [m] an edge this far inside another lane is no edge
+_SHORTEST = 4.0  # [m] length of a line
+_JOIN = 0.8  # [m] between the ends of two lines that are joined
 
 _Run: TypeAlias = tuple[int, int, int]  # first sample, the one after the last, kind
 
 
 class BorderKind(enum.IntEnum):
-    """What lies beyond the side of a lane."""
+    """Kind of what lies beyond the side of a lane."""
 
     NONE = 0
     LANE = 1
@@ -42,16 +42,16 @@ class BorderKind(enum.IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Border:
-    """A line along the sides of lanes that follow each other.
+    """Line along the sides of successive lanes.
 
     Attributes:
-        kind: what lies beyond it.
+        kind: kind of what lies beyond it.
         sign: side of the lanes: -1 left, +1 right.
-        lanes: those lanes, in driving direction.
-        street: index of the street of the first one, or -1.
-        points: the line in driving direction (n, 3) [m], on the lanes' edge.
+        lanes: ids of the lanes, in driving direction.
+        street: street of the first lane, or -1.
+        points: line on the edge of the lanes in driving direction (n, 3) [m].
         heading: (n,) [rad].
-        gap: width of what lies between the edge and the lane beyond it (n,) [m]; 0 where there is none.
+        gap: distance between the edge and the lane beyond it (n,) [m]; 0 without such a lane.
         width: of the lane (n,) [m].
     """
 
@@ -65,12 +65,12 @@ class Border:
     width: Array
 
     def shifted(self, inwards: Array | float) -> Array:
-        """The line moved into its lane by (n,) [m]; negative values move it out of it."""
+        """Returns the line (n, 2) [m] shifted into its lane by (n,) [m]; negative values shift it out of the lane."""
         shift = np.broadcast_to(np.asarray(-self.sign * np.asarray(inwards)), self.heading.shape)
         return np.asarray(self.points[:, :2] + shift[:, None] * right_of(self.heading))
 
     def part(self, run: NDArray[np.int64]) -> Border:
-        """Some of its places, by their indices."""
+        """Returns the part of the border with the given indices."""
         return replace(
             self, points=self.points[run], heading=self.heading[run], gap=self.gap[run], width=self.width[run]
         )
@@ -81,9 +81,9 @@ class Borders:
     """All borders of a town.
 
     Attributes:
-        lines: each line once.
-        right_neighbour: by lane, the lane in the same direction on its right, where there is one.
-        divided: lanes that have oncoming traffic on their left, beyond a line or a median.
+        lines: all lines, each once.
+        right_neighbour: lane in the same direction on the right of each lane that has one.
+        divided: lanes with oncoming traffic on their left, beyond a line or a median.
     """
 
     lines: tuple[Border, ...]
@@ -92,11 +92,11 @@ class Borders:
 
     @cached_property
     def left_neighbour(self) -> dict[int, int]:
-        """By lane, the lane in the same direction on its left, where there is one."""
+        """Lane in the same direction on the left of each lane that has one."""
         return {right: lane for lane, right in self.right_neighbour.items()}
 
     def abreast(self, lane: int) -> int:
-        """Lanes of the carriageway from this one to its left edge."""
+        """Returns the number of lanes from a lane to the left edge of its carriageway."""
         seen = {lane}
         while (beside := self.left_neighbour.get(lane, lane)) not in seen:
             seen.add(beside)
@@ -104,7 +104,7 @@ class Borders:
         return len(seen)
 
     def rightmost(self, lane: int) -> int:
-        """The lane at the kerb of the carriageway that a lane belongs to."""
+        """Returns the rightmost lane of the carriageway of a lane."""
         seen = {lane}
         while (beside := self.right_neighbour.get(lane, lane)) not in seen:
             seen.add(beside)
@@ -113,7 +113,7 @@ class Borders:
 
 
 def find_borders(town: Town, samples: TownSamples) -> Borders:
-    """Looks beside every lane outside junctions."""
+    """Finds the borders of all lanes outside junctions."""
     outside = samples.of_lanes(np.array([not lane.in_junction for lane in town.lanes], dtype=bool))
     if not len(outside):
         return Borders((), {}, frozenset())
@@ -144,7 +144,7 @@ def find_borders(town: Town, samples: TownSamples) -> Borders:
 
 
 def _beside(samples: TownSamples, outside: NDArray[np.int64], sign: int) -> NDArray[np.int64]:
-    """Sample (n,) of the lane in the same direction on that side, or -1."""
+    """Returns the sample of the adjacent lane in the same direction on a side (n,), or -1."""
     own, other = samples.edge(sign)[outside], samples.edge(-sign)[outside]
     near, where = cKDTree(other).query(own, k=6, distance_upper_bound=np.hypot(_TOUCH, 1.5))
     candidate = outside[np.minimum(where, len(outside) - 1)]  # (m, 6)
@@ -160,7 +160,7 @@ def _beside(samples: TownSamples, outside: NDArray[np.int64], sign: int) -> NDAr
 
 
 def _facing(samples: TownSamples, leftmost: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
-    """Sample (n,) of the oncoming lane on the left, or -1, and what lies between the two left edges (n,) [m]."""
+    """Returns the sample of the oncoming lane on the left (n,), or -1, and the gap between both left edges (n,) [m]."""
     found, gap = np.full(len(samples.lane), -1, dtype=np.int64), np.zeros(len(samples.lane))
     if not len(leftmost):
         return found, gap
@@ -180,14 +180,14 @@ def _facing(samples: TownSamples, leftmost: NDArray[np.int64]) -> tuple[NDArray[
 
 
 def _frame(samples: TownSamples, index: NDArray[np.int64], offset: Array) -> tuple[Array, Array]:
-    """Offsets (m, k, 2) [m] from samples, as seen from them: forward and to the right (m, k) each."""
+    """Transforms offsets (m, k, 2) [m] from samples into their frames: forward and right (m, k) each."""
     heading = samples.heading[index][:, None]
     c, s = np.cos(heading), np.sin(heading)
     return offset[..., 0] * c + offset[..., 1] * s, offset[..., 1] * c - offset[..., 0] * s
 
 
 def _inside_others(samples: TownSamples, outside: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Whether the left and right edges (2, n) lie inside another lane at the same height."""
+    """Returns whether the left and right edges lie inside another lane at the same height (2, n)."""
     hidden = np.zeros((2, len(samples.lane)), dtype=bool)
     tree = cKDTree(samples.centre[outside, :2])
     for row, sign in enumerate((-1, 1)):
@@ -201,7 +201,7 @@ def _inside_others(samples: TownSamples, outside: NDArray[np.int64]) -> NDArray[
 
 
 def _owns(town: Town, samples: TownSamples, facing: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Whether the line between a lane and the oncoming one is drawn from this lane (n,)."""
+    """Returns whether the line between a lane and the oncoming lane is drawn from this lane (n,)."""
     number = np.array([lane.lane_id for lane in town.lanes])[samples.lane]
     other = number[np.maximum(facing, 0)]
     different = (number < 0) != (other < 0)
@@ -209,7 +209,7 @@ def _owns(town: Town, samples: TownSamples, facing: NDArray[np.int64]) -> NDArra
 
 
 def _majority(samples: TownSamples, beside: NDArray[np.int64]) -> dict[int, int]:
-    """By lane, the lane that most of its samples have beside them."""
+    """Returns for each lane the most frequent adjacent lane of its samples."""
     index = np.flatnonzero(beside >= 0)
     pairs, counts = np.unique(
         np.column_stack((samples.lane[index], samples.lane[beside[index]])), axis=0, return_counts=True
@@ -222,13 +222,13 @@ def _majority(samples: TownSamples, beside: NDArray[np.int64]) -> dict[int, int]
 
 
 def _lines(town: Town, samples: TownSamples, kinds: NDArray[np.int64], gap: Array, sign: int) -> Iterator[Border]:
-    """Lines along one side, joined across the ends of lanes."""
+    """Yields lines along one side, joined across the ends of lanes."""
     runs = [run for lane in range(len(town.lanes)) for run in _runs(kinds, *samples.bounds[lane].tolist())]
     edge = np.column_stack((samples.edge(sign), samples.centre[:, 2]))
     after = _followers(town, samples, runs, edge)
     used = [False] * len(runs)
     followed = frozenset(after.values())
-    # Lines with a beginning first; what is left then are rings.
+    # lines with a beginning first; the rest are rings
     for head in (*(k for k in range(len(runs)) if k not in followed), *range(len(runs))):
         chain: list[_Run] = []
         number = head
@@ -241,7 +241,7 @@ def _lines(town: Town, samples: TownSamples, kinds: NDArray[np.int64], gap: Arra
 
 
 def _followers(town: Town, samples: TownSamples, runs: Sequence[_Run], edge: Array) -> dict[int, int]:
-    """By run that reaches the end of its lane, the run of the same kind and street that goes on where it ends."""
+    """Returns the continuation of each run that reaches the end of its lane: same kind and street, adjacent start."""
     begins = {(int(samples.lane[a]), kind): k for k, (a, _, kind) in enumerate(runs) if samples.station[a] == 0.0}
     after: dict[int, int] = {}
     for k, (_, end, kind) in enumerate(runs):
@@ -261,7 +261,7 @@ def _followers(town: Town, samples: TownSamples, runs: Sequence[_Run], edge: Arr
 def _border(
     town: Town, samples: TownSamples, edge: Array, gap: Array, sign: int, chain: Sequence[_Run]
 ) -> Iterator[Border]:
-    # Where one lane follows another their common place is kept once.
+    # the common point of successive lanes is kept once
     index = np.concatenate([np.arange(a + (k > 0), b) for k, (a, b, _) in enumerate(chain)])
     line = edge[index]
     if len(line) < 2 or np.hypot(*np.diff(line[:, :2], axis=0).T).sum() < _SHORTEST:
@@ -280,7 +280,7 @@ def _border(
 
 
 def _runs(kinds: NDArray[np.int64], start: int, end: int) -> Iterator[_Run]:
-    """Index ranges of one lane in which the kind does not change, with the kind; single samples in between give way."""
+    """Yields index ranges of one lane with constant kind, and the kind; single samples in between are absorbed."""
     row = kinds[start:end].copy()
     for k in range(1, len(row) - 1):
         if row[k - 1] == row[k + 1] != row[k]:
@@ -292,7 +292,7 @@ def _runs(kinds: NDArray[np.int64], start: int, end: int) -> Iterator[_Run]:
 
 
 def _smooth(values: Array) -> Array:
-    """A running mean over five samples: distances to samples of another lane jitter."""
+    """Smooths with a running mean over five samples: distances to samples of another lane jitter."""
     if len(values) < 5:
         return values
     padded = np.pad(values, 2, mode="edge")

@@ -1,23 +1,27 @@
-"""How charts look: the ink and paper of all pictures, for matplotlib."""
+"""Style of charts: ink and paper of all pictures, for matplotlib."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.rendering import palette
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 DOTS: Final = 130
-"""Dots an inch."""
+"""Dots per inch."""
 
 GRID: Final = "#e2ddd1"
 BAND: Final = "#f2ede1"
-"""Behind every other row."""
+"""Background of every other row."""
 
 
 def hexadecimal(colour: palette.Colour) -> str:
-    """A colour as matplotlib takes it."""
+    """Returns a colour in matplotlib's notation."""
     return "#{:02x}{:02x}{:02x}".format(*colour)
 
 
@@ -27,14 +31,14 @@ SHEET: Final = hexadecimal(palette.SHEET)
 
 
 @contextmanager
-def empty_figure(width: float, height: float) -> Iterator[Any]:
-    """A matplotlib figure to draw on within the context; it needs no display.
+def empty_figure(width: float, height: float) -> Iterator[Figure]:
+    """Creates a matplotlib figure for use within the context; it needs no display.
 
     Args:
-        width: of the picture [inches].
-        height: of the picture [inches].
+        width: width of the picture [inches].
+        height: height of the picture [inches].
     """
-    # imported here: matplotlib is slow to import, and a picture is not always wanted
+    # imported on demand: matplotlib is slow to import
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -45,14 +49,14 @@ def empty_figure(width: float, height: float) -> Iterator[Any]:
         yield figure
 
 
-def dress_percent_axes(axes: Any, title: str, rows: int, *, margin: float) -> None:
-    """Makes axes a panel of rows of dots between 0 and 100 per cent.
+def dress_percent_axes(axes: Axes, title: str, rows: int, *, margin: float) -> None:
+    """Styles axes as a panel of rows of dots between 0 and 100 per cent.
 
     Args:
-        axes: of matplotlib; row k is at height k.
-        title: above the panel.
-        rows: how many; every other one has a band behind it.
-        margin: room beside 0 and 100 [per cent].
+        axes: matplotlib axes; row k is at y = k.
+        title: title above the panel.
+        rows: number of rows; every other one has a band behind it.
+        margin: margin beyond 0 and 100 [per cent].
     """
     for row in range(0, rows, 2):
         axes.axhspan(row - 0.5, row + 0.5, color=BAND, zorder=0)

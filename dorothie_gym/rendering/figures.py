@@ -1,8 +1,8 @@
-"""Cars, people and things as they look from above, and the pins of landmarks."""
+"""Top views of cars, people and objects, landmark pins, and the canvas for them."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,17 +14,20 @@ from dorothie_gym.rendering.shapes import disc, place, stroke
 from dorothie_gym.rendering.text import words
 from dorothie_gym.rendering.town_map import SUPERSAMPLING
 
+if TYPE_CHECKING:
+    import pygame
+
 _STROKE = 6  # segments
 
 
 class Canvas:
-    """Draws on a layer twice as fine as the picture below it.
+    """Supersampled layer on top of a picture.
 
-    The layer holds premultiplied colours: what is half covered after scaling down is then mixed rightly.
+    The layer holds premultiplied colours, so that partly covered pixels mix correctly after scaling down.
 
     Attributes:
-        size: of the picture below [px].
-        scale: of that picture [px/m].
+        size: size of the picture below [px].
+        scale: scale of that picture [px/m].
         origin: world position (2,) of its upper left corner [m].
     """
 
@@ -37,23 +40,23 @@ class Canvas:
         self._layer = pygame.Surface((size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING), pygame.SRCALPHA, 32)
 
     def begin(self, scale: float, origin: Array) -> None:
-        """Clears the layer and sets where it lies."""
+        """Clears the layer and sets its scale and origin."""
         self.scale, self.origin = scale, origin
         self._layer.fill((0, 0, 0, 0))
 
-    def blit_on(self, picture: Any) -> None:
-        """Puts what was drawn onto the picture."""
+    def blit_on(self, picture: pygame.Surface) -> None:
+        """Draws the layer onto the picture."""
         import pygame
 
         smooth = pygame.transform.smoothscale(self._layer, self.size)
         picture.blit(smooth, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
 
     def pixel(self, xy: ArrayLike) -> Array:
-        """World positions (..., 2) [m] as pixels (..., 2) of the picture."""
+        """Converts world positions (..., 2) [m] to pixels (..., 2) of the picture."""
         return np.asarray((np.asarray(xy, dtype=float) - self.origin) * self.scale)
 
     def shows(self, xy: ArrayLike, border: float = 0.0) -> bool:
-        """Whether a world position (2,) is on the picture, not closer to its edge than so many pixels."""
+        """Returns whether a world position (2,) is on the picture, at least `border` [px] from its edge."""
         x, y = self.pixel(xy)
         return bool(border <= x <= self.size[0] - border and border <= y <= self.size[1] - border)
 
@@ -62,7 +65,7 @@ class Canvas:
         self.pixel_polygon(self.pixel(points), colour, alpha)
 
     def pixel_polygon(self, points: Array, colour: Colour, alpha: float = 1.0) -> None:
-        """Fills a polygon (n, 2) [px]; a translucent one hides what was drawn on this layer before it."""
+        """Fills a polygon (n, 2) [px]; a translucent one replaces earlier drawings on this layer."""
         import pygame
 
         ink = (*(round(c * alpha) for c in colour), round(255 * alpha))
@@ -87,7 +90,7 @@ class Canvas:
 
         fine = points * SUPERSAMPLING
         pen = width * SUPERSAMPLING - 1.0  # a polygon's border adds half a pixel on either side
-        # In short strokes: a polygon that crosses itself, as a way around a block does, would have holes.
+        # in short strokes: a polygon that crosses itself would have holes
         for k in range(0, len(fine) - 1, _STROKE):
             piece = fine[k : k + _STROKE + 1]
             pygame.draw.polygon(self._layer, colour, stroke(piece, pen).tolist())
@@ -111,7 +114,7 @@ class Canvas:
         self._layer.blit(piece.premul_alpha(), corner, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
-# --- Cars, people and things as they look from above, and the pins of landmarks --------------------------------------
+# --- Figures ---------------------------------------------------------------------------------------------------------
 
 _BODY = np.array(
     [[-0.5, -0.42], [-0.44, -0.5], [0.2, -0.5], [0.5, -0.12], [0.5, 0.12], [0.2, 0.5], [-0.44, 0.5], [-0.5, 0.42]]
@@ -123,12 +126,12 @@ _BOX = np.array(
 _WINDSCREEN = np.array([[0.08, -0.38], [0.26, -0.32], [0.26, 0.32], [0.08, 0.38]])
 _BEAM_LENGTH = 19.0  # [m]
 _BEAM_HALF_ANGLE = 0.24  # [rad]
-_SMALLEST_CAR = 24.0  # [px] long, however small the scale
+_SMALLEST_CAR = 24.0  # [px] smallest length at any scale
 _SMALLEST_ACTOR = 6.0  # [px]
 
 
 def draw_headlights(canvas: Canvas, at: Array, heading: float, length: float, width: float) -> None:
-    """A translucent beam that fades with distance; it hides what is on the canvas, so it comes first."""
+    """Draws a translucent beam that fades with distance; draw it first, because it replaces earlier drawings."""
     zoom = max(1.0, _SMALLEST_CAR / (length * canvas.scale))
     angles = np.linspace(-_BEAM_HALF_ANGLE, _BEAM_HALF_ANGLE, 9)
     front, half = 0.4 * length * zoom, 0.38 * width * zoom
@@ -140,7 +143,7 @@ def draw_headlights(canvas: Canvas, at: Array, heading: float, length: float, wi
 
 
 def draw_car(canvas: Canvas, at: Array, heading: float, length: float, width: float) -> None:
-    """The car itself: a blue body with a white rim, pointed where it goes; never too small to be found."""
+    """Draws the car: a blue body with a white rim, pointed in its direction, with a minimum size."""
     shape = np.array([length, width]) * max(1.0, _SMALLEST_CAR / (length * canvas.scale))
     rim = 1.8 / canvas.scale
     canvas.polygon(place(_BODY * (shape + 2.0 * rim), at, heading), palette.PAPER)
@@ -149,7 +152,7 @@ def draw_car(canvas: Canvas, at: Array, heading: float, length: float, width: fl
 
 
 def draw_actor(canvas: Canvas, kind: str, at: Array, heading: float, length: float, width: float) -> None:
-    """A "vehicle", "cyclist", "pedestrian" or "prop"; small ones are drawn larger than they are."""
+    """Draws a "vehicle", "cyclist", "pedestrian" or "prop", with a minimum size."""
     zoom = max(1.0, _SMALLEST_ACTOR / (max(length, width) * canvas.scale))
     shape = np.array([length, width]) * zoom
     rim = 1.0 / canvas.scale
@@ -167,7 +170,7 @@ def draw_actor(canvas: Canvas, kind: str, at: Array, heading: float, length: flo
 
 
 def draw_trail(canvas: Canvas, trail: Array) -> None:
-    """The way driven (n, 2) [m], thinned to what can be seen."""
+    """Draws the driven path (n, 2) [m], thinned to visible detail."""
     points = canvas.pixel(trail.reshape(-1, 2))
     if len(points) < 2:
         return
@@ -182,7 +185,7 @@ def draw_trail(canvas: Canvas, trail: Array) -> None:
 
 
 def draw_waypoints(canvas: Canvas, waypoints: Array) -> None:
-    """The way ahead (n, 2) [m] as dots, at least eight pixels apart."""
+    """Draws the planned path (n, 2) [m] as dots, at least eight pixels apart."""
     last = np.full(2, -np.inf)
     for point in canvas.pixel(waypoints.reshape(-1, 2)):
         if np.hypot(*(point - last)) < 8.0:
@@ -192,7 +195,7 @@ def draw_waypoints(canvas: Canvas, waypoints: Array) -> None:
 
 
 def draw_pin(canvas: Canvas, at: Array, waypoint: Array, colour: Colour, hollow: bool, done: bool) -> None:
-    """A pin whose tip is on a landmark (2,) [m]: hollow and dashed for a hidden one, with a tick once reached."""
+    """Draws a pin with its tip on a landmark (2,) [m]: hollow and dashed if hidden, with a tick once reached."""
     tip = canvas.pixel(at)
     stop = canvas.pixel(waypoint)
     canvas.line(np.stack((tip, stop)), 1.2, colour)

@@ -1,10 +1,10 @@
-"""Frames of a session: the aerial view on the left, tasks and talk on the right."""
+"""Frames of a session: aerial view on the left, subgoals and dialogue on the right."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,9 @@ from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.aerial import AerialView
 from dorothie_gym.rendering.panel import Panel
 from dorothie_gym.rendering.scene import Scene
+
+if TYPE_CHECKING:
+    import pygame
 
 _SMALLEST = (640, 400)
 
@@ -25,7 +28,7 @@ class SceneRenderer:
     """
 
     def __init__(self, size: tuple[int, int] = (1280, 800)) -> None:
-        """Prepares to draw.
+        """Allocates the views.
 
         Args:
             size: width and height [px].
@@ -44,8 +47,8 @@ class SceneRenderer:
         """Draws a scene.
 
         Args:
-            scene: what to show.
-            follow: whether the map is a window of some 160 m around the car, north up; else the whole town.
+            scene: scene to show.
+            follow: whether to show about 160 m around the car, north up, instead of the whole town.
 
         Returns:
             Pixels (height, width, 3) in 0..255.
@@ -68,7 +71,7 @@ class SceneRenderer:
             raise FileNotFoundError(f"{target}: the folder {target.parent} does not exist; make it first")
         pygame.image.save(self._surface(scene, follow), str(target), ".png")
 
-    def _surface(self, scene: Scene, follow: bool) -> Any:
+    def _surface(self, scene: Scene, follow: bool) -> pygame.Surface:
         import pygame
 
         frame = pygame.Surface(self.size)
@@ -80,17 +83,17 @@ class SceneRenderer:
 
 
 class HumanWindow:
-    """A window on the screen that shows frames.
+    """Window on the screen that shows frames.
 
     Attributes:
-        closed: whether the user has closed it; further frames are then ignored.
+        closed: whether the user has closed the window; further frames are then ignored.
     """
 
     def __init__(self, size: tuple[int, int] = (1280, 800), title: str = "dorothie_gym") -> None:
         """Opens the window.
 
         Raises:
-            RuntimeError: there is no screen to open it on.
+            RuntimeError: there is no display.
         """
         import pygame
 
@@ -104,7 +107,7 @@ class HumanWindow:
         self.closed = False
 
     def show(self, frame: NDArray[np.uint8], frames_per_second: float = 0.0) -> None:
-        """Shows a frame (height, width, 3), and waits so that no more than so many are shown a second (0: no wait)."""
+        """Shows a frame (height, width, 3), limited to a frame rate [1/s] (0: no limit)."""
         import pygame
 
         if self.closed:

@@ -1,11 +1,11 @@
-"""What the road network encloses: blocks between streets, and the asphalt inside junctions that no lane covers."""
+"""Ground enclosed by the road network: blocks between streets, and asphalt of junctions outside the lanes."""
 
 from __future__ import annotations
 
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +17,17 @@ from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.palette import Colour
 from dorothie_gym.rendering.shapes import Shape, disc, ribbon, simplified, strokes
 
-# Larger holes between connectors are islands (the middle of a roundabout), not asphalt [m2].
+if TYPE_CHECKING:
+    import pygame
+
+# Larger holes between connectors are islands (such as the middle of a roundabout), not asphalt [m2].
 _LARGEST_HOLE = 160.0
 _CLOSING = 2.5  # [m]
-_MOUTH = 6.0  # [m] of the lanes before and behind a junction that its asphalt meets
-_INSET = 0.1  # [m] that lanes are drawn narrower by: a grid makes everything wider
+_MOUTH = 6.0  # [m] of the lanes before and behind a junction that belong to its asphalt
+_INSET = 0.1  # [m] by which lanes are narrowed: rasterization widens them
 _SMOOTHING = 5
 _RIM = 2.6  # [m]
-_BLOCK_SCALE = 1.0  # [px/m]: the edges of blocks lie under roads, so a metre is fine enough
+_BLOCK_SCALE = 1.0  # [px/m]: edges of blocks lie under roads, so 1 m is sufficient
 _HOLE_SCALE = 4.0
 _TREE_SPACING = 13.0  # [m]
 _SLIVER = 500.0  # [m2]
@@ -32,7 +35,7 @@ _SMALLEST_PARK = 1500.0  # [m2]
 
 
 def town_bounds(town: Town, margin: float = 0.0) -> tuple[float, float, float, float]:
-    """Smallest x, y and largest x, y [m] of all lanes, widened by a margin [m]."""
+    """Returns smallest x, y and largest x, y [m] of all lanes, extended by a margin [m]."""
     points = np.concatenate([lane.points[:, :2] for lane in town.lanes])
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])
@@ -40,33 +43,33 @@ def town_bounds(town: Town, margin: float = 0.0) -> tuple[float, float, float, f
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """A piece of ground that polygons leave free.
+    """Connected area of ground outside polygons.
 
     Attributes:
-        mask: a `pygame.mask.Mask` of it.
-        low: world position (2,) of the mask's corner [m].
-        scale: of the mask [px/m].
-        outside: whether it reaches the border.
+        mask: its cells.
+        low: world position of the corner of the mask (2,) [m].
+        scale: scale of the mask [px/m].
+        outside: whether it touches the border.
     """
 
-    mask: Any
+    mask: pygame.Mask
     low: Array
     scale: float
     outside: bool
 
     @property
     def area(self) -> float:
-        """Its area [m2]."""
+        """Area [m2]."""
         return float(self.mask.count()) / self.scale**2
 
     @property
     def outline(self) -> Array:
-        """Its outline (n, 2) [m]."""
+        """Outline (n, 2) [m]."""
         return _outline(self.mask, self.low, self.scale)
 
 
 def _free(outlines: Sequence[Array], scale: float, border: float) -> list[_Piece]:
-    """What polygons (n, 2) [m] leave free inside a frame that is wider than they are by a border [m]."""
+    """Returns the areas outside polygons (n, 2) [m], within a frame extended by a border [m]."""
     import pygame
 
     surface, low = _painted(outlines, scale, border)
@@ -81,9 +84,9 @@ def _free(outlines: Sequence[Array], scale: float, border: float) -> list[_Piece
 
 
 def junction_areas(town: Town) -> list[Array]:
-    """Outlines (n, 2) [m] of the asphalt of junctions: their connectors and mouths, and the gaps between them.
+    """Returns the outlines (n, 2) [m] of the asphalt of junctions: connectors, mouths, and the gaps between them.
 
-    Gaps narrower than five metres are closed, and so are holes; larger holes stay free, as the middle of a roundabout.
+    Gaps narrower than five metres and small holes are closed; larger holes, as in a roundabout, stay open.
     """
     return [outline for junction in town.junctions for outline in _closed(town, junction.connectors)]
 
@@ -103,7 +106,7 @@ def _closed(town: Town, connectors: Sequence[int]) -> Iterator[Array]:
         return
     surface, low = _painted(outlines, _HOLE_SCALE, 2.0 * _CLOSING)
     solid = pygame.surfarray.array_alpha(surface) > 0
-    # Closing: grown by a radius, then shrunk by it, which only fills what is narrower than twice the radius.
+    # Morphological closing: fills gaps narrower than twice the radius.
     radius = _CLOSING * _HOLE_SCALE
     grown = distance_transform_edt(~solid) <= radius
     solid |= distance_transform_edt(grown) > radius
@@ -116,9 +119,9 @@ def _closed(town: Town, connectors: Sequence[int]) -> Iterator[Array]:
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A connected part of a grid: as a `pygame.mask.Mask`, as cells (width, height), and whether it is at the rim."""
+    """Connected part of a grid: as a mask, as cells (width, height), and whether it touches the edge."""
 
-    mask: Any
+    mask: pygame.Mask
     array: NDArray[np.bool_]
     outside: bool
 
@@ -137,8 +140,8 @@ def _pieces(cells: NDArray[np.bool_]) -> Iterator[_Part]:
         yield _Part(pygame.mask.from_surface(shown), array, bool(rim))
 
 
-def _outline(mask: Any, low: Array, scale: float) -> Array:
-    """Outline (n, 2) [m] of a mask; a small disc where it is too small to have one."""
+def _outline(mask: pygame.Mask, low: Array, scale: float) -> Array:
+    """Returns the outline (n, 2) [m] of a mask; a small disc if the mask is too small."""
     line = np.array(mask.outline(), dtype=float).reshape(-1, 2)
     if len(line) < 4:
         return disc(np.array(mask.centroid()) / scale + low, 1.0 / scale, 8)
@@ -146,7 +149,7 @@ def _outline(mask: Any, low: Array, scale: float) -> Array:
 
 
 def smooth_outline(outline: Array, size: int) -> Array:
-    """A closed outline (n, 2) without the steps of the grid it was taken from: a running mean over `size` points."""
+    """Smooths the grid steps of a closed outline (n, 2) with a running mean over `size` points."""
     if len(outline) <= 2 * size:
         return outline
     around = np.concatenate((outline[-(size // 2) :], outline, outline[: size // 2]))
@@ -154,8 +157,8 @@ def smooth_outline(outline: Array, size: int) -> Array:
     return np.stack([np.convolve(around[:, k], kernel, mode="valid") for k in (0, 1)], axis=-1)
 
 
-def _painted(outlines: Sequence[Array], scale: float, border: float) -> tuple[Any, Array]:
-    """Polygons (n, 2) [m] on a transparent surface that is wider than they are by a border [m], and its corner [m]."""
+def _painted(outlines: Sequence[Array], scale: float, border: float) -> tuple[pygame.Surface, Array]:
+    """Draws polygons (n, 2) [m] on a surface, extended by a border [m]; returns it and its corner (2,) [m]."""
     import pygame
 
     points = np.concatenate(outlines)
@@ -168,25 +171,25 @@ def _painted(outlines: Sequence[Array], scale: float, border: float) -> tuple[An
 
 
 def landscape(town: Town, border: float) -> list[Shape]:
-    """What lies between and around the streets: blocks, parks with trees, and the country.
+    """Returns the ground between and around the streets: blocks, parks with trees, and country.
 
-    The scenery is made up, from the town's name alone; nothing drives into it.
+    The scenery is fictional and depends on the name of the town only; it has no effect on the simulation.
 
     Args:
-        town: whose streets.
-        border: how far the country reaches beyond the streets [m].
+        town: town to paint.
+        border: width of the country beyond the streets [m].
     """
     pieces = _free([ribbon(lane, 0.5) for lane in town.lanes], _BLOCK_SCALE, border)
     rng = np.random.default_rng(zlib.crc32(town.name.encode()))
     inner = sorted((p for p in pieces if not p.outside and p.area > 12.0), key=lambda p: -p.area)
     shapes = []
     for rank, piece in enumerate(inner):
-        # Every third large block is a park; slivers (medians, islands) are grass.
+        # every third large block is a park; slivers (medians, islands) are grass
         park = piece.area < _SLIVER or (piece.area > _SMALLEST_PARK and rank % 3 == 1)
         colour = palette.PARK if park else palette.BLOCK
         outline = simplified(smooth_outline(piece.outline, 5), 0.3)
         shapes.append(Shape(outline, colour))
-        # The grid is coarse: what it leaves of the ground beside the road's edge is covered by a broad rim.
+        # the grid is coarse: a broad rim covers the ground up to the edge of the road
         shapes += [Shape(part, colour) for part in strokes(np.concatenate((outline, outline[:1])), _RIM)]
         if park and piece.area > _SMALLEST_PARK:
             shapes += _trees(town, piece, rng, 0.8, palette.TREE)
@@ -197,7 +200,7 @@ def landscape(town: Town, border: float) -> list[Shape]:
 
 
 def _trees(town: Town, piece: _Piece, rng: np.random.Generator, share: float, colour: Colour) -> Iterator[Shape]:
-    """Trees on a jittered grid inside a piece of ground, well away from its edge and from landmark sites."""
+    """Yields trees on a jittered grid inside an area, away from its edge and from landmark sites."""
     size = np.array(piece.mask.get_size())
     grid = np.stack(np.meshgrid(*(np.arange(0.0, n / piece.scale, _TREE_SPACING) for n in size)), axis=-1).reshape(
         -1, 2

@@ -1,9 +1,9 @@
-"""Small signs in pixels: lights, stop and yield signs, and the pins of landmark sites."""
+"""Icons: lights, stop and yield signs, and the pins of landmark sites."""
 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,7 +13,10 @@ from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.palette import Colour
 from dorothie_gym.rendering.text import font
 
-_FINE = 4  # times as large as they are shown, before they are scaled down
+if TYPE_CHECKING:
+    import pygame
+
+_FINE = 4  # supersampling factor
 _LAMPS = (
     (LightColour.RED, palette.LIGHT_RED),
     (LightColour.YELLOW, palette.LIGHT_AMBER),
@@ -22,16 +25,16 @@ _LAMPS = (
 
 
 def lamp_colour(shown: LightColour) -> Colour:
-    """The colour in which a light is painted."""
+    """Returns the colour of a lamp."""
     return dict(_LAMPS)[shown]
 
 
 @lru_cache(maxsize=64)
-def sign_icon(kind: SignalKind, size: int, shown: LightColour | None = None) -> Any:
-    """A surface with a light or sign of a height [px]; a light with no colour to show has all its lamps on.
+def sign_icon(kind: SignalKind, size: int, shown: LightColour | None = None) -> pygame.Surface:
+    """Returns a surface with a light or sign of a height [px]; a light without a colour has all lamps on.
 
     Raises:
-        KeyError: there is no picture of that kind of signal.
+        KeyError: there is no icon of this kind.
     """
     return {
         SignalKind.TRAFFIC_LIGHT: lambda: _light(size, shown),
@@ -40,7 +43,7 @@ def sign_icon(kind: SignalKind, size: int, shown: LightColour | None = None) -> 
     }[kind]()
 
 
-def _light(size: int, shown: LightColour | None) -> Any:
+def _light(size: int, shown: LightColour | None) -> pygame.Surface:
     import pygame
 
     high, wide = size * _FINE, round(0.5 * size) * _FINE
@@ -55,7 +58,7 @@ def _light(size: int, shown: LightColour | None) -> Any:
     return _smooth(fine)
 
 
-def _stop(size: int) -> Any:
+def _stop(size: int) -> pygame.Surface:
     import pygame
 
     side = size * _FINE
@@ -67,7 +70,7 @@ def _stop(size: int) -> Any:
     return _smooth(fine)
 
 
-def _yield(size: int) -> Any:
+def _yield(size: int) -> pygame.Surface:
     import pygame
 
     side = size * _FINE
@@ -80,12 +83,12 @@ def _yield(size: int) -> Any:
 
 
 @lru_cache(maxsize=256)
-def pin_icon(text: str, radius: int, bearing: int) -> Any:
-    """A pin with a few letters, its head in the middle of the surface and its tip at a bearing [whole degrees].
+def pin_icon(text: str, radius: int, bearing: int) -> pygame.Surface:
+    """Returns a pin with a short text, its head at the centre of the surface and its tip at a bearing [degrees].
 
     Args:
-        text: what stands on it, upright.
-        radius: of its head [px].
+        text: text on it, upright.
+        radius: radius of its head [px].
         bearing: direction of the tip, clockwise from the right.
     """
     import pygame
@@ -113,16 +116,16 @@ def _regular(corners: int, middle: float, radius: float, turn: float) -> Array:
     return np.asarray(middle + radius * np.stack((np.cos(angle), np.sin(angle)), axis=-1))
 
 
-def _smooth(fine: Any) -> Any:
-    """A fine surface scaled down, its colours premultiplied so that half covered pixels are mixed rightly."""
+def _smooth(fine: pygame.Surface) -> pygame.Surface:
+    """Scales a supersampled surface down, with premultiplied colours for correct edges."""
     import pygame
 
     width, height = fine.get_size()
     return pygame.transform.smoothscale(fine.premul_alpha(), (width // _FINE, height // _FINE))
 
 
-def stamp(picture: Any, icon: Any, centre: Array) -> None:
-    """Puts an icon on a picture, centred on a pixel."""
+def stamp(picture: pygame.Surface, icon: pygame.Surface, centre: Array) -> None:
+    """Draws an icon centred on a pixel."""
     import pygame
 
     corner = (round(float(centre[0]) - icon.get_width() / 2.0), round(float(centre[1]) - icon.get_height() / 2.0))

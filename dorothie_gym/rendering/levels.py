@@ -1,4 +1,4 @@
-"""Where one road passes over another: bridges, and tunnels under streets on the ground."""
+"""Bridges and tunnels: parts of lanes above or below other roads."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering.shapes import TownSamples, right_of
 
 CLEARANCE = 3.0
-"""A lane this much higher than another passes over it [m]."""
+"""Smallest difference of height of a lane that passes over another [m]."""
 
 _NEAR = 6.0  # [m] within which samples of two lanes that cross are found
 _REACH = 12.0  # [m] of road drawn as a bridge before and after a crossing, at least
-_FARTHEST = 60.0  # [m] of it at most, as long as it stays that high
-_COVER = 4.5  # [m] that goes on beyond the edges of a street over a tunnel: its pavements
-_SKEWEST = 0.3  # sine of the smallest angle at which roads are taken to cross
-_CUTTING = -1.0  # [m] a road deeper than this lies in a cutting
+_FARTHEST = 60.0  # [m] of it at most, while it stays high enough
+_COVER = 4.5  # [m] of cover beyond the edges of a street over a tunnel: its pavements
+_SKEWEST = 0.3  # sine of the smallest angle between crossing roads
+_CUTTING = -1.0  # [m] a lower road lies in a cutting
 _LONGEST_CUTTING = 200.0  # [m] on either side
-_TUNNEL_DEPTH = -2.0  # [m] a road deeper than this under a street on the ground is a tunnel
-_ON_GROUND = 3.0  # [m] a street below this is on the ground
+_TUNNEL_DEPTH = -2.0  # [m] a lower road under a street on the ground is a tunnel
+_ON_GROUND = 3.0  # [m] a lower street is on the ground
 
 
 @dataclass(frozen=True)
 class LevelStretch:
-    """A part of a lane that is not on the level of the ground.
+    """Part of a lane above or below the ground.
 
     Attributes:
-        level: 1 and more for bridges, a bridge over a bridge being higher; -1 for tunnels, which are what a street
-            on the ground covers; 0 for the open cuttings that lead there.
-        lane: index of the lane.
+        level: 1 and more for bridges, higher for a bridge over a bridge; -1 for tunnels, which a street on the ground
+            covers; 0 for the open cuttings at their ends.
+        lane: id of the lane.
         start, end: stations [m].
     """
 
@@ -45,7 +45,7 @@ class LevelStretch:
 
 
 def stretches(town: Town, samples: TownSamples) -> list[LevelStretch]:
-    """Stretches of lanes that are bridges or tunnels, lower levels first."""
+    """Returns the stretches of lanes that are bridges or tunnels, lower levels first."""
     lower, upper = _crossings(samples)
     z = samples.centre[:, 2]
     deep = (z[lower] < _TUNNEL_DEPTH) & (z[upper] < _ON_GROUND)
@@ -56,7 +56,7 @@ def stretches(town: Town, samples: TownSamples) -> list[LevelStretch]:
 
 
 def cuttings(town: Town, tunnels: Iterable[LevelStretch]) -> list[LevelStretch]:
-    """Stretches of lanes in open cuttings: where a road comes down to a tunnel and where it goes up again."""
+    """Returns the stretches of lanes in open cuttings on both sides of tunnels."""
     pieces: list[tuple[int, float, float]] = []
     for part in tunnels:
         for station, direction in ((part.start, -1.0), (part.end, 1.0)):
@@ -65,7 +65,7 @@ def cuttings(town: Town, tunnels: Iterable[LevelStretch]) -> list[LevelStretch]:
 
 
 def _crossings(samples: TownSamples) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of samples of which the second lies above the first: two index arrays (m,)."""
+    """Returns pairs of samples with the second above the first, as two index arrays (m,)."""
     pairs = cKDTree(samples.centre[:, :2]).query_pairs(_NEAR, output_type="ndarray")
     z = samples.centre[:, 2]
     pairs = np.where((z[pairs[:, 0]] <= z[pairs[:, 1]])[:, None], pairs, pairs[:, ::-1])
@@ -91,7 +91,7 @@ def _raised(town: Town, samples: TownSamples, lower: NDArray[np.int64], upper: N
 def _covered(
     town: Town, samples: TownSamples, lower: NDArray[np.int64], upper: NDArray[np.int64]
 ) -> Iterator[tuple[int, float, float]]:
-    """What lies under streets as (lane, start, end): exact for straight roads, whatever the places of the samples."""
+    """Yields the parts under streets as (lane, start, end): exact for straight roads, independent of the sampling."""
     offset = samples.centre[lower, :2] - samples.centre[upper, :2]
     aside = (offset * right_of(samples.heading[upper])).sum(axis=1)
     slope = np.sin(samples.heading[lower] - samples.heading[upper])  # how fast one gets aside
@@ -110,7 +110,7 @@ def _covered(
 
 
 def _grown(town: Town, samples: TownSamples, at: NDArray[np.int64], limit: Array) -> Iterator[tuple[int, float, float]]:
-    """The samples of crossings as (lane, start, end), grown along the road while it stays above a limit."""
+    """Yields the samples of crossings as (lane, start, end), extended along the road while it stays above a limit."""
     for lane in np.unique(samples.lane[at]).tolist():
         own = samples.lane[at] == lane
         stations = samples.station[at[own]]
@@ -124,7 +124,7 @@ def _grown(town: Town, samples: TownSamples, at: NDArray[np.int64], limit: Array
 def _walk(
     town: Town, lane_id: int, station: float, direction: float, bound: float, sign: float
 ) -> Iterator[tuple[int, float, float]]:
-    """Goes along the road from a place, over the ends of lanes too, until it comes down to a bound; up if sign < 0."""
+    """Follows the road from a station, across the ends of lanes, until it descends to a bound (rises if sign < 0)."""
     farthest = _FARTHEST if sign > 0 else _LONGEST_CUTTING
     todo, seen = [(lane_id, station, 0.0)], {lane_id}
     while todo:
@@ -147,7 +147,7 @@ def _walk(
 
 
 def _merged(pieces: Iterable[tuple[int, float, float]]) -> Iterator[tuple[int, float, float]]:
-    """Stretches of lanes without those that overlap or nearly touch."""
+    """Yields the stretches with overlapping and almost touching ones merged."""
     last: tuple[int, float, float] | None = None
     for lane, start, end in sorted(pieces):
         if last is not None and last[0] == lane and start <= last[2] + _REACH:
@@ -161,10 +161,10 @@ def _merged(pieces: Iterable[tuple[int, float, float]]) -> Iterator[tuple[int, f
 
 
 class LevelLookup:
-    """Tells which world positions lie on some stretches of lanes, heights considered."""
+    """Lookup of world positions on given stretches of lanes, with heights."""
 
     def __init__(self, samples: TownSamples, parts: Iterable[LevelStretch], further: float = 0.0) -> None:
-        """Takes the stretches, each longer by `further` [m] on either side."""
+        """Builds the lookup; `further` extends each stretch at both ends [m]."""
         keep = np.zeros(len(samples.lane), dtype=bool)
         for part in parts:
             a, b = samples.bounds[part.lane]
@@ -174,7 +174,7 @@ class LevelLookup:
         self._tree = cKDTree(self._centre[:, :2]) if len(self._centre) else None
 
     def hold(self, points: Array) -> NDArray[np.bool_]:
-        """Whether positions (n, 3) [m] lie on the stretches (n,)."""
+        """Returns which positions (n, 3) [m] lie on the stretches (n,)."""
         if self._tree is None or not len(points):
             return np.zeros(len(points), dtype=bool)
         found = self._tree.query(points[:, :2], k=min(4, len(self._centre)))
@@ -183,7 +183,7 @@ class LevelLookup:
         return np.asarray((level & (distance < self._half[index] + 0.8)).any(axis=1))
 
     def cross(self, points: Array, within: float) -> NDArray[np.bool_]:
-        """Whether a stretch at another height is within a distance [m] of positions (n, 3) [m] (n,)."""
+        """Returns which positions (n, 3) [m] have a stretch at another height within a distance [m] (n,)."""
         if self._tree is None or not len(points):
             return np.zeros(len(points), dtype=bool)
         near = self._tree.query_ball_point(points[:, :2], within)

@@ -1,4 +1,4 @@
-"""What there is to paint on a map, in world coordinates and in the order of painting."""
+"""Layers of a map: all shapes in world coordinates, in the order of painting."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ SHOWN = (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP, SignalKind.YIELD)
 
 @dataclass(frozen=True)
 class Post:
-    """A light or sign on the map.
+    """Light or sign on the map.
 
     Attributes:
-        kind: what it is.
-        at: where it is drawn (x, y) [m].
-        lanes: the lanes that it rules.
+        kind: kind of the signal.
+        at: position of the icon (x, y) [m].
+        lanes: ids of the lanes that it applies to.
     """
 
     kind: SignalKind
@@ -40,10 +40,10 @@ class Post:
 
 
 def posts(town: Town, borders: Borders, stops: Mapping[int, float]) -> tuple[Post, ...]:
-    """The lights and signs of a town, one for every approach and kind.
+    """Returns the lights and signs of a town, one for each approach and kind.
 
-    A map may put a light on the far side of its junction, or several on one approach; a reader looks for one at the
-    stop line. A light for inner lanes alone stands on their left. One that rules no lane stands where the map says.
+    Maps may place a light on the far side of its junction, or several at one approach; here one stands at the stop
+    line. A light for inner lanes only stands on their left. One without lanes keeps the position in the map.
     """
     found: dict[tuple[SignalKind, tuple[float, float]], Post] = {}
     for signal in town.signals:
@@ -65,7 +65,7 @@ def _posts(town: Town, borders: Borders, stops: Mapping[int, float], signal: Sig
             continue
         lane, sign = town.lanes[number], 1.0
         if beside is not None:
-            # The outermost lanes have a light of their own.
+            # the outermost lanes have their own light
             lane, sign = town.lanes[_leftmost(borders, own, number)], -1.0
         station = stops.get(lane.id, lane.length)
         x, y = lane.position(station, sign * (lane.width_at(station) / 2.0 + _ASIDE)).tolist()
@@ -81,34 +81,34 @@ def _leftmost(borders: Borders, lanes: frozenset[int], lane: int) -> int:
     return lane
 
 
-# --- What there is to paint on a map, in world coordinates and in the order of painting ------------------------------
+# --- All layers ------------------------------------------------------------------------------------------------------
 
-_FURTHER = 6.0  # [m] of paint beyond a bridge, as much as its asphalt goes on
+_FURTHER = 6.0  # [m] of paint beyond a bridge, as far as its asphalt
 
 
 class MapLayers:
-    """Everything on the map but its words and signs.
+    """Everything on the map except text and icons.
 
     Attributes:
-        town: what is painted.
-        detail: what is worth drawing.
-        borders: what lies beside the lanes; names are set along it.
-        stretches: parts of lanes that are bridges or tunnels.
-        raised: the places on these.
-        arrows: the turn arrows before junctions.
-        pockets: the beginnings of turn lanes.
-        ruled: by lane, what a driver must heed at its end.
-        stops: by lane, where its stop line lies or would lie [m].
-        posts: the lights and signs.
+        town: the town.
+        detail: level of detail.
+        borders: borders of the lanes, along which names are placed.
+        stretches: bridges and tunnels.
+        raised: lookup of the positions on bridges and in tunnels.
+        arrows: turn arrows before junctions.
+        pockets: beginnings of turn lanes.
+        ruled: control at the end of each lane that has one.
+        stops: station of the (possible) stop line of each lane that leads to a junction [m].
+        posts: lights and signs.
     """
 
     def __init__(self, town: Town, *, scale: float = 8.0, border: float = 6.0) -> None:
-        """Works out a town.
+        """Derives the layers from a town.
 
         Args:
-            town: what to paint.
-            scale: of the picture [px/m]; details too small for it are left out.
-            border: how far the country reaches beyond the streets [m].
+            town: town to paint.
+            scale: scale of the picture [px/m]; details too small for it are omitted.
+            border: width of the country beyond the streets [m].
         """
         self.town = town
         self.detail = markings.MapDetail.at(scale)
@@ -126,7 +126,7 @@ class MapLayers:
 
     @cached_property
     def shapes(self) -> list[Shape]:
-        """Polygons, in the order of painting."""
+        """All polygons, in the order of painting."""
         ground = streets(self.town, self._samples, self.borders.lines, self.stretches, self.pockets)
         return [*landscape(self.town, self._border), *ground, *self._layers(list(self._paint()))]
 
@@ -140,14 +140,14 @@ class MapLayers:
             yield from markings.painted_arrows(self.town, self.arrows, pen)
 
     def _open_lines(self) -> Iterator[Border]:
-        """The lines beside lanes where no street covers them."""
+        """Yields the borders that are not covered by a street."""
         tunnels = [part for part in self.stretches if part.level < 0]
         covered = LevelLookup(self._samples, tunnels)
         for line in self.borders.lines:
             yield from (line.part(run) for run in held(line, covered, wanted=False))
 
     def _layers(self, paint: list[Shape]) -> Iterator[Shape]:
-        """Paint on the ground, then bridge after bridge with the paint that lies on it."""
+        """Yields road markings on the ground, then level by level the bridges with their markings."""
         samples = self._samples
         if not paint:
             places = np.zeros((0, 3))

@@ -1,11 +1,11 @@
-"""A map one would hang up: the town in a frame, with a title, a legend, a scale bar and an arrow to the north."""
+"""Map sheet of a town: framed map with title, legend, scale bar and north arrow."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,27 +20,30 @@ from dorothie_gym.rendering.markings import one_way_arrow, one_way_places, turn_
 from dorothie_gym.rendering.text import words
 from dorothie_gym.rendering.town_map import GROUND, MapPainter
 
+if TYPE_CHECKING:
+    import pygame
+
 _ROWS = 4
 _FINE = 4
-_HIGH = 1.9  # units: a swatch
+_HIGH = 1.9  # [units] height of a swatch
 _WIDE = 3.2
-_METRES = 8.0  # that a swatch is wide, for what is drawn in metres
+_METRES = 8.0  # width of a swatch for shapes in metres
 
 
 class Legend:
-    """The legend of a map.
+    """Legend of a map.
 
     Attributes:
-        entries: what it explains, in order: the words and the function that draws the swatch.
+        entries: pairs of text and swatch function, in order.
     """
 
     def __init__(self, town: Town, plan: MapLayers, unit: float) -> None:
-        """Finds out what there is to explain; `unit` is what the sheet is measured in [px]."""
+        """Selects the entries for a map; `unit` is the base length of the sheet [px]."""
         self._unit = unit
         kinds = {border.kind for border in plan.borders.lines}
         signals = {post.kind for post in plan.posts}
         size = round(_HIGH * unit)
-        known: list[tuple[bool, str, Callable[[], Any]]] = [
+        known: list[tuple[bool, str, Callable[[], pygame.Surface]]] = [
             (bool(town.sites), "landmark site", lambda: pin_icon("7", round(0.72 * unit), 90)),
             (SignalKind.TRAFFIC_LIGHT in signals, "traffic light", lambda: sign_icon(SignalKind.TRAFFIC_LIGHT, size)),
             (SignalKind.STOP in signals, "stop", lambda: sign_icon(SignalKind.STOP, size)),
@@ -56,8 +59,8 @@ class Legend:
         ]
         self.entries = tuple((text, draw) for wanted, text, draw in known if wanted)
 
-    def draw(self, surface: Any, left: float, right: float, top: float) -> None:
-        """Draws it in columns between two sides [px]; what does not fit is left out."""
+    def draw(self, surface: pygame.Surface, left: float, right: float, top: float) -> None:
+        """Draws the legend in columns between two sides [px]; entries without room are omitted."""
         unit = self._unit
         size = max(9, round(1.15 * unit))
         x = left
@@ -72,8 +75,8 @@ class Legend:
                 surface.blit(text, (round(x + (_WIDE + 0.9) * unit), round(middle - text.get_height() / 2.0)))
             x += wide + 2.2 * unit
 
-    def _swatch(self, *shapes: tuple[Array, palette.Colour], ground: palette.Colour = palette.ROAD) -> Any:
-        """A little piece of map, `_METRES` wide, whose middle is (0, 0)."""
+    def _swatch(self, *shapes: tuple[Array, palette.Colour], ground: palette.Colour = palette.ROAD) -> pygame.Surface:
+        """Returns a swatch of map, `_METRES` wide, with its centre at (0, 0)."""
         import pygame
 
         wide, high = round(_WIDE * self._unit), round(_HIGH * self._unit)
@@ -84,33 +87,33 @@ class Legend:
             pygame.draw.polygon(fine, colour, (points * scale + np.array(fine.get_size()) / 2.0).tolist())
         return pygame.transform.smoothscale(fine.premul_alpha(), (wide, high))
 
-    def _crosswalk(self) -> Any:
+    def _crosswalk(self) -> pygame.Surface:
         bars = [_box(x, x + 0.7, -1.7, 1.7) for x in np.arange(-3.3, 3.0, 1.35)]
         return self._swatch(*((bar, palette.ZEBRA) for bar in bars))
 
-    def _arrow(self) -> Any:
+    def _arrow(self) -> pygame.Surface:
         outlines = turn_arrow((LinkType.STRAIGHT, LinkType.LEFT), np.array([-3.1, 0.5]), 0.0)
         return self._swatch(*((outline, palette.ARROW) for outline in outlines))
 
-    def _one_way(self) -> Any:
+    def _one_way(self) -> pygame.Surface:
         return self._swatch(*((outline, palette.ONE_WAY) for outline in one_way_arrow(np.zeros(2), 0.0, 6.4)))
 
-    def _lanes(self) -> Any:
+    def _lanes(self) -> pygame.Surface:
         return self._swatch(*((_box(x, x + 2.0, -0.15, 0.15), palette.LANE_LINE) for x in (-3.4, -1.0, 1.4)))
 
-    def _centre(self) -> Any:
+    def _centre(self) -> pygame.Surface:
         return self._swatch(*((_box(-4.0, 4.0, y - 0.13, y + 0.13), palette.CENTRE_LINE) for y in (-0.35, 0.35)))
 
-    def _median(self) -> Any:
+    def _median(self) -> pygame.Surface:
         return self._swatch(
             (_box(-4.0, 4.0, -1.1, 1.1), palette.MEDIAN_KERB), (_box(-4.0, 4.0, -0.8, 0.8), palette.MEDIAN)
         )
 
-    def _bridge(self) -> Any:
+    def _bridge(self) -> pygame.Surface:
         sides = [(y, y + 0.35) for y in (-1.85, 1.5)]
         return self._swatch(*((_box(-4.0, 4.0, a, b), palette.BRIDGE_EDGE) for a, b in sides))
 
-    def _tunnel(self) -> Any:
+    def _tunnel(self) -> pygame.Surface:
         dashes = [_box(x, x + 1.1, y, y + 0.35) for x in np.arange(-3.8, 3.5, 1.8) for y in (-1.85, 1.5)]
         return self._swatch(*((dash, palette.TUNNEL_EDGE) for dash in dashes), ground=palette.TUNNEL)
 
@@ -119,25 +122,25 @@ def _box(x0: float, x1: float, y0: float, y1: float) -> Array:
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
 
 
-# --- A map one would hang up: the town in a frame, with a title, a legend, a scale bar and an arrow to th ------------
+# --- Sheet -----------------------------------------------------------------------------------------------------------
 
 _LARGEST = 4000  # [px] on the long side
 _FINEST = 12.0  # [px/m]
 _SMALLEST = 1400  # [px] on the long side
-_NAME_HEIGHT = 7.0  # [m] of type on the broadest roads
+_NAME_HEIGHT = 7.0  # [m] font size on the broadest roads
 _NAME_SPACING = 120.0  # [m]
-_SMALLEST_TYPE = 0.0068  # of the long side: still read where the whole sheet is seen
-_LARGE_TYPE = 0.0105  # of the long side: seen at first sight, on roads that are broad enough for it
+_SMALLEST_TYPE = 0.0068  # of the long side: legible when the whole sheet is visible
+_LARGE_TYPE = 0.0105  # of the long side: prominent, on roads that are broad enough
 _BAR_LENGTHS = (10, 20, 50, 100, 200, 500, 1000, 2000)
 
 
 def sheet_size(town: Town) -> tuple[int, int]:
-    """Width and height [px] of a sheet on which a town can be read: up to 4000 px on the long side."""
+    """Returns the size [px] of a legible sheet of a town: up to 4000 px on the long side."""
     x0, y0, x1, y1 = town_bounds(town, GROUND)
     extent = np.array([x1 - x0, y1 - y0])
     long = float(np.clip(extent.max() * _FINEST, _SMALLEST, 0.96 * _LARGEST))
     width, height = extent * long / extent.max()
-    # A narrow town still needs room for its title and legend.
+    # a narrow town needs room for title and legend
     width = max(width, 0.7 * height)
     unit = _unit(width)
     whole = np.array([width + 4.0 * unit, height + 2.0 * unit + _strip(unit)])
@@ -148,11 +151,11 @@ def sheet_size(town: Town) -> tuple[int, int]:
 def sheet_painter(
     town: Town, size: tuple[int, int] | None = None, street_names: Sequence[str] | None = None
 ) -> MapPainter:
-    """What paints the map of a sheet: it knows where the names stand, and has painted nothing yet.
+    """Returns the painter of the map on a sheet; labels are placed, nothing is painted yet.
 
     Args:
         town: what to paint.
-        size: width and height of the sheet [px]; as large as the town needs to be read where absent (`sheet_size`).
+        size: width and height of the sheet [px]; by default that of `sheet_size`.
         street_names: names by street index; the town's own where absent.
 
     Raises:
@@ -187,18 +190,18 @@ def town_picture(
     time: float | None = None,
     fold: str | None = None,
 ) -> MapPainter:
-    """Writes a map one would hang up, as a PNG file.
+    """Writes the map sheet of a town as a PNG file.
 
     Args:
         town: what to paint.
-        path: where to write; the folder must exist.
-        size: width and height [px]; as large as the town needs to be read where absent (`sheet_size`).
+        path: PNG file; its folder must exist.
+        size: width and height [px]; by default that of `sheet_size`.
         street_names: names by street index; the town's own where absent.
-        time: simulated time [s] at which the lights show their colours; all lamps are on where absent.
-        fold: a word on the town beside its name, as "seen" or "unseen".
+        time: simulated time of the light colours [s]; by default all lamps are on.
+        fold: fold of the town, shown beside the figures ("seen", "unseen").
 
     Returns:
-        The painter, which knows where everything is on the picture; its pixel (0, 0) is the picture's.
+        The painter, for conversions to pixels of the picture.
 
     Raises:
         FileNotFoundError: the folder of `path` does not exist.
@@ -217,22 +220,22 @@ def town_picture(
 
 
 def _measures(width: int) -> tuple[float, int, int]:
-    """The unit, the edge around the map and the strip below it [px] of a sheet of a width [px]."""
+    """Returns unit, edge around the map and strip below it [px] for a sheet of a width [px]."""
     unit = _unit(width)
     return unit, round(2.0 * unit), round(_strip(unit))
 
 
 def _unit(width: float) -> float:
-    """What everything around the map is measured in [px]: about the height of small type."""
+    """Returns the unit of everything around the map [px]: about the height of small type."""
     return max(9.0, width / 110.0)
 
 
 def _strip(unit: float) -> float:
-    """Height of the strip below the map [px]."""
+    """Returns the height of the strip below the map [px]."""
     return 11.0 * unit
 
 
-def _draw_sheet(surface: Any, painter: MapPainter, fold: str | None) -> None:
+def _draw_sheet(surface: pygame.Surface, painter: MapPainter, fold: str | None) -> None:
     import pygame
 
     width, height = painter.size
@@ -251,8 +254,8 @@ def _draw_sheet(surface: Any, painter: MapPainter, fold: str | None) -> None:
     Legend(painter.town, painter.plan, unit).draw(surface, after + 3.5 * unit, before - 3.0 * unit, top)
 
 
-def _draw_title(surface: Any, town: Town, unit: float, left: float, top: float, fold: str | None) -> float:
-    """Name and facts; returns where they end on the right [px]."""
+def _draw_title(surface: pygame.Surface, town: Town, unit: float, left: float, top: float, fold: str | None) -> float:
+    """Draws name and figures; returns their right end [px]."""
     name = _spaced(town.name.upper(), round(3.6 * unit), 0.5 * unit)
     surface.blit(name, (round(left), round(top - 0.3 * unit)))
     facts = [
@@ -269,8 +272,8 @@ def _draw_title(surface: Any, town: Town, unit: float, left: float, top: float, 
     return right
 
 
-def _spaced(text: str, size: int, space: float) -> Any:
-    """Letters with room between them."""
+def _spaced(text: str, size: int, space: float) -> pygame.Surface:
+    """Returns a line of text with extra space between the letters."""
     import pygame
 
     letters = [words(letter, size, palette.INK, True) for letter in text]
@@ -283,8 +286,8 @@ def _spaced(text: str, size: int, space: float) -> Any:
     return line
 
 
-def _draw_scale(surface: Any, scale: float, unit: float, right: float, top: float) -> float:
-    """Arrow to the north and scale bar; returns where they begin on the left [px]."""
+def _draw_scale(surface: pygame.Surface, scale: float, unit: float, right: float, top: float) -> float:
+    """Draws north arrow and scale bar; returns their left end [px]."""
     import pygame
 
     metres = max((n for n in _BAR_LENGTHS if n * scale <= 22.0 * unit), default=_BAR_LENGTHS[0])

@@ -1,4 +1,4 @@
-"""What is painted on the road: lines, stop lines, yield triangles, crossings and arrows."""
+"""Road markings: lines, stop lines, yield triangles, crosswalks and arrows."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ ARROW_LENGTH = 6.0
 """Length of a turn arrow [m]."""
 
 TURNS = (LinkType.STRAIGHT, LinkType.LEFT, LinkType.RIGHT, LinkType.U_TURN)
-"""Ways on that an arrow can show, in the order in which they are drawn."""
+"""Turn types that an arrow can show, in the order of drawing."""
 
-_BEFORE_LINE = 2.0  # [m] between an arrow's tip and the stop line
+_BEFORE_LINE = 2.0  # [m] between the tip of an arrow and the stop line
 _SHORTEST_LANE = 7.5  # [m]
 _ONE_WAY_SPACING = 45.0  # [m]
 _ONE_WAY_SHORTEST = 14.0  # [m]
@@ -29,14 +29,14 @@ _MIRROR = np.array([1.0, -1.0])
 
 
 def _bend(radius: float, start: float, turn: float) -> Array:
-    """A shaft that goes on straight to `start` [m] and then turns left on an arc."""
+    """Returns a shaft that runs straight to `start` [m] and then turns left on an arc."""
     angle = np.linspace(0.0, turn, 7)
     arc = np.stack((start + radius * np.sin(angle), -radius * (1.0 - np.cos(angle))), axis=-1)
     return np.concatenate(([[0.0, 0.0]], arc))
 
 
 def _head(tip: Array, direction: float, length: float, width: float) -> Array:
-    """A triangle whose base is centred on a point, pointing left by an angle [rad]."""
+    """Returns a triangle with its base centred on a point, rotated left by an angle [rad]."""
     c, s = np.cos(direction), -np.sin(direction)
     forward, side = np.array([c, s]), np.array([-s, c])
     return np.stack((tip - side * width / 2.0, tip + forward * length, tip + side * width / 2.0))
@@ -55,7 +55,7 @@ _HEADS = {
 
 
 def turn_arrow(kinds: Iterable[LinkType], origin: Array, heading: float, pen: float = 0.42) -> list[Array]:
-    """Outlines [m] of the arrow painted on a lane that may be left in these ways; its tail is at the origin."""
+    """Returns the outlines [m] of an arrow with the given turn types; its tail is at the origin."""
     out = []
     for kind in kinds:
         base = LinkType.LEFT if kind is LinkType.RIGHT else kind
@@ -67,7 +67,7 @@ def turn_arrow(kinds: Iterable[LinkType], origin: Array, heading: float, pen: fl
 
 
 def one_way_arrow(origin: Array, heading: float, length: float = 7.0) -> list[Array]:
-    """Outlines [m] of a slim arrow along a one-way street, centred on the origin."""
+    """Returns the outlines [m] of a slim arrow along a one-way street, centred on the origin."""
     half = length / 2.0
     shaft = np.array([[-half, -0.16], [half - 1.4, -0.16], [half - 1.4, 0.16], [-half, 0.16]])
     head = np.array([[half - 1.8, -0.75], [half, 0.0], [half - 1.8, 0.75], [half - 1.4, 0.0]])
@@ -76,7 +76,7 @@ def one_way_arrow(origin: Array, heading: float, length: float = 7.0) -> list[Ar
 
 @dataclass(frozen=True)
 class LaneArrow:
-    """An arrow as it stands: the lane whose exits it shows, the ways on, and the lane and place [m] of its tail."""
+    """Turn arrow: lane whose exits it shows, turn types, and lane and station [m] of its tail."""
 
     shows: int
     turns: tuple[LinkType, ...]
@@ -85,14 +85,14 @@ class LaneArrow:
 
 
 def lane_arrows(town: Town, shared: Iterable[int], stops: Mapping[int, float]) -> Iterator[LaneArrow]:
-    """The arrows before junctions.
+    """Yields the arrows before junctions.
 
-    A lane has one if it can be left by a turn, or if drivers have to choose between lanes.
+    A lane has an arrow if it has an exit that turns, or if there are parallel lanes to choose from.
 
     Args:
-        town: whose lanes.
-        shared: lanes that have another one in the same direction beside them.
-        stops: where the stop lines lie or would lie, by lane [m].
+        town: town to paint.
+        shared: lanes with a parallel lane in the same direction.
+        stops: station of the (possible) stop line of each lane [m].
     """
     beside = frozenset(shared)
     for lane in town.lanes:
@@ -105,7 +105,7 @@ def lane_arrows(town: Town, shared: Iterable[int], stops: Mapping[int, float]) -
 
 
 def _back_from(town: Town, lane: int, stop: float) -> tuple[int, float] | None:
-    """Where an arrow before a stop line begins: on the lane before it where it is short, if there is just one."""
+    """Returns lane and station of the tail of an arrow, on the only predecessor if the lane is short, or None."""
     station = stop - _BEFORE_LINE - ARROW_LENGTH
     if station >= 0.0:
         return lane, station
@@ -118,7 +118,7 @@ def _back_from(town: Town, lane: int, stop: float) -> tuple[int, float] | None:
 
 
 def one_way_places(town: Town, borders: Borders) -> Iterator[tuple[int, float]]:
-    """Lanes and stations [m] of the arrows along streets that have no oncoming traffic beside them."""
+    """Yields lanes and stations [m] of the arrows along one-way streets."""
     for lane in town.lanes:
         innermost, seen = lane.id, {lane.id}
         while (beside := borders.left_neighbour.get(innermost, innermost)) not in seen:
@@ -130,23 +130,23 @@ def one_way_places(town: Town, borders: Borders) -> Iterator[tuple[int, float]]:
         yield from ((lane.id, (k + 0.5) / count * lane.length) for k in range(count))
 
 
-# --- What is painted on the road: lines, stop lines, yield triangles, crossings and arrows ---------------------------
+# --- Lines and controls ----------------------------------------------------------------------------------------------
 
-_PIECE = 8.0  # [m] of a solid line in one piece
+_PIECE = 8.0  # [m] of a solid line per polygon
 _DASH, _GAP = 3.0, 4.5  # [m]
 _BACK = 0.5  # [m] between a stop line and the end of its lane
 _BEFORE_CROSSING = 1.0  # [m] between a stop line and a crossing
-_LOOK_BACK = 14.0  # [m] of a lane's end in which a crossing moves the stop line
+_LOOK_BACK = 14.0  # [m] at the end of a lane in which a crosswalk moves the stop line
 
 
 @dataclass(frozen=True)
 class MapDetail:
-    """What is worth drawing at a scale.
+    """Level of detail of a picture.
 
     Attributes:
-        pen: thinnest line that is still seen [m].
-        fine: whether edge lines and the gap of double lines can be seen.
-        arrows: whether arrows can be read.
+        pen: width of the thinnest visible line [m].
+        fine: whether edge lines and the gap of double lines are visible.
+        arrows: whether arrows are legible.
     """
 
     pen: float
@@ -155,12 +155,12 @@ class MapDetail:
 
     @classmethod
     def at(cls, scale: float) -> MapDetail:
-        """For a picture of a scale [px/m]."""
+        """Returns the level of detail for a scale [px/m]."""
         return cls(pen=0.8 / scale, fine=scale >= 4.0, arrows=scale >= 2.0)
 
 
 def lines(borders: Iterable[Border], detail: MapDetail) -> Iterator[Shape]:
-    """Dashes between lanes of one direction, a double line between the two, solid lines at the edges."""
+    """Yields dashes between lanes of one direction, double lines between directions, solid lines at the edges."""
     for border in borders:
         match border.kind:
             case BorderKind.LANE:
@@ -199,7 +199,7 @@ def _solid(border: Border, line: Array, width: float, colour: Colour) -> Iterato
 
 
 def ruled_lanes(town: Town) -> dict[int, SignalKind]:
-    """By lane, what a driver must heed at its end: a light, else a stop sign, else a yield sign."""
+    """Returns the control at the end of each lane that has one: a light, else a stop sign, else a yield sign."""
     ruled: dict[int, SignalKind] = {}
     for kind in (SignalKind.YIELD, SignalKind.STOP, SignalKind.TRAFFIC_LIGHT):
         for signal in town.signals:
@@ -209,7 +209,7 @@ def ruled_lanes(town: Town) -> dict[int, SignalKind]:
 
 
 def stop_stations(town: Town) -> dict[int, float]:
-    """By lane that leads to a junction, where its stop line is or would be [m]: before a crossing if there is one."""
+    """Returns the station of the (possible) stop line of lanes before junctions [m], in front of any crosswalk."""
     outlines = [crossing.outline for crossing in town.crosswalks]
     low = np.array([outline.min(axis=0) for outline in outlines]).reshape(-1, 2) - _LOOK_BACK
     high = np.array([outline.max(axis=0) for outline in outlines]).reshape(-1, 2) + _LOOK_BACK
@@ -225,7 +225,7 @@ def stop_stations(town: Town) -> dict[int, float]:
 
 
 def _before(lane: Lane, outline: Array) -> float:
-    """Where to stop before a crossing that lies over the lane's last metres [m]; infinite where none does."""
+    """Returns the stop position before a crosswalk over the last metres of a lane [m]; infinite without one."""
     for s in np.arange(max(0.0, lane.length - _LOOK_BACK), lane.length, 0.5).tolist():
         if _inside(lane.position(s), outline):
             return max(1.0, float(s) - _BEFORE_CROSSING)
@@ -233,7 +233,7 @@ def _before(lane: Lane, outline: Array) -> float:
 
 
 def _inside(point: Array, outline: Array) -> bool:
-    """Whether a point (2,) lies in a polygon (n, 2): an odd number of its sides is to the right of it."""
+    """Returns whether a point (2,) lies in a polygon (n, 2), by the even-odd rule."""
     a, b = outline, np.roll(outline, -1, axis=0)
     crosses = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
     rise = np.where(crosses, b[:, 1] - a[:, 1], 1.0)
@@ -241,13 +241,13 @@ def _inside(point: Array, outline: Array) -> bool:
 
 
 def stop_bar(lane: Lane, station: float, pen: float) -> Array:
-    """Outline (n, 2) [m] of a stop line across a lane."""
+    """Returns the outline (n, 2) [m] of a stop line across a lane."""
     half = lane.width_at(station) / 2.0 - 0.2
     return stroke(np.array([lane.position(station, -half), lane.position(station, half)]), max(0.5, pen))
 
 
 def yield_triangles(lane: Lane, station: float) -> Iterator[Array]:
-    """Outlines (3, 2) [m] of the row of triangles across a lane, pointing at who has to yield."""
+    """Yields the outlines (3, 2) [m] of yield triangles across a lane, which point at approaching traffic."""
     half = lane.width_at(station) / 2.0 - 0.25
     count = max(2, round(2.0 * half / 0.85))
     for middle in ((np.arange(count) + 0.5) / count * 2.0 - 1.0) * half:
@@ -262,7 +262,7 @@ def yield_triangles(lane: Lane, station: float) -> Iterator[Array]:
 
 
 def approaches(town: Town, ruled: Mapping[int, SignalKind], stops: Mapping[int, float], pen: float) -> Iterator[Shape]:
-    """Stop lines where there is a light or a stop sign, triangles where one has to yield."""
+    """Yields stop lines at lights and stop signs, and triangles at yield signs."""
     for k, kind in ruled.items():
         lane = town.lanes[k]
         station = stops.get(k, lane.length - _BACK)
@@ -275,14 +275,14 @@ def approaches(town: Town, ruled: Mapping[int, SignalKind], stops: Mapping[int, 
 
 
 def crossings(town: Town) -> Iterator[Shape]:
-    """The bars of the crosswalks."""
+    """Yields the bars of the crosswalks."""
     for crossing in town.crosswalks:
         for bar in zebra(crossing.outline):
             yield Shape(bar, palette.ZEBRA)
 
 
 def painted_arrows(town: Town, arrows: Sequence[LaneArrow], pen: float) -> Iterator[Shape]:
-    """The turn arrows as they lie on the road."""
+    """Yields the turn arrows."""
     for arrow in arrows:
         lane = town.lanes[arrow.lane]
         at, heading = lane.position(arrow.station), lane.heading_at(arrow.station + ARROW_LENGTH / 2.0)

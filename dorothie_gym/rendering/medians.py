@@ -1,4 +1,4 @@
-"""What lies between the two directions of a street: kerbs, grass and trees."""
+"""Medians between the two directions of a street (kerbs, grass, trees), and the islands before turn lanes."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from dorothie_gym.rendering.levels import LevelLookup
 from dorothie_gym.rendering.shapes import Shape, disc, longer, stroke
 
 SHORTEST_MEDIAN = 8.0
-"""What is no longer than this between the two directions is not planted [m]."""
+"""Longest median without plants [m]."""
 
 _KERB = 0.3  # [m]
 _TREE_SPACING = 11.0  # [m]
-_TREE_ROOM = 2.2  # [m] of median that a tree needs
+_TREE_ROOM = 2.2  # [m] width of median for a tree
 
 
 def medians(lines: Iterable[Border], bridges: LevelLookup) -> Iterator[Shape]:
-    """The strips between the two directions, each half from its own side: a kerb, grass, and trees where they fit."""
+    """Yields medians, each half from its own side: a kerb, grass, and trees where they fit."""
     strips = []
     for line in lines:
         if line.kind is not BorderKind.MEDIAN:
@@ -33,14 +33,14 @@ def medians(lines: Iterable[Border], bridges: LevelLookup) -> Iterator[Shape]:
             if np.ptp(line.points[run, :2], axis=0).max() > SHORTEST_MEDIAN:
                 strips.append((line, run))
     for line, run in strips:
-        # Asphalt around the round ends.
+        # asphalt around the round ends
         yield from (Shape(piece, palette.ROAD) for piece in flat_strip(line, run))
     for inset, colour in ((0.0, palette.MEDIAN_KERB), (_KERB, palette.MEDIAN)):
         for line, run in strips:
             yield from (Shape(quad, colour) for quad in _half_strip(line, run, inset))
     planted: list[Array] = []
     for line, run in strips:
-        # Each strip is found from both sides.
+        # each strip is found from both sides
         for centre, radius in _median_trees(line, run):
             if not planted or np.hypot(*(np.array(planted) - centre).T).min() > 0.6 * _TREE_SPACING:
                 planted.append(centre)
@@ -48,7 +48,7 @@ def medians(lines: Iterable[Border], bridges: LevelLookup) -> Iterator[Shape]:
 
 
 def held(line: Border, places: LevelLookup, wanted: bool = True) -> Iterator[NDArray[np.int64]]:
-    """Index runs of a border that lie on some places, or do not."""
+    """Yields index runs of a border that lie (or do not lie) on the stretches of a lookup."""
     on = places.hold(line.points) == wanted
     for run in np.split(np.arange(len(on)), np.flatnonzero(np.diff(on.astype(int)) != 0) + 1):
         if on[run[0]] and len(run) > 1:
@@ -56,7 +56,7 @@ def held(line: Border, places: LevelLookup, wanted: bool = True) -> Iterator[NDA
 
 
 def flat_strip(line: Border, run: NDArray[np.int64], further: float = 3.0) -> Iterator[Array]:
-    """Polygons (n, 2) [m] from the edge to a little beyond the middle of a median, and `further` [m] at its ends."""
+    """Yields polygons (n, 2) [m] from the edge to slightly beyond the middle of a median, extended by `further` [m]."""
     edge, inner = line.points[run, :2], line.shifted(-line.gap / 2.0 - 0.1)[run]
     if further:
         edge, inner = longer(edge, further), longer(inner, further)
@@ -65,7 +65,7 @@ def flat_strip(line: Border, run: NDArray[np.int64], further: float = 3.0) -> It
 
 
 def _half_strip(line: Border, run: NDArray[np.int64], inset: float) -> Iterator[Array]:
-    """Quadrangles (4, 2) [m] from the edge to a little beyond the middle of a median, round at its ends."""
+    """Yields polygons (n, 2) [m] from the edge to slightly beyond the middle of a median, with round ends."""
     s = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line.points[run, :2], axis=0).T))))
     fine = np.unique(np.concatenate((np.linspace(0, s[-1], max(2, len(s))), *(_nose(end, s[-1]) for end in (0, 1)))))
     edge = np.stack([np.interp(fine, s, line.points[run, k]) for k in (0, 1)], axis=-1)
@@ -73,7 +73,7 @@ def _half_strip(line: Border, run: NDArray[np.int64], inset: float) -> Iterator[
     gap = np.interp(fine, s, line.gap[run])
     left = np.stack((np.sin(heading), -np.cos(heading)), axis=-1)
     radius = np.maximum(gap / 2.0 - inset, 0.0)
-    # A nose is a half circle: the strip narrows over as much of its length as it is wide on one side.
+    # an end is a half circle: the strip narrows over half of its width
     near = np.clip(np.minimum(fine, s[-1] - fine) - inset, 0.0, None)
     depth = np.clip(radius - near, 0.0, radius)
     half = np.sqrt(np.maximum(radius**2 - depth**2, 0.0))
@@ -86,13 +86,13 @@ def _half_strip(line: Border, run: NDArray[np.int64], inset: float) -> Iterator[
 
 
 def _nose(end: int, length: float) -> Array:
-    """Stations close to an end of a strip, fine enough for a round nose."""
+    """Returns stations near an end of a strip, dense enough for a round end."""
     near = np.arange(0.0, min(length, 7.0), 0.25)
     return length - near if end else near
 
 
 def _median_trees(line: Border, run: NDArray[np.int64]) -> Iterator[tuple[Array, float]]:
-    """Where trees may stand and how large they are [m]."""
+    """Yields positions and radii of trees [m]."""
     middle = line.shifted(-line.gap / 2.0)[run]
     s = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(middle, axis=0).T))))
     for at in np.arange(_TREE_SPACING / 2.0, s[-1] - _TREE_SPACING / 2.0, _TREE_SPACING):
@@ -102,31 +102,31 @@ def _median_trees(line: Border, run: NDArray[np.int64]) -> Iterator[tuple[Array,
             yield centre, min(1.5, 0.4 * room)
 
 
-# --- Where turn lanes open in the middle of a road: the closed ends of what parts the directions before t ------------
+# --- Islands before turn lanes ---------------------------------------------------------------------------------------
 
 FACING = 9.0
-"""Between two turn lanes that open back to back, at most [m]."""
+"""Largest distance between two turn lanes that open back to back [m]."""
 
-_TAPER = 8.0  # [m] over which the middle line goes over to the other side of the turn lane
-_SHARE = 0.3  # of the turn lane that this takes at most
-_WIDE = 2.0  # [m] at its beginning: a lane that widens from nothing needs no taper
+_TAPER = 8.0  # [m] over which the middle line crosses to the other side of the turn lane
+_SHARE = 0.3  # largest share of the turn lane for this
+_WIDE = 2.0  # [m] width at its beginning: a lane that widens from zero needs no taper
 _BACK = 3.0  # [m] of asphalt before the opening
-_AROUND = 0.7  # [m] of it on either side
-_OVERLAP = 0.2  # [m] of the lines of two islands that meet
-_HATCH = 2.0  # [m] from bar to bar
+_AROUND = 0.7  # [m] of asphalt on both sides
+_OVERLAP = 0.2  # [m] of the lines of two adjoining islands
+_HATCH = 2.0  # [m] between bars
 _SLANT = 1.2  # [m]
 
 
 @dataclass(frozen=True)
 class Pocket:
-    """The beginning of a turn lane.
+    """Beginning of a turn lane.
 
     Attributes:
-        lane: index of the lane.
+        lane: id of the lane.
         taper: length of the island in it [m].
-        back: length of the island before it, up to half-way to the turn lane of the other direction [m]; 0 where
-            there is none, or a planted median.
-        aside: how far the island lies to the right of the turn lane's middle [m].
+        back: length of the island before it, up to half-way to the turn lane of the other direction [m]; 0 without
+            one, or with a planted median.
+        aside: offset of the island to the right of the middle of the turn lane [m].
     """
 
     lane: int
@@ -136,7 +136,7 @@ class Pocket:
 
 
 def find_pockets(town: Town, borders: Borders) -> tuple[Pocket, ...]:
-    """All turn lanes that open beside a lane that goes on, on its left, with their full width."""
+    """Returns all turn lanes that open at full width on the left of a continuing lane."""
     found = [lane for lane in town.lanes if _opens(town, borders, lane)]
     starts = np.array([lane.points[0] for lane in found]).reshape(-1, 3)
     heading = np.array([lane.headings[0] for lane in found])
@@ -147,7 +147,7 @@ def find_pockets(town: Town, borders: Borders) -> tuple[Pocket, ...]:
         other = (np.cos(heading - heading[k]) < -0.9) & (behind > 0.0) & (np.hypot(*offset.T) < FACING)
         back, aside = 0.0, 0.0
         if other.any():
-            # The island lies in the middle between the two lanes, which are not quite in line.
+            # the island lies midway between the two lanes, which are slightly offset
             nearest = int(np.argmin(np.where(other, behind, np.inf)))
             back = float(behind[nearest]) / 2.0
             aside = float(offset[nearest] @ np.array([-np.sin(heading[k]), np.cos(heading[k])])) / 2.0
@@ -164,13 +164,13 @@ def _opens(town: Town, borders: Borders, lane: Lane) -> bool:
 
 
 def pocket_places(town: Town, found: Sequence[Pocket]) -> Array:
-    """Places (pockets, 4, 2) [m] along the islands in and before turn lanes."""
+    """Returns positions (pockets, 4, 2) [m] along the islands in and before turn lanes."""
     rows = [_placed(town.lanes[p.lane], [(s, p.aside) for s in (-p.back, 0.0, p.taper / 2.0, p.taper)]) for p in found]
     return np.array(rows).reshape(-1, 4, 2)
 
 
 def pocket_grounds(town: Town, found: Sequence[Pocket]) -> Iterator[Shape]:
-    """Asphalt where the island lies: neither kerbs nor gaps are left between the lanes around it."""
+    """Yields asphalt under the islands, without kerbs or gaps between the lanes around them."""
     for pocket in found:
         lane = town.lanes[pocket.lane]
         half = lane.width_at(0.0) / 2.0 + _AROUND
@@ -179,18 +179,18 @@ def pocket_grounds(town: Town, found: Sequence[Pocket]) -> Iterator[Shape]:
 
 
 def pocket_paint(town: Town, found: Sequence[Pocket], pen: float, fine: bool) -> Iterator[Shape]:
-    """The line that goes over to the other side of the turn lane, and the hatched island that it bounds.
+    """Yields the line that crosses to the other side of the turn lane, and the hatched island that it bounds.
 
     Args:
-        town: whose lanes.
-        found: the beginnings of turn lanes.
+        town: town to paint.
+        found: beginnings of turn lanes.
         pen: width of the thinnest line [m].
         fine: whether there is room for bars.
     """
     for pocket in found:
         lane = town.lanes[pocket.lane]
         half = lane.width_at(0.0) / 2.0
-        # From the right side of the turn lane, where the median ended, to its left side.
+        # from the right side of the turn lane, where the median ended, to its left side
         near, far = pocket.aside - half, pocket.aside + half
         line = [(-pocket.back - _OVERLAP, far), (0.0, far), (pocket.taper, near)]
         other = [(-pocket.back - _OVERLAP, near), (0.0, near)]
@@ -207,7 +207,7 @@ def pocket_paint(town: Town, found: Sequence[Pocket], pen: float, fine: bool) ->
 
 
 def _placed(lane: Lane, places: Sequence[tuple[float, float]]) -> Array:
-    """Positions (n, 2) [m] of places (forward, right) [m] seen from a lane's start, before it straight on."""
+    """Transforms points (forward, right) [m] relative to the start of a lane to positions (n, 2) [m]."""
     start, way = lane.position(0.0), lane.heading_at(0.0)
     forward, right = np.array([np.cos(way), np.sin(way)]), np.array([-np.sin(way), np.cos(way)])
     return np.array(

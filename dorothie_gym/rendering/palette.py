@@ -1,4 +1,4 @@
-"""Colours of every picture, in one place: a calm paper map with slate streets and a few loud things on it."""
+"""Colours of all pictures: a light paper map with slate streets and a few strong accents."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ PAPER: Colour = (255, 255, 255)
 SHEET: Colour = (251, 248, 241)
 STREET_NAME: Colour = (255, 255, 255)
 
-# Who and what moves.
+# Moving objects.
 CAR: Colour = (36, 107, 235)
 CAR_GLASS: Colour = (205, 224, 255)
 TRAIL: Colour = (132, 180, 255)

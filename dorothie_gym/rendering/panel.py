@@ -1,8 +1,8 @@
-"""The panel beside the map: clock and speed, the tasks, and the conversation as bubbles."""
+"""Panel beside the map: clock and speed, subgoals, and the dialogue as speech bubbles."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 from dorothie_gym.ontology import Role
 from dorothie_gym.rendering import palette
@@ -11,13 +11,16 @@ from dorothie_gym.rendering.palette import Colour
 from dorothie_gym.rendering.scene import Scene, SpokenLine
 from dorothie_gym.rendering.text import shorten, words, wrap
 
-_FINE = 2  # drawn so much larger, then scaled down: smooth edges
+if TYPE_CHECKING:
+    import pygame
+
+_FINE = 2  # supersampling factor
 _PAD = 20
 _HEADER = 92
 _GAP = 8
 _KMH = 3.6
 _SPEAKERS: dict[Role, tuple[str, Colour, float]] = {
-    # name, bubble, where it stands: 0 left, 1 right, 0.5 in the middle
+    # name, bubble colour, horizontal position: 0 left, 1 right, 0.5 centred
     Role.PARTICIPANT: ("Participant", palette.BUBBLE_PARTICIPANT, 0.0),
     Role.CO_WIZARD: ("Co-Wizard", palette.BUBBLE_CO_WIZARD, 1.0),
     Role.AD_WIZARD: ("Ad-Wizard", palette.BUBBLE_AD_WIZARD, 0.5),
@@ -26,7 +29,7 @@ _SPEAKERS: dict[Role, tuple[str, Colour, float]] = {
 
 
 class Panel:
-    """Draws the panel; what does not change between two frames is kept.
+    """Panel; parts that do not change between frames are cached.
 
     Attributes:
         size: width and height [px].
@@ -34,10 +37,10 @@ class Panel:
 
     def __init__(self, size: tuple[int, int]) -> None:
         self.size = size
-        self._held: tuple[object, Any] | None = None
+        self._held: tuple[object, pygame.Surface] | None = None
 
-    def draw(self, scene: Scene) -> Any:
-        """A `pygame.Surface` with the panel; the same one may be changed by the next call."""
+    def draw(self, scene: Scene) -> pygame.Surface:
+        """Returns a surface with the panel."""
         import pygame
 
         key = (tuple(scene.subgoals), tuple(scene.notes), tuple(scene.utterances), scene.caption)
@@ -70,7 +73,7 @@ class Panel:
         pen.line(_PAD, 86, width - _PAD)
 
     def _tasks(self, pen: _Pen, scene: Scene, top: int) -> int:
-        """The storyboard's tasks; returns where they end [px]."""
+        """Draws the subgoals; returns their lower end [px]."""
         room = self.size[0] - 2 * _PAD - 28
         for text, state in scene.subgoals:
             lines = wrap(text, 14, room)
@@ -98,7 +101,7 @@ class Panel:
         return top
 
     def _notes(self, pen: _Pen, scene: Scene, top: int) -> int:
-        """Warnings; returns where they end [px]."""
+        """Draws the warnings; returns their lower end [px]."""
         for note in scene.notes:
             lines = wrap(note, 13, self.size[0] - 2 * _PAD - 24)
             height = 17 * len(lines) + 10
@@ -109,7 +112,7 @@ class Panel:
         return top
 
     def _talk(self, pen: _Pen, scene: Scene, top: int) -> None:
-        """The conversation, newest at the bottom, as far back as there is room."""
+        """Draws the dialogue, newest at the bottom, as far back as there is room."""
         bottom = self.size[1] - 14
         for line in reversed(scene.utterances):
             bubble = _Bubble(line, self.size[0] - 2 * _PAD)
@@ -121,7 +124,7 @@ class Panel:
 
 
 class _Bubble:
-    """One thing said, laid out: its speaker and time above the words, its acts below."""
+    """Layout of an utterance: speaker and time above the text, dialogue acts below."""
 
     def __init__(self, line: SpokenLine, room: int) -> None:
         self.name, self.colour, self.side = _SPEAKERS[line.speaker]
@@ -147,7 +150,7 @@ class _Bubble:
 
 
 class _Pen:
-    """Draws on a surface twice as fine as the pixels it is told."""
+    """Supersampled surface with coordinates in final pixels."""
 
     def __init__(self, size: tuple[int, int]) -> None:
         import pygame
@@ -158,7 +161,7 @@ class _Pen:
     def text(
         self, text: str, x: float, middle: float, size: int, colour: Colour, bold: bool = False, align: float = 0.0
     ) -> float:
-        """Writes a line; returns where it ends, or where it begins if it is aligned to the right (1.0) [px]."""
+        """Draws a line of text; returns its right end, or its left end if right-aligned (1.0) [px]."""
         piece = words(text, size * _FINE, colour, bold)
         left = x * _FINE - align * piece.get_width()
         self.surface.blit(piece, (round(left), round(middle * _FINE - piece.get_height() / 2)))
@@ -181,7 +184,7 @@ class _Pen:
         pygame.draw.rect(self.surface, colour, (left * _FINE, y * _FINE, (right - left) * _FINE, _FINE))
 
     def tick_box(self, x: float, y: float, colour: Colour, state: str) -> None:
-        """The mark before a task: a ring, filled with a tick once it is complete."""
+        """Draws the mark of a subgoal: a ring, filled with a tick once complete."""
         import pygame
 
         centre = (x * _FINE, y * _FINE)

@@ -1,4 +1,4 @@
-"""A recorded session as scenes that can be drawn, whoever recorded it."""
+"""Playback of recorded sessions, native or imported, as scenes."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from dorothie_gym.maps import Town
 from dorothie_gym.ontology import DialogueAct, PhysicalAction, Role, parse_landmark
 from dorothie_gym.recording import FRAME_RATE, ActorKind, EventType, Session
 from dorothie_gym.recording.header import LandmarkRow
-from dorothie_gym.rendering.scene import Actor, CarView, Pin, Scene, SpokenLine, SubgoalState
+from dorothie_gym.rendering.scene import Actor, CarView, FigureKind, Pin, Scene, SpokenLine, SubgoalState
 
-_KINDS: Final = {
+_KINDS: Final[dict[int, FigureKind]] = {
     int(ActorKind.VEHICLE): "vehicle",
     int(ActorKind.CYCLIST): "cyclist",
     int(ActorKind.PEDESTRIAN): "pedestrian",
@@ -28,15 +28,15 @@ _STATES: Final[dict[str, SubgoalState]] = {
 }  # fmt: skip
 
 _TRAIL: Final = 0.5
-"""Time between two points of the way driven [s]."""
+"""Time between two points of the driven path [s]."""
 
 
 class Playback:
-    """Shows a session at any of its frames.
+    """Scenes of a session at any frame.
 
     Args:
-        session: what was recorded.
-        town: where it happened.
+        session: recorded session.
+        town: town of the session.
     """
 
     def __init__(self, session: Session, town: Town) -> None:
@@ -51,16 +51,16 @@ class Playback:
 
     @property
     def last_frame(self) -> int:
-        """The last frame at which anything was recorded."""
+        """Last frame with a recorded event or state."""
         return round(self._session.duration * FRAME_RATE)
 
     def scenes(self, frames_per_second: float) -> Iterator[Scene]:
-        """Yields so many scenes for each second of the session, from its first frame with the car in it to its last."""
+        """Yields scenes at a frame rate [1/s], from the first frame with a car state to the last."""
         for k in range(self.count(frames_per_second)):
             yield self.scene(self._first_frame + round(k * FRAME_RATE / frames_per_second))
 
     def count(self, frames_per_second: float) -> int:
-        """Returns how many scenes that are."""
+        """Returns the number of scenes at a frame rate [1/s]."""
         return math.floor((self.last_frame - self._first_frame) * frames_per_second / FRAME_RATE) + 1
 
     def scene(self, frame: int) -> Scene:
@@ -97,7 +97,7 @@ class Playback:
         )
 
     def _street_names(self) -> list[str] | None:
-        """Names of the town's streets; None where the recording names others."""
+        """Returns the recorded street names; None if they do not match the town."""
         names = list(self._session.header.street_names)
         return names if len(names) == len(self._town.streets) else None
 
@@ -123,7 +123,7 @@ class Playback:
         )
 
     def _others(self, frame: int) -> list[Actor]:
-        """Who was around, on the straight way between where they were recorded."""
+        """Returns the actors at a frame, interpolated between recorded positions."""
         table = self._session.scene.actors
         k = int(np.searchsorted(table.frames, frame, side="right")) - 1
         if k < 0:
@@ -136,17 +136,17 @@ class Playback:
         return [_actor(row, after.get(int(row["key"]), row), share) for row in here]
 
     def _goals(self, frame: int) -> dict[int, tuple[str, SubgoalState]]:
-        """Words and state of the subgoals that are tasks at a frame, by number."""
+        """Returns description and state of the active subgoals at a frame, by number."""
         subgoals = self._session.header.subgoals
-        told: dict[int, tuple[str, str]] = {}
+        status_of: dict[int, tuple[str, str]] = {}
         for event in self._session.of_type(EventType.SUBGOAL):
             number = event.data.get("subgoal")
             if event.frame <= frame and isinstance(number, int) and 0 <= number < len(subgoals):
-                told[number] = str(event.data.get("status", "")).lower(), str(event.data.get("cause", ""))
-        reached = {number for number, (status, _) in told.items() if status == "complete"}
+                status_of[number] = str(event.data.get("status", "")).lower(), str(event.data.get("cause", ""))
+        reached = {number for number, (status, _) in status_of.items() if status == "complete"}
         goals: dict[int, tuple[str, SubgoalState]] = {}
         for number, row in enumerate(subgoals):
-            status, cause = told.get(number, ("", ""))
+            status, cause = status_of.get(number, ("", ""))
             if row["trigger"] and not status:
                 continue
             state = _STATES.get(status, "pending")
@@ -177,7 +177,7 @@ class Playback:
 def _actor(row: np.void, after: np.void, share: float) -> Actor:
     turn = wrap_radians(float(after["heading"] - row["heading"]))
     return Actor(
-        kind=_KINDS[int(row["kind"])],  # type: ignore[arg-type]
+        kind=_KINDS[int(row["kind"])],
         x=float(row["x"] + share * (after["x"] - row["x"])),
         y=float(row["y"] + share * (after["y"] - row["y"])),
         heading=float(row["heading"]) + share * turn,
@@ -187,7 +187,7 @@ def _actor(row: np.void, after: np.void, share: float) -> Actor:
 
 
 def _waypoint(row: LandmarkRow, town: Town) -> tuple[float, float]:
-    """Where to stop for a landmark: on its lane, or where it stands if that is not known."""
+    """Returns the waypoint of a landmark on its lane, or its position if the lane is unknown."""
     if not 0 <= row["lane"] < len(town.lanes):
         return row["x"], row["y"]
     x, y = town.lanes[row["lane"]].position(row["station"])
@@ -195,7 +195,7 @@ def _waypoint(row: LandmarkRow, town: Town) -> tuple[float, float]:
 
 
 def _lines(session: Session) -> list[SpokenLine]:
-    """Everything that is said, in order of time."""
+    """Returns all utterances and messages in order of time."""
     lines = [
         SpokenLine(
             time=said.start,

@@ -1,4 +1,4 @@
-"""What a picture of the world shows, as plain data: an environment or a recorded session fills it in."""
+"""Scene of a picture as plain data, filled in by an environment or a recorded session."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import Role
 
-ActorKind: TypeAlias = Literal["vehicle", "cyclist", "pedestrian", "prop"]
+FigureKind: TypeAlias = Literal["vehicle", "cyclist", "pedestrian", "prop"]
 SubgoalState: TypeAlias = Literal["none", "pending", "ongoing", "complete", "abandoned"]
 
 
@@ -22,7 +22,7 @@ def _no_points() -> NDArray[np.float64]:
 
 @dataclass(frozen=True, kw_only=True)
 class CarView:
-    """The car: its place [m], heading [rad], size [m], speed [m/s], and whether its lights are on."""
+    """Car: position [m], heading [rad], size [m], speed [m/s], and whether its lights are on."""
 
     x: float
     y: float
@@ -35,9 +35,9 @@ class CarView:
 
 @dataclass(frozen=True, kw_only=True)
 class Actor:
-    """Another one on the road, or a thing: its place [m], heading [rad] and size [m]."""
+    """Other road user or object: position [m], heading [rad] and size [m]."""
 
-    kind: ActorKind
+    kind: FigureKind
     x: float
     y: float
     heading: float = 0.0
@@ -45,13 +45,13 @@ class Actor:
     width: float = 2.0
 
     def __post_init__(self) -> None:
-        if self.kind not in get_args(ActorKind):
-            raise ValueError(f"Actor.kind: {self.kind!r} is none of {', '.join(get_args(ActorKind))}")
+        if self.kind not in get_args(FigureKind):
+            raise ValueError(f"Actor.kind: {self.kind!r} is none of {', '.join(get_args(FigureKind))}")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Pin:
-    """A landmark on the map: name, place (x, y) [m], the waypoint (x, y) [m] to stop at, its state, if it is hidden."""
+    """Landmark on the map: name, position (x, y) [m], waypoint (x, y) [m], state, and whether it is hidden."""
 
     label: str
     x: float
@@ -67,7 +67,7 @@ class Pin:
 
 @dataclass(frozen=True, kw_only=True)
 class SpokenLine:
-    """Something said: when [s], by whom, the words, and the dialogue acts in short."""
+    """Utterance or message: time [s], speaker, text, and dialogue acts in short form."""
 
     time: float
     speaker: Role
@@ -77,22 +77,22 @@ class SpokenLine:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scene:
-    """A moment of a session.
+    """State of a session at one time.
 
     Attributes:
-        time: since the start [s].
-        town: where it happens.
+        time: time since the start [s].
+        town: the town.
         car: the car.
         street_names: by street index; the town's own where None.
-        trail: the way driven so far (n, 2) [m].
-        waypoints: the way planned (m, 2) [m].
-        others: who and what else is there.
-        landmarks: pins.
+        trail: path driven so far (n, 2) [m].
+        waypoints: planned path (m, 2) [m].
+        others: other road users and objects.
+        landmarks: landmarks with pins.
         subgoals: (description, state) of each task.
-        utterances: what was said, oldest first.
-        notes: what deserves a warning, such as a hazard or an exception.
-        weather: the ten parameters by name; those absent are as on a clear noon.
-        caption: a line at the head of the panel, such as the storyboard's name.
+        utterances: utterances and messages, oldest first.
+        notes: warnings, such as a hazard or an exception.
+        weather: the ten parameters by name; missing ones have their values of a clear noon.
+        caption: first line of the panel, such as the name of the storyboard.
     """
 
     time: float

@@ -1,4 +1,4 @@
-"""Polygons in world coordinates: outlines of lanes, strokes, discs, dashes, arrows."""
+"""Polygons in world coordinates (outlines of lanes, strokes, discs, dashes), and samples of all lanes of a town."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dorothie_gym.rendering.palette import Colour
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A filled polygon: its corners (n, 2) [m] and its colour; for paint on a road the height that lies at [m]."""
+    """Filled polygon: corners (n, 2) [m], colour, and for road markings the height of the road [m]."""
 
     points: Array
     colour: Colour
@@ -31,17 +31,17 @@ class Shape:
 
 
 def right_of(headings: Array) -> Array:
-    """Unit vectors (n, 2) to the right of headings (n,) [rad]."""
+    """Returns unit vectors (n, 2) to the right of headings (n,) [rad]."""
     return np.stack((-np.sin(headings), np.cos(headings)), axis=-1)
 
 
 def sample(lane: Lane, start: float, end: float, step: float) -> Array:
-    """Stations (n,) [m] from start to end, both included, at most a step apart; n >= 2."""
+    """Returns stations (n,) [m] from start to end, both included, at most a step apart; n >= 2."""
     return np.linspace(start, end, max(2, int(np.ceil((end - start) / step)) + 1))
 
 
 def side_line(lane: Lane, stations: Array, lateral: Array | float) -> Array:
-    """Points (n, 2) [m] at stations (n,) along a lane, `lateral` (n,) [m] to its right."""
+    """Returns points (n, 2) [m] at stations (n,) along a lane and `lateral` (n,) [m] to its right."""
     headings = np.interp(stations, lane.stations, lane.headings)
     x = np.interp(stations, lane.stations, lane.points[:, 0])
     y = np.interp(stations, lane.stations, lane.points[:, 1])
@@ -49,17 +49,17 @@ def side_line(lane: Lane, stations: Array, lateral: Array | float) -> Array:
 
 
 def widths_at(lane: Lane, stations: Array) -> Array:
-    """Widths (n,) [m] of a lane at stations (n,)."""
+    """Returns the widths (n,) [m] of a lane at stations (n,)."""
     return np.asarray(np.interp(stations, lane.stations, lane.widths))
 
 
 def sparse_stations(lane: Lane, start: float = 0.0, end: float | None = None) -> Array:
-    """Stations (n,) that suffice to draw a lane: more where it bends or widens, few where it is straight."""
+    """Returns stations (n,) sufficient to draw a lane: dense where it bends or widens, sparse where it is straight."""
     end = lane.length if end is None else end
     fine = sample(lane, start, end, 1.0)
     headings = np.interp(fine, lane.stations, lane.headings)
     widths = widths_at(lane, fine)
-    # A degree and a half of turning, a decimetre of width or 40 m, whichever comes first.
+    # 1.5 degrees of turning, 0.1 m of width or 40 m, whichever comes first
     amount = np.abs(np.diff(headings)) / 0.026 + np.abs(np.diff(widths)) / 0.1 + np.diff(fine) / 40.0
     total = np.concatenate(([0.0], np.cumsum(amount)))
     keep = np.flatnonzero(np.diff(np.floor(total)) > 0) + 1
@@ -67,20 +67,20 @@ def sparse_stations(lane: Lane, start: float = 0.0, end: float | None = None) ->
 
 
 def ribbon(lane: Lane, margin: float = 0.0, start: float = 0.0, end: float | None = None) -> Array:
-    """Outline (n, 2) [m] of a lane, or of a stretch of it, widened by a margin on both sides."""
+    """Returns the outline (n, 2) [m] of a lane or a part of it, widened by a margin on both sides."""
     stations = sparse_stations(lane, start, end)
     half = widths_at(lane, stations) / 2.0 + margin
     return np.concatenate((side_line(lane, stations, half), side_line(lane, stations, -half)[::-1]))
 
 
 def disc(centre: Sequence[float] | Array, radius: float, corners: int = 20) -> Array:
-    """A circle (corners, 2) [m]."""
+    """Returns a circle (corners, 2) [m]."""
     angles = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False)
     return np.asarray(centre, dtype=float)[:2] + radius * np.stack((np.cos(angles), np.sin(angles)), axis=-1)
 
 
 def stroke(line: Array, width: float) -> Array:
-    """Outline of a line (n, 2) [m] drawn with a pen of a width [m] and butt ends."""
+    """Returns the outline of a line (n, 2) [m] with a width [m] and butt ends."""
     steps = np.diff(line, axis=0)
     if len(steps) == 1:  # most strokes are straight
         (along, aside), length = steps[0], math.hypot(*steps[0])
@@ -93,17 +93,17 @@ def stroke(line: Array, width: float) -> Array:
 
 
 def polyline_stations(line: Array) -> Array:
-    """Distances (n,) [m] from the start of a line (n, k) to its points, in the plane."""
+    """Returns the distances (n,) [m] from the start of a line (n, k) to its points, in the plane."""
     return np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))))
 
 
 def polyline_length(line: Array) -> float:
-    """Length [m] of a line (n, k) in the plane."""
+    """Returns the length [m] of a line (n, k) in the plane."""
     return float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum())
 
 
 def cut(line: Array, pieces: Sequence[tuple[float, float]], step: float = 2.0) -> list[Array]:
-    """Parts (n, k) of a line (m, k) in space or in the plane, given by where they start and end along it [m]."""
+    """Returns parts (n, k) of a line (m, k) between pairs of distances along it [m]."""
     stations = polyline_stations(line)
     parts = []
     for start, end in pieces:
@@ -113,7 +113,7 @@ def cut(line: Array, pieces: Sequence[tuple[float, float]], step: float = 2.0) -
 
 
 def dash_pattern(total: float, dash: float, gap: float) -> list[tuple[float, float]]:
-    """Where dashes start and end along a line of a length [m], cut so that it starts and ends with half a gap."""
+    """Returns start and end of each dash along a line of a length [m]; the line begins and ends with half a gap."""
     if total < dash:
         return []
     count = max(1, round(total / (dash + gap)))
@@ -123,14 +123,14 @@ def dash_pattern(total: float, dash: float, gap: float) -> list[tuple[float, flo
 
 
 def place(points: Array, origin: Array, heading: float) -> Array:
-    """Points given as (forward, right) [m] seen from an origin with a heading, in world coordinates (n, 2)."""
+    """Transforms points (forward, right) (n, 2) [m] relative to a pose into world coordinates (n, 2)."""
     forward = np.array([np.cos(heading), np.sin(heading)])
     right = np.array([-np.sin(heading), np.cos(heading)])
     return np.asarray(origin + points[:, :1] * forward + points[:, 1:] * right)
 
 
 def zebra(outline: Array, bar: float = 0.5, gap: float = 0.55) -> list[Array]:
-    """Bars of a marked crossing, across its long axis; the outline is any convex polygon (n, 2) [m]."""
+    """Returns the bars of a crosswalk, across its long axis; the outline is a convex polygon (n, 2) [m]."""
     corners = outline[:-1] if np.allclose(outline[0], outline[-1]) else outline
     centre = corners.mean(axis=0)
     edges = np.roll(corners, -1, axis=0) - corners
@@ -150,13 +150,16 @@ def zebra(outline: Array, bar: float = 0.5, gap: float = 0.55) -> list[Array]:
 
 
 def strokes(line: Array, width: float, segments: int = 8) -> Iterator[Array]:
-    """Outlines of a line (n, 2) [m] in short pieces: one that crosses itself would have holes as a single polygon."""
+    """Yields outlines of short parts of a line (n, 2) [m]: a single polygon that crosses itself would have holes."""
     for k in range(0, len(line) - 1, segments):
         yield stroke(line[k : k + segments + 1], width)
 
 
 def simplified(line: Array, tolerance: float) -> Array:
-    """A line (n, 2) with fewer points, none of those left out further from it than a tolerance (Douglas, Peucker)."""
+    """Simplifies a line (n, 2) with the algorithm of Douglas and Peucker.
+
+    Omitted points are at most `tolerance` from the straight line through the ends of their part.
+    """
     keep = np.zeros(len(line), dtype=bool)
     keep[[0, -1]] = True
     todo = [(0, len(line) - 1)]
@@ -180,28 +183,28 @@ def simplified(line: Array, tolerance: float) -> Array:
 
 
 def longer(path: Array, more: float) -> Array:
-    """A path (n, 2) that goes on straight at both ends by a length."""
+    """Extends a path (n, 2) straight at both ends by a length."""
     first, last = path[0] - path[1], path[-1] - path[-2]
     ends = path[0] + first / np.hypot(*first) * more, path[-1] + last / np.hypot(*last) * more
     return np.concatenate((ends[0][None], path, ends[1][None]))
 
 
-# --- All lanes of a town cut into samples, so that questions about what lies beside or above them are arr ------------
+# --- Samples of all lanes --------------------------------------------------------------------------------------------
 
 STEP = 2.0  # [m] between samples, at most
 
 
 @dataclass(frozen=True, eq=False)
 class TownSamples:
-    """Places on lanes, lane after lane and along each.
+    """Samples of all lanes, lane by lane in driving direction.
 
     Attributes:
-        lane: index of the lane (n,).
+        lane: id of the lane (n,).
         station: distance along it (n,) [m].
         heading: (n,) [rad].
         half_width: of the lane (n,) [m].
-        centre: on its centre line (n, 3) [m].
-        bounds: of each lane, its first sample and the one after its last (lanes, 2).
+        centre: position on the centre line (n, 3) [m].
+        bounds: range of samples of each lane (lanes, 2), end excluded.
     """
 
     lane: NDArray[np.int64]
@@ -213,7 +216,7 @@ class TownSamples:
 
     @classmethod
     def of(cls, town: Town) -> TownSamples:
-        """Samples every lane of a town about every two metres, its ends included."""
+        """Samples every lane of a town at most every two metres, both ends included."""
         columns: list[list[Array]] = [[], [], [], []]
         owners, bounds, count = [], [], 0
         for lane in town.lanes:
@@ -229,9 +232,9 @@ class TownSamples:
         return cls(np.concatenate(owners), station, heading, half, centre, np.array(bounds, dtype=np.int64))
 
     def edge(self, sign: float) -> Array:
-        """Points (n, 2) [m] on the right (+1) or left (-1) edges."""
+        """Returns the points (n, 2) [m] on the right (+1) or left (-1) edges."""
         return np.asarray(self.centre[:, :2] + sign * self.half_width[:, None] * right_of(self.heading))
 
     def of_lanes(self, wanted: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Indices of the samples of the lanes that are wanted (lanes,)."""
+        """Returns the indices of the samples of the selected lanes (lanes,)."""
         return np.flatnonzero(wanted[self.lane])

@@ -1,4 +1,4 @@
-"""The lines along which the names of streets may be set."""
+"""Axes of streets, along which their names can be placed."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from dorothie_gym.rendering.medians import SHORTEST_MEDIAN
 from dorothie_gym.rendering.shapes import longer, polyline_length, polyline_stations, right_of
 
 _BROADEST = 45.0  # [m]
-_AHEAD = 1.5  # [m] that places across the road from each other may lie apart along it
+_AHEAD = 1.5  # [m] largest longitudinal offset of points opposite each other
 _SAME_LEVEL = 1.5  # [m]
-_FEW = 6  # samples without a line in the middle, as where turn lanes begin back to back
-_CELL = 64  # nearest places that are looked at: those on the own kerb are among them
+_FEW = 6  # samples without a middle line, as where turn lanes begin back to back
+_CELL = 64  # nearest points to consider, which include those on the same kerb
 _SMOOTHING = 9  # samples
 
 
 @dataclass(frozen=True, eq=False)
 class Roadway:
-    """A stretch of road without grass in it, along its right kerb.
+    """Part of a road without a planted median, along its right kerb.
 
     Attributes:
         street: index of the street.
-        line: its middle (n, 2) [m].
+        line: middle line (n, 2) [m].
         heading: (n,) [rad], unwrapped.
         height: (n,) [m].
         width: (n,) [m].
@@ -43,7 +43,7 @@ class Roadway:
 
 @dataclass(frozen=True, eq=False)
 class _Lines:
-    """Lines of one kind as one set of places, with the number of the line and its length [m] for each."""
+    """Lines of one kind as one set of points, with the line number and its length [m] for each point."""
 
     place: Array
     heading: Array
@@ -61,10 +61,10 @@ class _Lines:
         )
 
     def across(self, line: Border, cosine: tuple[float, float]) -> tuple[Array, NDArray[np.int64]]:
-        """Distance (n,) [m] across the road from a right kerb to the nearest place on its left, and which place.
+        """Returns the distance (n,) [m] from a right kerb to the nearest point across the road, and its index.
 
-        Only places count whose heading differs from the kerb's by an angle with a cosine between the two given;
-        the distance is infinite where there is none.
+        Only points count whose heading differs from that of the kerb by an angle with a cosine in the given range;
+        the distance is infinite without such a point.
         """
         if not len(self.place):
             return np.full(len(line.heading), np.inf), np.zeros(len(line.heading), dtype=np.int64)
@@ -87,9 +87,9 @@ class _Lines:
 
 
 def roadways(borders: Borders) -> Iterator[Roadway]:
-    """All roadways of a town's streets, from what lies beside its lanes.
+    """Yields all roadways of the streets of a town, from the borders of its lanes.
 
-    Where nothing but paint lies between the two directions they are one roadway, which is yielded once.
+    Two directions with only paint between them are one roadway, yielded once.
     """
     by_street: dict[int, list[Border]] = {}
     for line in borders.lines:
@@ -108,10 +108,10 @@ def _of_street(borders: Borders, lines: Sequence[Border]) -> Iterator[Roadway]:
     for number, line in enumerate(right):
         alone, _ = left.across(line, (0.9, 1.0))
         planted, painted = grass.across(line, (0.9, 1.0))[0], paint.across(line, (-1.0, 1.0))[0]
-        # What lies beyond the left edge of this road belongs to another one, as beside a ramp.
+        # beyond the left edge another road begins, as beside a ramp
         planted, painted = (np.where(alone < found, np.inf, found) for found in (planted, painted))
         opposite, index = kerbs.across(line, (-1.0, -0.8))
-        # At the mouth of a ramp its left edge is missing, and the next one on the left is another road's.
+        # at the mouth of a ramp the left edge is missing, and the next one belongs to another road
         most = max(borders.abreast(lane) for lane in line.lanes) * line.width
         shared = _spread(np.isfinite(painted) & (painted < planted) & np.isfinite(opposite), np.isfinite(planted))
         own = np.where(
@@ -125,20 +125,20 @@ def _of_street(borders: Borders, lines: Sequence[Border]) -> Iterator[Roadway]:
 
 
 def _spread(known: NDArray[np.bool_], against: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Flags (n,), set too where one that is set is a few places away; but not where there is something against it."""
+    """Sets flags (n,) also within a few samples of a set flag, except where `against` is set."""
     near = np.convolve(known, np.ones(2 * _FEW + 1), mode="same")[: len(known)] if len(known) > 2 * _FEW else known
     return np.asarray((known | (np.asarray(near) > 0.5)) & ~against)
 
 
 def _is_second(kerbs: _Lines, number: int, length: float, facing: NDArray[np.int64]) -> bool:
-    """Whether the roadway is found from the other kerb, too, which is longer or comes first."""
+    """Returns whether the roadway is also found from the other kerb, which is longer or comes first."""
     other = int(np.bincount(kerbs.owner[facing]).argmax())
     longest = float(kerbs.length[kerbs.owner == other][0])
     return (longest, -other) > (length, -number)
 
 
 def _filled(width: Array, otherwise: Array) -> Array:
-    """Widths (n,) [m] with those in between where they are infinite, and smooth."""
+    """Interpolates infinite widths (n,) [m] and smooths the result."""
     good = np.isfinite(width)
     if not good.any():
         return otherwise
@@ -157,27 +157,27 @@ def _runs(line: Border, wanted: NDArray[np.bool_], width: Array) -> Iterator[Roa
             yield Roadway(line.street, middle, line.heading[run], line.points[run, 2], part)
 
 
-# --- The lines along which the names of streets may be set -----------------------------------------------------------
+# --- Axes ------------------------------------------------------------------------------------------------------------
 
 _STEP = 5.0  # [px]
-_WIDEST_JUNCTION = 50.0  # [m] that a name may bridge
+_WIDEST_JUNCTION = 50.0  # [m] that a label may span
 _STRAIGHT_ON = 0.3  # [rad]
 
 
 @dataclass(eq=False)
 class Axis:
-    """A line along a street, in steps of the same length.
+    """Line along a street with equidistant points.
 
     Attributes:
         street: index of the street.
-        line: (n, 2) [px].
-        height: of the road (n,) [m].
-        heading: of the line (n,) [rad], unwrapped.
-        room: width of the road around it (n,) [px].
-        step: between the points [px].
-        beside: whether it runs along the road and not on it.
-        clear: by level of obstacles, the distance to them (n,) [px], as far as it is known.
-        taken: distance to the names set so far (n,) [px].
+        line: points (n, 2) [px].
+        height: height of the road (n,) [m].
+        heading: direction of the line (n,) [rad], unwrapped.
+        room: width of the road (n,) [px].
+        step: distance between the points [px].
+        beside: whether it runs beside the road instead of on it.
+        clear: cached distance to the obstacles of each level (n,) [px].
+        taken: distance to the labels placed so far (n,) [px].
     """
 
     street: int
@@ -195,22 +195,22 @@ class Axis:
 
     @property
     def length(self) -> float:
-        """Its length [px]."""
+        """Length [px]."""
         return (len(self.line) - 1) * self.step
 
     def keep_off(self, places: cKDTree, radius: float) -> None:
-        """Takes note of a name, given by a tree of its points, that takes so many pixels on either side."""
+        """Registers a label, given by a tree of its points and its half width [px]."""
         near, _ = places.query(self.line)
         self.taken = np.minimum(self.taken, near - radius)
 
     def along(self, start: float, length: float, points: int) -> Array:
-        """Points (points, 2) [px] of the stretch that begins at a station and has a length [px]."""
+        """Returns points (points, 2) [px] of the part that begins at a station and has a length [px]."""
         s = np.linspace(start, start + length, points)
         stations = np.arange(len(self.line)) * self.step
         return np.stack([np.interp(s, stations, column) for column in self.line.T], axis=-1)
 
     def reversed(self) -> Axis:
-        """The same line the other way."""
+        """Returns the axis in the opposite direction."""
         back = slice(None, None, -1)
         return replace(
             self,
@@ -223,10 +223,10 @@ class Axis:
 
 
 def street_axes(borders: Borders, scale: float, origin: Array) -> list[Axis]:
-    """The middles of all roadways of a town, by street and then by length.
+    """Returns the middle lines of all roadways of a town, sorted by street and length.
 
     Args:
-        borders: what lies beside the lanes.
+        borders: borders of the lanes.
         scale: [px/m].
         origin: world position of pixel (0, 0) [m].
     """
@@ -256,7 +256,7 @@ def _axis(street: int, pixels: Array, heading: Array, height: Array, room: Array
 
 
 def across_junctions(axes: Sequence[Axis], scale: float) -> Iterator[Axis]:
-    """Axes of one street that go on straight beyond a junction, joined in pairs; `scale` is in px/m."""
+    """Yields pairs of axes of a street that continue straight across a junction, joined; `scale` in px/m."""
     for k, first in enumerate(axes):
         for second in axes[k + 1 :]:
             for a in (first, first.reversed()):
@@ -283,7 +283,7 @@ def _joined(a: Axis, b: Axis) -> Axis | None:
 def beside_axes(
     lines: Sequence[Border], street: int, scale: float, origin: Array, aside: float, more: float
 ) -> Iterator[Axis]:
-    """Lines on the ground along the edges of a street, so many pixels beside it, and as much longer at both ends."""
+    """Yields lines beside the edges of a street at a distance `aside` [px], extended by `more` [px] at both ends."""
     for line in lines:
         if line.street != street or line.kind is not BorderKind.EDGE:
             continue

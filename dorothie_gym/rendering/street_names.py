@@ -1,4 +1,4 @@
-"""Where the names of streets go: along the road, upright, clear of junctions and of each other."""
+"""Placement of street names along the road: upright, clear of junctions and of each other."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from dorothie_gym.rendering.text import font
 
 
 class LabelClearance(enum.IntEnum):
-    """What a name has to keep clear of: less and less, but always of bridges, pins and signs."""
+    """Obstacles that a label avoids: fewer on each level, but always bridges, pins and signs."""
 
     ALL = 0
     ARROWS_HIDDEN = 1
@@ -32,17 +32,17 @@ class LabelClearance(enum.IntEnum):
     OFF_ROAD = 5
 
 
-_NARROW = 0.4  # of a junction's width still counts on the third level
-_OTHER_ROAD = 1.5  # [m] between the heights of two roads that cross
-_ISLAND = 2.0  # [m], half the width of the hatching before a turn lane
-_CELL = 8  # nearest circles that are looked at
+_NARROW = 0.4  # share of the width of a junction that counts on the third level
+_OTHER_ROAD = 1.5  # [m] between the heights of two crossing roads
+_ISLAND = 2.0  # [m] half the width of the hatching before a turn lane
+_CELL = 8  # nearest circles to consider
 
 
 class Obstacles:
-    """Circles [px] that names keep clear of, by kind and by level."""
+    """Circles [px] that labels avoid, by kind and level."""
 
     def __init__(self, plan: MapLayers, scale: float, origin: Array, fixed: Array) -> None:
-        """Finds them on a plan; `fixed` are circles (n, 3) [px] that count on all levels."""
+        """Collects the circles of a map; `fixed` are circles (n, 3) [px] that count on all levels."""
         lanes = plan.town.lanes
 
         def circles(rows: Iterable[tuple[Lane, float, float]], widen: float = 1.0) -> Array:
@@ -54,7 +54,7 @@ class Obstacles:
                 out.append(np.column_stack((points, radius, np.interp(s, lane.stations, lane.points[:, 2]))))
             return np.concatenate(out)
 
-        # Over and under bridges no name of the other road may go: their circles have heights, (n, 4).
+        # labels of another road must not cross bridges: their circles have heights, (n, 4)
         self._bridges = _Circles(circles((lanes[p.lane], p.start, p.end) for p in plan.stretches))
         tunnels = circles((lanes[p.lane], p.start, p.end) for p in plan.stretches if p.level < 0)[:, :3]
         junctions = circles(((lane, 0.0, lane.length) for lane in lanes if lane.in_junction), 0.9)[:, :3]
@@ -79,7 +79,7 @@ class Obstacles:
         self._circles: dict[LabelClearance, _Circles] = {}
 
     def clearance(self, axis: Axis, level: LabelClearance) -> Array:
-        """Distance (n,) [px] from the points of an axis to the nearest obstacle of a level."""
+        """Returns the distance (n,) [px] from the points of an axis to the nearest obstacle of a level."""
         if level not in axis.clear:
             if level not in self._circles:
                 self._circles[level] = _Circles(np.concatenate(self._levels[level]))
@@ -89,14 +89,14 @@ class Obstacles:
 
 
 class _Circles:
-    """Circles (n, 3) [px], or those (n, 4) of roads whose heights matter, as a tree."""
+    """Search tree of circles (n, 3) [px], or (n, 4) with heights of roads."""
 
     def __init__(self, circles: Array) -> None:
         self._rows = circles
         self._tree = cKDTree(circles[:, :2]) if len(circles) else None
 
     def clearance(self, axis: Axis) -> Array:
-        """Distance (n,) [px] to the nearest circle that is in the way."""
+        """Returns the distance (n,) [px] to the nearest relevant circle."""
         if self._tree is None:
             return np.full(len(axis.line), np.inf)
         found = self._tree.query(axis.line, k=min(_CELL, len(self._rows)))
@@ -108,53 +108,53 @@ class _Circles:
 
 
 def _arrow_stretches(plan: MapLayers) -> Iterator[tuple[Lane, float, float]]:
-    """Stretches of lanes that arrows take."""
+    """Yields the parts of lanes covered by arrows."""
     for arrow in plan.arrows if plan.detail.arrows else ():
         lane = plan.town.lanes[arrow.lane]
         yield lane, arrow.station, min(arrow.station + ARROW_LENGTH, lane.length)
 
 
 def _stop_stretches(plan: MapLayers) -> Iterator[tuple[Lane, float, float]]:
-    """Stretches of lanes that stop lines take."""
+    """Yields the parts of lanes covered by stop lines."""
     for number in plan.ruled:
         lane = plan.town.lanes[number]
         yield lane, max(0.0, plan.stops.get(number, 0.0) - 1.0), lane.length
 
 
 def _around(outline: Array) -> Array:
-    """A circle (3,) around most of a crossing: where it lies across a road, that road's width is enough."""
+    """Returns a circle (3,) around most of a crosswalk; across a road, the width of the road is enough."""
     centre = outline.mean(axis=0)
     return np.array([*centre, 0.8 * np.hypot(*(outline - centre).T).max()])
 
 
-# --- Where the names of streets go: along the road, upright, clear of junctions and of each other --------------------
+# --- Labels ----------------------------------------------------------------------------------------------------------
 
-_TIGHTEST = 2.2  # sizes of type: the smallest radius that letters still stand well on
-_ROOM = 0.72  # of the road's width that a row of type may take
-_ROOM_OF_ROWS = 0.9  # and that two of them may take
+_TIGHTEST = 2.2  # font sizes: smallest radius of legible text
+_ROOM = 0.72  # of the width of the road for one row of text
+_ROOM_OF_ROWS = 0.9  # of the width of the road for two rows
 ROW_HEIGHT = 1.0
-"""From row to row, times the size of the type."""
+"""Distance between rows, relative to the font size."""
 
-_HALF = 0.62  # of a name's height that is kept free on either side of its line
-_LONGER = 1.08  # times a name's length of road is taken
+_HALF = 0.62  # of the height of a label kept free on both sides of its line
+_LONGER = 1.08  # of the length of a label reserved on the road
 _POINTS = 24
-_SHARES = (1.0, 0.85, 0.72, 0.6, 0.5, 0.42)  # of the largest type
-_REPEATED = 0.8  # times its size a name may be set again where there is less room
-_TINY = 0.8  # times the smallest type, rather than no name
-_ASIDE = 3.0  # [m] between the road's edge and a name beside it: the pavement
+_SHARES = (1.0, 0.85, 0.72, 0.6, 0.5, 0.42)  # of the largest font size
+_REPEATED = 0.8  # of the font size for repetitions with less room
+_TINY = 0.8  # of the smallest font size, instead of no label
+_ASIDE = 3.0  # [m] between the edge of the road and a label beside it: the pavement
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Manner:
-    """How a name may be set.
+    """Constraints on a label.
 
     Attributes:
-        size: of the type [px].
-        level: what it keeps clear of.
-        forced: whether it may be higher than the road is broad.
-        across: whether it may go across a junction.
-        bent: how much its line may turn [rad].
-        rows: that the name is broken into.
+        size: font size [px].
+        level: obstacles to avoid.
+        forced: whether it may be higher than the road is wide.
+        across: whether it may cross a junction.
+        bent: largest change of direction of its line [rad].
+        rows: number of rows.
     """
 
     size: int
@@ -167,15 +167,15 @@ class _Manner:
 
 @dataclass(frozen=True, eq=False)
 class Label:
-    """A name as it stands on the map.
+    """Street name placed on the map.
 
     Attributes:
         text: the name.
         street: index of the street.
-        size: height of the type [px].
-        path: points (n, 2) [px] along which it is set, from its first letter to its last.
-        beside: whether it stands on the ground beside the road, there being no room on it.
-        rows: the name as it is broken into rows, their middle being on the path.
+        size: font size [px].
+        path: points (n, 2) [px] of its line, from the first letter to the last.
+        beside: whether it lies beside the road, for lack of room on it.
+        rows: rows of the name, centred on the path.
     """
 
     text: str
@@ -187,11 +187,11 @@ class Label:
 
     @property
     def half(self) -> float:
-        """What is kept free on either side of the path [px]."""
+        """Distance kept free on both sides of the path [px]."""
         return _half(self.size, len(self.rows))
 
     def row_paths(self) -> list[Array]:
-        """The path of each row (n, 2) [px]."""
+        """Returns the path of each row (n, 2) [px]."""
         steps = np.gradient(self.path, axis=0)
         down = np.stack((-steps[:, 1], steps[:, 0]), axis=-1) / np.hypot(*steps.T)[:, None]
         middle = (len(self.rows) - 1) / 2.0
@@ -200,18 +200,18 @@ class Label:
 
 @dataclass
 class LabelPlacer:
-    """Sets the names of a town's streets.
+    """Placement of the street names of a town.
 
     Attributes:
-        names: by street index; empty for streets that have none.
+        names: names by street index; empty for streets without one.
         scale: [px/m].
         origin: world position of pixel (0, 0) [m].
-        frame: left, top, right and bottom [px] that names stay inside.
-        sizes: largest and smallest type [px].
-        spacing: smallest distance between two settings of the same name [px].
-        farthest: distance beyond which a name is set again even over arrows [px].
-        placed: the names set so far.
-        missing: names of streets on and beside which there is no room at all.
+        frame: left, top, right and bottom [px] of the area for labels.
+        sizes: largest and smallest font size [px].
+        spacing: smallest distance between two labels of the same name [px].
+        farthest: distance beyond which a name is repeated even over arrows [px].
+        placed: labels placed so far.
+        missing: names without any room on or beside their streets.
     """
 
     names: Sequence[str]
@@ -225,14 +225,14 @@ class LabelPlacer:
     missing: list[str] = field(default_factory=list)
 
     def place(self, plan: MapLayers, fixed: Array) -> list[Label]:
-        """Sets every name at least once where its street can be seen, and again where it is long.
+        """Places each name at least once where its street is visible, and repeats it on long streets.
 
-        Streets with the least room come first. A name first gives way to all markings, then hides arrows, then gets
-        smaller, goes on across a junction and at last stands beside the road.
+        Streets with the least room come first. A label first avoids all markings, then hides arrows, then becomes
+        smaller, then crosses a junction, and finally lies beside the road.
 
         Args:
-            plan: what is painted.
-            fixed: circles (n, 3) [px] that no name may touch: x, y, radius.
+            plan: layers of the map.
+            fixed: circles (n, 3) [px] that no label may touch: x, y, radius.
         """
         lines = plan.borders.lines
         self._obstacles = Obstacles(plan, self.scale, self.origin, fixed)
@@ -254,7 +254,7 @@ class LabelPlacer:
         large, small = self.sizes
         tiny = round(_TINY * small)
         sizes = list(dict.fromkeys(max(small, round(share * large)) for share in _SHARES))
-        # Broad streets have large names; each size is tried on the road's free stretches, then over its arrows.
+        # broad streets have large labels; each size is tried on free road first, then over arrows
         manners = [
             _Manner(size=size, level=level)
             for part in (sizes[:2], sizes[2:4], sizes[4:])
@@ -281,7 +281,7 @@ class LabelPlacer:
     def _set(self, street: int, manner: _Manner, spacing: float = 0.0) -> bool:
         axes: Iterable[Axis] = self._own[street]
         if manner.across:
-            # Names set before are not known to axes made just now.
+            # new axes do not know the labels placed earlier
             axes = sorted(across_junctions(self._own[street], self.scale), key=lambda axis: -axis.length)
             self._tell(axes)
         return self._set_on(axes, manner, spacing)
@@ -319,14 +319,14 @@ class LabelPlacer:
                 pass
 
     def _tell(self, axes: Iterable[Axis]) -> None:
-        """Tells axes of the names set so far."""
+        """Registers the labels placed so far with new axes."""
         for label in self.placed:
             places = cKDTree(label.path)
             for axis in axes:
                 axis.keep_off(places, label.half)
 
     def _set_on(self, axes: Iterable[Axis], manner: _Manner, spacing: float) -> bool:
-        """Sets a name on the first of some axes on which there is room for it; tells whether there is one."""
+        """Places a name on the first axis with room for it; returns whether there is one."""
         for axis in axes:
             text = self.names[axis.street]
             rows = _broken(text, manner)
@@ -345,7 +345,7 @@ class LabelPlacer:
         return False
 
     def _window(self, axis: Axis, width: float, manner: _Manner, spacing: float) -> Array | None:
-        """The best place on an axis: straight, and near the middle of the stretch that is free."""
+        """Returns the best path on an axis: straight, and near the middle of a free part; None without room."""
         count = int(np.ceil(width / axis.step)) + 1
         if count > len(axis.line):
             return None
@@ -383,7 +383,7 @@ def _half(size: int, rows: int) -> float:
 
 
 def _broken(text: str, manner: _Manner) -> tuple[str, ...]:
-    """A name in one row, or broken between two words so that the longer row is as short as may be."""
+    """Breaks a name between two words into rows of similar length, if more than one row is allowed."""
     parts = text.split()
     if manner.rows == 1 or len(parts) < 2:
         return (text,)
@@ -393,20 +393,20 @@ def _broken(text: str, manner: _Manner) -> tuple[str, ...]:
 
 
 def _middle_of_run(starts: NDArray[np.int64]) -> Array:
-    """For each of ascending integers (n,), the middle of the run of successive ones that it belongs to."""
+    """Returns for each of ascending integers (n,) the middle of its run of successive integers."""
     cuts = np.flatnonzero(np.diff(starts) > 1) + 1
     return np.concatenate([np.full(len(run), (run[0] + run[-1]) / 2.0) for run in np.split(starts, cuts)])
 
 
 def _upright(path: Array) -> Array:
-    """The path in the direction in which text on it can be read: to the right, and straight upwards."""
+    """Returns the path in reading direction: to the right, or straight up."""
     across = path[-1] - path[0]
     backwards = across[0] < -0.02 * abs(across[1]) or (abs(across[0]) <= 0.02 * abs(across[1]) and across[1] > 0)
     return path[::-1] if backwards else path
 
 
 def covering(labels: Iterable[Label]) -> Iterator[tuple[float, float, float]]:
-    """Circles (x, y, radius) [px] that cover names."""
+    """Yields circles (x, y, radius) [px] that cover labels."""
     for label in labels:
         for x, y in label.path.tolist():
             yield x, y, label.half

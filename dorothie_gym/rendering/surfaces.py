@@ -1,4 +1,4 @@
-"""What is built: pavements, kerbs, asphalt, planted medians, lay-bys, bridges and tunnels."""
+"""Built surfaces: pavements, kerbs, asphalt, planted medians, lay-bys, bridges and tunnels."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from dorothie_gym.rendering.shapes import Shape, TownSamples, cut, disc, polylin
 from dorothie_gym.rendering.tunnels import portals, tunnel_floors, walls
 
 _EDGE = 0.15  # [m]
-_WIDEST_WALK = 4.0  # [m] that is drawn: squares that a map calls pavements would hide the ground
+_WIDEST_WALK = 4.0  # [m] drawn at most: some maps mark whole squares as pavements
 _WIDEST_VERGE = 4.5  # [m]
-_CORNER = 6.0  # [m] between a junction and the pavements that go on around it
-_AROUND = 45  # [m] from the end of a pavement to where another one takes over
+_CORNER = 6.0  # [m] between a junction and the pavements that continue around it
+_AROUND = 45  # [m] from the end of a pavement to the start of the next one
 _BESIDE = 0.1  # [m] between the edge of the road and a pavement
-_FROM_ARM = 16.0  # [m] from the end of an arm's pavement to where the ring's goes on
-_LARGEST_RING = 80.0  # [m], its radius
+_FROM_ARM = 16.0  # [m] from the end of an arm's pavement to the start of that of the ring
+_LARGEST_RING = 80.0  # [m] radius
 _LONGEST_ARC = 120.0  # [m] from arm to arm
 _SAME_LEVEL = 1.5  # [m]
-_JOINED = 4  # segments of an outline that are drawn at once
+_JOINED = 4  # segments of an outline per polygon
 
 
 def sidewalks(town: Town, areas: Sequence[Array], lines: Sequence[Border]) -> Iterator[Shape]:
-    """The pavements, around roundabouts those that go on from its arms, and around corners what joins them."""
+    """Yields pavements, including those around roundabouts and around the corners of junctions."""
     walks = [(walk.points[:, :2], min(walk.width, _WIDEST_WALK)) for walk in town.sidewalks]
     walks += list(_around_rings(walks, lines))
     corners = list(_corners(walks, areas))
@@ -48,7 +48,7 @@ def sidewalks(town: Town, areas: Sequence[Array], lines: Sequence[Border]) -> It
 
 
 def _around_rings(walks: Sequence[tuple[Array, float]], lines: Iterable[Border]) -> Iterator[tuple[Array, float]]:
-    """Pavements outside the ring of a roundabout, where none is known, between those of its arms."""
+    """Yields pavements outside the ring of a roundabout without its own, between those of its arms."""
     tree = cKDTree(np.concatenate([line[[0, -1]] for line, _ in walks]))
     every = cKDTree(np.concatenate([line for line, _ in walks]))
     for line in lines:
@@ -66,7 +66,7 @@ def _around_rings(walks: Sequence[tuple[Array, float]], lines: Iterable[Border])
 
 
 def _corners(walks: Sequence[tuple[Array, float]], areas: Sequence[Array]) -> Iterator[tuple[Array, float]]:
-    """Parts (n, 2) [m] of the outlines of junctions between ends of pavements, and how far those reach from them."""
+    """Yields parts (n, 2) [m] of junction outlines between ends of pavements, and the width of pavement on them [m]."""
     ends = np.concatenate([line[[0, -1]] for line, _ in walks])
     half = np.repeat([width / 2.0 for _, width in walks], 2)
     for outline in areas:
@@ -83,7 +83,7 @@ def _corners(walks: Sequence[tuple[Array, float]], areas: Sequence[Array]) -> It
 
 
 def verges(town: Town, lines: Iterable[Border]) -> Iterator[Shape]:
-    """What lies between a kerb and a pavement that does not touch it, paved as well."""
+    """Yields paving between a kerb and a pavement that does not touch it."""
     walks = [(walk, cut(walk.points, [(0.0, polyline_length(walk.points))], 1.0)[0]) for walk in town.sidewalks]
     places = np.concatenate([points for _, points in walks])
     tree = cKDTree(places[:, :2])
@@ -103,21 +103,21 @@ def verges(town: Town, lines: Iterable[Border]) -> Iterator[Shape]:
 
 
 def rim(outline: Array, margin: float, colour: Colour) -> Iterator[Shape]:
-    """What lies along an outline (n, 2) [m], as far as a margin [m] from it."""
+    """Yields a strip along an outline (n, 2) [m], up to a margin [m] from it."""
     yield from (Shape(piece, colour) for piece in strokes(outline, 2.0 * margin, _JOINED))
     yield from (Shape(disc(point, margin, 16), colour) for point in (*outline[::_JOINED], outline[-1]))
 
 
-# --- What is built: pavements, kerbs, asphalt, planted medians, lay-bys, bridges and tunnels -------------------------
+# --- Streets and bridges ---------------------------------------------------------------------------------------------
 
 _KERB = 0.45  # [m]
-_VERGE = 1.6  # [m] of pavement made up beside the roads of a town that knows of none
+_VERGE = 1.6  # [m] of fictional pavement beside the roads of a town without sidewalks
 _JOINT = 0.05  # [m]
 _BAY_DEPTH = 2.3  # [m]
 _BAY_LENGTH = 6.0  # [m] without its tapered ends
 _BAY_TAPER = 2.2  # [m]
 _BEFORE_PORTAL = 4.0  # [m] of asphalt between a median and the mouth of a tunnel
-_FURTHER = 6.0  # [m] of asphalt beyond a bridge: lanes side by side do not start theirs at the same place
+_FURTHER = 6.0  # [m] of asphalt beyond a bridge: adjacent lanes begin theirs at different places
 
 
 def streets(
@@ -127,14 +127,14 @@ def streets(
     parts: Sequence[LevelStretch],
     turn_lanes: Sequence[Pocket],
 ) -> Iterator[Shape]:
-    """Everything on the ground, from the pavements to the medians; what lies in tunnels comes first.
+    """Yields everything on the ground, from the pavements to the medians; surfaces in tunnels come first.
 
     Args:
         town: whose streets.
-        samples: of its lanes.
-        lines: what lies beside them.
+        samples: samples of its lanes.
+        lines: borders of its lanes.
         parts: bridges and tunnels.
-        turn_lanes: the beginnings of turn lanes.
+        turn_lanes: beginnings of turn lanes.
     """
     tunnels = [part for part in parts if part.level < 0]
     covered = LevelLookup(samples, tunnels)
@@ -154,30 +154,30 @@ def streets(
     yield from _layer(town, pieces, [], 0.0, palette.ROAD)
     for line in lines:
         if line.kind in (BorderKind.LANE, BorderKind.CENTRE):
-            # Lanes side by side may lie a little apart.
+            # parallel lanes may have a small gap
             middle = line.shifted(-line.gap / 2.0)
             for run in held(line, covered, wanted=False):
                 yield from (Shape(piece, palette.ROAD) for piece in strokes(middle[run], 1.0))
     yield from pocket_grounds(town, turn_lanes)
-    # Grass goes on below the ends of bridges: those of lanes side by side are not at the same place.
+    # grass continues below the ends of bridges, which differ between adjacent lanes
     shorter = [_longer(part, -_FURTHER) for part in parts if part.level > 0]
     yield from medians(lines, LevelLookup(samples, [*shorter, *(_longer(part, _BEFORE_PORTAL) for part in tunnels)]))
     yield from portals(town, tunnels)
 
 
 def _longer(part: LevelStretch, more: float) -> LevelStretch:
-    """A stretch that begins and ends so much further out [m]."""
+    """Extends a stretch at both ends [m]."""
     return replace(part, start=part.start - more, end=part.end + more)
 
 
 def deck(town: Town, parts: Sequence[LevelStretch], lines: Iterable[Border], places: LevelLookup) -> Iterator[Shape]:
-    """The bridges of one level: their shadow on what lies below, the parapets, and the asphalt.
+    """Yields the bridges of one level: shadow, parapets and asphalt.
 
     Args:
-        town: whose lanes.
-        parts: the stretches of that level.
-        lines: borders; between two bridges side by side there is concrete.
-        places: what lies on the stretches.
+        town: town to paint.
+        parts: stretches of that level.
+        lines: borders; between parallel bridges there is concrete.
+        places: lookup of the positions on the stretches.
     """
     between = [(line, run) for line in lines if line.kind is BorderKind.MEDIAN for run in held(line, places)]
     layers = (
@@ -229,7 +229,7 @@ def _layer(
 
 
 def _bays(town: Town, samples: TownSamples) -> Iterator[Shape]:
-    """A lay-by at every landmark site where there is room beside the lane, and a path from it to the site."""
+    """Yields a lay-by at each landmark site with room beside the lane, and a path from it to the site."""
     tree = cKDTree(samples.centre[:, :2])
     for site in town.sites:
         lane = town.lanes[site.lane]
@@ -247,9 +247,9 @@ def _bays(town: Town, samples: TownSamples) -> Iterator[Shape]:
 
 
 def bay_outline(lane: Lane, site: Site) -> Array | None:
-    """Outline (n, 2) [m] of the lay-by beside a lane at a site, or None where the lane is too short for one.
+    """Returns the outline (n, 2) [m] of the lay-by beside a lane at a site, or None if the lane is too short.
 
-    Its first and last points are on the lane; all others are beyond its edge.
+    The first and last points lie on the lane, all others beyond its edge.
     """
     half = _BAY_LENGTH / 2.0 + _BAY_TAPER
     if lane.length < 2.0 * half + 1.0:

@@ -1,24 +1,27 @@
-"""Words on a picture: straight ones, and ones set along a line."""
+"""Text on pictures: straight lines, and text along a path."""
 
 from __future__ import annotations
 
 import importlib.util
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.rendering.palette import Colour
 
+if TYPE_CHECKING:
+    import pygame
+
 _FILES = {False: "DejaVuSans.ttf", True: "DejaVuSans-Bold.ttf"}
-_loaded: dict[tuple[int, bool], Any] = {}
+_loaded: dict[tuple[int, bool], pygame.font.Font] = {}
 
 
 @cache
 def font_path(bold: bool = False) -> str | None:
-    """File of the typeface, found without importing matplotlib; None (pygame's own font) where it is not there."""
+    """Returns the font file, found without importing matplotlib; None (pygame's default font) if it is missing."""
     spec = importlib.util.find_spec("matplotlib")
     if spec is None or spec.origin is None:
         return None
@@ -26,8 +29,8 @@ def font_path(bold: bool = False) -> str | None:
     return str(path) if path.is_file() else None
 
 
-def font(size: int, bold: bool = False) -> Any:
-    """A `pygame.font.Font` of this height [px]. Needs no display."""
+def font(size: int, bold: bool = False) -> pygame.font.Font:
+    """Returns a `pygame.font.Font` of a height [px]; needs no display."""
     import pygame
 
     if not pygame.font.get_init():
@@ -40,8 +43,8 @@ def font(size: int, bold: bool = False) -> Any:
     return made
 
 
-def _alive(held: Any) -> bool:
-    """Whether a font may still be used: `pygame.quit()`, which others may call, kills all that were made before."""
+def _alive(held: pygame.font.Font) -> bool:
+    """Returns whether a font is still valid: `pygame.quit()` invalidates all earlier ones."""
     import pygame
 
     try:
@@ -51,19 +54,19 @@ def _alive(held: Any) -> bool:
     return True
 
 
-# --- Words on a picture: straight ones, and ones set along a line ----------------------------------------------------
+# --- Lines of text ---------------------------------------------------------------------------------------------------
 
 
 @lru_cache(maxsize=512)
-def words(text: str, size: int, colour: Colour, bold: bool = False) -> Any:
-    """A surface with a line of text."""
+def words(text: str, size: int, colour: Colour, bold: bool = False) -> pygame.Surface:
+    """Returns a surface with a line of text."""
     return font(size, bold).render(text, True, colour)
 
 
-def set_along(surface: Any, text: str, path: Array, size: int, colour: Colour, bold: bool = True) -> None:
-    """Sets a text along a path (n, 2) [px], its letters centred on the line.
+def set_along(surface: pygame.Surface, text: str, path: Array, size: int, colour: Colour, bold: bool = True) -> None:
+    """Draws text along a path (n, 2) [px], its letters centred on the line.
 
-    A straight path takes the whole line of text at once, which keeps the spacing of its letters exact.
+    On a straight path the text is drawn as a whole, which keeps the exact letter spacing.
     """
     steps = np.diff(path, axis=0)
     angle = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
@@ -81,8 +84,8 @@ def set_along(surface: Any, text: str, path: Array, size: int, colour: Colour, b
         _stamp(surface, words(letter, size, colour, bold), at, float(np.interp(s, middles, angle)))
 
 
-def _stamp(surface: Any, piece: Any, centre: Array, angle: float) -> None:
-    """Draws a surface turned clockwise by an angle [rad] around its own centre."""
+def _stamp(surface: pygame.Surface, piece: pygame.Surface, centre: Array, angle: float) -> None:
+    """Draws a surface rotated clockwise by an angle [rad] around its centre."""
     import pygame
 
     turned = pygame.transform.rotozoom(piece, -float(np.degrees(angle)), 1.0) if abs(angle) > 1e-3 else piece
@@ -90,7 +93,7 @@ def _stamp(surface: Any, piece: Any, centre: Array, angle: float) -> None:
 
 
 def wrap(text: str, size: int, width: int, bold: bool = False) -> list[str]:
-    """Lines of a text that are no wider than a width [px]; a longer word is cut."""
+    """Wraps a text into lines no wider than a width [px]; longer words are split."""
     face = font(size, bold)
     lines: list[str] = []
     line = ""
@@ -112,7 +115,7 @@ def wrap(text: str, size: int, width: int, bold: bool = False) -> list[str]:
 
 
 def shorten(text: str, size: int, width: int, bold: bool = False) -> str:
-    """The text, cut with an ellipsis where it is wider than a width [px]."""
+    """Shortens a text with an ellipsis if it is wider than a width [px]."""
     face = font(size, bold)
     if face.size(text)[0] <= width:
         return text

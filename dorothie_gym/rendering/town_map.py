@@ -1,10 +1,10 @@
-"""The map of a town as a picture."""
+"""Map of a town as a picture."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,30 +22,33 @@ from dorothie_gym.rendering.shapes import Shape, longer, strokes
 from dorothie_gym.rendering.street_names import Label, LabelPlacer, covering
 from dorothie_gym.rendering.text import set_along, words
 
+if TYPE_CHECKING:
+    import pygame
+
 SUPERSAMPLING = 2
 GROUND = 14.0
-"""Country around the outermost roads [m]."""
+"""Margin of country around the outermost roads [m]."""
 
-_TILE = 1024  # [px]: what is painted at a time, so that large maps need little memory
+_TILE = 1024  # [px] painted at once, so that large maps need little memory
 _BAR_LENGTHS = (10, 20, 50, 100, 200, 500, 1000, 2000)
-_SIGN = (4.2, 54)  # height of signs [m], but not larger than this [px]
-_PIN = (2.9, 34)  # radius of pins, likewise
-_NAME_GROUND = (0.25, 1.04)  # times the size of type: what the bare road under a name is longer, and its height
-_HALO = 0.09  # times the size of type
+_SIGN = (4.2, 54)  # height of signs [m], and upper limit [px]
+_PIN = (2.9, 34)  # radius of pins [m], and upper limit [px]
+_NAME_GROUND = (0.25, 1.04)  # extra length and height of the plain road under a label, relative to the font size
+_HALO = 0.09  # relative to the font size
 
 
 class MapPainter:
-    """Works out the map of a town, and paints it once when it is first asked for; `surface()` hands out copies.
+    """Map of a town, painted once on first use; `surface()` returns copies.
 
     Attributes:
-        town: what is painted.
+        town: the town.
         size: width and height of the picture [px].
         scale: [px/m].
         origin: world position (2,) of the picture's upper left corner [m].
         street_names: names by street index.
-        labels: the names as they were set.
-        missing: names of streets on which there is no room for them.
-        plan: what was painted.
+        labels: placed street names.
+        missing: names without room on or beside their streets.
+        plan: layers of the map.
     """
 
     def __init__(
@@ -65,16 +68,16 @@ class MapPainter:
         """Fits a town into a picture.
 
         Args:
-            town: what to paint.
+            town: town to paint.
             size: width and height [px].
             street_names: names by street index; the town's own where absent.
-            margin: pixels free of roads, all around or (left, top, right, bottom).
-            type_sizes: largest and smallest type of street names [px].
-            label_spacing: smallest distance between two settings of one name [px].
-            label_distance: distance beyond which a name is set again even where arrows are in the way [m].
-            border: how far trees stand beyond the roads [m]; to the edge of the picture where absent.
-            numbered: whether the sites of landmarks have pins with their numbers.
-            smallest_sign: height of lights and signs, however small the scale [px].
+            margin: margin without roads [px], for all sides or as (left, top, right, bottom).
+            type_sizes: largest and smallest font size of street names [px].
+            label_spacing: smallest distance between two labels with the same name [px].
+            label_distance: distance beyond which a name is repeated even across arrows [m].
+            border: width of the country with trees around the roads [m]; by default up to the edge of the picture.
+            numbered: whether landmark sites have numbered pins.
+            smallest_sign: smallest height of lights and signs at any scale [px].
 
         Raises:
             ValueError: `size` leaves no room inside `margin`, or there are too few names.
@@ -111,24 +114,24 @@ class MapPainter:
 
     @classmethod
     def at_scale(cls, town: Town, scale: float, **options: Any) -> MapPainter:
-        """A painter whose picture is as large as the town needs at a scale [px/m]; other options as in the class."""
+        """Returns a painter with a picture of sufficient size at a scale [px/m]; other options as in the class."""
         margin = options.setdefault("margin", 24)
         left, top, right, bottom = (margin,) * 4 if isinstance(margin, int) else margin
         x0, y0, x1, y1 = town_bounds(town, GROUND)
         size = (round((x1 - x0) * scale) + left + right, round((y1 - y0) * scale) + top + bottom)
         return cls(town, size=size, border=GROUND + min(left, top, right, bottom) / scale, **options)
 
-    def surface(self, time: float | None = None) -> Any:
-        """A copy of the base map, a `pygame.Surface`, to draw on; with the colours that lights show at a time [s]."""
+    def surface(self, time: float | None = None) -> pygame.Surface:
+        """Returns a copy of the base map to draw on; with lights in their colours at a time [s] if one is given."""
         copy = self._surface.copy()
         if time is not None:
             self.draw_lights(copy, time)
         return copy
 
-    def window(self, centre: ArrayLike, size: tuple[int, int], time: float | None = None) -> Any:
-        """A part of the base map around a world position (2,), as a new surface of a size [px].
+    def window(self, centre: ArrayLike, size: tuple[int, int], time: float | None = None) -> pygame.Surface:
+        """Returns the part of the base map around a world position (2,) [m], as a new surface of a size [px].
 
-        Lights show their colours at a time [s], if one is given.
+        Lights show their colours at a time [s] if one is given.
         """
         import pygame
 
@@ -140,13 +143,13 @@ class MapPainter:
             self.draw_lights(view, time, corner)
         return view
 
-    def draw_lights(self, picture: Any, time: float, corner: ArrayLike = (0.0, 0.0)) -> None:
-        """Draws what the lights show at a time [s]: lamps and stop lines; lights without a programme stay as they are.
+    def draw_lights(self, picture: pygame.Surface, time: float, corner: ArrayLike = (0.0, 0.0)) -> None:
+        """Draws lamps and stop lines in the colours at a time [s]; lights without a programme are not changed.
 
         Args:
-            picture: a `pygame.Surface` with this map or a part of it.
+            picture: surface with this map or a part of it.
             time: simulated time [s].
-            corner: pixel of the map that is the upper left one of the picture.
+            corner: pixel of the map at the upper left corner of the picture.
         """
         import pygame
 
@@ -170,22 +173,22 @@ class MapPainter:
                 stamp(picture, sign_icon(post.kind, self._signs, colours[0]), at)
 
     def to_pixel(self, xy: ArrayLike) -> NDArray[np.float64]:
-        """World positions (..., 2) [m] as pixels (..., 2)."""
+        """Converts world positions (..., 2) [m] to pixels (..., 2)."""
         return (np.asarray(xy, dtype=float) - self.origin) * self.scale
 
-    def draw_scale_bar(self, surface: Any, corner: tuple[int, int], longest: int = 180) -> None:
-        """A scale bar whose lower left corner is at a pixel, no longer than so many pixels; north is up."""
+    def draw_scale_bar(self, surface: pygame.Surface, corner: tuple[int, int], longest: int = 180) -> None:
+        """Draws a scale bar at most `longest` px long, with its lower left corner at a pixel, and a north arrow."""
         draw_scale_bar(surface, self.scale, corner, longest)
 
     def _fixed(self) -> Array:
-        """Circles (n, 3) [px] that names keep off: signs and pins."""
+        """Returns circles (n, 3) [px] around signs and pins, which labels avoid."""
         rows = [(*self.to_pixel(post.at).tolist(), 0.5 * self._signs) for post in self.plan.posts]
         if self._pins:
             rows += [(*self.to_pixel(site.position).tolist(), 1.3 * self._pins) for site in self.town.sites]
         return np.array(rows, dtype=float).reshape(-1, 3)
 
     def _uncovered(self) -> Iterator[Shape]:
-        """The shapes of the plan without the arrows, hatchings and dashes that a name would cover in part."""
+        """Yields the shapes of the map without the arrows, hatchings and dashes that a label would cover partly."""
         lanes, plan = self.town.lanes, self.plan
         along = np.array([0.0, 0.5, 1.0]) * ARROW_LENGTH
         arrows = [[lanes[a.lane].position(a.station + s) for s in along] for a in plan.arrows]
@@ -194,7 +197,7 @@ class MapPainter:
             palette.HATCHING: pocket_places(self.town, plan.pockets),
         }
         covered = {colour: self._covered(at) for colour, at in places.items()}
-        # Two turn lanes back to back have one island.
+        # two turn lanes back to back share one island
         islands = places[palette.HATCHING][:, 1]
         away = np.hypot(*(islands[:, None] - islands).transpose(2, 0, 1))
         covered[palette.HATCHING] = ((away < FACING) & covered[palette.HATCHING]).any(axis=1)
@@ -210,7 +213,7 @@ class MapPainter:
                 yield shape
 
     def _covered(self, places: Array) -> NDArray[np.bool_]:
-        """Which of some things a name would touch (n,), from places on each of them (n, k, 2) [m]."""
+        """Returns which objects a label touches (n,), given positions on each object (n, k, 2) [m]."""
         pixels = self.to_pixel(places).reshape(-1, 2)
         found = np.zeros(len(places), dtype=bool)
         for label in self.labels:
@@ -219,7 +222,7 @@ class MapPainter:
         return found
 
     def _one_way_arrows(self) -> Iterator[Shape]:
-        """Arrows along one-way streets, where neither a name nor a turn arrow is in the way."""
+        """Yields arrows along one-way streets where no label or turn arrow is in the way."""
         if not self.plan.detail.arrows:
             return
         taken = np.array([*covering(self.labels), *self._turn_arrows()]).reshape(-1, 3)
@@ -232,7 +235,7 @@ class MapPainter:
                     break
 
     def _free(self, lane: Lane, station: float, taken: Array) -> bool:
-        """Whether an arrow on a lane would touch none of the circles (n, 3) [px], no bridge and no tunnel."""
+        """Returns whether an arrow on a lane is clear of the circles (n, 3) [px], of bridges and of tunnels."""
         at = lane.position(station)
         gap = np.hypot(*(taken[:, :2] - self.to_pixel(at)).T) - taken[:, 2]
         place = np.array([[*at, lane.height_at(station)]])
@@ -245,7 +248,7 @@ class MapPainter:
             yield x, y, 3.5 * self.scale
 
     @cached_property
-    def _surface(self) -> Any:
+    def _surface(self) -> pygame.Surface:
         import pygame
 
         shapes = [*self._uncovered(), *self._one_way_arrows()]
@@ -263,7 +266,9 @@ class MapPainter:
             stamp(picture, pin_icon(str(site.id + 1), self._pins, bearing), self.to_pixel(site.position))
         return picture
 
-    def _paint_tile(self, shapes: Sequence[Shape], bounds: Array, left: int, top: int, size: tuple[int, int]) -> Any:
+    def _paint_tile(
+        self, shapes: Sequence[Shape], bounds: Array, left: int, top: int, size: tuple[int, int]
+    ) -> pygame.Surface:
         import pygame
 
         factor = SUPERSAMPLING
@@ -285,8 +290,8 @@ class MapPainter:
         return pygame.transform.smoothscale(tile, size)
 
 
-def _draw_name(tile: Any, label: Label, corner: Array) -> None:
-    """Draws a name on a tile with its corner at a pixel: light on bare road, or dark with a halo beside it."""
+def _draw_name(tile: pygame.Surface, label: Label, corner: Array) -> None:
+    """Draws a label on a tile with its corner at a pixel: light on plain road, or dark with a halo beside the road."""
     import pygame
 
     size = label.size * SUPERSAMPLING
@@ -309,8 +314,8 @@ def _sized(rule: tuple[float, int], scale: float, smallest: float) -> int:
     return int(np.clip(round(metres * scale), smallest, largest))
 
 
-def draw_scale_bar(surface: Any, scale: float, corner: tuple[int, int], longest: int) -> None:
-    """A scale bar for a picture of `scale` [px/m], with its lower left corner at a pixel, and an arrow to the north."""
+def draw_scale_bar(surface: pygame.Surface, scale: float, corner: tuple[int, int], longest: int) -> None:
+    """Draws a scale bar for a `scale` [px/m] with its lower left corner at a pixel, and a north arrow."""
     import pygame
 
     metres = max((n for n in _BAR_LENGTHS if n * scale <= longest), default=_BAR_LENGTHS[0])

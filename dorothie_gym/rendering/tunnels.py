@@ -1,4 +1,4 @@
-"""Roads below the ground: the slopes of open cuttings, and the light floor of what a street covers."""
+"""Tunnels and cuttings: slopes of open cuttings, and the light floor of covered roads."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from dorothie_gym.rendering.shapes import (
     strokes,
 )
 
-_LAID_BACK = 0.55  # [m] of slope for each metre of depth
+_LAID_BACK = 0.55  # [m] of slope per metre of depth
 _BROADEST = 3.0  # [m]
-_HACHURE = 2.4  # [m] from one to the next
+_HACHURE = 2.4  # [m] between hachures
 _PORTAL = 0.9  # [m]
-_APRON = 4.0  # [m] of asphalt before a portal: grass ends there
-_OVER = 0.9  # [m] that the wall of a portal goes on beyond the road
-_JITTER = 2.0  # [m] between the places at which borders are known
-_ABREAST = 14.0  # [m] between lanes that go through one portal
+_APRON = 4.0  # [m] of asphalt before a portal, where grass ends
+_OVER = 0.9  # [m] by which the wall of a portal extends beyond the road
+_JITTER = 2.0  # [m] between the points of borders
+_ABREAST = 14.0  # [m] between lanes through one portal
 
 
 def walls(lines: Iterable[Border], deep: LevelLookup, covered: LevelLookup) -> Iterator[Shape]:
-    """Slopes beside roads in cuttings, hachured from their upper edges, broader where they are deeper."""
+    """Yields slopes beside roads in cuttings, hachured from their upper edges, wider where they are deeper."""
     for line in lines:
         if line.kind is not BorderKind.EDGE:
             continue
@@ -47,14 +47,14 @@ def walls(lines: Iterable[Border], deep: LevelLookup, covered: LevelLookup) -> I
 
 
 def _slope(foot: Array, top: Array) -> Iterator[Shape]:
-    """The ground between the foot and the upper edge (n, 2) [m] of a slope."""
+    """Yields the ground between foot and upper edge (n, 2) [m] of a slope."""
     for k in range(0, len(top) - 1, 8):
         yield Shape(np.concatenate((foot[k : k + 9], top[k : k + 9][::-1])), palette.CUTTING)
     s = polyline_stations(foot)
     for at in np.arange(_HACHURE / 2.0, s[-1], _HACHURE):
         low, high = (np.array([np.interp(at, s, line[:, k]) for k in (0, 1)]) for line in (foot, top))
         along = 0.28 * (foot[-1] - foot[0]) / max(float(np.hypot(*(foot[-1] - foot[0]))), 1e-6)
-        # Hachures are broad above and thin out downhill.
+        # hachures taper downhill
         yield Shape(np.stack((high - along, high + along, 0.35 * high + 0.65 * low)), palette.CUTTING_EDGE)
     yield from (Shape(piece, palette.CUTTING_EDGE) for piece in strokes(top, 0.3))
 
@@ -68,7 +68,7 @@ def _runs(wanted: NDArray[np.bool_]) -> Iterator[NDArray[np.int64]]:
 def tunnel_floors(
     town: Town, parts: Sequence[LevelStretch], lines: Sequence[Border], covered: LevelLookup
 ) -> Iterator[Shape]:
-    """Light asphalt with broken edges between walls: what is seen of a road that runs under a street.
+    """Yields light asphalt with broken edges between walls for the parts of roads under streets.
 
     Args:
         town: whose lanes.
@@ -91,7 +91,7 @@ def tunnel_floors(
 
 
 def portals(town: Town, parts: Sequence[LevelStretch]) -> Iterator[Shape]:
-    """The walls over the mouths of tunnels: one for all lanes side by side, straight across them."""
+    """Yields the walls above tunnel mouths: one straight wall for all parallel lanes."""
     mouths = []
     for part in parts:
         lane = town.lanes[part.lane]
@@ -117,7 +117,7 @@ def _same_portal(group: Sequence[tuple[Array, Array]], mouth: tuple[Array, Array
 
 
 def _portal(group: Sequence[tuple[Array, Array]]) -> Iterator[Shape]:
-    """The light floor of each lane up to the wall, and the wall; from the lanes' corners (2, 2) [m] and ways out."""
+    """Yields the light floor of each lane up to the wall, and the wall; from corners (2, 2) [m] and directions."""
     out = np.mean([way for _, way in group], axis=0)
     right = np.array([-out[1], out[0]])
     middles = np.array(sorted((corners.mean(axis=0) for corners, _ in group), key=lambda at: float(at @ right)))

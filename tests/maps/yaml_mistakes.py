@@ -197,7 +197,7 @@ WRONG_FILES = {
     "crosswalk of a ramp": (
         ROAD.replace("one_way", "ramp") + "crosswalks: [[b, Lane]]",
         3,
-        "crosswalks: 'Lane' is a ramp, which nobody crosses on foot; remove it or name another street",
+        "crosswalks: 'Lane' is a ramp, which has no crosswalks; remove it or name another street",
     ),
     "not UTF-8": (b"name: x\nspeed: \xff\xfe", 2, "is not UTF-8 text (byte 15 of the file); save the file as UTF-8"),
     "UTF-16": (ROAD.encode("utf-16"), 1, "is not UTF-8 text (byte 0 of the file)"),

@@ -109,7 +109,7 @@ WRONG = {
         "turn_lanes: [market]",
         "turn_lanes: [circus]",
         11,
-        "'circus' is a roundabout, where nobody turns left; remove it",
+        "'circus' is a roundabout, which has no left turns; remove it",
     ),
     "turn lane not in a list": (
         "turn_lanes: [market]",

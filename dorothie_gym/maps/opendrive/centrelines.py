@@ -1,4 +1,4 @@
-"""Centre lines of lanes: sampled densely from the road's profiles, thinned where they are straight, joined at links."""
+"""Centre lines of OpenDRIVE lanes: sampled densely from the profiles of the road, thinned, and joined at links."""
 
 from __future__ import annotations
 
@@ -12,37 +12,37 @@ from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.opendrive.records import SIDEWALK, OpenDriveRecords, RoadRecord
 from dorothie_gym.maps.opendrive.topology import SHORTEST_LANE, Topology, runs_forward
 
-# Distance between the samples taken from the file [m]: the chord of a 5 m radius is then 1.6 mm off its arc.
+# Sampling distance in the file [m]: chords of a 5 m radius deviate by 1.6 mm.
 _DENSE_STEP = 0.25
-# Distance at which curvature is measured [m], and the one between points of the result: largest on straights, largest
-# on curves, smallest.
+# Sampling distance of curvature [m], and distance between points of the result: largest on straights, largest
+# on curves, and smallest [m].
 _GRID_STEP = 0.5
 _LONGEST_STEP, _LONGEST_CURVE_STEP, _SHORTEST_STEP = 20.0, 2.0, 0.25
-# Largest distance between a chord and its arc that we aim at [m]; with the sampling's error it stays below 1 cm.
+# Target for the distance between chord and arc [m]; together with the sampling error it stays below 1 cm.
 _CHORD_ERROR = 0.005
 # Curvature below which a lane counts as straight [1/m]: 20 m of it bend by 5 mm.
 _STRAIGHT = 1e-4
-# Ends of linked lanes further apart than this [m] are no slip of rounding: they are left as the file has them, and
-# `check` tells of them. CARLA's maps need 2 mm.
+# Largest gap between linked lanes that is closed [m]; larger gaps are not rounding errors, remain as they are, and
+# are reported by `lint`. CARLA's maps need 2 mm.
 _LARGEST_STITCH = 0.05
-# A lane's own centre line may not jump further than this from one sample to the next [m].
+# Largest jump of a centre line from one sample to the next [m].
 _LARGEST_JUMP = 10.0
-# Length over which a lane gives way to its moved end [m], for each metre that it moves, and at least for one.
+# Length over which a lane is deformed towards its moved end [m], per metre of shift and at least for one.
 _STITCH_LENGTH = 10.0
-# A lane narrower than this [m] and than this share of its greatest width (or of what it meets) is opening or closing.
+# A lane is opening or closing below this width [m] and this share of its greatest width (or of the linked lanes).
 _OPEN_WIDTH, _OPEN_SHARE = 1.75, 0.5
 
 
 @dataclass(frozen=True)
 class RoadSamples:
-    """Samples along one road, in the file's frame.
+    """Samples along one road, in the frame of the file.
 
     Attributes:
         x, y, z: reference line (n,) each [m].
-        heading: its direction (n,) [rad].
-        tilt: roll angle of the road (n,) [rad], its left side up where it is positive.
-        spans: which samples belong to which lane section.
-        centres: for each section, by lane number: lateral place of the lane's middle and its width (m,) [m], of driving
+        heading: direction of the reference line (n,) [rad].
+        tilt: roll angle of the road (n,) [rad], positive with the left side up.
+        spans: range of samples of each lane section.
+        centres: for each section, by lane number: lateral position of the centre and width (m,) [m] of driving
             lanes and sidewalks.
     """
 
@@ -55,7 +55,7 @@ class RoadSamples:
     centres: tuple[dict[int, tuple[Array, Array]], ...]
 
     def line(self, pieces: Iterable[tuple[int, int]]) -> Array:
-        """Middle of lanes, given as (section, lane) one after another along the road: x, y, z, width in OUR frame."""
+        """Returns the centre line of successive pieces (section, lane): x, y, z, width in the frame of the TOWN."""
         rows = []
         for section, lane in pieces:
             here = self.spans[section]
@@ -71,21 +71,21 @@ class RoadSamples:
 def sample_centrelines(
     records: OpenDriveRecords, topology: Topology, samples: Mapping[int, RoadSamples]
 ) -> list[Array]:
-    """Centre lines of all lanes in our frame and in driving direction, ends of linked lanes joined.
+    """Returns the centre lines of all lanes in the frame of the town and in driving direction, joined at links.
 
-    A lane that opens beside others, or ends there, and is linked to none at that end, begins where it is half as wide
-    as it becomes: nobody could drive in the wedge before.
+    A lane that opens or closes beside others without a link at that end begins where it reaches half of its width:
+    the wedge before cannot be driven.
 
     Args:
-        records: the file.
-        topology: its lanes.
-        samples: its roads, by their ids.
+        records: records of the file.
+        topology: lanes of the file.
+        samples: samples of the roads, by road id.
 
     Returns:
-        One array (n, 4) a lane: x, y, z and width [m].
+        One array (n, 4) for each lane: x, y, z and width [m].
 
     Raises:
-        TownError: a lane's centre line has no length, or leaves a gap that no rounding explains.
+        TownError: a centre line has no length, or a jump.
     """
     entered, left = ({link[k] for link in topology.links} for k in (1, 0))
     lines = []
@@ -110,7 +110,7 @@ def _is_open(widths: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
 
 
 def _without_wedges(line: Array, at_start: bool, at_end: bool) -> Array:
-    """A centre line (n, 4) without the samples at its ends where the lane is still opening or already closing."""
+    """Removes the samples at the ends of a centre line (n, 4) where the lane is still opening or already closing."""
     wide = np.flatnonzero(_is_open(line[:, 3]))
     first, last = wide[0] if at_start else 0, wide[-1] if at_end else len(line) - 1
     kept = line[first : last + 1]
@@ -118,7 +118,7 @@ def _without_wedges(line: Array, at_start: bool, at_end: bool) -> Array:
 
 
 def _fault(dense: Array) -> str:
-    """What makes a centre line (n, 4) impossible to drive; empty if nothing does."""
+    """Returns the reason why a centre line (n, 4) cannot be driven; empty if there is none."""
     if np.hypot(*np.ptp(dense[:, :2], axis=0)) < SHORTEST_LANE / 2:
         return "its centre line shrinks to a point: the bend is too sharp for it"
     jump = float(np.max(np.hypot(*np.diff(dense[:, :2], axis=0).T)))
@@ -126,7 +126,7 @@ def _fault(dense: Array) -> str:
 
 
 def sample_road(road: RoadRecord) -> RoadSamples:
-    """Samples a road every few decimetres, section by section."""
+    """Samples a road every 0.25 m, section by section."""
     pieces, picks, spans = [], [], []
     total = 0
     for section in road.sections:
@@ -134,7 +134,7 @@ def sample_road(road: RoadRecord) -> RoadSamples:
         count = int(np.ceil(length / _DENSE_STEP)) + 1 if length > 0.0 else 1
         s = np.linspace(section.start, section.end, count)
         pieces.append(s)
-        # At its end a section still obeys its own profiles, not those that begin there with the next one.
+        # the end of a section belongs to its own profiles, not to those of the next one
         picks.append(np.minimum(s, section.end - min(1e-7, 0.5 * length)))
         spans.append(slice(total, total + count))
         total += count
@@ -152,9 +152,9 @@ def sample_road(road: RoadRecord) -> RoadSamples:
 def _lateral_places(
     road: RoadRecord, section: int, ds: Array, pick: Array, offset: Array
 ) -> dict[int, tuple[Array, Array]]:
-    """Centre and width of lanes of a section, which are laid side by side from the middle outwards.
+    """Returns lateral position and width of the lanes of a section, stacked from the middle outwards.
 
-    A lane given by its border ends there whatever lies between (OpenDRIVE 1.7, section 11.6.2).
+    A lane with a border ends at it regardless of the lanes between (OpenDRIVE 1.7, section 11.6.2).
     """
     lanes = road.sections[section].lanes
     places = {}
@@ -170,7 +170,7 @@ def _lateral_places(
 
 
 def thin(line: Array) -> Array:
-    """The same line (n, 4) with as few points as its curvature, its width and its height allow."""
+    """Thins a line (n, 4) to as few points as its curvature, width and height allow."""
     step = np.hypot(*np.diff(line[:, :2], axis=0).T)
     line = line[np.concatenate(([True], step > 1e-6))]
     station = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))))
@@ -193,7 +193,7 @@ def _at(where: Array, station: Array, line: Array) -> Array:
 
 
 def _stitch(lines: list[Array], links: tuple[tuple[int, int], ...]) -> None:
-    """Moves the ends of linked lanes to one common point: files leave gaps of some millimetres or centimetres."""
+    """Joins the ends of linked lanes at a common point: files have gaps of millimetres or centimetres."""
     group = list(range(2 * len(lines)))  # 2 k is the start of lane k, 2 k + 1 its end
 
     def find(end: int) -> int:
@@ -213,7 +213,7 @@ def _stitch(lines: list[Array], links: tuple[tuple[int, int], ...]) -> None:
 
 
 def _join(lines: list[Array], ends: list[int]) -> None:
-    """Moves ends of lanes to the middle of those that are open; one that is only opening there comes out of them."""
+    """Joins ends of lanes at the mean of those that are open; opening lanes start from that point."""
     places = np.array([lines[e // 2][-1 if e % 2 else 0] for e in ends])  # (n, 4)
     open_ = _is_open(places[:, 3])
     target = places[open_, :3].mean(axis=0)

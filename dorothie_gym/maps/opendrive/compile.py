@@ -1,4 +1,4 @@
-"""From records to a `Town`: lanes, links, junctions, signals, streets and sites."""
+"""OpenDRIVE compiler: from records to a `Town`."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from dorothie_gym.maps.opendrive.topology import LanePiece, Topology, build_topo
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_light_programs import derive_programmes
 
-# Limit of a road that names none, in built-up areas [m/s] (50 km/h).
+# Speed limit of roads without one, as in built-up areas [m/s] (50 km/h).
 DEFAULT_SPEED_LIMIT = 50.0 / 3.6
 
-# Lanes have to run side by side for this long before one can change between them [m].
+# Shortest length of parallel lanes with a lane change [m].
 SHORTEST_LANE_CHANGE = 5.0
 
 
 def read_opendrive(path: str | Path) -> Town:
-    """Reads an OpenDRIVE file (1.4, as CARLA's towns) into a town named like the file.
+    """Reads an OpenDRIVE file (1.4, as CARLA's towns) into a town with the name of the file.
 
-    The file's y points north and ours south: everything is mirrored once. A lane is a chain of lane sections of one
-    road that go on one to one; lanes of other types than "driving" (and the types of ramps) are left out.
+    The y axis of the file points north and that of a town south: all coordinates are mirrored. A lane is a chain of
+    lane sections of one road; lanes of types other than "driving" (and those of ramps) are ignored.
 
     Args:
         path: file to read.
 
     Returns:
-        The town. OpenDRIVE has neither streets as people name them nor places for landmarks: both are derived.
+        The town. Streets and landmark sites, which OpenDRIVE does not have, are inferred.
 
     Raises:
-        TownError: the file cannot be read; the error names the file, the element and the reason.
+        TownError: the file is invalid; the message names the file, the element and the reason.
     """
     records = parse_opendrive(path)
     topology = build_topology(records)
@@ -77,7 +77,7 @@ def _lanes(records: OpenDriveRecords, topology: Topology, lines: list[Array]) ->
 
 
 def _speed_limits(records: OpenDriveRecords, topology: Topology) -> list[float]:
-    """Limit of each lane; one without its own (most connectors) takes the lowest of the lanes that it links."""
+    """Returns the speed limit of each lane; lanes without one (most connectors) take the lowest of their links."""
     own = [_own_limit(records.roads[chain[0].road], chain) for chain in topology.chains]
     linked: defaultdict[int, list[float]] = defaultdict(list)
     for source, target in topology.links:
@@ -88,7 +88,7 @@ def _speed_limits(records: OpenDriveRecords, topology: Topology) -> list[float]:
 
 
 def _own_limit(road: RoadRecord, chain: tuple[LanePiece, ...]) -> float | None:
-    """The lowest limit that holds anywhere on the lane, where the road or the lane names one."""
+    """Returns the lowest speed limit on a lane according to its road or lane records, or None."""
     limits = [speed for p in chain for _, speed in road.sections[p.section].lanes[p.lane].speeds]
     if not limits:
         start = min(road.sections[p.section].start for p in chain)
@@ -99,7 +99,7 @@ def _own_limit(road: RoadRecord, chain: tuple[LanePiece, ...]) -> float | None:
 
 
 def _lane_change_links(records: OpenDriveRecords, topology: Topology, lanes: tuple[Lane, ...]) -> tuple[LaneLink, ...]:
-    """Links between lanes that run side by side, each pair once and the longest neighbour of a lane first."""
+    """Returns lane changes between parallel lanes, each pair once and the longest neighbour of a lane first."""
     lane_of = {piece: k for k, chain in enumerate(topology.chains) for piece in chain}
     shared: defaultdict[tuple[int, int], float] = defaultdict(float)
     open_: defaultdict[tuple[int, int], bool] = defaultdict(bool)
@@ -123,18 +123,18 @@ def _lane_change_links(records: OpenDriveRecords, topology: Topology, lanes: tup
 
 
 def _permits(changes: tuple[str, ...], toward: int) -> bool:
-    """Whether a road mark lets cars change to higher (1) or lower (-1) lane numbers; one that says nothing does."""
+    """Returns whether a road mark permits changes to higher (1) or lower (-1) lane numbers; by default it does."""
     allowing = ("both", "increase" if toward > 0 else "decrease")
     return not changes or any(change in allowing for change in changes)
 
 
 def _side(road: RoadRecord, outward: bool) -> LinkType:
-    """Side of the driver on which the outer (or inner) lane lies: the outer one is at the kerb."""
+    """Returns the side on which the outer (or inner) lane lies: the outer one is at the kerb."""
     return LinkType.LANE_CHANGE_RIGHT if outward == road.right_hand else LinkType.LANE_CHANGE_LEFT
 
 
 def _junctions(lanes: tuple[Lane, ...]) -> tuple[Junction, ...]:
-    """Junctions that lanes cross, each at the middle of the box around its connectors."""
+    """Returns the junctions, each at the centre of the bounding box of its connectors."""
     members: defaultdict[int, list[Lane]] = defaultdict(list)
     for lane in lanes:
         if lane.in_junction:

@@ -1,4 +1,4 @@
-"""What stands on or beside the roads of a file: lights, signs and crosswalks, placed in our frame."""
+"""Signals, crosswalks and sidewalks of an OpenDRIVE file, in the frame of the town."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dorothie_gym.maps.opendrive.centrelines import RoadSamples, thin
 from dorothie_gym.maps.opendrive.records import SIDEWALK, CrosswalkRecord, OpenDriveRecords, RoadRecord, SignalRecord
 from dorothie_gym.maps.opendrive.topology import LanePiece, Topology, runs_forward
 
-# Types of signal that CARLA's maps use: lights as in OpenDRIVE 1.4, annex, signs by their numbers in German law.
+# Signal types in CARLA's maps: lights as in OpenDRIVE 1.4, annex, signs by their numbers in German law.
 SIGNAL_TYPES = {
     "1000001": SignalKind.TRAFFIC_LIGHT,
     "1000002": SignalKind.OTHER,  # a light for those on foot
@@ -23,22 +23,22 @@ SIGNAL_TYPES = {
     "274": SignalKind.SPEED,
 }
 
-# Kinds that have to be heeded at the end of a lane.
+# Kinds that control the end of a lane.
 _CONTROLS = (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP, SignalKind.YIELD)
 
-# A light or sign this far before a junction, or less, is meant for it, though a lane may end in between [m].
+# Largest distance of a light or sign to its junction, across ends of lanes [m].
 _FARTHEST = 50.0
 
-# One that stands nearer to the start of its lane than to its end, and further than this from its end, is the far one of
-# two at a junction that lies behind it [m].
+# A signal nearer to the start of its lane, and farther than this from its end, is the far-side signal of a junction
+# behind it [m].
 _NEAR_THE_END = 30.0
 
 
 def place_signals(records: OpenDriveRecords, topology: Topology, lanes: tuple[Lane, ...]) -> tuple[Signal, ...]:
-    """Signals of a file, one for each `signal` element, in order of their ids.
+    """Returns the signals of a file, one for each `signal` element, in order of their ids.
 
-    `Signal.lanes` are the lanes at whose end a driver has to heed it (speed limits: on which they hold): those that
-    lead into the junction that it stands before, and where the file names connectors, those that lead into them.
+    `Signal.lanes` are the lanes at whose end it applies (for speed limits: on which it applies): those that lead into
+    its junction, and if the file lists connectors, those that lead into them.
     """
     ways = _Ways(topology, lanes)
     ruled: defaultdict[int, dict[int, None]] = defaultdict(dict)
@@ -57,7 +57,7 @@ def _kind(record: SignalRecord) -> SignalKind:
 
 
 class _Ways:
-    """Finds the lanes that a signal is meant for."""
+    """Lookup of the lanes that a signal applies to."""
 
     def __init__(self, topology: Topology, lanes: tuple[Lane, ...]) -> None:
         self._lanes = lanes
@@ -72,13 +72,13 @@ class _Ways:
             self._after[source].append(target)
 
     def ruled(self, road: RoadRecord, record: SignalRecord, controls: bool) -> Iterator[int]:
-        """Lanes of this road that a signal rules: those that it names, else those of its direction."""
+        """Yields the lanes of the road that a signal applies to: those that it lists, else those of its direction."""
 
         def away(piece: LanePiece) -> tuple[float, int]:
             section = road.sections[piece.section]
             return max(section.start - record.s, record.s - section.end, 0.0), -piece.section
 
-        # The section that the signal stands in, or the one beside it where that is left out for having no length.
+        # section of the signal, or an adjacent one if it is omitted for zero length
         here = min((piece for piece, _ in self._at[road.id]), key=away, default=None)
         for piece, lane in self._at[road.id]:
             if here is None or piece.section != here.section or not _names(road, record, piece.lane):
@@ -87,7 +87,7 @@ class _Ways:
                 yield lane
 
     def _is_ahead(self, road: RoadRecord, record: SignalRecord, lane: int) -> bool:
-        """Whether a signal stands where a driver in its lane comes upon it before the junction."""
+        """Returns whether a signal stands before the junction as seen from its lane."""
         sections = [road.sections[piece.section] for piece, k in self._at[road.id] if k == lane]
         behind = record.s - min(section.start for section in sections)
         ahead = max(section.end for section in sections) - record.s
@@ -96,7 +96,7 @@ class _Ways:
         return ahead <= max(behind, _NEAR_THE_END)
 
     def approaches(self, lane: int, controls: bool) -> Iterator[int]:
-        """Lanes outside junctions by which one comes to a lane; for what controls a junction, those that end at it."""
+        """Yields the lanes outside junctions that lead to a lane; for junction controls, those that end there."""
         if not self._lanes[lane].in_junction:
             yield self._last_before_junction(lane) if controls else lane
             return
@@ -110,7 +110,7 @@ class _Ways:
                     todo.append(before)
 
     def _last_before_junction(self, lane: int) -> int:
-        """The lane that one comes to in going on to the next junction, if there is one near by and one way to it."""
+        """Returns the last lane before the next junction, if it is near and the only continuation."""
         way, further = lane, 0.0
         while further <= _FARTHEST:
             onward = self._after[way]
@@ -123,7 +123,7 @@ class _Ways:
 
 
 def _names(road: RoadRecord, record: SignalRecord, lane: int) -> bool:
-    """Whether a signal is for a lane; its orientation decides where it names lanes of both directions, or none."""
+    """Returns whether a signal applies to a lane; the orientation decides if it lists both directions or none."""
     spans: list[tuple[float, float]] = [(min(span), max(span)) for span in record.lanes] or [(-math.inf, math.inf)]
     if not any(low <= lane <= high for low, high in spans):
         return False
@@ -153,7 +153,7 @@ def _signal(
 
 
 def place_crosswalks(records: OpenDriveRecords) -> tuple[Crosswalk, ...]:
-    """Crosswalks of a file, outlines (n, 2) in our frame, numbered in the file's order."""
+    """Returns the crosswalks of a file, numbered in its order, with outlines (n, 2) in the frame of the town."""
     found = [(road, crossing) for road in records.roads.values() for crossing in road.crosswalks]
     return tuple(Crosswalk(id=k, outline=_outline(road, crossing)) for k, (road, crossing) in enumerate(found))
 
@@ -170,30 +170,30 @@ def _outline(road: RoadRecord, crossing: CrosswalkRecord) -> np.ndarray[tuple[in
     return np.column_stack((x + u * np.cos(angle) - v * np.sin(angle), -(y + u * np.sin(angle) + v * np.cos(angle))))
 
 
-# --- Pavements of a file: lanes of type sidewalk, joined to stretches along each side of a road ----------------------
+# --- Sidewalks -------------------------------------------------------------------------------------------------------
 
-# Where a sidewalk is narrower nobody walks [m].
+# Narrowest sidewalk [m].
 NARROWEST = 0.5
 
-# A shorter stretch leads nowhere [m].
+# Shortest sidewalk [m].
 SHORTEST = 1.0
 
-# A middle line may not jump further than this from one sample to the next [m].
+# Largest jump of a middle line from one sample to the next [m].
 LARGEST_JUMP = 2.0
 
-# Stretches of two lane sections whose ends are this close are one [m].
+# Largest gap between joined sidewalks of successive lane sections [m].
 TOUCHING = 0.5
 
 
 def lay_sidewalks(
     records: OpenDriveRecords, samples: Mapping[int, RoadSamples], lanes: tuple[Lane, ...]
 ) -> tuple[Sidewalk, ...]:
-    """Sidewalks of a file, along their roads, in the file's order.
+    """Returns the sidewalks of a file, along their roads, in its order.
 
     Args:
         records: the file.
         samples: its roads, by their ids.
-        lanes: the town's lanes with their streets; a sidewalk belongs to the street of its side of its road.
+        lanes: lanes of the town with streets; a sidewalk belongs to the street on its side of its road.
     """
     street: dict[tuple[int, bool], int] = {}
     for lane in lanes:
@@ -213,7 +213,7 @@ def lay_sidewalks(
 
 
 def _stretches(road: RoadRecord, samples: RoadSamples, left: bool) -> Iterator[Array]:
-    """Middle lines (n, 4) of the sidewalks at one side of a road: x, y, z, width [m]."""
+    """Yields the middle lines (n, 4) of the sidewalks at one side of a road: x, y, z, width [m]."""
     open_: list[Array] = []
     for k, section in enumerate(road.sections):
         begun = []
@@ -228,7 +228,7 @@ def _stretches(road: RoadRecord, samples: RoadSamples, left: bool) -> Iterator[A
 
 
 def _wide_parts(line: Array) -> list[Array]:
-    """Parts of a middle line where the sidewalk is wide enough; a jump in the file's profiles divides it, too."""
+    """Returns the parts of a middle line with sufficient width, split at jumps in the profiles."""
     wide = line[:, 3] >= NARROWEST
     step = np.hypot(*np.diff(line[:, :2], axis=0).T)
     edges = np.flatnonzero(np.diff(wide) | (step > LARGEST_JUMP)) + 1

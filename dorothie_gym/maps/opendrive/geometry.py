@@ -1,7 +1,7 @@
-"""Plan view and profiles of an OpenDRIVE road: from the distance along its reference line to places in the plane.
+"""Plan view and profiles of an OpenDRIVE road: from distances along its reference line to positions in the plane.
 
-Everything here is in OpenDRIVE's own frame (x east, y NORTH, headings counter-clockwise, lateral positive LEFT); the
-compiler flips it once. Formulas: ASAM OpenDRIVE 1.4, sections 5.3.4 (geometry) and 5.3.5 (elevation).
+Everything is in the frame of OpenDRIVE (x east, y NORTH, headings counter-clockwise, lateral positive LEFT); the
+compiler mirrors it. Formulas: ASAM OpenDRIVE 1.4, sections 5.3.4 (geometry) and 5.3.5 (elevation).
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from dorothie_gym.maps.model import Array
 # 32 Gauss-Legendre nodes integrate cos and sin of the heading to rounding error up to four full turns per element.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 
-# Grid on which a polynomial's arc length is tabulated: 1 cm of grid on a 10 m element, interpolated linearly.
+# Steps of the table of a polynomial's arc length: 1 cm on a 10 m element, interpolated linearly.
 _ARC_LENGTH_STEPS = 1000
 
 
 class Primitive(Protocol):
-    """One element of a plan view, in the local frame of its start (u ahead, v to the left)."""
+    """Element of a plan view in the local frame of its start (u ahead, v to the left)."""
 
     def place(self, distance: Array, length: float) -> tuple[Array, Array, Array]:
-        """Place at distances along the element.
+        """Returns the pose at distances along the element.
 
         Args:
             distance: (n,) [m], from 0 to `length`.
@@ -72,12 +72,12 @@ class Spiral:
 
 @dataclass(frozen=True)
 class Polynomial:
-    """Parametric cubic: u(p) and v(p), coefficients from the constant term up.
+    """Parametric cubic u(p), v(p) with coefficients from the constant term up.
 
     Attributes:
         u, v: four coefficients each.
         span: p at the end of the element; None where p is the distance itself (`pRange="arcLength"`).
-        by_arc_length: p runs until the curve is as long as the element (poly3, where p is u itself).
+        by_arc_length: whether p ends where the curve is as long as the element (poly3, with p = u).
     """
 
     u: tuple[float, float, float, float]
@@ -97,23 +97,23 @@ class Polynomial:
         return powers @ np.array(self.u[1:]), powers @ np.array(self.v[1:])
 
     def _parameter(self, distance: Array, length: float, span: float) -> Array:
-        """Parameter at a distance along the curve: its arc length, tabulated by Simpson's rule, turned round."""
+        """Returns the parameters at distances along the curve, by inverting its tabulated arc length."""
         grid = np.linspace(0.0, span, 2 * _ARC_LENGTH_STEPS + 1)
         speed = np.hypot(*self._slopes(grid))
         steps = (speed[:-2:2] + 4.0 * speed[1::2] + speed[2::2]) * (grid[2] / 6.0)
         along = np.concatenate(([0.0], np.cumsum(steps)))
-        # A normalised element is as long as its attribute says: rounding in the file must not open a gap at its end.
+        # a normalised element has the length of its attribute: rounding must not open a gap at its end
         reach = distance if self.by_arc_length else distance * (along[-1] / length)
         return np.interp(reach, along, grid[::2])
 
 
 def poly3(a: float, b: float, c: float, d: float, length: float) -> Polynomial:
-    """Element v(u) = a + b u + c u^2 + d u^3; u cannot run further than the element is long."""
+    """Returns the element v(u) = a + b u + c u^2 + d u^3; u is at most the length of the element."""
     return Polynomial((0.0, 1.0, 0.0, 0.0), (a, b, c, d), span=length, by_arc_length=True)
 
 
 class ReferenceLine:
-    """Plan view of a road: elements one after another.
+    """Plan view of a road as a sequence of elements.
 
     Args:
         starts: (n, 5) rows of s [m], x [m], y [m], heading [rad] and length [m], in order of s.
@@ -126,11 +126,11 @@ class ReferenceLine:
         self._curvature = np.array([p.curvature if isinstance(p, Arc) else np.nan for p in primitives])
 
     def place(self, s: Array, pick: Array | None = None) -> tuple[Array, Array, Array]:
-        """Place of the reference line.
+        """Returns the pose of the reference line.
 
         Args:
             s: distance along the road (n,) [m].
-            pick: where to look for the element that holds (n,) [m]; `s` if not given.
+            pick: distances that select the element (n,) [m]; `s` by default.
 
         Returns:
             x (n,) [m], y (n,) [m], heading (n,) [rad].
@@ -152,7 +152,7 @@ class ReferenceLine:
 
 
 class Cubics:
-    """A profile along a road: a + b ds + c ds^2 + d ds^3 piece by piece (elevation, lane offset, lane width).
+    """Profile along a road: a + b ds + c ds^2 + d ds^3 piece by piece (elevation, lane offset, lane width).
 
     Args:
         rows: (n, 5) rows of start [m], a, b, c, d, in order of start; n = 0 gives 0 everywhere.
@@ -166,7 +166,7 @@ class Cubics:
             self._simple = len(rows) == 0 or not rows[:, 2:].any() and bool(np.all(rows[:, 1] == rows[0, 1]))
 
     def at(self, s: Array, pick: Array | None = None) -> Array:
-        """Value (n,) at distances (n,) [m]; `pick` as in `ReferenceLine.place`."""
+        """Returns the values (n,) at distances (n,) [m]; `pick` as in `ReferenceLine.place`."""
         if self._simple:
             return np.full(len(s), self.rows[0, 1] if len(self.rows) else 0.0)
         row = self.rows[_holding(self.rows[:, 0], s if pick is None else pick)]
@@ -176,10 +176,10 @@ class Cubics:
 
 
 NO_CUBICS = Cubics(np.empty((0, 5)))
-"""The profile that is 0 everywhere, for the many that a file leaves out."""
+"""Profile that is 0 everywhere, for profiles missing in a file."""
 
 
 def _holding(starts: Array, s: Array) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-    """Index of the piece that holds each s: the last one that starts at or before it."""
+    """Returns the index of the piece at each s: the last one that starts at or before it."""
     index: np.ndarray[tuple[int], np.dtype[np.intp]] = np.searchsorted(starts, s, side="right") - 1
     return np.maximum(index, 0)

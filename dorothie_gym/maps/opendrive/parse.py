@@ -1,4 +1,4 @@
-"""Reading an OpenDRIVE file into records; what cannot be read is one `TownError` with file, element and reason."""
+"""Parser of OpenDRIVE files into records; all faults are reported as `TownError` with file, element and reason."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ from dorothie_gym.maps.opendrive.records import (
     SignalRecord,
 )
 
-# The kind of XML node that lxml calls an element; its stubs name the class with an underscore.
+# Type of XML elements; the stubs of lxml name the class with an underscore.
 Element: TypeAlias = etree._Element
 
-# Metres per second in one unit; a limit without a unit is in m/s (OpenDRIVE 1.4, section 5.3.2.2).
+# Metres per second of each unit; limits without a unit are in m/s (OpenDRIVE 1.4, section 5.3.2.2).
 SPEED_UNITS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 
-# Elements that only group others: they are left out where an element is named.
+# Grouping elements, which names of elements omit.
 _GROUPS = ("left", "right", "center", "lanes", "planView", "signals", "objects")
 
 
 def describe(element: Element) -> str:
-    """Name of an element for a person who looks for it, e.g. `road 12 / laneSection 0 / lane -1`."""
+    """Returns the name of an element for messages, e.g. `road 12 / laneSection 0 / lane -1`."""
     parts = []
     for node in (*reversed(list(element.iterancestors())), element):
         parent = node.getparent()
@@ -58,17 +58,17 @@ def describe(element: Element) -> str:
 
 
 class ElementReader:
-    """Reads attributes of a file's elements; whatever is wrong is one `TownError` that names file and element.
+    """Reader of the attributes of elements; raises `TownError` with file and element.
 
     Attributes:
-        source: the file, as its user named it.
+        source: the file, as named by the user.
     """
 
     def __init__(self, source: str) -> None:
         self.source = source
 
     def root(self) -> Element:
-        """The outermost element; namespaces are taken off, for OpenDRIVE's names are its own."""
+        """Returns the root element; namespaces are removed from all names."""
         parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True)
         try:
             text = Path(self.source).read_bytes()
@@ -94,14 +94,14 @@ class ElementReader:
         raise TownError(self.source, describe(element), reason)
 
     def text(self, element: Element, name: str) -> str:
-        """An attribute that has to be there."""
+        """Returns a required attribute."""
         text = element.get(name)
         if text is None:
             self.fail(element, f"attribute {name} is missing")
         return text
 
     def number(self, element: Element, name: str, default: float | None = None) -> float:
-        """A finite number; an attribute that is missing is the default, if there is one."""
+        """Returns a finite number; a missing attribute gives the default, if there is one."""
         if default is not None and element.get(name) is None:
             return default
         text = self.text(element, name)
@@ -114,7 +114,7 @@ class ElementReader:
         return value
 
     def integer(self, element: Element, name: str) -> int:
-        """A whole number that has to be there."""
+        """Returns a required integer."""
         text = self.text(element, name)
         try:
             return int(text)
@@ -122,12 +122,12 @@ class ElementReader:
             self.fail(element, f"attribute {name} must be a whole number, not {text!r}")
 
     def cubics(self, parent: Element, path: str, start: str) -> Cubics:
-        """A profile: rows of where they start and four coefficients, in order of their starts."""
+        """Returns a profile: rows of start and four coefficients, sorted by start."""
         rows = [[self.number(e, name) for name in (start, "a", "b", "c", "d")] for e in parent.iterfind(path)]
         return Cubics(np.array(sorted(rows, key=lambda row: row[0]))) if rows else NO_CUBICS
 
     def speed(self, element: Element) -> float | None:
-        """Limit [m/s]; None where the file says that there is none or that it is not known."""
+        """Returns a speed limit [m/s], or None if the file states that there is none or that it is unknown."""
         if element.get("max", "") in ("no limit", "undefined"):
             return None
         unit = element.get("unit") or "m/s"
@@ -137,19 +137,19 @@ class ElementReader:
         return limit if limit > 0.0 else None
 
 
-# --- Signals and crosswalks of a road, from their XML elements to records --------------------------------------------
+# --- Signals and crosswalks ------------------------------------------------------------------------------------------
 
-# Where an object's corners may be: in its own frame, or on its road.
+# Corner elements of an object: in its own frame, or on its road.
 _CORNERS = (("cornerLocal", ("u", "v")), ("cornerRoad", ("s", "t")))
 
 
 def read_signals(reader: ElementReader, road: Element) -> tuple[SignalRecord, ...]:
-    """Signals and references to signals of other roads, in the file's order."""
+    """Returns signals and references to signals of other roads, in the order of the file."""
     return tuple(_signal(reader, e) for e in road.iterfind("signals/*") if e.tag in ("signal", "signalReference"))
 
 
 def read_crosswalks(reader: ElementReader, road: Element) -> tuple[CrosswalkRecord, ...]:
-    """Objects that are crosswalks and have an outline, or a length and a width."""
+    """Returns the crosswalk objects with an outline, or with length and width."""
     objects = (e for e in road.iterfind("objects/object") if e.get("type", "").lower() == "crosswalk")
     return tuple(crossing for e in objects if (crossing := _crosswalk(reader, e)) is not None)
 
@@ -171,7 +171,7 @@ def _signal(reader: ElementReader, element: Element) -> SignalRecord:
 
 
 def _value(reader: ElementReader, element: Element) -> float | None:
-    """Value of a sign, a limit in m/s; -1 and an empty text say that it has none."""
+    """Returns the value of a sign, limits in m/s; None for -1 and an empty text."""
     if element.get("value") in (None, "", "-1"):
         return None
     value = reader.number(element, "value") * SPEED_UNITS.get(element.get("unit") or "km/h", 1.0)
@@ -179,7 +179,7 @@ def _value(reader: ElementReader, element: Element) -> float | None:
 
 
 def _crosswalk(reader: ElementReader, element: Element) -> CrosswalkRecord | None:
-    """The first outline counts: it is the outer one."""
+    """Reads a crosswalk from its first outline, which is the outer one."""
     for tag, names in _CORNERS:
         outline = next((o for o in element.iter("outline") if o.find(tag) is not None), None)
         if outline is not None:
@@ -199,25 +199,25 @@ def _crosswalk(reader: ElementReader, element: Element) -> CrosswalkRecord | Non
 
 
 def _rectangle(reader: ElementReader, element: Element) -> Array:
-    """Corners (4, 2) of an object that has only a length and a width; none if it has not even these."""
+    """Returns the corners (4, 2) of an object with length and width only, or none without these."""
     u, v = (0.5 * reader.number(element, name, 0.0) for name in ("length", "width"))
     return np.array([[-u, -v], [u, -v], [u, v], [-u, v]]) if u > 0.0 and v > 0.0 else np.empty((0, 2))
 
 
 def _open_ring(corners: Array) -> Array:
-    """Outline without the repeated first corner at its end."""
+    """Returns the outline without a repeated first corner at its end."""
     return corners[:-1] if len(corners) > 3 and np.allclose(corners[0], corners[-1]) else corners
 
 
-# --- Reading an OpenDRIVE file into records; what cannot be read is one `TownError` with file, element an ------------
+# --- Roads and junctions ---------------------------------------------------------------------------------------------
 
-# A longer road is a slip of the pen, and would be sampled until memory ends [m].
+# Largest length of a road [m]; a longer one is an error that would exhaust memory.
 LONGEST_ROAD = 100_000.0
 
-# How far behind the end of its road a lane section may start: exporters round [m].
+# Tolerance for the start of a lane section beyond the end of its road [m]: exporters round.
 ROUNDING = 0.1
 
-# Shapes that an element of a reference line may have.
+# Shapes of the elements of a reference line.
 _SHAPES = ("line", "arc", "spiral", "poly3", "paramPoly3")
 
 
@@ -231,7 +231,7 @@ def parse_opendrive(path: str | Path) -> OpenDriveRecords:
 
 
 class _Parser(ElementReader):
-    """Reads roads, where they run, and how they and their lanes are joined."""
+    """Parser of roads, reference lines, and links of roads and lanes."""
 
     def parse(self) -> OpenDriveRecords:
         root = self.root()
@@ -288,7 +288,7 @@ class _Parser(ElementReader):
             starts.append(row)
             primitives.append(self._primitive(shape, row[4]) if row[4] > 0.0 else Arc())
         if not primitives:
-            self.fail(road, "has no geometry, so that nobody knows where it runs")
+            self.fail(road, "has no geometry")
         table = np.array(starts)
         order = np.argsort(table[:, 0], kind="stable")
         return ReferenceLine(table[order], [primitives[k] for k in order])
@@ -354,10 +354,10 @@ class _Parser(ElementReader):
         return None if link is None else self.integer(link, "id")
 
     def _road_link(self, road: Element, side: str) -> RoadLink | None:
-        """What a road meets; nothing where the file says -1, or a place midway along another road.
+        """Returns the road or junction at an end of a road; None for -1, or for a position midway along another road.
 
-        The latter is how a virtual junction (OpenDRIVE 1.6) lets a side road out of a main road, which has no lane that
-        ends there: such a road stays without a way on at that end.
+        The latter occurs at virtual junctions (OpenDRIVE 1.6): a side road leaves a main road without lanes that end
+        there: such a road has no continuation at that end.
         """
         link = road.find(f"link/{side}")
         if link is None or link.get("elementId") == "-1" or link.get("elementS") is not None:
@@ -373,7 +373,7 @@ class _Parser(ElementReader):
         return contact
 
     def _connection(self, element: Element, roads: dict[int, RoadRecord]) -> ConnectionRecord | None:
-        """A connection by a connecting road, or in a direct junction (OpenDRIVE 1.7) straight to the linked road."""
+        """Returns a connection by a connecting road or, in a direct junction (OpenDRIVE 1.7), to the linked road."""
         direct = element.get("connectingRoad") is None
         other = "linkedRoad" if direct else "connectingRoad"
         if element.get(other) is None:

@@ -1,4 +1,4 @@
-"""What an OpenDRIVE file says, as records: the parts that matter for driving, checked, nothing interpreted yet."""
+"""Records of an OpenDRIVE file: the parts relevant for driving, validated but not interpreted."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from dorothie_gym.maps.opendrive.geometry import Cubics, ReferenceLine
 DRIVING = frozenset(
     ("driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane", "mwyEntry", "mwyExit")
 )
-"""Lane types that everybody drives on in one direction: "driving", and what OpenDRIVE calls the lanes of ramps.
+"""One-way lane types for all cars: "driving", and the lane types of ramps.
 
-Not "bidirectional" (a turn lane for both directions in the middle), nor lanes for buses, taxis or parking.
+Excluded are "bidirectional" (a central turn lane for both directions) and lanes for buses, taxis or parking.
 """
 
 SIDEWALK = frozenset(("sidewalk", "walking"))
-"""Lane types of pavements; the second is OpenDRIVE 1.8's name."""
+"""Lane types of sidewalks; the second is the name in OpenDRIVE 1.8."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LaneRecord:
-    """One lane of one lane section.
+    """Lane of a lane section.
 
     Attributes:
         id: lane number; 0 is the reference line, positive to its left.
         type: OpenDRIVE lane type.
         width: profile over the distance from the section's start.
-        border: profile of the outer edge's place beside the reference line, positive left, where the file gives this
-            instead of widths.
-        predecessor, successor: lane numbers before and behind it along the reference line, if linked.
+        border: profile of the lateral position of the outer edge, positive left, if the file contains this instead of
+            widths.
+        predecessor, successor: linked lane numbers before and after it along the reference line, or None.
         speeds: (offset from the section's start [m], limit [m/s]).
-        changes: what the outer road mark says about changing lanes, one entry a mark ("none", "both", "increase",
-            "decrease"); empty where the file does not say.
+        changes: lane changes permitted by the outer road marks, one entry for each mark ("none", "both", "increase",
+            "decrease"); empty if unspecified.
     """
 
     id: int
@@ -48,18 +48,18 @@ class LaneRecord:
 
     @property
     def drives(self) -> bool:
-        """Whether it is a lane for cars, of the kind that we keep."""
+        """Whether it is a lane for cars."""
         return self.type in DRIVING
 
     @property
     def is_closed(self) -> bool:
-        """Whether it has no width anywhere in its section: a lane that the file only announces."""
+        """Whether it has no width anywhere in its section."""
         return self.border is None and not np.any(self.width.rows[:, 1:])
 
 
 @dataclass(frozen=True, kw_only=True)
 class SectionRecord:
-    """A stretch of road with constant lanes, from `start` to `end` [m]; lanes by number."""
+    """Part of a road with constant lanes, from `start` to `end` [m]; lanes by number."""
 
     start: float
     end: float
@@ -68,7 +68,7 @@ class SectionRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class RoadLink:
-    """What a road meets at one end: a road at its "start" or "end", or a junction."""
+    """Link at one end of a road: to the "start" or "end" of a road, or to a junction."""
 
     is_road: bool
     id: int
@@ -77,16 +77,16 @@ class RoadLink:
 
 @dataclass(frozen=True, kw_only=True)
 class SignalRecord:
-    """A sign or light of a road.
+    """Sign or light of a road.
 
     Attributes:
-        id: the file's own number.
-        type, dynamic, value: as the file says.
-        s, t, z: place on the road [m] and height above it [m].
-        heading: angle against the road [rad].
+        id: id in the file.
+        type, dynamic, value: attributes in the file.
+        s, t, z: road coordinates [m] and height above the road [m].
+        heading: angle relative to the road [rad].
         orientation: "+", "-" or "none".
-        lanes: ranges (from, to) of lane numbers that it rules; empty where the file does not say.
-        reference: the record stands for a signal of another road.
+        lanes: ranges (from, to) of lane numbers that it applies to; empty if unspecified.
+        reference: whether the record refers to a signal of another road.
     """
 
     id: int
@@ -104,7 +104,7 @@ class SignalRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class CrosswalkRecord:
-    """A crossing: its place on the road, and its corners (n, 2), local (u, v) or on the road (s, t) [m]."""
+    """Crosswalk: road coordinates, and corners (n, 2) in local (u, v) or road (s, t) coordinates [m]."""
 
     s: float
     t: float
@@ -115,19 +115,19 @@ class CrosswalkRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class RoadRecord:
-    """A road.
+    """Road.
 
     Attributes:
-        id: the file's own number.
+        id: id in the file.
         length: [m].
         junction: junction that the road crosses, or -1.
         right_hand: traffic keeps to the right.
         line, elevation, offset: reference line, its height and the lateral shift of the lanes.
         superelevation: roll angle of the road about its reference line [rad]; the left side is up if it is positive.
         sections: lane sections in order.
-        predecessor, successor: what it meets at its start and end.
+        predecessor, successor: links at its start and end.
         speeds: (from s [m], limit [m/s]).
-        signals, crosswalks: what stands on it.
+        signals, crosswalks: signals and crosswalks of the road.
     """
 
     id: int
@@ -148,14 +148,14 @@ class RoadRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class ConnectionRecord:
-    """A way into a junction: which lanes of the incoming road go on in which lanes of the connecting road.
+    """Connection in a junction: links from lanes of the incoming road to lanes of the connecting road.
 
     Attributes:
-        incoming, connecting: the roads.
-        contact: end of the connecting road, "start" or "end", that meets the incoming one.
-        lanes: pairs (lane of the incoming road, lane of the connecting road); none where equal lanes are meant.
-        direct: the junction has no roads of its own: the connecting road is one that leads on from it, and its lanes
-            may as well lead back.
+        incoming, connecting: road ids.
+        contact: end of the connecting road at the incoming road, "start" or "end".
+        lanes: pairs (lane of the incoming road, lane of the connecting road); empty for equal lane numbers.
+        direct: whether the junction has no connecting roads: the linked road starts or ends at it, and its lanes may
+            also lead back.
     """
 
     incoming: int
@@ -167,7 +167,7 @@ class ConnectionRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class OpenDriveRecords:
-    """A whole file: roads in its order, connections of each junction."""
+    """Contents of a file: roads in its order, and connections by junction id."""
 
     source: str
     roads: dict[int, RoadRecord]

@@ -1,7 +1,7 @@
-"""Which lanes a file has and how they go on: lane sections linked, contracted and merged to lanes.
+"""Topology of an OpenDRIVE file: lane sections linked, contracted and merged to lanes, with turn types.
 
-A file cuts a road into lane sections wherever anything changes, often every few millimetres. What a driver calls a lane
-is a chain of sections of one road that go on one to one; where a lane forks, joins or enters another road, it ends.
+A file divides a road into lane sections wherever anything changes, often every few millimetres. A lane of a town is a
+chain of one-to-one linked lane sections of one road; it ends where it forks, merges or enters another road.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from dorothie_gym.errors import TownError
 from dorothie_gym.maps.model import Lane, LaneLink, LinkType
 from dorothie_gym.maps.opendrive.records import ConnectionRecord, OpenDriveRecords, RoadRecord
 
-# Sections shorter than this are joints, not road: they are left out and what they link is linked directly [m].
+# Lane sections shorter than this are contracted [m].
 JOINT_LENGTH = 1e-3
 
-# A merged lane shorter than this cannot be driven: its links are joined across it in the same way [m].
+# Merged lanes shorter than this are contracted [m].
 SHORTEST_LANE = 0.1
 
 _log = logging.getLogger(__name__)
 
 
 class LanePiece(NamedTuple):
-    """One driving lane of one lane section."""
+    """Driving lane of one lane section."""
 
     road: int
     section: int
@@ -41,8 +41,8 @@ class Topology:
     """Lanes and links of a file.
 
     Attributes:
-        chains: pieces of each lane in driving direction.
-        links: pairs (source, target) of indices in `chains`, sorted.
+        chains: pieces of each lane, in driving direction.
+        links: sorted pairs (source, target) of indices into `chains`.
     """
 
     chains: tuple[tuple[LanePiece, ...], ...]
@@ -50,17 +50,17 @@ class Topology:
 
 
 def runs_forward(road: RoadRecord, lane: int) -> bool:
-    """Whether traffic in a lane runs along the reference line (right-hand traffic: the lanes on its right)."""
+    """Returns whether traffic in a lane follows the reference line (right-hand traffic: the lanes on its right)."""
     return (lane < 0) == road.right_hand
 
 
 def build_topology(records: OpenDriveRecords) -> Topology:
-    """Lanes of a file and how they go on.
+    """Returns the lanes of a file and their links.
 
-    Links that lead to no lane, or against the traffic, are slips of exporters: they are left out and logged.
+    Links to missing lanes or against the traffic are errors of exporters: they are logged and ignored.
 
     Raises:
-        TownError: no driving lanes.
+        TownError: the file has no driving lanes.
     """
     graph = _Graph()
     for road in records.roads.values():
@@ -89,7 +89,7 @@ def build_topology(records: OpenDriveRecords) -> Topology:
 
 
 class _Graph:
-    """Pieces and links between them; dictionaries as ordered sets, so that the order is the file's."""
+    """Pieces and the links between them; dictionaries serve as ordered sets, in the order of the file."""
 
     def __init__(self) -> None:
         self.length: dict[LanePiece, float] = {}
@@ -105,14 +105,14 @@ class _Graph:
         self.before[target][source] = None
 
     def contract(self, piece: LanePiece) -> None:
-        """Takes a piece out and links what comes before it to what comes after it."""
+        """Removes a piece and links its predecessors to its successors."""
         before, after = self.remove(piece)
         for source in before:
             for target in after:
                 self.link(source, target)
 
     def remove(self, piece: LanePiece) -> tuple[tuple[LanePiece, ...], tuple[LanePiece, ...]]:
-        """Takes a piece out; returns what came before it and what came after it."""
+        """Removes a piece; returns its predecessors and successors."""
         before, after = self.before.pop(piece), self.after.pop(piece)
         before.pop(piece, None)
         after.pop(piece, None)
@@ -124,7 +124,7 @@ class _Graph:
         return tuple(before), tuple(after)
 
     def chains(self) -> list[tuple[LanePiece, ...]]:
-        """Pieces that go on one to one within a road, joined."""
+        """Returns the chains of one-to-one linked pieces within a road."""
         follower = {}
         for piece, after in self.after.items():
             if len(after) == 1:
@@ -143,7 +143,7 @@ class _Graph:
 
 
 class _Touch(NamedTuple):
-    """An end of a lane section: the road, the section's number, and whether it is the end at the section's start."""
+    """End of a lane section: road id, index of the section, and whether it is the start of the section."""
 
     road: int
     section: int
@@ -151,7 +151,7 @@ class _Touch(NamedTuple):
 
 
 def _lane_links(records: OpenDriveRecords, graph: _Graph) -> Iterator[tuple[LanePiece, LanePiece]]:
-    """Links that the lanes themselves name, in driving direction."""
+    """Yields the links in the lane records, in driving direction."""
     for piece in graph.length:
         road = records.roads[piece.road]
         lane = road.sections[piece.section].lanes[piece.lane]
@@ -164,7 +164,7 @@ def _lane_links(records: OpenDriveRecords, graph: _Graph) -> Iterator[tuple[Lane
 
 
 def _neighbour_section(records: OpenDriveRecords, road: RoadRecord, section: int, step: int) -> _Touch | None:
-    """Section before (-1) or behind (+1) a section; None at a junction and where the road ends."""
+    """Returns the section before (-1) or after (+1) a section; None at a junction and at the end of the road."""
     if 0 <= section + step < len(road.sections):
         return _Touch(road.id, section + step, step > 0)
     link = road.successor if step > 0 else road.predecessor
@@ -172,21 +172,21 @@ def _neighbour_section(records: OpenDriveRecords, road: RoadRecord, section: int
 
 
 def _touched(records: OpenDriveRecords, road: int, contact: str) -> _Touch:
-    """The lane section at an end of a road."""
+    """Returns the lane section at an end of a road."""
     return _Touch(road, 0, True) if contact == "start" else _Touch(road, len(records.roads[road].sections) - 1, False)
 
 
 def _joined(
     records: OpenDriveRecords, graph: _Graph, a: tuple[_Touch, int], b: tuple[_Touch, int], where: str
 ) -> Iterator[tuple[LanePiece, LanePiece]]:
-    """The link between two lanes that meet at ends of their sections, in driving direction; nothing if there is none.
+    """Yields the link between two lanes that meet at ends of their sections, in driving direction, if there is one.
 
     Args:
-        records: the file.
-        graph: its driving lanes; a lane may end in one of another type.
-        a: where one lane is touched, and its number.
-        b: the same for the other.
-        where: element that says so, for the log.
+        records: records of the file.
+        graph: driving lanes of the file; a lane may be linked to one of another type.
+        a: end of one section, and lane number.
+        b: the same for the other lane.
+        where: element with the link, for the log.
     """
     pieces = []
     for touch, number in (a, b):
@@ -206,7 +206,7 @@ def _joined(
 
 
 def _connection_links(records: OpenDriveRecords, graph: _Graph) -> Iterator[tuple[LanePiece, LanePiece]]:
-    """Links that the junctions name."""
+    """Yields the links in the junction records."""
     for junction, connections in records.junctions.items():
         for connection in connections:
             there = _touched(records, connection.connecting, connection.contact)
@@ -217,7 +217,7 @@ def _connection_links(records: OpenDriveRecords, graph: _Graph) -> Iterator[tupl
 
 
 def _incoming_ends(records: OpenDriveRecords, junction: int, connection: ConnectionRecord) -> Iterator[_Touch]:
-    """Ends of the incoming road that a connection begins at; none where the connecting road knows better."""
+    """Yields the ends of the incoming road at a connection; none if the link of the connecting road contradicts it."""
     if connection.direct:
         road = records.roads[connection.incoming]
         for link, contact in ((road.predecessor, "start"), (road.successor, "end")):
@@ -231,7 +231,7 @@ def _incoming_ends(records: OpenDriveRecords, junction: int, connection: Connect
 
 
 def _equal_lanes(records: OpenDriveRecords, here: _Touch, there: _Touch) -> Iterator[tuple[int, int]]:
-    """Lanes that a connection without lane links means: those of equal number, or opposite where the roads collide."""
+    """Yields the lane pairs of a connection without lane links: equal numbers, or opposite ones in collisions."""
     sign = 1 if here.at_start != there.at_start else -1
     beyond = records.roads[there.road].sections[there.section].lanes
     for number, lane in records.roads[here.road].sections[here.section].lanes.items():
@@ -239,14 +239,14 @@ def _equal_lanes(records: OpenDriveRecords, here: _Touch, there: _Touch) -> Iter
             yield number, sign * number
 
 
-# --- Turn types of the links into a junction's connectors: OpenDRIVE has no names for them, geometry tell ------------
+# --- Turn types, derived from geometry -------------------------------------------------------------------------------
 
-# Changes of heading that separate the types of turn [degrees].
+# Limits between the turn types [degrees].
 STRAIGHT_BELOW, U_TURN_ABOVE = 35.0, 150.0
 
 
 def turn_type(angle: float) -> LinkType:
-    """Type of a turn by its angle [degrees], positive left."""
+    """Returns the turn type of an angle [degrees], positive left."""
     if abs(angle) > U_TURN_ABOVE:
         return LinkType.U_TURN
     if abs(angle) < STRAIGHT_BELOW:
@@ -255,10 +255,10 @@ def turn_type(angle: float) -> LinkType:
 
 
 def successor_links(lanes: tuple[Lane, ...], topology: Topology) -> tuple[LaneLink, ...]:
-    """Links by which lanes go on at their ends, with their types; a turn is typed where it enters the junction.
+    """Returns the links between successive lanes; the link into a junction carries the turn type.
 
-    Where a road forks so that several ways are nearly straight, only the straightest is called so, and the others are
-    called by the side that they turn to from it.
+    If a road forks into several almost straight branches, only the straightest is called straight; the others are named
+    by their side of it.
     """
     after: defaultdict[int, list[int]] = defaultdict(list)
     for source, target in topology.links:
@@ -286,9 +286,9 @@ def successor_links(lanes: tuple[Lane, ...], topology: Topology) -> tuple[LaneLi
 
 
 def _turn(lanes: tuple[Lane, ...], after: dict[int, list[int]], connector: int) -> tuple[float, float]:
-    """Change of heading across a junction, and that from its entry to the way to its exit [degrees], positive left.
+    """Returns the change of direction across a junction, and that to its exit point [degrees], positive left.
 
-    The second one tells ways apart that lead into lanes side by side. A connector may go on in another one.
+    The second value distinguishes branches into parallel lanes. A connector may continue in another one.
     """
     turned, last, seen = 0.0, connector, {connector}
     while True:

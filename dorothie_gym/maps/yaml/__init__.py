@@ -1,4 +1,4 @@
-"""The YAML town language: `schema` reads a plan, `layout` finds its centre lines, `compile` makes the town."""
+"""YAML town language: `schema` reads a plan, `layout` computes its centre lines, `compile` builds the town."""
 
 from dorothie_gym.maps.yaml.compile import read_yaml_town
 

@@ -1,4 +1,4 @@
-"""The arms of a crossing: stretches as they are seen from it, with the lanes that come in and go out."""
+"""Arms of a crossing: stretches as seen from it, with incoming and outgoing lanes, and ramps."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from dorothie_gym.maps.yaml.plan import StreetPlan
 from dorothie_gym.maps.yaml.stretches import Crossing, Stretch
 
 POCKET = -1
-"""Number of a left-turn lane that opens in the median."""
+"""Number of a left-turn lane in the median."""
 
 
 @dataclass(frozen=True, slots=True)
 class LaneEnd:
-    """A lane at a crossing: its number, 0 for the innermost or `POCKET`, and its offset, seen outwards [m]."""
+    """Lane at a crossing: number (0 for the innermost, or `POCKET`) and offset, seen outwards [m]."""
 
     number: int
     offset: float
@@ -26,17 +26,17 @@ class LaneEnd:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Arm:
-    """A stretch seen from one of its crossings; offsets are positive to the right as one looks outwards [m].
+    """Stretch seen from one of its crossings; offsets are positive to the right, seen outwards [m].
 
     Attributes:
-        index: its place among the arms of the crossing, which are in order of heading.
+        index: index among the arms of the crossing, which are in order of heading.
         stretch: index of the stretch.
-        at_start: whether the stretch starts at this crossing (else it ends here).
-        leg: first piece of the stretch, outwards from the centre of the crossing.
-        street: the street it belongs to.
-        incoming, outgoing: its lanes, from the kerb inwards.
-        right, left: distance from the line to the edges of the road, pavements included but for those of rings [m].
-        on_ring: whether it is a part of a roundabout's ring.
+        at_start: whether the stretch starts at this crossing instead of ending there.
+        leg: first segment of the stretch, outwards from the centre of the crossing.
+        street: street in the plan.
+        incoming, outgoing: lanes from the kerb inwards.
+        right, left: distance from the line to the edges of the road, pavements included except on rings [m].
+        on_ring: whether it belongs to the ring of a roundabout.
     """
 
     index: int
@@ -62,35 +62,35 @@ class Arm:
 
     @property
     def pocket(self) -> LaneEnd | None:
-        """The left-turn lane, if there is one."""
+        """Left-turn lane, or None."""
         return next((lane for lane in self.incoming if lane.number == POCKET), None)
 
     def ending(self, lane: LaneEnd, trim: float) -> Pose:
-        """Where and in which direction an incoming lane ends, `trim` metres from the centre."""
+        """Returns the pose of the end of an incoming lane, `trim` metres from the centre."""
         x, y, heading = self.beginning(lane, trim)
         return x, y, wrap_radians(heading + math.pi)
 
     def beginning(self, lane: LaneEnd, trim: float) -> Pose:
-        """Where and in which direction an outgoing lane begins, `trim` metres from the centre."""
+        """Returns the pose of the start of an outgoing lane, `trim` metres from the centre."""
         x, y, heading = self.leg.at(trim)
         return x - lane.offset * math.sin(heading), y + lane.offset * math.cos(heading), wrap_radians(heading)
 
 
 def turn_between(source: Arm, target: Arm) -> float:
-    """Change of heading on the way from one arm into another [rad], positive to the right."""
+    """Returns the change of heading from one arm into another [rad], positive to the right."""
     return wrap_radians(target.leg.heading - source.leg.heading - math.pi)
 
 
 def arms_at(crossing: Crossing, stretches: Sequence[Stretch], ends: Sequence[tuple[int, bool]]) -> tuple[Arm, ...]:
-    """The arms of a crossing in order of heading, clockwise; left-turn lanes are not there yet.
+    """Returns the arms of a crossing in clockwise order of heading, without left-turn lanes.
 
     Args:
         crossing: the crossing.
         stretches: all stretches.
-        ends: which ends of which stretches meet here: index, and whether it is the start.
+        ends: ends of stretches at the crossing: index, and whether it is the start.
 
     Raises:
-        TownError: nothing meets here, or only one arm.
+        TownError: the crossing has no arm, or only one.
     """
     if not ends:
         crossing.plan.entry.fail("no street runs through it; put it into the course of one, or remove it")
@@ -117,7 +117,7 @@ def _arm(place: int, k: int, at_start: bool, stretch: Stretch) -> Arm:
         street=stretch.street,
         incoming=backward if at_start else forward,
         outgoing=forward if at_start else backward,
-        # The pavement around a ring ends where the corners of the streets that meet it begin, and takes no room there.
+        # the pavement around a ring ends at the corners of the streets that meet it, and takes no room there
         right=section.side(at_start) if stretch.arc is None else section.edge(at_start),
         left=section.side(not at_start) if stretch.arc is None else section.edge(not at_start),
         on_ring=stretch.arc is not None,
@@ -129,23 +129,23 @@ def _mirrored(lanes: tuple[LaneEnd, ...]) -> tuple[LaneEnd, ...]:
 
 
 def neighbours(arms: Sequence[Arm]) -> list[tuple[Arm, Arm, float]]:
-    """Arms that follow each other clockwise around a crossing, and the angle between them in [0, 2 pi) [rad]."""
+    """Returns successive arms in clockwise order, and the angle between them from 0 to 2 pi [rad]."""
     pairs = zip(arms, (*arms[1:], arms[0]), strict=True)
     return [(a, b, (b.leg.heading - a.leg.heading) % (2.0 * math.pi)) for a, b in pairs]
 
 
-# --- The arms of a crossing with the lanes that were built for them --------------------------------------------------
+# --- Arms with their lanes -------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Approach:
-    """An arm and its lanes, from the kerb inwards.
+    """Arm with its lanes, from the kerb inwards.
 
     Attributes:
-        arm: as it was laid out.
-        through: lanes that come in.
-        pocket: the left-turn lane that comes in beside them, or None.
-        outgoing: lanes that go out.
+        arm: arm of the layout.
+        through: incoming lanes without the left-turn lane.
+        pocket: left-turn lane beside them, or None.
+        outgoing: outgoing lanes.
     """
 
     arm: Arm
@@ -155,28 +155,28 @@ class Approach:
 
     @property
     def incoming(self) -> tuple[Lane, ...]:
-        """All lanes that come in."""
+        """All incoming lanes."""
         return self.through if self.pocket is None else (*self.through, self.pocket)
 
 
-# --- Where ramps leave and join other streets at a small angle, and with which arm they exchange their ca ------------
+# --- Ramps -----------------------------------------------------------------------------------------------------------
 
 SMALLEST_ANGLE, LARGEST_ANGLE = math.radians(12.0), math.radians(45.0)
-"""A ramp leaves and joins at an angle between these [rad]; at a larger one it meets a junction like any street."""
+"""Range of angles at which a ramp leaves and joins [rad]; at larger angles it meets a junction like any street."""
 _STRAIGHT_ON = math.radians(35.0)
 
 
 def find_slips(crossing: Crossing, arms: Sequence[Arm]) -> Mapping[int, int]:
-    """Ramps that leave or join a street at this crossing instead of meeting it as streets meet.
+    """Returns the ramps that leave or join a street at a small angle at this crossing.
 
-    A ramp that leaves lies just to the right of the arm in which its cars would go on else; one that joins lies just to
-    the left of the arm, seen outwards, from which it comes closer.
+    A ramp that leaves lies just to the right of the arm in which its cars would otherwise continue; one that joins lies
+    just to the left of the arm that it approaches, seen outwards.
 
     Returns:
-        For the index of each such arm that of the arm from which its cars come, or into which they go.
+        For the index of each such arm the index of the arm from which its cars come, or into which they continue.
 
     Raises:
-        TownError: a ramp lies on the wrong side, or nothing comes or goes on straight there.
+        TownError: a ramp lies on the wrong side, or the street does not continue straight there.
     """
     slips: dict[int, int] = {}
     for before, arm, angle in neighbours(arms):
@@ -193,7 +193,7 @@ def find_slips(crossing: Crossing, arms: Sequence[Arm]) -> Mapping[int, int]:
 
 
 def _partner(crossing: Crossing, arms: Sequence[Arm], ramp: Arm, host: Arm) -> int:
-    """The arm on the other side of the crossing from the arm beside which the ramp runs."""
+    """Returns the arm on the other side of the crossing from the arm beside the ramp."""
     others = [arm for arm in arms if arm is not ramp and arm is not host and not arm.street.ramp]
     if ramp.outgoing:
         ways = [(abs(turn_between(arm, host)), arm.index) for arm in others if arm.incoming and host.outgoing]
@@ -210,7 +210,7 @@ def _partner(crossing: Crossing, arms: Sequence[Arm], ramp: Arm, host: Arm) -> i
 
 
 def _check_side(ramp: Arm, other: Arm, wrong: object, slips: Mapping[int, int]) -> None:
-    """Refuses a ramp that is close to a street on its left side."""
+    """Rejects a ramp that is close to a street on its left side."""
     if wrong and ramp.street.ramp and ramp.index not in slips and not other.street.ramp:
         verb = "leaves" if ramp.outgoing else "joins"
         ramp.street.entry.fail(

@@ -1,4 +1,4 @@
-"""No street may touch another one, itself, or a junction that it does not run through, unless it passes above it."""
+"""Clearance of YAML towns: streets and junctions may only touch where they meet, unless one passes above the other."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from dorothie_gym.maps.yaml.stretches import Crossing, Stretch
 Indices: TypeAlias = NDArray[np.int64]
 
 HEADROOM = 4.5
-"""Difference of height from which a street passes above another one [m]."""
+"""Smallest difference of height of streets that pass above each other [m]."""
 _SPACING = 2.0
-"""Distance between the samples that are compared [m]."""
+"""Sampling distance [m]."""
 _SLACK = 0.5
-"""How much closer than edge to edge roads may come [m]: half a sample to the side of another is less than that off."""
+"""Permitted overlap of the edges of roads [m]: the error of a sample half a step aside is smaller."""
 
 
 def check_crossings(
     crossings: Sequence[Crossing], arms: Mapping[int, tuple[Arm, ...]], trims: Mapping[tuple[int, bool], float]
 ) -> None:
-    """Refuses junctions that overlap.
+    """Rejects overlapping junctions.
 
     Args:
-        crossings: all of them.
-        arms: by id of the crossing.
-        trims: room that each end of a stretch leaves to its crossing [m].
+        crossings: all crossings.
+        arms: arms by crossing id.
+        trims: distance from the centre of the crossing to each end of a stretch [m].
 
     Raises:
-        TownError: two junctions on one level are closer than the sum of their radii.
+        TownError: two junctions at one level are closer than the sum of their radii.
     """
     radii = {crossing.id: _radius(crossing, arms[crossing.id], trims) for crossing in crossings}
     for k, crossing in enumerate(crossings):
@@ -54,7 +54,7 @@ def check_crossings(
 
 
 def _radius(crossing: Crossing, arms: Sequence[Arm], trims: Mapping[tuple[int, bool], float]) -> float:
-    """How far a crossing reaches to all sides [m]; the long corners of ramps and on rings are left to `clearance`."""
+    """Returns the radius of a crossing [m]; `check_clearance` covers the long corners of ramps and rings."""
     if crossing.on_ring:
         return SMALLEST_RING_TRIM
     if any(arm.street.ramp for arm in arms):
@@ -88,13 +88,13 @@ def check_clearance(
     courses: Sequence[Course],
     ways: Mapping[int, tuple[MovementPath, ...]],
 ) -> None:
-    """Compares all roads and ways through crossings with one another.
+    """Checks all roads and all paths through crossings against each other.
 
     Raises:
-        TownError: two of them touch on one level that do not meet there.
+        TownError: two of them touch at one level without meeting there.
     """
     samples = _samples(crossings, stretches, courses, ways)
-    # What is wider apart than two of the widest roads cannot touch.
+    # samples farther apart than the width of the widest road cannot touch
     farthest = 2.0 * float(samples.reach.max() + samples.pavement.max())
     pairs = cKDTree(samples.points[:, :2]).query_pairs(farthest, output_type="ndarray")
     a, b = np.ascontiguousarray(pairs.T)
@@ -111,23 +111,23 @@ def check_clearance(
 def _may_be_near(
     samples: _Samples, crossings: Sequence[Crossing], stretches: Sequence[Stretch], pairs: Indices, room: Array
 ) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Which pairs (n, 2) of samples belong together: they follow each other, or meet at a crossing."""
+    """Returns which pairs (n, 2) of samples belong together (n,): they follow each other, or meet at a crossing."""
     place = {crossing.id: k for k, crossing in enumerate(crossings)}
     nowhere = [-1] * len(crossings)
     starts = np.array([*(place[stretch.start.id] for stretch in stretches), *nowhere])
     ends = np.array([*(place[stretch.end.id] for stretch in stretches), *nowhere])
     first, second = samples.owner[pairs].T
     a, b = pairs.T
-    # Samples of one stretch are near each other for as long as a half circle of its width.
+    # samples of one stretch are close to each other within half a circle of its width
     fine = (first == second) & (
         (first >= len(stretches)) | (np.abs(samples.before[a] - samples.before[b]) < 2.0 * room)
     )
-    # Stretches that meet at a crossing were trimmed there; corner to corner they are closer than side to side.
+    # stretches that meet at a crossing were trimmed there; corner to corner they are closer than side to side
     for tips_a, from_a in ((starts, samples.before), (ends, samples.after)):
         for tips_b, from_b in ((starts, samples.before), (ends, samples.after)):
             meet = (tips_a[first] == tips_b[second]) & (tips_a[first] >= 0)
             fine |= meet & (from_a[a] < room) & (from_b[b] < room)
-    # A crossing touches its own arms, and others on the same ring.
+    # a crossing touches its own arms, and others on the same ring
     plans = np.array([*[-1] * len(stretches), *(crossing.plan.id for crossing in crossings)])
     fine |= (plans[first] == plans[second]) & (plans[first] >= 0)
     for one, other in ((first, second), (second, first)):
@@ -167,7 +167,7 @@ def _samples(
     courses: Sequence[Course],
     ways: Mapping[int, tuple[MovementPath, ...]],
 ) -> _Samples:
-    """Samples of all stretches, then of all crossings: along the ways through them, and their centres."""
+    """Returns the samples of all stretches, then of all crossings: along the paths through them, and their centres."""
     rows = []  # each (n, 8): the attributes in their order
 
     def add(places: Array, along: Array, height: Array, *, half: float, pavement: float, owner: int) -> None:

@@ -1,4 +1,4 @@
-"""From lines to a `Town`: lanes, connectors, links, and what stands beside them."""
+"""YAML town compiler: from the layout to a `Town` with lanes, connectors, links, and everything beside the roads."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from dorothie_gym.maps.yaml.schema import read_plan
 from dorothie_gym.maps.yaml.stretches import Crossing
 
 SITES = 24
-"""Landmark sites in a town that does not say where they are."""
+"""Number of landmark sites of a town without explicit ones."""
 _KMH = 1.0 / 3.6
 
 
@@ -38,7 +38,7 @@ def compile_town(layout: Layout) -> Town:
     """Builds the town of a layout: first the lanes of all stretches, then the connectors.
 
     Raises:
-        TownError: a light's phases do not fit the lights that stand there, or a site is nowhere near a street.
+        TownError: the phases of a light do not match its signals, or a site is far from all streets.
     """
     build = _Build(layout)
     for k in range(len(layout.stretches)):
@@ -68,7 +68,7 @@ def compile_town(layout: Layout) -> Town:
 def _sites(
     layout: Layout, lanes: Sequence[Lane], links: Sequence[LaneLink], on_ramps: Collection[int]
 ) -> tuple[Site, ...]:
-    """Where landmarks stand: as written, or spread by themselves; nobody stops for one on a ramp."""
+    """Returns the explicit sites, or sites spread over the town; none on ramps."""
     if layout.plan.sites:
         return place_sites(layout.plan.sites, lanes)
     return lay_sites(lanes, links, count=SITES, avoid=on_ramps)
@@ -76,13 +76,13 @@ def _sites(
 
 @dataclass
 class _Build:
-    """Lanes, links and junctions as they are added.
+    """Builder of lanes, links and junctions.
 
     Attributes:
-        layout: what is built.
-        lanes, links, junctions: what there is so far.
-        first, last: by stretch, whether along its course, and number of a lane: the lanes at its start and its end.
-        on_ramps: lanes of ramps.
+        layout: layout of the town.
+        lanes, links, junctions: elements so far.
+        first, last: id of the first and last lane, by index of the stretch, whether along its course, and lane number.
+        on_ramps: ids of the lanes of ramps.
         roads: number of roads so far.
     """
 
@@ -98,7 +98,7 @@ class _Build:
     def add_stretch(self, k: int) -> None:
         """Adds the lanes along a stretch's course, innermost first, then those against it.
 
-        Where a left-turn lane opens they are cut, and a new road begins.
+        Where a left-turn lane opens, the lanes are split and a new road begins.
         """
         length, section = self.layout.courses[k].path.length, self.layout.stretches[k].section
         road = self._road()
@@ -106,7 +106,7 @@ class _Build:
             (True, section.forward, section.pocket),
             (False, section.backward, -section.pocket),
         ):
-            # What is left of the street, in driving direction, where the left-turn lane opens.
+            # rest of the street in driving direction where the left-turn lane opens
             room = self.layout.pockets.get((k, not along), 0.0)
             opening = length - room if along else room
             before = (0.0, opening) if along else (opening, length)
@@ -123,7 +123,7 @@ class _Build:
     def _add_side(
         self, k: int, road: int, offsets: Sequence[tuple[int, float]], span: tuple[float, float], *, along: bool
     ) -> dict[int, int]:
-        """Adds lanes side by side, innermost first, between two distances along a stretch; returns ids by number."""
+        """Adds parallel lanes, innermost first, between two distances along a stretch; returns ids by number."""
         street, course = self.layout.stretches[k].street, self.layout.courses[k]
         whole = span == (0.0, course.path.length)
         ids: dict[int, int] = {}
@@ -145,12 +145,12 @@ class _Build:
         return ids
 
     def _join(self, source: int, target: int) -> None:
-        """Links a lane to the one that goes on from its end, at exactly the same point."""
+        """Links a lane to its continuation, at exactly the same point."""
         self.lanes[target].points[0] = self.lanes[source].points[-1]
         self.links.append(LaneLink(source, target, LinkType.STRAIGHT))
 
     def add_crossing(self, crossing: Crossing) -> None:
-        """Adds a connector for every way through a crossing."""
+        """Adds a connector for each path through a crossing."""
         begin = len(self.lanes)
         onward: dict[int, dict[int, MovementPath]] = defaultdict(dict)
         for way in self.layout.ways[crossing.id]:
@@ -163,7 +163,7 @@ class _Build:
         self.junctions.append(Junction(id=crossing.id, position=crossing.centre, connectors=connectors))
 
     def _connect(self, crossing: Crossing, way: MovementPath) -> tuple[int, int]:
-        """Adds the connector of a way; returns the lane that leads into it and the connector."""
+        """Adds the connector of a path; returns the ids of its predecessor and of the connector."""
         movement = way.movement
         source = self.lanes[self._incoming(movement.source, movement.source_lane)]
         target = self.lanes[self._outgoing(movement.target, movement.target_lane)]
@@ -190,7 +190,7 @@ class _Build:
         return self.first[arm.stretch, arm.at_start, lane.number]
 
     def approaches(self, crossing: Crossing) -> list[Approach]:
-        """The arms of a crossing with their lanes."""
+        """Returns the arms of a crossing with their lanes."""
         return [
             Approach(
                 arm=arm,
@@ -216,7 +216,7 @@ class _Build:
         street: int,
         junction_id: int = NO_JUNCTION,
     ) -> int:
-        """Adds a lane; its width goes evenly from the first value to the second."""
+        """Adds a lane whose width changes linearly from the first value to the second."""
         lane = Lane(
             id=len(self.lanes),
             road_id=road_id,

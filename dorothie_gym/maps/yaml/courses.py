@@ -1,4 +1,4 @@
-"""The middle line of a stretch between the edges of its two crossings: corners rounded, room checked, heights laid."""
+"""Courses: the middle line of each stretch between the edges of its crossings, with rounded bends and heights."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ STEEPEST = 0.12
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HeightProfile:
-    """Cubic pieces between given heights.
+    """Piecewise cubic interpolation of given heights.
 
     Attributes:
-        stations: distances along the street (n,) at which its height is given, rising [m].
+        stations: ascending distances along the street with given heights (n,) [m].
         heights: heights there (n,) [m].
         slopes: slopes there (n,).
     """
@@ -32,11 +32,11 @@ class HeightProfile:
 
     @property
     def is_flat(self) -> bool:
-        """Whether the street has the same height everywhere."""
+        """Whether the height is constant."""
         return bool(np.ptp(self.heights) == 0.0)
 
     def at(self, station: Array) -> Array:
-        """Height (n,) at distances (n,) along the street [m]."""
+        """Returns the heights (n,) at distances (n,) along the street [m]."""
         if self.is_flat:
             return np.full(len(station), self.heights[0])
         k = np.clip(np.searchsorted(self.stations, station, side="right") - 1, 0, len(self.stations) - 2)
@@ -52,7 +52,7 @@ class HeightProfile:
         return result
 
     def steepest(self) -> float:
-        """Largest slope, up or down."""
+        """Returns the largest slope, up or down."""
         if self.is_flat:
             return 0.0
         grid = np.linspace(self.stations[0], self.stations[-1], max(3, int(self.stations[-1] - self.stations[0])))
@@ -60,14 +60,14 @@ class HeightProfile:
 
 
 def height_profile(stations: Sequence[float], heights: Sequence[float | None]) -> HeightProfile:
-    """The profile through the given heights, flat at both ends and wherever it turns from rising to falling.
+    """Returns the profile through given heights, flat at both ends and at local extremes.
 
-    Slopes between are the harmonic mean of those on either side, which keeps every piece monotone (Fritsch and Butland,
+    Inner slopes are the harmonic mean of the adjacent secants, which keeps every piece monotone (Fritsch and Butland,
     "A method for constructing local monotone piecewise cubic interpolants", SIAM J. Sci. Stat. Comput. 5(2), 1984).
 
     Args:
-        stations: distances along the street, rising [m].
-        heights: heights there, or None where nothing is given; the first and the last are given [m].
+        stations: ascending distances along the street [m].
+        heights: heights there, or None to interpolate; the first and the last must be given [m].
     """
     given = [(s, height) for s, height in zip(stations, heights, strict=True) if height is not None]
     s, z = (np.array(column, dtype=float) for column in zip(*given, strict=True))
@@ -82,28 +82,28 @@ def height_profile(stations: Sequence[float], heights: Sequence[float | None]) -
     return HeightProfile(stations=s, heights=z, slopes=slopes)
 
 
-# --- The middle line of a stretch between the edges of its two crossings: corners rounded, room checked,  ------------
+# --- Lines -----------------------------------------------------------------------------------------------------------
 
 SMALLEST_RADIUS = 5.5
-"""Radius of a lane's centre line below which a curve is refused [m]."""
+"""Smallest radius of the centre line of a lane [m]."""
 SMALLEST_STRETCH = 10.0
-"""Length of street that has to remain between two junctions [m]."""
+"""Shortest street between two junctions [m]."""
 SMALLEST_RING_STRETCH = 6.0
 """The same on the ring of a roundabout [m]."""
 SLOPE_SPACING = 5.0
-"""Largest distance between the points of a line where it is not level [m]."""
+"""Largest distance between the points of a sloping line [m]."""
 _SLOPE_SLACK = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Course:
-    """Where a stretch runs: its line from the edge of one crossing to that of the next, and how high it is."""
+    """Line of a stretch from the edge of one crossing to that of the next, with its heights."""
 
     path: Curve
     heights: HeightProfile
 
     def beside(self, offset: float, span: tuple[float, float] | None = None) -> Array:
-        """Points (n, 3) of the parallel line a distance to the right, or of what lies between two distances [m]."""
+        """Returns points (n, 3) of the parallel line at a distance to the right, optionally of a part only [m]."""
         path = self.path if span is None else self.path.part(*span)
         spacing = LINE_SPACING if self.heights.is_flat else SLOPE_SPACING
         plane, stations = path.sample(offset, line_spacing=spacing)
@@ -111,7 +111,7 @@ class Course:
 
 
 def course_of(stretch: Stretch, trim_start: float, trim_end: float) -> Course:
-    """Lays the line of a stretch.
+    """Computes the line of a stretch.
 
     Args:
         stretch: the stretch.
@@ -153,7 +153,7 @@ def _on_ring(stretch: Stretch, trim_start: float, trim_end: float) -> Curve:
 
 
 def _between(stretch: Stretch, trim_start: float, trim_end: float) -> list[Point]:
-    """The corners of a stretch with its ends moved to the edges of its crossings."""
+    """Returns the corners of a stretch with its ends moved to the edges of its crossings."""
     corners, street = stretch.corners, stretch.street
     legs = [math.dist(a, b) for a, b in zip(corners, corners[1:], strict=False)]
     room = legs[0] - trim_start - trim_end if len(legs) == 1 else min(legs[0] - trim_start, legs[-1] - trim_end)
@@ -175,7 +175,7 @@ def _check_length(stretch: Stretch, length: float) -> None:
 
 
 def _radii(stretch: Stretch, points: Sequence[Point]) -> list[float]:
-    """Radius of each bend [m]: the street's own, else the largest for which neighbours share their leg evenly."""
+    """Returns the radius of each bend [m]: that of the street, else the largest if bends share their leg evenly."""
     legs = [math.dist(a, b) for a, b in zip(points, points[1:], strict=False)]
     rooms = [leg if k in (0, len(legs) - 1) else leg / 2.0 for k, leg in enumerate(legs)]
     street, radii = stretch.street, list[float]()

@@ -1,4 +1,4 @@
-"""Crosswalks at crossings and pavements beside streets."""
+"""Crosswalks, sidewalks, signals, light programmes and landmark sites of YAML towns."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from dorothie_gym.maps.yaml.plan import GreenPlan, LightsPlan, StreetPlan
 from dorothie_gym.maps.yaml.stretches import Crossing
 
 CROSSWALK_SPAN = (0.5, 3.5)
-"""A crosswalk lies between these distances beyond the ends of the lanes, towards the junction [m]."""
+"""Distances of both edges of a crosswalk beyond the ends of the lanes, towards the junction [m]."""
 CROSSWALK_ASIDE = 0.5
-"""A crosswalk reaches this far beyond the edges of the road [m]."""
+"""Extent of a crosswalk beyond the edges of the road [m]."""
 
 
 def crosswalks(layout: Layout, approaches: Callable[[Crossing], Sequence[Approach]]) -> tuple[Crosswalk, ...]:
-    """One for each arm of the street at the junction, across all of its lanes and its median."""
+    """Returns one crosswalk for each arm of the street at the junction, across all lanes and the median."""
     found: list[Crosswalk] = []
     for name, street in layout.plan.crosswalks:
         for crossing in layout.crossings_of(name):
@@ -38,9 +38,9 @@ def crosswalks(layout: Layout, approaches: Callable[[Crossing], Sequence[Approac
 
 
 def _outline(approach: Approach) -> Array:
-    """Corners (4, 2) of the crosswalk across an arm [m], clockwise from the left one next to the lanes."""
+    """Returns the corners (4, 2) of the crosswalk across an arm [m], clockwise from the left one next to the lanes."""
     outgoing, incoming = approach.outgoing, approach.through
-    # Any lane will do to measure from: seen outwards, each ends as far from the centre as the others.
+    # any lane can be the reference: seen outwards, all end at the same distance from the centre
     lane = outgoing[0] if outgoing else incoming[0]
     x, y = lane.points[0 if outgoing else -1, :2]
     heading = float(lane.headings[0]) if outgoing else float(lane.headings[-1]) + math.pi
@@ -58,9 +58,9 @@ def _outline(approach: Approach) -> Array:
 
 
 def sidewalks(layout: Layout) -> tuple[Sidewalk, ...]:
-    """Pavements beside every stretch whose street has them: right of its course, then left of it.
+    """Returns the pavements beside all stretches whose street has them: right of its course, then left of it.
 
-    A ring has one on its outer side only, which is the right one; nobody walks on its island.
+    A ring has a pavement on its outer (right) side only.
     """
     found: list[Sidewalk] = []
     for stretch, course in zip(layout.stretches, layout.courses, strict=True):
@@ -73,14 +73,14 @@ def sidewalks(layout: Layout) -> tuple[Sidewalk, ...]:
     return tuple(found)
 
 
-# --- Lights and signs at the approaches of crossings, and the programmes of the lights -------------------------------
+# --- Signals and programmes ------------------------------------------------------------------------------------------
 
 SIGNAL_HEIGHT = 3.0
-"""A light or a sign is this high above the road [m]."""
+"""Height of lights and signs above the road [m]."""
 SIGNAL_ASIDE, MEDIAN_ASIDE = 1.0, 0.5
-"""It stands this far from the edge of the lane at the kerb, and from that of a left-turn lane in the median [m]."""
+"""Distance of signals from the edge of the lane at the kerb, and from that of a left-turn lane in the median [m]."""
 CLEARANCE_TIME = 2.0
-"""Between written phases: how long after their yellow all lights that change are red [s]."""
+"""Clearance interval between explicit phases, after yellow, with red for all lights that change [s]."""
 
 
 def place_signals(
@@ -90,21 +90,21 @@ def place_signals(
     links: Sequence[LaneLink],
     junctions: Sequence[Junction],
 ) -> tuple[tuple[Signal, ...], tuple[LightProgramme, ...]]:
-    """Places all signals of a town and makes the programmes of its lights.
+    """Places all signals of a town and builds the programmes of its lights.
 
     A lit approach has one light for all lanes but its left-turn lane, which has its own. Approaches have stop and yield
-    signs where the plan says so; those of ramps that join and of streets onto roundabouts have yield signs if nothing
-    else rules them.
+    signs as in the plan; those of ramps that join and of streets onto roundabouts have yield signs if they have
+    no other signal.
 
     Args:
         layout: the layout.
-        approaches: tells the arms of a crossing with their lanes.
+        approaches: function that returns the arms of a crossing with their lanes.
         lanes: lanes of the town.
         links: links between them.
         junctions: its junctions.
 
     Raises:
-        TownError: a written programme names lights that are not there, or leaves one without green.
+        TownError: an explicit programme refers to missing lights, or a light never has green.
     """
     signals: list[Signal] = []
     heads: dict[str, list[_Head]] = {}
@@ -121,7 +121,7 @@ def place_signals(
 
 @dataclass(frozen=True)
 class _Head:
-    """A signal, the street at whose approach it stands, and whether it rules the left-turn lane alone."""
+    """Signal with the street of its approach, and whether it only controls the left-turn lane."""
 
     signal: Signal
     street: StreetPlan
@@ -129,7 +129,7 @@ class _Head:
 
 
 def _kinds(layout: Layout, crossing: Crossing) -> dict[int, SignalKind]:
-    """What stands at the arms of a crossing, by index of the arm."""
+    """Returns the kind of signal at each arm of a crossing, by index."""
     arms, plan, name = layout.arms[crossing.id], layout.plan, crossing.plan.name
     if any(lights.junction == name for lights in plan.lights):
         return {arm.index: SignalKind.TRAFFIC_LIGHT for arm in arms}
@@ -143,7 +143,7 @@ def _kinds(layout: Layout, crossing: Crossing) -> dict[int, SignalKind]:
 
 
 def _heads(approach: Approach, kind: SignalKind, number: int) -> list[_Head]:
-    """The signals of an approach, the first of them with id `number`."""
+    """Returns the signals of an approach, with ids from `number` on."""
     street, through, pocket = approach.arm.street, approach.through, approach.pocket
     kerb = through[0]
     aside = kerb.widths[-1] / 2.0 + SIGNAL_ASIDE
@@ -157,7 +157,7 @@ def _heads(approach: Approach, kind: SignalKind, number: int) -> list[_Head]:
 
 
 def _signal(number: int, kind: SignalKind, rules: Sequence[Lane], beside: Lane, aside: float) -> Signal:
-    """A signal to the right of the end of a lane; it faces the cars that come."""
+    """Returns a signal to the right of the end of a lane, facing approaching cars."""
     x, y = beside.position(beside.length, aside)
     return Signal(
         id=number,
@@ -173,7 +173,7 @@ def _programmes(
     heads: Mapping[str, Sequence[_Head]],
     town: tuple[Sequence[Lane], Sequence[LaneLink], Sequence[Junction]],
 ) -> tuple[LightProgramme, ...]:
-    """Written programmes, and derived ones where nothing is written, in the order of the junctions."""
+    """Returns the programmes in the order of the junctions: explicit ones, and generated ones elsewhere."""
     ids = {junction.name: junction.id for junction in layout.plan.junctions.values()}
     written = {ids[p.junction]: _written(p, ids[p.junction], heads[p.junction]) for p in layout.plan.lights if p.phases}
     offsets = {ids[p.junction]: p.offset for p in layout.plan.lights if p.offset}
@@ -187,7 +187,7 @@ def _programmes(
 
 
 def _written(plan: LightsPlan, junction_id: int, heads: Sequence[_Head]) -> LightProgramme:
-    """The programme of written phases, with yellow and a clearance between them for the lights that change."""
+    """Returns the programme of explicit phases, with yellow and clearance between them for the lights that change."""
     greens = [_greens(plan, phase, heads) for phase in plan.phases]
     for head in heads:
         if not any(head.signal.id in green for green in greens):
@@ -211,7 +211,7 @@ def _written(plan: LightsPlan, junction_id: int, heads: Sequence[_Head]) -> Ligh
 
 
 def _greens(plan: LightsPlan, phase: GreenPlan, heads: Sequence[_Head]) -> tuple[int, ...]:
-    """Ids of the signals that are green in a phase."""
+    """Returns the ids of the signals that are green in a phase."""
     for name in (*phase.streets, *phase.left_only):
         left_only = name in phase.left_only
         if not any(head.street.name == name and (head.left or not left_only) for head in heads):
@@ -225,21 +225,21 @@ def _greens(plan: LightsPlan, phase: GreenPlan, heads: Sequence[_Head]) -> tuple
     )
 
 
-# --- Places for landmarks that the plan names, each reached from the street beside it --------------------------------
+# --- Landmark sites --------------------------------------------------------------------------------------------------
 
 FARTHEST_SITE = 25.0
-"""A landmark stands at most this far from the lane at its kerb [m]."""
+"""Largest distance of a landmark from its lane at the kerb [m]."""
 _SPACING = 1.0
-"""Distance between the places on lanes that are compared [m]."""
+"""Sampling distance on lanes [m]."""
 _STOP_ROOM = 1.0
-"""A waypoint is this far from the ends of its lane, at least [m]."""
+"""Smallest distance of a waypoint from the ends of its lane [m]."""
 
 
 def place_sites(places: Sequence[tuple[Point, YamlEntry]], lanes: Sequence[Lane]) -> tuple[Site, ...]:
-    """Finds the nearest lane at a kerb for each place.
+    """Returns the sites at given positions, each on the nearest lane.
 
     Raises:
-        TownError: a place is too far from every street, on a road, or nearest to a junction.
+        TownError: a position is too far from all streets, on a road, or nearest to a junction.
     """
     points, owner = [], []
     for lane in lanes:

@@ -1,6 +1,6 @@
-"""Plane curves made of straight lines and circular arcs: exact offsets, cuts and connections, sampled at the end.
+"""Plane curves of straight lines and circular arcs: exact offsets, cuts and connections, sampled at the end.
 
-Same frame as the town: x east, y south, headings clockwise, curvature positive where the curve bends to the right.
+Frame of the town: x east, y south, headings clockwise, curvature positive to the right.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ Pose: TypeAlias = tuple[float, float, float]
 """x, y [m], heading [rad]."""
 
 CHORD_ERROR = 0.01
-"""Largest distance between a sampled curve and the true one [m]."""
+"""Largest distance between a sampled curve and the exact one [m]."""
 CURVE_SPACING, LINE_SPACING = 2.0, 20.0
 """Largest distance between samples on arcs and on straights [m]."""
 LINE_GUARD = 1.0
-"""A straight has samples this close to its ends [m], so that headings taken from samples do not smear into it."""
+"""Distance of the second sample of a straight from its ends [m], so that sampled headings stay exact there."""
 CLOSEST = 0.1
-"""Samples are not closer than this [m]: where ends are joined, a rounding error must not turn the last step."""
-_STRAIGHT = 1e-9  # [1/m] curvatures below this are lines; at 1 km they are 0.5 mm off
-_TINY = 1e-6  # [m] pieces shorter than this are left out
+"""Smallest distance between samples [m]: rounding errors at joints must not change the direction of the last step."""
+_STRAIGHT = 1e-9  # [1/m] smaller curvatures are lines; at 1 km they deviate by 0.5 mm
+_TINY = 1e-6  # [m] shorter segments are omitted
 
 
 @dataclass(frozen=True, slots=True)
 class CurveSegment:
-    """A line or an arc: where it starts [m, m, rad], how long it is [m], and its curvature [1/m]."""
+    """Line or arc: start pose [m, m, rad], length [m] and curvature [1/m]."""
 
     x: float
     y: float
@@ -42,7 +42,7 @@ class CurveSegment:
     curvature: float = 0.0
 
     def at(self, s: float) -> Pose:
-        """Pose at a distance along the piece [m]."""
+        """Returns the pose at a distance along the segment [m]."""
         heading = self.heading + self.curvature * s
         if abs(self.curvature) < _STRAIGHT:
             return self.x + s * math.cos(self.heading), self.y + s * math.sin(self.heading), heading
@@ -53,19 +53,19 @@ class CurveSegment:
         )
 
     def reversed(self) -> CurveSegment:
-        """The same piece, driven the other way."""
+        """Returns the segment in the opposite direction."""
         x, y, heading = self.at(self.length)
         return CurveSegment(x, y, heading + math.pi, self.length, -self.curvature)
 
     def offset(self, right: float) -> CurveSegment:
-        """The parallel piece a distance to the right [m]; the distance must be smaller than the radius on that side."""
+        """Returns the parallel segment at a distance to the right [m], less than the radius on that side."""
         scale = 1.0 - self.curvature * right
         x = self.x - right * math.sin(self.heading)
         y = self.y + right * math.cos(self.heading)
         return CurveSegment(x, y, self.heading, self.length * scale, self.curvature / scale)
 
     def points(self, s: Array) -> Array:
-        """Places (n, 2) [m] at distances (n,) along the piece [m]."""
+        """Returns positions (n, 2) [m] at distances (n,) along the segment [m]."""
         if abs(self.curvature) < _STRAIGHT:
             return np.column_stack((self.x + s * math.cos(self.heading), self.y + s * math.sin(self.heading)))
         heading = self.heading + self.curvature * s
@@ -74,7 +74,7 @@ class CurveSegment:
         return np.column_stack((x, y))
 
     def samples(self, line_spacing: float) -> Array:
-        """Distances (n,) along the piece [m], both ends included, close enough together for the spacings above."""
+        """Returns distances (n,) along the segment [m], both ends included, dense enough for the limits above."""
         if abs(self.curvature) >= _STRAIGHT:
             spacing = min(CURVE_SPACING, math.sqrt(8.0 * CHORD_ERROR / abs(self.curvature)))
             return np.linspace(0.0, self.length, max(3, math.ceil(self.length / spacing) + 1))
@@ -87,13 +87,13 @@ class CurveSegment:
 
 @dataclass(frozen=True)
 class Curve:
-    """Pieces one after the other, each starting where the one before ends and with its heading."""
+    """Sequence of segments, each starting at the end of the previous one with its heading."""
 
     pieces: tuple[CurveSegment, ...]
 
     @property
     def length(self) -> float:
-        """Length of the path [m]."""
+        """Length [m]."""
         return sum(piece.length for piece in self.pieces)
 
     @property
@@ -108,11 +108,11 @@ class Curve:
 
     @property
     def smallest_radius(self) -> float:
-        """Radius of the tightest arc [m], infinite where there is none."""
+        """Radius of the tightest arc [m], very large without arcs."""
         return 1.0 / max(max((abs(piece.curvature) for piece in self.pieces), default=0.0), 1e-12)
 
     def part(self, start: float, end: float) -> Curve:
-        """What lies between two distances along the path [m]."""
+        """Returns the part between two distances along the curve [m]."""
         pieces, begin = [], 0.0
         for piece in self.pieces:
             low, high = max(start - begin, 0.0), min(end - begin, piece.length)
@@ -122,14 +122,14 @@ class Curve:
         return Curve(tuple(pieces))
 
     def sample(self, right: float = 0.0, *, line_spacing: float = LINE_SPACING) -> tuple[Array, Array]:
-        """Points on the parallel path a distance to the right, its ends included.
+        """Samples the parallel curve at a distance to the right, both ends included.
 
         Args:
-            right: distance [m]; it must be smaller than every radius on that side.
+            right: distance [m]; less than all radii on that side.
             line_spacing: largest distance between points on straights [m].
 
         Returns:
-            The points (n, 2), and how far along this path each of them lies (n,) [m].
+            The points (n, 2) [m], and their distances along this curve (n,) [m].
         """
         points, stations, begin = [], [], 0.0
         for k, piece in enumerate(self.pieces):
@@ -143,7 +143,7 @@ class Curve:
         return table[:, :2], table[:, 2]
 
     def every(self, spacing: float, right: float = 0.0) -> tuple[Array, Array]:
-        """The same as `sample`, at points that are nowhere further apart than `spacing` on this path [m]."""
+        """Samples like `sample`, with points at most `spacing` apart on this curve [m]."""
         points, stations, begin = [], [], 0.0
         for piece in self.pieces:
             s = np.linspace(0.0, piece.length, math.ceil(piece.length / spacing) + 1)
@@ -155,7 +155,7 @@ class Curve:
 
 
 def _apart(points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Which of points (n, 2) to keep so that none but the ends follows close on the one before it."""
+    """Returns which points (n, 2) to keep so that only the ends are close to their predecessors (n,)."""
     close = np.hypot(*np.diff(points, axis=0).T) < CLOSEST
     keep = np.concatenate(([True], ~close))
     keep[-1] = True
@@ -165,17 +165,17 @@ def _apart(points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
 
 
 def line(a: Point, b: Point) -> CurveSegment:
-    """The straight from one point to another."""
+    """Returns the straight from one point to another."""
     return CurveSegment(a[0], a[1], math.atan2(b[1] - a[1], b[0] - a[0]), math.dist(a, b))
 
 
 def turn_at(a: Point, b: Point, c: Point) -> float:
-    """Change of heading at the middle one of three points [rad], positive to the right."""
+    """Returns the change of heading at the second of three points [rad], positive to the right."""
     return wrap_radians(line(b, c).heading - line(a, b).heading)
 
 
 def rounded(points: Sequence[Point], radii: Sequence[float]) -> Curve:
-    """The polyline through `points` with each inner point replaced by an arc.
+    """Returns the polyline through `points` with each inner point replaced by an arc.
 
     Args:
         points: at least two, no two successive ones equal [m].
@@ -196,7 +196,7 @@ def rounded(points: Sequence[Point], radii: Sequence[float]) -> Curve:
 
 
 def bend_stations(points: Sequence[Point], radii: Sequence[float]) -> list[float]:
-    """How far along the `rounded` polyline the middles of its bends lie [m]."""
+    """Returns the distances of the middles of the bends along the `rounded` polyline [m]."""
     stations, here = list[float](), 0.0
     shortened = 0.0  # what the bend before takes of the leg
     for k, radius in enumerate(radii, start=1):
@@ -209,16 +209,16 @@ def bend_stations(points: Sequence[Point], radii: Sequence[float]) -> list[float
 
 
 def connect(entry: Pose, exit_: Pose) -> Curve:
-    """A smooth way from one pose to another: line-arc-line where it exists, else two arcs.
+    """Returns a smooth curve between two poses: line-arc-line if it exists, else two arcs.
 
-    No way that turns to one side only is gentler than the one with a single arc; two arcs may be, but where there is
-    one they swing out to the other side first.
+    Of all curves that turn to one side only, the single arc is the gentlest; two arcs may be gentler, but if there is
+    a single arc they first swing out to the other side.
     """
     return _fillet(entry, exit_) or _biarc(entry, exit_)
 
 
 def _fillet(entry: Pose, exit_: Pose) -> Curve | None:
-    """One arc between the lines through the two poses, if they meet ahead of the first and behind the second."""
+    """Returns one arc between the lines through both poses, if they meet ahead of the first and behind the second."""
     turn = wrap_radians(exit_[2] - entry[2])
     if abs(math.sin(turn)) < 1e-3:  # as good as parallel
         return None
@@ -251,7 +251,7 @@ def _biarc(entry: Pose, exit_: Pose) -> Curve:
 
 
 def _arc_to(start: Pose, end: Point) -> CurveSegment:
-    """The arc that leaves a pose and ends in a point."""
+    """Returns the arc from a pose to a point."""
     chord = line(start[:2], end)
     half = wrap_radians(chord.heading - start[2])
     if abs(half) < 1e-9:

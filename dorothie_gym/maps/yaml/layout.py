@@ -1,4 +1,4 @@
-"""From a written plan to lines: streets cut at crossings, bends rounded, crossings given room and ways through them."""
+"""Layout of a YAML town: streets divided at crossings, bends rounded, crossings given room and movements."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from dorothie_gym.maps.yaml.roundabout import lay_ring
 from dorothie_gym.maps.yaml.stretches import Crossing, Stretch, split, stretch_of
 
 POCKET_LENGTH, SHORTEST_POCKET = 40.0, 25.0
-"""A left-turn lane is this long, and on short blocks at least that long [m]."""
+"""Length of left-turn lanes, and smallest length on short blocks [m]."""
 _POCKET_REST = 10.0
-"""Length of street before a left-turn lane opens, at least [m]."""
+"""Shortest length of street before a left-turn lane opens [m]."""
 _POCKETS_APART = 4.0
 """Distance between two left-turn lanes that share a narrow median [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Layout:
-    """A town's lines.
+    """Lines of a town.
 
     Attributes:
-        plan: what was written.
-        streets: those of the plan, then the rings of roundabouts.
-        crossings: junctions in the order of the file, then those on rings; ids need not be successive.
-        stretches: all pieces of street, those on rings last.
-        courses: the line of each stretch, from the edge of its first crossing to that of its second.
-        arms: by id of the crossing, in order of heading.
-        ways: by id of the crossing, all ways through it.
-        pockets: length of left-turn lanes [m], by stretch and whether they lead to its start.
-        hosts: by id of each ramp the id of the street that it belongs to: the one that it leaves, or else joins.
+        plan: plan of the town.
+        streets: streets of the plan, then the rings of roundabouts.
+        crossings: junctions in the order of the file, then crossings on rings; ids may have gaps.
+        stretches: all stretches, those on rings last.
+        courses: line of each stretch, from the edge of its first crossing to that of its second.
+        arms: arms in order of heading, by crossing id.
+        ways: paths of all movements, by crossing id.
+        pockets: length of left-turn lanes [m], by index of the stretch and whether they lead to its start.
+        hosts: id of the street that each ramp leaves or else joins, by id of the ramp.
     """
 
     plan: TownPlan
@@ -51,25 +51,25 @@ class Layout:
 
     @property
     def named_streets(self) -> tuple[StreetPlan, ...]:
-        """Streets of the town: all but ramps, which belong to others."""
+        """Streets of the town: all but ramps, which belong to other streets."""
         return tuple(street for street in self.streets if street.id not in self.hosts)
 
     @cached_property
     def numbers(self) -> Mapping[int, int]:
-        """Number in the town of each street, by its id in the plan."""
+        """Index of each street in the town, by its id in the plan."""
         own = {street.id: k for k, street in enumerate(self.named_streets)}
         return own | {ramp: own[host] for ramp, host in self.hosts.items()}
 
     def crossings_of(self, junction: str) -> list[Crossing]:
-        """The crossing of a junction, or all those on the ring of a roundabout."""
+        """Returns the crossing of a junction, or all crossings on the ring of a roundabout."""
         return [crossing for crossing in self.crossings if crossing.plan.name == junction]
 
 
 def lay_out(plan: TownPlan) -> Layout:
-    """Finds the lines of a plan.
+    """Computes the layout of a plan.
 
     Raises:
-        TownError: streets or junctions do not fit into their places.
+        TownError: streets or junctions do not fit.
     """
     streets, crossings, stretches = _graph(plan)
     ends: dict[int, list[tuple[int, bool]]] = {crossing.id: [] for crossing in crossings}
@@ -103,7 +103,7 @@ def lay_out(plan: TownPlan) -> Layout:
 
 
 def _graph(plan: TownPlan) -> tuple[tuple[StreetPlan, ...], tuple[Crossing, ...], tuple[Stretch, ...]]:
-    """Streets, crossings and stretches, roundabouts laid out."""
+    """Returns streets, crossings and stretches, with roundabouts."""
     runs = split(plan)
     plain = {
         name: Crossing(id=j.id, name=name, centre=j.centre, height=j.height, plan=j)
@@ -129,7 +129,7 @@ def _graph(plan: TownPlan) -> tuple[tuple[StreetPlan, ...], tuple[Crossing, ...]
 
 
 def _hosts(plan: TownPlan, crossings: Sequence[Crossing], arms: Mapping[int, tuple[Arm, ...]]) -> dict[int, int]:
-    """Streets that ramps belong to; refuses ramps that meet every street at a large angle."""
+    """Returns the streets that ramps belong to; rejects ramps that meet every street at a large angle."""
     left, joined = dict[int, int](), dict[int, int]()
     for crossing in crossings:
         here = arms[crossing.id]
@@ -150,7 +150,7 @@ def _hosts(plan: TownPlan, crossings: Sequence[Crossing], arms: Mapping[int, tup
 def _pockets(
     stretches: Sequence[Stretch], courses: Sequence[Course], arms: Mapping[int, tuple[Arm, ...]]
 ) -> dict[tuple[int, bool], float]:
-    """Lengths of left-turn lanes; two in one narrow median must not overlap."""
+    """Returns the lengths of left-turn lanes; two in one narrow median must not overlap."""
     wanted = {(arm.stretch, arm.at_start): arm for row in arms.values() for arm in row if arm.pocket is not None}
     lengths = {}
     for (k, at_start), arm in wanted.items():

@@ -1,4 +1,4 @@
-"""Which lane leads into which at a crossing: the lanes that a driver would use."""
+"""Movements through crossings: which lane leads into which, the room for them, and their paths."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from dorothie_gym.maps.yaml.geometry import Curve, connect
 from dorothie_gym.maps.yaml.stretches import Crossing, Stretch
 
 STRAIGHT_BELOW = math.radians(35.0)
-"""A way through a crossing that turns less than this goes straight on [rad]."""
+"""Largest change of heading of a straight movement [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Movement:
-    """A way from a lane that comes in to a lane that goes out; `slip` where a ramp leaves or joins."""
+    """Movement from an incoming lane to an outgoing lane; `slip` marks ramps that leave or join."""
 
     source: Arm
     source_lane: LaneEnd
@@ -38,9 +38,9 @@ class Movement:
 
 
 def kinds_of(turns: Mapping[int, float]) -> dict[int, LinkType]:
-    """Types of the ways on from one place by their change of heading [rad], positive to the right.
+    """Returns the turn types of movements from one lane, by change of heading [rad], positive to the right.
 
-    Only the straightest of several that turn by less than 35 degrees goes straight on.
+    Of several that turn by less than 35 degrees only the straightest is called straight.
     """
     straight = [key for key in turns if abs(turns[key]) < STRAIGHT_BELOW]
     straightest = min(straight, key=lambda key: (abs(turns[key]), key)) if straight else None
@@ -55,17 +55,17 @@ def kinds_of(turns: Mapping[int, float]) -> dict[int, LinkType]:
 
 
 def with_pockets(crossing: Crossing, arms: tuple[Arm, ...], stretches: Sequence[Stretch]) -> tuple[Arm, ...]:
-    """The arms with left-turn lanes where their street wants them here and there is a way to the left.
+    """Adds left-turn lanes to arms whose street requests them, if there is a left turn.
 
     Raises:
-        TownError: a street that wants one has no way to the left.
+        TownError: a street with a left-turn lane has no left turn.
     """
     slips = find_slips(crossing, arms)
     wanted = [arm for arm in arms if crossing.plan.name in arm.street.turn_lanes]
     result = []
     for arm in arms:
         if arm in wanted and LinkType.LEFT in _kinds(arms, arm, slips).values() and arm.incoming:
-            # Between the median's middle and the lanes that come in, which lie on the left as one looks outwards.
+            # between the middle of the median and the incoming lanes, which are on the left seen outwards
             pocket = LaneEnd(POCKET, -stretches[arm.stretch].section.pocket)
             arm = replace(arm, incoming=(*arm.incoming, pocket))
         result.append(arm)
@@ -76,10 +76,10 @@ def with_pockets(crossing: Crossing, arms: tuple[Arm, ...], stretches: Sequence[
 
 
 def movements_at(crossing: Crossing, arms: tuple[Arm, ...]) -> tuple[Movement, ...]:
-    """All ways through a crossing, so that every lane leads somewhere and every arm can be reached.
+    """Returns all movements through a crossing; every lane has a continuation and every arm can be reached.
 
     Raises:
-        TownError: cars could come in by an arm but not go on, or go out but not get there.
+        TownError: an incoming arm has no continuation, or an outgoing arm cannot be reached.
     """
     slips = find_slips(crossing, arms)
     found = [movement for arm in arms if arm.incoming for movement in _movements(arms, arm, slips)]
@@ -91,14 +91,14 @@ def movements_at(crossing: Crossing, arms: tuple[Arm, ...]) -> tuple[Movement, .
             )
         if arm.outgoing and not any(movement.target is arm for movement in found):
             arm.street.entry.fail(
-                f"it leaves {crossing.name!r} and there is no way into it: nobody could reach its lanes; turn a one-way"
+                f"it leaves {crossing.name!r} and there is no way into it: its lanes cannot be reached; turn a one-way"
                 " street round or make it two-way, or let this one only lead to that junction (one_way)"
             )
     return tuple(found)
 
 
 def _targets(arms: Sequence[Arm], source: Arm, slips: Mapping[int, int]) -> list[Arm]:
-    """Arms that one may drive into from an arm."""
+    """Returns the arms that can be entered from an arm."""
     open_ = [arm for arm in arms if arm is not source and arm.outgoing]
     if source.index in slips:
         return [arm for arm in open_ if arm.index == slips[source.index]]
@@ -106,12 +106,12 @@ def _targets(arms: Sequence[Arm], source: Arm, slips: Mapping[int, int]) -> list
 
 
 def _kinds(arms: Sequence[Arm], source: Arm, slips: Mapping[int, int]) -> dict[int, LinkType]:
-    """By index of the arms that one may drive into: on which side they lie."""
+    """Returns the turn types into the arms that can be entered, by index."""
     return kinds_of({arm.index: turn_between(source, arm) for arm in _targets(arms, source, slips)})
 
 
 def _movements(arms: Sequence[Arm], source: Arm, slips: Mapping[int, int]) -> Iterator[Movement]:
-    """Ways on from an arm: by the rules first, then for lanes that those leave without one."""
+    """Yields the movements from an arm: first by the rules, then for lanes without a movement."""
     kinds = _kinds(arms, source, slips)
     served = set[int]()
     for index, kind in kinds.items():
@@ -137,9 +137,9 @@ def _movement(source: Arm, lane: LaneEnd, target: Arm, target_lane: LaneEnd, sli
 
 
 def _lanes(source: Arm, target: Arm, kind: LinkType, slip: bool) -> list[tuple[LaneEnd, LaneEnd]]:
-    """Pairs of lanes for one way: outermost to outermost to the right, innermost to innermost to the left.
+    """Returns the lane pairs of a movement: outermost to outermost to the right, innermost to innermost to the left.
 
-    Straight on, on ramps, and onto and off a ring the lanes go on side by side, counted from the kerb.
+    Straight on, on ramps, and onto and off a ring lanes continue side by side, counted from the kerb.
     """
     if kind is LinkType.STRAIGHT or slip or source.on_ring != target.on_ring:
         return list(zip(source.through, target.outgoing, strict=False))
@@ -149,13 +149,13 @@ def _lanes(source: Arm, target: Arm, kind: LinkType, slip: bool) -> list[tuple[L
 
 
 def _spare(arms: Sequence[Arm], source: Arm, place: int, kinds: Mapping[int, LinkType]) -> tuple[int, LaneEnd]:
-    """Where a lane leads that the rules leave over: straight on if possible, else beside the lane that turns.
+    """Returns the target of a lane without a movement: straight on if possible, else beside the lane that turns.
 
     Args:
-        arms: of the crossing.
-        source: the arm.
-        place: of the lane among its through lanes, counted from the kerb.
-        kinds: the ways on.
+        arms: arms of the crossing.
+        source: incoming arm.
+        place: index of the lane among its through lanes, counted from the kerb.
+        kinds: turn types by index of the target arm.
     """
     count = len(source.through)
     sides = [LinkType.RIGHT, LinkType.LEFT] if place + 0.5 < count / 2.0 else [LinkType.LEFT, LinkType.RIGHT]
@@ -166,29 +166,29 @@ def _spare(arms: Sequence[Arm], source: Arm, place: int, kinds: Mapping[int, Lin
             lanes, beside = lanes[::-1], count - 1 - place + (source.pocket is not None)
         else:
             beside = place
-        # A lane that ends in one of its own is better than one that merges, but nobody turns across the way ahead.
+        # a target lane of its own is better than a merge, but a movement must not cross those ahead
         rank = (kind is not LinkType.STRAIGHT, beside >= len(lanes), kind is not sides[0], index)
         options.append((rank, index, lanes[min(beside, len(lanes) - 1)]))
     _, index, lane = min(options)
     return index, lane
 
 
-# --- How much room a crossing takes: how far from its centre the lanes of each arm end, and the ways betw ------------
+# --- Room and paths --------------------------------------------------------------------------------------------------
 
 CORNER_RADIUS = 8.0
-"""Radius that a turn from arm to arm has at least [m]; the car itself turns within 5 m."""
+"""Smallest radius of a turn between arms [m]; the car itself turns within 5 m."""
 SLIP_RADIUS = 30.0
-"""Radius that the way onto or off a ramp has at least [m]."""
+"""Smallest radius of a movement onto or off a ramp [m]."""
 BEND_RADIUS = 20.0
-"""Radius that a way straight on has at least, where lanes do not lie opposite one another [m]."""
+"""Smallest radius of a straight movement between lanes that are not opposite each other [m]."""
 SMALLEST_TRIM = 11.0
-"""Distance from the centre of a junction to the ends of its lanes, at least [m]."""
+"""Smallest distance from the centre of a junction to the ends of its lanes [m]."""
 SMALLEST_RING_TRIM = 6.0
-"""The same on the ring of a roundabout and where a street meets it [m]."""
+"""The same on the ring of a roundabout and at the streets that meet it [m]."""
 CROSSWALK_ROOM = 4.0
-"""Distance from the ends of lanes to the edge of the road beside them [m], so that a crosswalk lies between."""
+"""Distance from the ends of lanes to the edge of the adjacent road [m], with room for a crosswalk."""
 GORE = 0.5
-"""The same where two arms have no way between them, as at a ramp [m]."""
+"""The same between arms without a movement between them, as at a ramp [m]."""
 _STEP, _STEPS = 0.5, 160
 _TOLERANCE = 1e-6
 _ROUNDING = math.radians(0.5)
@@ -196,7 +196,7 @@ _ROUNDING = math.radians(0.5)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MovementPath:
-    """A movement and its course through the crossing."""
+    """Movement with its path through the crossing."""
 
     movement: Movement
     path: Curve
@@ -209,11 +209,11 @@ class MovementPath:
 
 @dataclass(frozen=True, kw_only=True)
 class CrossingRoom:
-    """What a crossing takes.
+    """Room of a crossing.
 
     Attributes:
-        trims: distance from its centre to the ends of the lanes, for each arm [m].
-        ways: all ways through it.
+        trims: distance from its centre to the ends of the lanes of each arm [m].
+        ways: paths of all movements.
     """
 
     trims: tuple[float, ...]
@@ -221,10 +221,10 @@ class CrossingRoom:
 
 
 def make_room(crossing: Crossing, arms: Sequence[Arm], movements: Sequence[Movement]) -> CrossingRoom:
-    """Trims the arms until roads do not overlap beside the crossing and no way through it is too tight.
+    """Trims the arms until roads do not overlap beside the crossing and no path is too tight.
 
     Raises:
-        TownError: two arms are too close together, or a way stays too tight however far the arms are cut back.
+        TownError: two arms are too close to each other, or a path remains too tight.
     """
     _check_angles(crossing, arms, movements)
     least = SMALLEST_RING_TRIM if crossing.on_ring else SMALLEST_TRIM
@@ -256,7 +256,7 @@ def _check_angles(crossing: Crossing, arms: Sequence[Arm], movements: Sequence[M
 
 
 def _edge_room(angle: float, mine: float, its: float) -> float:
-    """How far from the centre an arm with an edge `mine` beside its line is clear of one with the edge `its` [m]."""
+    """Returns the distance from the centre at which an arm with edge `mine` is clear of one with edge `its` [m]."""
     if angle >= math.pi:
         return 0.0
     if angle >= math.pi / 2.0:
@@ -265,12 +265,12 @@ def _edge_room(angle: float, mine: float, its: float) -> float:
 
 
 def _turn_room(movement: Movement) -> tuple[float, float]:
-    """Trims of the two arms of a movement so that one arc of the wanted radius fits between their lanes [m]."""
+    """Returns the trims of both arms for which an arc of the wanted radius fits between the two lanes [m]."""
     radius = SLIP_RADIUS if movement.slip else CORNER_RADIUS
     angle = movement.target.leg.heading - movement.source.leg.heading
     a, b, c, s = movement.source_lane.offset, movement.target_lane.offset, math.cos(angle), math.sin(angle)
     tangent = radius * math.tan(abs(movement.turn) / 2.0)
-    # Where the lines of the two lanes meet, measured from the centre along each arm.
+    # intersection of both lanes, measured from the centre along each arm
     return (a * c - b) / s + tangent, (a - b * c) / s + tangent
 
 
@@ -282,7 +282,7 @@ def _wanted_radius(movement: Movement) -> float:
 
 
 def _ways(crossing: Crossing, movements: Sequence[Movement], trims: list[float]) -> tuple[MovementPath, ...]:
-    """The courses of all movements; `trims` grow until none is too tight."""
+    """Returns the paths of all movements; increases `trims` until none is too tight."""
     for _ in range(_STEPS):
         ways = [_way(movement, trims) for movement in movements]
         tight = [way for way in ways if way.path.smallest_radius < _wanted_radius(way.movement) - _TOLERANCE]

@@ -1,4 +1,4 @@
-"""Typed access to YAML nodes, where every mistake names the file, the line, the key and what to do."""
+"""Typed access to YAML nodes; errors name the file, the line, the key and the remedy."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from dorothie_gym.errors import TownError
 
 _NULL, _BOOL, _MERGE = (f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "merge"))
 _PLAIN_NUMBER = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?")
-"""What counts as a number: YAML 1.1 also reads 017 as 15, 12:30 as 750 and 1_0 as 10, which nobody means here."""
+"""Accepted numbers: YAML 1.1 would also read 017 as 15, 12:30 as 750 and 1_0 as 10, which is never intended."""
 _LISTED, _LONGEST = 12, 60
-"""How many known names a message lists, and how many characters of a value it shows."""
+"""Number of known names in a message, and of characters of a value."""
 
 
 @dataclass(frozen=True)
 class YamlEntry:
-    """A place in a YAML file.
+    """Position in a YAML file.
 
     Attributes:
-        source: the file, for messages.
-        element: what the place is called in messages ("street 'High Street'").
-        node: what stands there.
+        source: file name for messages.
+        element: name of the position in messages ("street 'High Street'").
+        node: YAML node.
     """
 
     source: str
@@ -36,15 +36,15 @@ class YamlEntry:
 
     @property
     def line(self) -> int:
-        """Line in the file, counted from 1."""
+        """Line number, starting at 1."""
         return int(self.node.start_mark.line) + 1
 
     def fail(self, reason: str) -> NoReturn:
-        """Raises the `TownError` of this place."""
+        """Raises a `TownError` for this position."""
         raise TownError(self.source, f"line {self.line}, {self.element}", reason)
 
     def named(self, element: str) -> YamlEntry:
-        """The same place under another name."""
+        """Returns the same position with another name."""
         return YamlEntry(self.source, element, self.node)
 
     def _child(self, node: yaml.Node, element: str) -> YamlEntry:
@@ -52,16 +52,16 @@ class YamlEntry:
 
     @property
     def is_mapping(self) -> bool:
-        """Whether keys and values stand here."""
+        """Whether the node is a mapping."""
         return isinstance(self.node, yaml.MappingNode)
 
     @property
     def is_sequence(self) -> bool:
-        """Whether a list stands here."""
+        """Whether the node is a list."""
         return isinstance(self.node, yaml.SequenceNode)
 
     def items(self, expected: str) -> list[tuple[YamlEntry, YamlEntry]]:
-        """Keys and values, in the order of the file; `expected` says in messages what should stand here."""
+        """Returns keys and values in the order of the file; `expected` describes the expected content in messages."""
         if not isinstance(self.node, yaml.MappingNode):
             self.fail(f"this must be {expected}, not {self.shown()}")
         pairs, seen = [], dict[str, int]()
@@ -77,7 +77,7 @@ class YamlEntry:
         return pairs
 
     def fields(self, allowed: Collection[str], required: Collection[str]) -> dict[str, YamlEntry]:
-        """Values of a mapping with known keys."""
+        """Returns the values of a mapping with known keys."""
         found = {}
         for key, value in self.items(f"keys and values ({', '.join(allowed)})"):
             name = key.text("a name")
@@ -92,26 +92,26 @@ class YamlEntry:
         return found
 
     def elements(self, expected: str) -> list[YamlEntry]:
-        """Elements of a list; `expected` says in messages what should stand here."""
+        """Returns the elements of a list; `expected` describes the expected content in messages."""
         if not isinstance(self.node, yaml.SequenceNode):
             self.fail(f"this must be {expected}, not {self.shown()}")
         return [self._child(node, self.element) for node in self.node.value]
 
     def names(self, expected: str) -> list[YamlEntry]:
-        """Elements of a list of names, which may be one name short of its brackets by mistake."""
+        """Returns the elements of a list of names; a single name gets advice about brackets."""
         if isinstance(self.node, yaml.ScalarNode) and self.node.value.strip():
             self.fail(f"this must be {expected}, not {self.shown()}; put it into brackets: [{self.node.value}]")
         return self.elements(expected)
 
     def pair(self, expected: str) -> tuple[YamlEntry, YamlEntry]:
-        """Elements of a list of two."""
+        """Returns the elements of a list of two."""
         elements = self.elements(expected)
         if len(elements) != 2:
             self.fail(f"this must be {expected}, not a list of {len(elements)}")
         return elements[0], elements[1]
 
     def text(self, expected: str) -> str:
-        """A text of one line as it is written, without spaces around it: `No` or `12` are fine as names."""
+        """Returns a text of one line as written, without surrounding spaces: `No` or `12` are valid names."""
         node = self.node
         if not isinstance(node, yaml.ScalarNode):
             self.fail(f"this must be {expected}, not {self.shown()}")
@@ -125,7 +125,7 @@ class YamlEntry:
         return value
 
     def choice(self, known: Collection[str], what: str, expected: str) -> str:
-        """One of the known names; `what` is what is named (junction, street)."""
+        """Returns one of the known names; `what` is the kind of name in messages (junction, street)."""
         name = self.text(expected)
         if name not in known:
             guess = closest(name, known)
@@ -134,7 +134,7 @@ class YamlEntry:
         return name
 
     def number(self, low: float, high: float, unit: str) -> float:
-        """A number in [low, high], in plain decimal digits."""
+        """Returns a number from `low` to `high` in plain decimal digits."""
         expected = f"a number of {unit} from {low:g} to {high:g}"
         node = self.node
         if not isinstance(node, yaml.ScalarNode) or not str(node.value).strip():
@@ -150,21 +150,21 @@ class YamlEntry:
         return float(value) + 0.0  # -0.0 is 0.0
 
     def whole(self, low: int, high: int, what: str) -> int:
-        """A whole number in [low, high] of what is counted."""
+        """Returns an integer from `low` to `high`."""
         value = self.number(low, high, what)
         if not value.is_integer():
             self.fail(f"this must be a whole number of {what} from {low} to {high}, not {self.shown()}")
         return int(value)
 
     def boolean(self) -> bool:
-        """True or false, in any of YAML's spellings."""
+        """Returns a boolean in any spelling of YAML."""
         node = self.node
         if not isinstance(node, yaml.ScalarNode) or node.tag != _BOOL:
             self.fail(f"this must be true or false, not {self.shown()}")
         return str(node.value).lower() in ("true", "yes", "on")
 
     def shown(self) -> str:
-        """What stands here, for messages."""
+        """Returns a description of the node for messages."""
         if self.is_mapping:
             return "keys and values"
         if self.is_sequence:
@@ -176,37 +176,37 @@ class YamlEntry:
 
 
 def closest(name: str, known: Iterable[str]) -> str | None:
-    """The known name that is most like `name`, whatever its capitals, or None where none comes near."""
+    """Returns the most similar known name regardless of case, or None."""
     by_folded = {other.casefold(): other for other in known}
     found = difflib.get_close_matches(name.casefold(), list(by_folded), n=1)
     return by_folded[found[0]] if found else None
 
 
 def listed(names: Collection[str]) -> str:
-    """Names in a row for a message, the first dozen of them."""
+    """Returns a list of names for messages, limited to the first dozen."""
     if not names:
         return "none"
     rest = len(names) - _LISTED
     return ", ".join(list(names)[:_LISTED]) + (f" and {rest} more" if rest > 0 else "")
 
 
-# --- A town file as text: found, decoded and parsed, or refused with the line and what to do -------------------------
+# --- Files -----------------------------------------------------------------------------------------------------------
 
 LARGEST_FILE = 1_000_000
-"""A file with more bytes is no town: a city of 500 lanes takes 10 kB."""
+"""Largest size of a town file [bytes]: a city of 500 lanes takes 10 kB."""
 DEEPEST = 20
-"""Lists within lists; the town language needs 7. libyaml overflows the stack of the process where they are many."""
+"""Largest nesting depth; the town language needs 7. libyaml overflows the process stack on deep nesting."""
 _UNPRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")
-"""Characters that YAML does not allow (YAML 1.1, section 4.1.1), and byte order marks in the middle of a file."""
+"""Characters that YAML does not allow (YAML 1.1, section 4.1.1), and byte order marks inside a file."""
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-"""libyaml's where PyYAML has it: the same lines in the marks, 15 times faster (16 ms instead of 300 ms for 60 kB)."""
+"""libyaml if PyYAML has it: identical line marks, 15 times faster (16 ms instead of 300 ms for 60 kB)."""
 
 
 def read_nodes(path: Path) -> YamlEntry:
-    """The top of a YAML file.
+    """Returns the root of a YAML file.
 
     Raises:
-        TownError: the file cannot be read, is no text, is empty or is not YAML.
+        TownError: the file cannot be read, is not text, is empty or is not YAML.
     """
     source = str(path)
     text = _text(path, source)
@@ -224,7 +224,7 @@ def read_nodes(path: Path) -> YamlEntry:
 
 
 def _fail(source: str, line: int, reason: str) -> NoReturn:
-    """Raises the error of a line, which is counted from 0 as YAML's marks are."""
+    """Raises the error of a line, numbered from 0 as in YAML marks."""
     raise TownError(source, f"line {line + 1}", reason)
 
 
@@ -246,7 +246,7 @@ def _text(path: Path, source: str) -> str:
 
 
 def _check_events(text: str, source: str) -> None:
-    """Refuses what would hang or crash the composer, or hide a mistake: depth, aliases, further documents."""
+    """Rejects deep nesting, aliases and further documents, which would crash the composer or hide mistakes."""
     depth, documents = 0, 0
     for event in yaml.parse(text, Loader=_LOADER):
         line = event.start_mark.line if event.start_mark else 0
@@ -265,7 +265,7 @@ def _check_events(text: str, source: str) -> None:
 
 
 def _explain(error: yaml.MarkedYAMLError, text: str, source: str) -> NoReturn:
-    """Raises a parser's error in words of the file."""
+    """Raises a parser error with advice in terms of the file."""
     lines = text.splitlines() or [""]
     mark = error.problem_mark or error.context_mark
     line = min(mark.line if mark else 0, len(lines) - 1)

@@ -1,4 +1,4 @@
-"""What a town file says, read and checked for names, before any geometry: the schema writes it, the layout reads it."""
+"""Plan of a YAML town: contents of a file with validated names, before any geometry."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from dorothie_gym.maps.yaml.nodes import YamlEntry
 
 @dataclass(frozen=True, kw_only=True)
 class Bend:
-    """A plain point of a street's course: where it is [m] and how high, or None where the height follows on."""
+    """Point of a street's course besides junctions: position [m], and height [m] or None to interpolate."""
 
     at: Point
     height: float | None = None
 
 
 CourseStep: TypeAlias = "str | Bend"
-"""A step of a street's course: a junction's name or a point that bends the street."""
+"""Step of a street's course: name of a junction, or a point that bends the street."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RoundaboutPlan:
-    """A ring instead of a plain junction: radius of its middle line [m], lanes on it, speed limit [km/h]."""
+    """Roundabout: radius of the middle line [m], number of lanes, speed limit [km/h]."""
 
     radius: float
     lanes: int
@@ -33,15 +33,15 @@ class RoundaboutPlan:
 
 @dataclass(frozen=True, kw_only=True)
 class JunctionPlan:
-    """A junction as it is written.
+    """Junction in a plan.
 
     Attributes:
-        id: its place in the list.
-        name: in the file.
+        id: index in the list.
+        name: name in the file.
         centre: [m].
         height: [m].
-        roundabout: the ring that stands for it, or None.
-        entry: where it is written.
+        roundabout: roundabout, or None for a plain junction.
+        entry: position in the file.
     """
 
     id: int
@@ -54,22 +54,22 @@ class JunctionPlan:
 
 @dataclass(frozen=True, kw_only=True)
 class StreetPlan:
-    """A street as it is written.
+    """Street in a plan.
 
     Attributes:
-        id: its place in the list.
-        name: as people call it.
-        course: junctions and points; the first and last step are junctions (they may be the same one: a ring).
+        id: index in the list.
+        name: name of the street.
+        course: junctions and points; the first and last step are junctions, possibly the same one (a ring).
         forward: lanes along the course, at least 1.
         backward: lanes against it; 0 makes the street one-way.
-        median: width of what lies between the directions [m].
+        median: width of the median [m].
         turn_lanes: names of the junctions before which a left-turn lane opens in the median.
-        ramp: whether it is a ramp: one-way, it leaves and joins other streets at their right side, at a small angle.
-        speed: limit [km/h].
-        width: of a lane [m].
-        radius: of its bends [m], or None for the largest that fits.
-        sidewalk: width of the pavement on either side [m]; 0 for none.
-        entry: where it is written.
+        ramp: whether it is a ramp: one-way, leaves and joins other streets on their right at a small angle.
+        speed: speed limit [km/h].
+        width: width of a lane [m].
+        radius: radius of its bends [m], or None for the largest that fits.
+        sidewalk: width of the pavements on both sides [m]; 0 for none.
+        entry: position in the file.
     """
 
     id: int
@@ -89,9 +89,9 @@ class StreetPlan:
 
 @dataclass(frozen=True, kw_only=True)
 class GreenPlan:
-    """A phase of a light programme as it is written: streets that have green (all their approaches) and how long [s].
+    """Phase of a light programme in a plan: streets with green on all approaches, and duration [s].
 
-    `left_only` holds the names of those streets of which only the left-turn lanes have green.
+    `left_only` holds the names of the streets with green for the left-turn lanes only.
     """
 
     streets: tuple[str, ...]
@@ -101,7 +101,7 @@ class GreenPlan:
 
 @dataclass(frozen=True, kw_only=True)
 class LightsPlan:
-    """Lights of a junction: written phases, or none for a programme that is derived; offset of its start [s]."""
+    """Lights of a junction: explicit phases, or none for a generated programme; offset of its start [s]."""
 
     junction: str
     phases: tuple[GreenPlan, ...] = ()
@@ -111,17 +111,17 @@ class LightsPlan:
 
 @dataclass(frozen=True, kw_only=True)
 class TownPlan:
-    """A town as it is written; names are known to be right, the geometry is not checked yet.
+    """Plan of a town with validated names; the geometry is not checked yet.
 
     Attributes:
-        name: of the town.
-        junctions: by name.
-        streets: in order.
+        name: name of the town.
+        junctions: junctions by name.
+        streets: streets in the order of the file.
         lights: junctions with traffic lights, none of them a roundabout.
-        stops: pairs of a junction's name and the street whose approaches have a stop sign there.
+        stops: pairs of a junction name and a street whose approaches have a stop sign there.
         yields: the same for yield signs.
-        crosswalks: pairs of a junction's name and the street that is crossed there.
-        sites: places where landmarks stand [m], or none: then they are laid out automatically.
+        crosswalks: pairs of a junction name and the street that is crossed there.
+        sites: positions of landmarks [m]; empty to place them automatically.
     """
 
     name: str

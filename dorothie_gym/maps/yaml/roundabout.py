@@ -1,4 +1,4 @@
-"""Roundabouts: a ring of one-way stretches through one crossing for each street that meets it."""
+"""Roundabouts: a ring of one-way stretches with one crossing for each street that meets it."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from dorothie_gym.maps.yaml.plan import JunctionPlan, StreetPlan
 from dorothie_gym.maps.yaml.stretches import Crossing, CrossSection, StreetRun, Stretch
 
 SMALLEST_RING = 8.0
-"""Radius of the innermost lane of a ring, at least [m]: cars have to come round without stopping."""
+"""Smallest radius of the innermost lane of a ring [m], for traffic that does not stop."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ring:
-    """A roundabout, laid out.
+    """Layout of a roundabout.
 
     Attributes:
-        street: its own street, named as the junction; its lanes and the pavement around it are as wide as the widest of
-            those that meet it.
-        crossings: one for each end of a run that meets it, clockwise.
-        ends: for each crossing the run that meets it there, and whether that one starts there.
-        stretches: between the crossings.
+        street: street with the name of the junction; lanes and pavement are as wide as the widest of the streets that
+            meet it.
+        crossings: one for each end of a run at the ring, clockwise.
+        ends: for each crossing the index of the run, and whether the run starts there.
+        stretches: stretches between the crossings.
     """
 
     street: StreetPlan
@@ -33,7 +33,7 @@ class Ring:
 
 
 def lay_ring(junction: JunctionPlan, runs: Sequence[StreetRun], *, street_id: int, crossing_id: int) -> Ring:
-    """Lays out a roundabout; traffic drives round it counter-clockwise as seen on a map.
+    """Lays out a roundabout; traffic circulates counter-clockwise as seen on a map.
 
     Args:
         junction: a junction with a roundabout.
@@ -97,7 +97,7 @@ def lay_ring(junction: JunctionPlan, runs: Sequence[StreetRun], *, street_id: in
 def _ring_stretch(
     street: StreetPlan, start: Crossing, end: Crossing, from_: float, to: float, radius: float
 ) -> Stretch:
-    """The piece of the ring from one bearing [rad] back to a smaller one, or once round."""
+    """Returns the stretch of the ring from one bearing [rad] back to a smaller one, or the full circle."""
     angle = (from_ - to) % (2.0 * math.pi) if start is not end else 2.0 * math.pi
     arc = CurveSegment(*start.centre, from_ - math.pi / 2.0, radius * angle, -1.0 / radius)
     return Stretch(

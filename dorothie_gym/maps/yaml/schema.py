@@ -1,7 +1,7 @@
-"""The town language: what a YAML town may say, read into a checked plan.
+"""Schema of the YAML town language: reads a file into a validated plan.
 
-The whole language is told in docs/towns.md. What is checked here needs no geometry: keys, types, ranges, names, and
-whether things that are named together go together; whether it all fits into its place is the layout's question.
+docs/towns.md describes the language. The checks here need no geometry: keys, types, ranges, names, and references
+between elements. The layout checks whether everything fits geometrically.
 
 A village::
 
@@ -34,23 +34,23 @@ from dorothie_gym.maps.yaml.streets import (
     pavement,
     point,
     read_street,
+    shown,
     speed,
-    told,
 )
 
 LIGHTS_KEYS = ("at", "offset", "phases")
 PHASE_KEYS = ("green", "left", "seconds")
 SECONDS = (3.0, 300.0)
-"""Length of a phase [s]."""
+"""Range of phase durations [s]."""
 OFFSET = (0.0, 600.0)
-"""Start of a programme [s]."""
+"""Range of programme offsets [s]."""
 
 Junctions: TypeAlias = Mapping[str, JunctionPlan]
 Pairs: TypeAlias = tuple[tuple[str, StreetPlan], ...]
 
 
 def read_lights(entry: YamlEntry, junctions: Junctions, streets: Sequence[StreetPlan]) -> tuple[LightsPlan, ...]:
-    """Reads the traffic lights, each a junction's name or a mapping.
+    """Reads the traffic lights, each given by a junction name or a mapping.
 
     Raises:
         TownError: with the line and what to do.
@@ -103,14 +103,14 @@ def read_crosswalks(entry: YamlEntry, junctions: Junctions, streets: Sequence[St
     pairs = _pairs(entry, junctions, streets)
     for element, _, street in pairs:
         if street.ramp:
-            element.fail(f"{street.name!r} is a ramp, which nobody crosses on foot; remove it or name another street")
+            element.fail(f"{street.name!r} is a ramp, which has no crosswalks; remove it or name another street")
     return tuple((name, street) for _, name, street in pairs)
 
 
 def _pairs(
     entry: YamlEntry, junctions: Junctions, streets: Sequence[StreetPlan]
 ) -> tuple[tuple[YamlEntry, str, StreetPlan], ...]:
-    """Pairs [junction, street] and where they are written."""
+    """Reads pairs [junction, street], with their positions in the file."""
     by_name = {street.name: street for street in streets}
     found: dict[tuple[str, str], YamlEntry] = {}
     for element in entry.elements("a list of [junction, street]"):
@@ -190,16 +190,16 @@ def _green(
     return tuple(found)
 
 
-# --- The town language: what a YAML town may say, read into a checked plan -------------------------------------------
+# --- Whole town ------------------------------------------------------------------------------------------------------
 
 TOWN_KEYS = (
     "name", "speed", "width", "sidewalk", "junctions", "streets", "lights", "stops", "yields", "crosswalks", "sites",
 )  # fmt: skip
 JUNCTION_KEYS = ("at", "roundabout", "lanes", "speed")
 ROUNDABOUT_SPEED = 30.0
-"""Speed limit on a roundabout where none is given [km/h], if the town's own is not lower."""
+"""Default speed limit of roundabouts [km/h], unless that of the town is lower."""
 ROUNDABOUT_RADIUS = (8.0, 150.0)
-"""Radius of a ring's middle line [m]."""
+"""Range of radii of the middle line of a ring [m]."""
 ROUNDABOUT_LANES = (1, 3)
 
 
@@ -255,7 +255,7 @@ def _junctions(entry: YamlEntry, defaults: StreetDefaults) -> dict[str, Junction
 
 
 def _junction(entry: YamlEntry, defaults: StreetDefaults) -> tuple[Bend, RoundaboutPlan | None]:
-    """Where a junction is, and its ring."""
+    """Reads the position of a junction, and its roundabout if it has one."""
     if not entry.is_mapping:
         return point(entry), None
     element = entry.element
@@ -280,7 +280,7 @@ def _sites(entry: YamlEntry) -> tuple[tuple[Point, YamlEntry], ...]:
         bend = point(element, flat=True)
         place = bend.at
         if place in sites:
-            element.fail(f"{told(bend)} is there twice (first in line {sites[place].line}); remove one")
+            element.fail(f"{shown(bend)} is there twice (first in line {sites[place].line}); remove one")
         sites[place] = element
     if not sites:
         entry.fail("there is no site; add one, or remove the key to have them laid out")

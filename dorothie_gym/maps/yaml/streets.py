@@ -1,4 +1,4 @@
-"""The `streets` of a town file: courses through junctions and points, lanes, medians, turn lanes and ramps."""
+"""Reader of the streets of a town file: courses through junctions and points, lanes, medians, turn lanes and ramps."""
 
 from __future__ import annotations
 
@@ -13,53 +13,53 @@ STREET_KEYS = (
     "through", "lanes", "one_way", "ramp", "median", "turn_lanes", "speed", "width", "radius", "sidewalk",
 )  # fmt: skip
 SPEED = (5.0, 130.0)
-"""Speed limits [km/h]."""
+"""Range of speed limits [km/h]."""
 WIDTH = (2.5, 6.0)
-"""Of a lane [m]."""
+"""Range of lane widths [m]."""
 SIDEWALK = (0.0, 10.0)
-"""Of a pavement [m]."""
+"""Range of pavement widths [m]."""
 MEDIAN = (0.0, 50.0)
-"""Between the directions [m]."""
+"""Range of median widths [m]."""
 LANES = (1, 4)
-"""In one direction."""
+"""Range of lane counts in one direction."""
 RADIUS = (1.0, 20_000.0)
-"""Of a street's bends [m]."""
+"""Range of radii of bends [m]."""
 FAR = 20_000.0
-"""Coordinates are not larger than this [m]."""
+"""Largest coordinate [m]."""
 HEIGHT = (-500.0, 9000.0)
-"""From the shore of the Dead Sea to the top of Everest [m]."""
+"""Range of heights [m], from the shore of the Dead Sea to the top of Everest."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StreetDefaults:
-    """What a street has where neither it nor the town says otherwise: speed limit [km/h], widths [m]."""
+    """Default properties of streets: speed limit [km/h], widths [m]."""
 
     speed: float = 40.0
     width: float = 3.5
     sidewalk: float = 2.0
 
     def replaced(self, key: str, value: float) -> StreetDefaults:
-        """The same but for one value."""
+        """Returns a copy with one value replaced."""
         return dataclasses.replace(self, **{key: value})
 
 
 def speed(entry: YamlEntry) -> float:
-    """A speed limit [km/h]."""
+    """Reads a speed limit [km/h]."""
     return entry.number(*SPEED, "km/h")
 
 
 def lane_width(entry: YamlEntry) -> float:
-    """The width of a lane [m]."""
+    """Reads the width of a lane [m]."""
     return entry.number(*WIDTH, "metres")
 
 
 def pavement(entry: YamlEntry) -> float:
-    """The width of a pavement [m]."""
+    """Reads the width of a pavement [m]."""
     return entry.number(*SIDEWALK, "metres")
 
 
 def point(entry: YamlEntry, *, flat: bool = False) -> Bend:
-    """A point [x, y] or, if not `flat`, [x, y, height] [m]."""
+    """Reads a point `[x, y]` or, unless `flat`, `[x, y, height]` [m]."""
     expected = "a point [x, y] in metres" if flat else "a point [x, y] or [x, y, height] in metres"
     numbers = entry.elements(expected)
     if len(numbers) not in ((2,) if flat else (2, 3)):
@@ -71,7 +71,7 @@ def point(entry: YamlEntry, *, flat: bool = False) -> Bend:
 def read_street(
     k: int, key: YamlEntry, value: YamlEntry, junctions: Mapping[str, JunctionPlan], defaults: StreetDefaults
 ) -> StreetPlan:
-    """Reads the street with number `k`.
+    """Reads the street with index `k`.
 
     Raises:
         TownError: with the line, the street and what to do.
@@ -111,7 +111,7 @@ def read_street(
 
 
 def approaches(street: StreetPlan, junction: str) -> bool:
-    """Whether a direction of the street leads to the junction (a one-way street only leaves the one it starts at)."""
+    """Returns whether a direction of the street leads to a junction (a one-way street only leaves its first one)."""
     return junction in street.course[1:] or (street.backward > 0 and junction in street.course[:-1])
 
 
@@ -124,23 +124,25 @@ def _course(entry: YamlEntry, junctions: Mapping[str, JunctionPlan]) -> tuple[Co
             else element.choice(junctions, "junction", "the name of a junction or a point [x, y]")
         )
         if course and course[-1] == step:
-            element.fail(f"{told(step)} comes twice in a row; remove one")
+            element.fail(f"{shown(step)} comes twice in a row; remove one")
         course.append(step)
     if len(course) < 2:
         entry.fail("it runs nowhere; name at least the two junctions where it starts and ends")
     for end, where in ((course[0], "starts"), (course[-1], "ends")):
         if not isinstance(end, str):
-            entry.fail(f"it {where} at {told(end)}, which is no junction: dead ends are not supported; name a junction")
+            entry.fail(
+                f"it {where} at {shown(end)}, which is no junction: dead ends are not supported; name a junction"
+            )
     return tuple(course)
 
 
-def told(step: CourseStep) -> str:
-    """A step of a course, for messages."""
+def shown(step: CourseStep) -> str:
+    """Returns a step of a course for messages."""
     return repr(step) if isinstance(step, str) else f"[{step.at[0]:g}, {step.at[1]:g}]"
 
 
 def _lanes(fields: Mapping[str, YamlEntry], *, ramp: bool) -> tuple[int, int]:
-    """Lanes along the course and against it."""
+    """Reads the numbers of lanes along the course and against it."""
     one_way = fields["one_way"].boolean() if "one_way" in fields else ramp
     if ramp and not one_way:
         fields["one_way"].fail("a ramp has one direction; remove this key, or the key 'ramp'")
@@ -172,7 +174,7 @@ def _turn_lanes(
         if name not in on_course:
             element.fail(f"the street does not run through {name!r}; it does through {', '.join(on_course)}")
         if junctions[name].roundabout:
-            element.fail(f"{name!r} is a roundabout, where nobody turns left; remove it here")
+            element.fail(f"{name!r} is a roundabout, which has no left turns; remove it here")
         if name in found:
             element.fail(f"{name!r} is there twice; remove one")
         found.append(name)
@@ -180,7 +182,7 @@ def _turn_lanes(
 
 
 def _check_room(entry: YamlEntry, *, backward: int, median: float, width: float) -> None:
-    """Turn lanes lie in the median."""
+    """Checks that turn lanes fit into the median."""
     if not backward:
         entry.fail("a one-way street has no median for turn lanes; remove them, or the key 'one_way' or 'ramp'")
     if median < width:

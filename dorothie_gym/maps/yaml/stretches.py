@@ -1,4 +1,4 @@
-"""Streets cut into stretches at the crossings that they run through."""
+"""Streets divided into stretches at their crossings."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from dorothie_gym.maps.yaml.plan import Bend, JunctionPlan, StreetPlan, TownPlan
 
 @dataclass(frozen=True, eq=False)
 class CrossSection:
-    """The cross-section of a street, seen along its course; offsets are positive to the right [m].
+    """Cross-section of a street in the direction of its course; offsets are positive to the right [m].
 
-    A two-way street has its median in the middle of the line, a one-way street the middle of its lanes.
+    The line is the middle of the median of a two-way street, and the middle of the lanes of a one-way street.
     """
 
     street: StreetPlan
@@ -44,37 +44,37 @@ class CrossSection:
 
     @property
     def pocket(self) -> float:
-        """Offset of the left-turn lane that opens in the median for the lanes along the course [m]."""
+        """Offset of the left-turn lane in the median for the lanes along the course [m]."""
         return (self.street.median - self.street.width) / 2.0
 
     def edge(self, to_the_right: bool) -> float:
-        """Distance from the line to the edge of the road on one side [m]."""
+        """Returns the distance from the line to the edge of the road on one side [m]."""
         return self.right if to_the_right else self.left
 
     def side(self, to_the_right: bool) -> float:
-        """Distance from the line to the outer end of the pavement on one side [m]."""
+        """Returns the distance from the line to the outer edge of the pavement on one side [m]."""
         return self.edge(to_the_right) + self.street.sidewalk
 
     def tightest(self, to_the_right: bool, lane_radius: float) -> float:
-        """Radius that the line needs in a bend to one side so that the lane inside still has `lane_radius` [m]."""
+        """Returns the line's radius in a bend to one side for which the inner lane has the radius `lane_radius` [m]."""
         edge = self.edge(to_the_right)
-        # The pavement needs a little radius of its own, too.
+        # the pavement needs some radius as well
         return max(lane_radius + edge - self.street.width / 2.0, edge + max(self.street.sidewalk, 0.5) + 0.5)
 
 
-# --- Streets cut into stretches at the crossings that they run through -----------------------------------------------
+# --- Stretches -------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Crossing:
-    """Where stretches meet: a junction, or the place where one street meets the ring of a roundabout.
+    """Meeting point of stretches: a junction, or the point where a street meets the ring of a roundabout.
 
     Attributes:
-        id: of the town's junction.
-        name: of the junction; on a ring with a number ("circus/1").
+        id: id of the junction of the town.
+        name: name of the junction; on a ring with a number ("circus/1").
         centre: [m].
         height: [m].
-        plan: the junction as it is written.
+        plan: junction in the plan.
     """
 
     id: int
@@ -85,21 +85,21 @@ class Crossing:
 
     @property
     def on_ring(self) -> bool:
-        """Whether it is a part of a roundabout."""
+        """Whether it belongs to a roundabout."""
         return self.plan.roundabout is not None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stretch:
-    """A piece of street from one crossing to the next.
+    """Part of a street from one crossing to the next.
 
     Attributes:
-        street: the street it belongs to.
-        section: its lanes.
+        street: street in the plan.
+        section: cross-section.
         start, end: crossings.
-        corners: polyline from centre to centre [m]; on a ring its two ends.
-        heights: of the corners, None where the height follows on [m].
-        arc: the piece of a ring that it is, from centre to centre, or None.
+        corners: polyline between the centres of both crossings [m]; on a ring its two ends.
+        heights: heights of the corners, None to interpolate [m].
+        arc: arc of the ring between both centres, or None.
     """
 
     street: StreetPlan
@@ -111,15 +111,15 @@ class Stretch:
     arc: CurveSegment | None = None
 
     def label(self) -> str:
-        """What it is called in messages."""
+        """Returns its name in messages."""
         return f"between {self.start.name!r} and {self.end.name!r}"
 
     def crossing(self, at_start: bool) -> Crossing:
-        """The crossing at one of its ends."""
+        """Returns the crossing at one end."""
         return self.start if at_start else self.end
 
     def leg(self, at_start: bool) -> CurveSegment:
-        """Its first piece, seen from the crossing at one of its ends outwards."""
+        """Returns its first segment outwards from the crossing at one end."""
         if self.arc is not None:
             return self.arc if at_start else self.arc.reversed()
         return line(*self.corners[:2]) if at_start else line(self.corners[-1], self.corners[-2])
@@ -127,7 +127,7 @@ class Stretch:
 
 @dataclass(frozen=True, kw_only=True)
 class StreetRun:
-    """A stretch before roundabouts are laid out: its street, its two junctions, and the points between."""
+    """Stretch before the layout of roundabouts: street, two junctions, and the points between them."""
 
     street: StreetPlan
     start: JunctionPlan
@@ -135,20 +135,20 @@ class StreetRun:
     bends: tuple[Bend, ...]
 
     def junction(self, at_start: bool) -> JunctionPlan:
-        """The junction at one of its ends."""
+        """Returns the junction at one end."""
         return self.start if at_start else self.end
 
     def towards(self, at_start: bool) -> Point:
-        """The point next to the junction at one of its ends [m]."""
+        """Returns the point next to the junction at one end [m]."""
         points = [self.start.centre, *(bend.at for bend in self.bends), self.end.centre]
         return points[1] if at_start else points[-2]
 
 
 def split(plan: TownPlan) -> list[StreetRun]:
-    """Cuts the streets of a plan at their junctions.
+    """Divides the streets of a plan at their junctions.
 
     Raises:
-        TownError: two points of a course are as good as the same.
+        TownError: two points of a course are (almost) equal.
     """
     return [run for street in plan.streets for run in _runs(street, plan.junctions)]
 
@@ -175,7 +175,7 @@ def _check_points(run: StreetRun) -> None:
 
 
 def stretch_of(run: StreetRun, start: Crossing, end: Crossing) -> Stretch:
-    """The stretch of a run between two crossings."""
+    """Returns the stretch of a run between two crossings."""
     return Stretch(
         street=run.street,
         section=CrossSection(run.street),
