@@ -1,4 +1,4 @@
-"""How fast the closest lane is found: the grid index against highway-env's scan, on the same points."""
+"""Speed of the closest-lane lookup: the grid index against highway-env's scan, on the same points."""
 
 import json
 import statistics

@@ -1,4 +1,4 @@
-"""Runs `dorothie-gym bench` and keeps the figures, with the date, in `benchmarks/results/NAME.json`."""
+"""Runs `dorothie-gym bench` and stores the figures with the date in `benchmarks/results/NAME.json`."""
 
 import datetime
 import json
@@ -23,7 +23,7 @@ def main(
     names: Annotated[list[str] | None, typer.Argument(help=f"of {', '.join(BENCHMARKS)}; by default all")] = None,
     charts: Annotated[Path | None, typer.Option(help="folder for charts, bench_NAME.png")] = None,
 ) -> None:
-    """Measures one after another; leave the machine alone meanwhile."""
+    """Runs the benchmarks one after another; the machine should be idle."""
     RESULTS.mkdir(exist_ok=True)
     for name in names or list(BENCHMARKS):
         if name not in BENCHMARKS:

@@ -1,4 +1,4 @@
-"""How fast a town is there: compiled from its file, and from the cache, each time in a process of its own."""
+"""Loading time of towns: compiled from the file and read from the cache, each in a new process."""
 
 import json
 import os
@@ -15,7 +15,7 @@ from rich.table import Table
 from dorothie_gym.maps import load_town, town_names
 from dorothie_gym.user_cache import CACHE_VARIABLE
 
-# The clock starts when the package is there: importing numpy and the town package is the same for both.
+# The clock starts after the imports, which are the same for both.
 LOAD = """
 import sys, time
 from dorothie_gym.maps import load_town
@@ -56,7 +56,7 @@ def main(
 
 
 def seconds(town: str, cache: str) -> float:
-    """Time that a new process takes to load a town; `cache` is the cache folder, or empty for none."""
+    """Returns the time of a new process to load a town; `cache` is the cache folder, or empty for none."""
     command = [sys.executable, "-c", LOAD, town]
     environment = {**os.environ, CACHE_VARIABLE: cache}
     return float(subprocess.run(command, env=environment, capture_output=True, check=True, text=True).stdout)

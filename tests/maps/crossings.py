@@ -1,4 +1,4 @@
-"""Junctions drawn by hand for the tests: arms that meet in a point, or lanes one by one."""
+"""Hand-made junctions for tests: arms that meet in a point, or individual lanes."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def turn_of(change: float, *, alone: bool = True) -> LinkType:
 
 
 def meeting(*arms: Arm, radius: float = 15.0, forbidden: Iterable[tuple[int, int]] = ()) -> Crossing:
-    """A junction of arms; `forbidden` are pairs of arms that one may not go between."""
+    """Junction of arms; `forbidden` are pairs of arms without a movement between them."""
     lanes: list[Lane] = []
     places: dict[tuple[str, int, int], Lane] = {}
     for a, arm in enumerate(arms):
@@ -152,7 +152,7 @@ def town_of(
     links: Iterable[tuple[int, int, LinkType]],
     signs: Mapping[int, SignalKind] | None = None,
 ) -> Town:
-    """A town of lanes one by one, each with its junction (-1 for none); `signs` stand at the ends of lanes."""
+    """Town of individual lanes, each with its junction (-1 for none); `signs` stand at the ends of lanes."""
     lanes = [lane(k, points, junction) for k, (junction, points) in enumerate(lines)]
     numbers = sorted({lane.junction_id for lane in lanes if lane.in_junction})
     return Town(

@@ -1,4 +1,4 @@
-"""Small towns to find routes in, and what has to hold for a route."""
+"""Small towns for route search, and checks of routes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def small_town(
     connectors: dict[int, int] | None = None,
     limits: dict[int, float] | None = None,
 ) -> Town:
-    """A town of lanes along some points; `connectors` tells the junctions of lanes, `limits` speeds [km/h]."""
+    """Town of lanes along given points; `connectors` are the junctions of lanes, `limits` speed limits [km/h]."""
     connectors, limits = connectors or {}, limits or {}
     lanes = [
         Lane(
@@ -59,7 +59,7 @@ def two_lanes(length: float) -> Town:
 
 
 def turn_lane(pocket: float, before: float = 100.0) -> Town:
-    """A road (0) that goes on beside a turn lane (2) from which alone one turns left; 1 leads straight on.
+    """Road (0) that continues beside a turn lane (2), the only lane with a left turn; 1 leads straight on.
 
     Lanes 3 and 4 are the connectors straight on and to the left, 5 and 6 the lanes behind the junction.
     """
@@ -117,7 +117,7 @@ def check_drivable(town: Town, route: Route, start: Place, goal: Place) -> None:
 
 
 def check_change(town: Town, one: Leg, two: Leg) -> float:
-    """A lane change has the room that the planner asks for, on both lanes; tells about how long it is [m]."""
+    """Checks the room for a lane change on both lanes; returns its approximate length [m]."""
     lane, target = town.lanes[one.lane], town.lanes[two.lane]
     assert lane.length - (one.end - CHANGE_LEAD) >= SHORT_CHANGE - 1e-6
     assert not lane.in_junction

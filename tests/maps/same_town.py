@@ -1,4 +1,4 @@
-"""Whether two towns are the same one, to the last bit; and a town that has something of everything."""
+"""Bitwise comparison of towns, and a town with every kind of element."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from dorothie_gym.maps.cache import PARTS
 
 
 def bits(value: Any) -> Any:
-    """A value in a form that is equal only if every bit, every shape and every type of it is."""
+    """Converts a value to a form that is equal only if all bits, shapes and types are equal."""
     if dataclasses.is_dataclass(value):
         return type(value).__name__, [(f.name, bits(getattr(value, f.name))) for f in dataclasses.fields(value)]
     if isinstance(value, np.ndarray):
@@ -46,7 +46,7 @@ def town_bits(town: Town) -> Any:
 
 
 def town_with_everything() -> Town:
-    """A town that makes no sense as a place, but has every kind of part, and numbers that are easily bent."""
+    """Returns a town with every kind of element, and with numbers that are sensitive to rounding."""
     ahead = np.array([[0.1 + 0.2, -0.0, 1e-300], [30.0, 1 / 3, 2.5], [60.0, np.pi, 5.0]])
     lanes = [
         Lane(id=0, road_id=3, lane_id=-1, points=ahead, widths=np.array([3.5, 3.4, 0.1]), speed_limit=50 / 3.6),

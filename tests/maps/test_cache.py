@@ -222,7 +222,7 @@ def test_a_file_that_changes_while_it_is_compiled_is_not_kept(path: Path, folder
     assert not folder.exists()
 
 
-def test_a_file_at_fault_is_told_under_its_own_path_every_time(tmp_path: Path, folder: Path) -> None:
+def test_an_invalid_file_is_reported_under_its_own_path_every_time(tmp_path: Path, folder: Path) -> None:
     for name in ("first.yaml", "second.yaml", "first.yaml"):
         bad = tmp_path / name
         bad.write_text("junctions: [")

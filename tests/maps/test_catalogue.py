@@ -51,12 +51,12 @@ def test_opendrive_files_are_read() -> None:
 
 
 @pytest.mark.parametrize("name", ["brokside", "town.json", ""])
-def test_an_unknown_town_is_told_with_what_there_is(name: str) -> None:
+def test_an_unknown_town_is_reported_with_the_known_towns(name: str) -> None:
     with pytest.raises(TownError, match=r"no such town; known towns are .*brookside.*\.xodr or \.yaml"):
         load_town(name)
 
 
 @pytest.mark.parametrize("name", ["missing.yaml", "missing.xodr"])
-def test_a_missing_file_is_told(tmp_path: Path, name: str) -> None:
+def test_a_missing_file_is_reported(tmp_path: Path, name: str) -> None:
     with pytest.raises(TownError, match=rf"{name}: file: cannot be read \(No such file or directory\)"):
         load_town(tmp_path / name)

@@ -1,4 +1,4 @@
-"""The page about towns: its examples compile, its message is the real one, its tables tell the keys as they are."""
+"""Page about towns: the examples compile, the message is the real one, and the tables agree with the code."""
 
 import math
 import re
@@ -129,13 +129,13 @@ def test_the_tables_tell_ranges_and_defaults(heading: str, key: str, limits: tup
     assert told.startswith(default)
 
 
-def test_the_page_tells_the_figures_of_the_layout() -> None:
+def test_the_page_states_the_figures_of_the_layout() -> None:
     low, high = (math.degrees(angle) for angle in (ramps.SMALLEST_ANGLE, ramps.LARGEST_ANGLE))
     for told in (
-        f"{clearance.HEADROOM:g} m or more above",
+        f"at least {clearance.HEADROOM:g} m above",
         f"at most {100 * heights.STEEPEST:.0f} %",
-        f"they open {layout.POCKET_LENGTH:.0f} m before",
-        f"{site_places.FARTHEST_SITE:.0f} m from the kerb lane at most",
+        f"They open {layout.POCKET_LENGTH:.0f} m before",
+        f"at most {site_places.FARTHEST_SITE:.0f} m from the kerb lane",
         f"at {low:.0f} to {high:.0f} degrees",
     ):
         assert told in PAGE.replace("\n", " "), told

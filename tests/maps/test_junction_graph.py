@@ -76,7 +76,7 @@ def test_a_way_along_one_road_is_as_long_as_the_lane_that_leads_there(name: str)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_ways_tell_their_roads_and_street(name: str) -> None:
+def test_paths_list_their_roads_and_street(name: str) -> None:
     town, graph = town_of(name), graph_of(name)
     roads = {lane.road_id: lane for lane in town.lanes if not lane.in_junction}
     for ids, street, length in zip(graph.roads, graph.streets, graph.lengths, strict=True):

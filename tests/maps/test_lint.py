@@ -1,4 +1,4 @@
-"""Each fault is made by damaging a sound town: exactly that fault has to be found, where it was made."""
+"""Each test damages a sound town and expects exactly that fault at that place."""
 
 from __future__ import annotations
 
@@ -227,7 +227,7 @@ class TestPromises:
             assert faults == ()
 
     @pytest.mark.parametrize("kind", [SignalKind.TRAFFIC_LIGHT, SignalKind.STOP, SignalKind.YIELD])
-    def test_a_sign_that_nobody_has_to_heed(self, kind: SignalKind) -> None:
+    def test_a_sign_that_applies_to_no_lane(self, kind: SignalKind) -> None:
         sign = Signal(id=99, kind=kind, position=(3.0, 4.0, 2.0), heading=0.0)
         (fault,) = only(check_town(rebuilt(ring(), signals=[sign])), FaultKind.SIGNAL)
         assert fault.position == (3.0, 4.0) and "99 rules no lane" in fault.message

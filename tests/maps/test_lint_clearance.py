@@ -1,4 +1,4 @@
-"""Kerbs that lanes run over, and lanes in each other's way; faults are made as in `test_check`."""
+"""Lanes across kerbs and overlapping lanes; faults are made as in `test_lint`."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class TestKerbs:
         else:
             assert faults == ()
 
-    def test_a_pavement_on_a_bridge_is_in_nobodys_way(self) -> None:
+    def test_a_pavement_on_a_bridge_is_no_fault(self) -> None:
         street = a_street()
         path = Sidewalk(id=0, points=street.points + np.array([0.0, 0.0, 6.0]), width=2.0)
         assert check_town(rebuilt(brookside(), sidewalks=[path])) == ()

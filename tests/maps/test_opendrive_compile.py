@@ -109,7 +109,7 @@ def test_a_small_gap_between_linked_lanes_is_closed(tmp_path: Path) -> None:
     assert town.lanes[0].points[-1] == pytest.approx([100.01, 2.0 - 0.015, 0.0])
 
 
-def test_a_gap_that_is_no_slip_of_rounding_is_left_and_told(tmp_path: Path) -> None:
+def test_a_gap_beyond_rounding_is_kept_and_reported(tmp_path: Path) -> None:
     first = road(1, link=_next("successor", 2, "start"), sections=section(0.0, lane(-1, more=linked(after=-1))))
     town = _town(tmp_path, first, road(2, plan=geometry("<line/>", 100.0, x=100.1, y=0.08)))
     assert town.lanes[1].points[0] == pytest.approx([100.1, 2.0 - 0.08, 0.0])

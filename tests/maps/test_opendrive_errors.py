@@ -34,11 +34,11 @@ def test_a_path_that_no_file_can_have_is_one_error() -> None:
 
 
 @pytest.mark.parametrize("text", ["", "lanes: [1, 2]", "<OpenDRIVE><road></OpenDRIVE>"])
-def test_what_is_not_xml_is_told_with_its_line(tmp_path: Path, text: str) -> None:
+def test_invalid_xml_is_reported_with_its_line(tmp_path: Path, text: str) -> None:
     assert "XML" in _error(tmp_path, text).reason
 
 
-def test_a_truncated_map_is_told_with_its_line(tmp_path: Path) -> None:
+def test_a_truncated_map_is_reported_with_its_line(tmp_path: Path) -> None:
     text = opendrive(road(1), "\n", road(2))
     error = _error(tmp_path, text[: len(text) * 2 // 3])
     assert error.element == "line 2"
@@ -181,7 +181,7 @@ def test_a_map_may_have_a_namespace_and_what_no_reader_knows(tmp_path: Path) -> 
     assert _small(text, tmp_path) == _small(named, tmp_path) == 1
 
 
-def test_a_namespace_does_not_change_how_a_fault_is_told(tmp_path: Path) -> None:
+def test_a_namespace_does_not_change_the_message_of_a_fault(tmp_path: Path) -> None:
     text = opendrive(road(3, plan=" ")).replace("<OpenDRIVE>", '<OpenDRIVE xmlns="http://example.org/o">')
     assert _error(tmp_path, text).element.startswith("road 3")
 

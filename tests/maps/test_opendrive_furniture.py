@@ -1,4 +1,4 @@
-"""Signals, crosswalks and sidewalks as other files have them."""
+"""Signals, crosswalks and sidewalks in files of different exporters."""
 
 from pathlib import Path
 
@@ -134,7 +134,7 @@ def test_a_signal_rules_the_lanes_it_names(
         ("294", "no", SignalKind.OTHER),
     ],
 )
-def test_signals_are_told_apart_by_their_types(tmp_path: Path, kind: str, dynamic: str, expected: SignalKind) -> None:
+def test_kind_of_a_signal_follows_from_its_type(tmp_path: Path, kind: str, dynamic: str, expected: SignalKind) -> None:
     (signal,) = _read(tmp_path, *_street(first=_signal(70, 5.0, f'dynamic="{dynamic}"', kind=kind))).signals
     assert isinstance(signal, Signal)
     assert signal.kind is expected

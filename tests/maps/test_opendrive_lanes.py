@@ -1,4 +1,4 @@
-"""Lanes as other exporters write them: borders, tilted roads, lanes that open, links that lead nowhere."""
+"""Lanes in files of different exporters: borders, tilted roads, opening lanes, links to missing lanes."""
 
 import logging
 from pathlib import Path

@@ -29,7 +29,7 @@ def four_way(*signs: tuple[int, SignalKind | None]) -> Crossing:
 
 
 def waits(crossing: Crossing, one: tuple[int, int], other: tuple[int, int]) -> bool:
-    """Whether who goes from an arm to another (of one lane each) waits for who goes between two others."""
+    """Returns whether a movement between two arms (of one lane each) waits for another one."""
     table, way = right_of_way(crossing.town), crossing.connectors
     return way[other[0], 0, other[1]] in table.waits_for(way[one[0], 0, one[1]])
 
@@ -48,7 +48,7 @@ def test_ways_that_cross_or_join_are_foes_and_those_that_pass_are_not() -> None:
     assert not meets(crossing, (WEST, SOUTH), (EAST, NORTH))  # right turns at opposite corners
 
 
-def test_who_comes_from_the_same_lane_follows() -> None:
+def test_connectors_from_the_same_lane_do_not_conflict() -> None:
     crossing = four_way()
     table = right_of_way(crossing.town)
     ways = [crossing.connectors[WEST, 0, to] for to in (NORTH, EAST, SOUTH)]
@@ -104,7 +104,7 @@ def test_a_bridge_is_no_crossing() -> None:
     assert right_of_way(crossing_at(5.0)).foes(1) == ()
 
 
-def test_left_turn_waits_for_those_who_come_towards_it() -> None:
+def test_left_turn_waits_for_oncoming_traffic() -> None:
     crossing = four_way()
     assert waits(crossing, (WEST, NORTH), (EAST, WEST))
     assert waits(crossing, (WEST, NORTH), (EAST, NORTH))
@@ -121,7 +121,7 @@ def test_left_turn_waits_under_any_sign_that_both_have(sign: SignalKind | None) 
 
 
 @pytest.mark.parametrize("sign", [STOP, YIELD])
-def test_who_has_a_sign_waits_for_who_has_none(sign: SignalKind | None) -> None:
+def test_signed_approach_waits_for_unsigned_approach(sign: SignalKind | None) -> None:
     crossing = meeting(Arm(0), Arm(90, sign), Arm(180))
     east, stem, west = 0, 1, 2
     assert waits(crossing, (stem, west), (west, east))
@@ -247,7 +247,7 @@ def test_right_of_way_is_found_once_for_a_town() -> None:
 
 
 def check_order(town: Town) -> int:
-    """Checks that foes are mutual and priority is not, and that nobody waits in a circle; gives how many wait."""
+    """Checks that conflicts are symmetric, priorities are not, and waiting has no cycles; returns the waits."""
     table = RightOfWay(town)
     follows: dict[int, tuple[int, ...]] = {}
     for lane in town.lanes:
@@ -269,7 +269,7 @@ def check_order(town: Town) -> int:
 
 
 @pytest.mark.parametrize("name", TOWNS)
-def test_nobody_waits_for_one_another(name: str) -> None:
+def test_no_mutual_waiting(name: str) -> None:
     assert check_order(town_named(name)) > 5
 
 
@@ -295,7 +295,7 @@ def arms_of(rows: list[tuple[int, SignalKind | None, int, bool]]) -> list[Arm]:
 
 @settings(max_examples=40, deadline=None)
 @given(ARMS)
-def test_nobody_waits_for_one_another_at_any_meeting_of_roads(
+def test_no_mutual_waiting_at_any_junction(
     rows: list[tuple[int, SignalKind | None, int, bool]],
 ) -> None:
     check_order(meeting(*arms_of(rows), radius=25.0).town)

@@ -217,7 +217,7 @@ def test_place_ahead_in_the_same_cell_is_driven_to_straight() -> None:
     assert (route.lanes, route.length) == ((0,), pytest.approx(3.0))
 
 
-def test_crossed_junctions_are_told_in_order() -> None:
+def test_crossed_junctions_are_listed_in_order() -> None:
     town = network("brookside").town
     start, goal = pairs(town, 9)[8]
     route = router(town).route(start, goal)
@@ -227,7 +227,7 @@ def test_crossed_junctions_are_told_in_order() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_who_does_what_a_route_tells_comes_along_its_lanes(name: str) -> None:
+def test_following_the_instructions_of_a_route_leads_along_its_lanes(name: str) -> None:
     town = network(name).town
     turned = 0
     for start, goal in pairs(town, 40, seed=5):

@@ -1,4 +1,4 @@
-"""The four towns that ship: of the scale of the paper's, and with what a driver meets in them."""
+"""Shipped towns: of the scale of the paper's towns, with all elements of road traffic."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_small_towns_have_single_lane_streets(name: str) -> None:
 
 
 def side_by_side(town: Town, lane: int) -> int:
-    """How many lanes of one direction there are at a lane."""
+    """Returns the number of parallel lanes in the direction of a lane."""
     count = 1
     for side in (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT):
         beside = town.neighbour(lane, side)

@@ -118,7 +118,7 @@ def test_turn_lane_without_another_that_faces_it_has_its_green_too() -> None:
     assert (tuple(sorted((through, *crossing.signals[2]))), THROUGH_GREEN) in shown
 
 
-def test_turn_lane_that_nobody_faces_is_green_with_the_lane_beside_it() -> None:
+def test_turn_lane_without_facing_traffic_is_green_with_the_lane_beside_it() -> None:
     crossing = meeting(Arm(0, LIGHT), Arm(90, LIGHT, lanes_in=2, turn_lane=True), Arm(180, LIGHT))
     programme = the_programme(crossing)
     assert sorted(arms_at_green(crossing, programme)) == [(0, 2), (1, 1)]

@@ -1,4 +1,4 @@
-"""Mistakes in town files: each is told with file, line, key and what to do."""
+"""Mistakes in town files: each is reported with file, line, key and remedy."""
 
 import re
 import tempfile
@@ -36,7 +36,7 @@ def check(path: Path, line: int | None, fragments: str) -> None:
 
 
 @pytest.mark.parametrize("old, new, line, fragments", MISTAKES.values(), ids=MISTAKES.keys())
-def test_a_mistake_is_told_with_line_key_and_advice(
+def test_a_mistake_is_reported_with_line_key_and_advice(
     tmp_path: Path, old: str, new: str, line: int, fragments: str
 ) -> None:
     assert MIDTOWN.count(old) >= 1

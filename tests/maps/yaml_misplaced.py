@@ -1,4 +1,4 @@
-"""Mistakes in a town's plan that show when it is laid out: what does not fit into its place."""
+"""Mistakes in plans that the layout detects: elements that do not fit."""
 
 FORD = "Ford Lane: [cross, gate]"
 LOW_ROAD = f"{FORD}\n  Low Road: [hill, [100, -50], [100, 100], gate]"
@@ -83,11 +83,11 @@ MISPLACED = {
         14,
         "street 'South Road': it leads to 'gate' and no way goes on|make it two-way",
     ),
-    "street that nobody reaches": (
+    "unreachable street": (
         FORD,
         "Ford Lane: {through: [gate, cross], one_way: true}\n  Lane: {through: [gate, [60, 140], corner], one_way: on}",
         15,
-        "street 'South Road': it leaves 'gate' and there is no way into it: nobody|turn a one-way street round",
+        "street 'South Road': it leaves 'gate' and there is no way into it: its lanes|turn a one-way street round",
     ),
     "sign where a street only leaves": (
         f"South Road: {SOUTH}",

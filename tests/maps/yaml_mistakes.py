@@ -1,4 +1,4 @@
-"""Mistakes in how a town file is written, and what the message about each has to say.
+"""Mistakes in the notation of town files, with the expected messages.
 
 `MISWRITTEN`, and `WRONG` and `MISPLACED` of the files beside, change the town of `yaml_text`: what stands there, what
 stands there instead, the line of the message, and fragments of it, separated by bars. `WRONG_FILES` are whole files:

@@ -1,4 +1,4 @@
-"""Town files for tests of the layout and of the towns that come of it."""
+"""Town files for tests of layouts and compiled towns."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""A town file that uses most of the language, for tests that read it, change it or break it."""
+"""Town file with most features of the language, for tests that read, change or break it."""
 
 from pathlib import Path
 

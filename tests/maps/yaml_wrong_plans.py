@@ -1,4 +1,4 @@
-"""Mistakes in a town's plan that need no geometry: of junctions, courses, lanes, lights and signs."""
+"""Mistakes in plans that need no geometry: junctions, courses, lanes, lights and signs."""
 
 FORD = "Ford Lane: [cross, gate]"
 PHASE_1, PHASE_2 = "{green: [Grand Avenue], seconds: 25}", "{left: [Grand Avenue], seconds: 8}"

@@ -1,4 +1,4 @@
-"""The map one would hang up: names along their streets, a sheet as large as the town needs, a legend that fits it."""
+"""Map sheets: names along their streets, size of the sheet, and legend."""
 
 from __future__ import annotations
 
@@ -145,8 +145,8 @@ def test_a_name_longer_than_its_street_stands_beside_it() -> None:
     assert (np.abs(letters - palette.INK).max(axis=-1) < 40).any(), "dark type on the ground"
 
 
-def test_a_street_nobody_can_see_is_reported() -> None:
-    """All there is of it lies inside a junction."""
+def test_an_invisible_street_is_reported() -> None:
+    """The whole street lies inside a junction."""
     inner = Lane(
         id=1,
         road_id=1,

@@ -1,4 +1,4 @@
-"""What is painted on roads and stands beside them: lines, medians, arrows, lights, signs, bridges and tunnels."""
+"""Road markings and structures: lines, medians, arrows, lights, signs, bridges and tunnels."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def test_triangles_and_no_line_where_one_has_to_yield() -> None:
         assert len(triangle.points) == 3 and triangle.points[:, 0].max() - tip[0] > 0.5, "points at who comes"
 
 
-def test_no_line_where_nobody_has_to_stop() -> None:
+def test_no_line_where_no_stop_is_required() -> None:
     assert not painted(approach(SignalKind.SPEED), palette.STOP_LINE)
 
 

@@ -22,7 +22,7 @@ TOWN = load_town("brookside")
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory: pytest.TempPathFactory) -> tuple[Session, dict[int, Scene]]:
-    """A session, and what was to be seen while it was played, by frame."""
+    """A session, and the expected scenes by frame."""
     folder, scenes = tmp_path_factory.mktemp("seen") / "one", {}
 
     def look(env: DuoWizardEnv) -> None:

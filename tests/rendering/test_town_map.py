@@ -211,7 +211,7 @@ def test_text_is_wrapped_and_shortened_to_a_width() -> None:
     assert shorten("much too long for so little room", 14, 120).endswith("…")
 
 
-def test_weather_is_told_in_words() -> None:
+def test_weather_summary_in_words() -> None:
     assert weather_summary({}) == "day, clear"
     assert weather_summary({"sun_altitude_angle": -30.0, "precipitation": 80.0}) == "night, heavy rain"
     assert weather_summary({"fog_density": 80.0}) == "day, dense fog"
