@@ -1,4 +1,4 @@
-"""Settings of the environment."""
+"""Settings of a session."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 
 @dataclass(frozen=True, kw_only=True)
 class RewardWeights:
-    """Weights of the reward's terms; the participant and the Co-Wizard share theirs, the Ad-Wizard gets the opposite.
+    """Weights of the reward terms. Participant and Co-Wizard share the first four; the Ad-Wizard gets them negated.
 
     Attributes:
-        subgoal: for each subgoal reached.
-        success: at the end, if every live subgoal was reached and nothing was hit.
-        collision: for each collision of the car's own making.
-        time: for each second.
-        talk: for each act that the role itself says (participant and Co-Wizard).
-        refusal: for each action of the role that is refused.
+        subgoal: reward for each subgoal reached.
+        success: reward at the end, if every live subgoal was reached without a collision caused by the ego.
+        collision: reward for each collision caused by the ego.
+        time: reward per second [1/s].
+        talk: reward for each utterance span of the role itself (participant and Co-Wizard).
+        refusal: reward for each refused action of the role.
     """
 
     subgoal: float = 1.0
@@ -31,18 +31,18 @@ class RewardWeights:
 
 @dataclass(frozen=True, kw_only=True)
 class EnvConfig:
-    """Settings of `DuoWizardEnv`.
+    """Settings of a session, of `DuoWizardEnv` and of the single-role environments.
 
     Attributes:
-        decision_frequency: decisions a second [Hz]; it divides the 30 Hz of the physics.
-        max_seconds: the session is cut off (truncated) after this long [s].
-        words_per_second: how fast everybody speaks.
-        observe_acts: whether others' words come with their acts (move and slots), or as text only.
-        word_error_rate: how badly the participant and the Co-Wizard hear each other, in [0, 1): errors of a recogniser
-            per word that is said. They then observe its transcript, and of words that were misheard no act but the one
-            that rules read from the transcript. The Ad-Wizard observes what was said.
-        world: traffic, pedestrians and the like.
-        rewards: weights of the reward's terms.
+        decision_frequency: decisions per second [Hz]; a divisor of the 30 Hz of the physics.
+        max_seconds: simulated time after which the session is truncated [s].
+        words_per_second: speaking rate of all roles [words/s].
+        observe_acts: whether utterances are observed with their acts (move and slots), or as text only.
+        word_error_rate: word error rate of the speech recognition between participant and Co-Wizard, in [0, 1). They
+            observe the transcript; a misrecognised span carries the act that the classifier reads from its transcript.
+            The Ad-Wizard observes the spoken words.
+        world: settings of traffic, pedestrians and sensing.
+        rewards: weights of the reward terms.
     """
 
     decision_frequency: float = 2.0
@@ -69,5 +69,5 @@ class EnvConfig:
 
     @property
     def frames(self) -> int:
-        """Physics frames between two decisions."""
+        """Number of physics frames between two decisions."""
         return round(FRAME_RATE / self.decision_frequency)

@@ -1,9 +1,9 @@
-"""What the participant and the Co-Wizard say to each other: who speaks when, what is heard, and how it is annotated."""
+"""Dialogue channel between participant and Co-Wizard: turn-taking, speech recognition, understanding, annotation."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 
@@ -24,29 +24,33 @@ from dorothie_gym.ontology import AGENT_ROLES, DialogueAct, GoalStatus, Landmark
 from dorothie_gym.spaces import Speech, plain_text
 from dorothie_gym.spaces.limits import UTTERANCE_LENGTH
 
+SpanRecord: TypeAlias = dict[str, object]
+"""Event data of one span."""
+
 
 @dataclass(frozen=True, kw_only=True)
-class HeardUtterance:
-    """An utterance whose words are over.
+class DeliveredUtterance:
+    """Utterance that is over, with the one parse of its words.
 
     Attributes:
-        said: what was said.
-        heard: what the recogniser made of it.
-        understood: acts that the Co-Wizard may take from it.
-        records: data of an event for each of its spans.
+        said: the utterance as it was spoken.
+        heard: the utterance as the listener recognises it, with the acts that belong to the recognised words.
+        understood: acts that the belief tracker reads: those of `heard`, or where acts are not observed, those that the
+            classifier finds in its words.
+        records: event data of each span.
     """
 
     said: Utterance
     heard: Utterance
     understood: tuple[DialogueAct, ...]
-    records: tuple[dict[str, Any], ...]
+    records: tuple[SpanRecord, ...]
 
 
 class DialogueChannel:
-    """The talk of a session.
+    """Dialogue of a session.
 
     Attributes:
-        said: all utterances that were heard so far.
+        said: all utterances that are over, as they were spoken.
     """
 
     def __init__(
@@ -59,19 +63,19 @@ class DialogueChannel:
         ears: np.random.SeedSequence,
         styles: np.random.SeedSequence,
     ) -> None:
-        """Begins in silence.
+        """Begins without an utterance.
 
         Args:
-            scenario: of the session.
-            config: of the environment.
-            spans: acts of an utterance at most.
-            words: seed of the words of acts that come without.
-            ears: seed of what is misheard.
-            styles: seed of how the speakers talk.
+            scenario: scenario of the session.
+            config: settings of the session.
+            spans: largest number of acts in an utterance.
+            words: seed of the wording of acts without words.
+            ears: seed of the recognition errors.
+            styles: seed of the speakers' styles.
         """
         storyboard = scenario.storyboard
         self.said: list[Utterance] = []
-        self._acts_show, self._misheard = config.observe_acts, bool(config.word_error_rate)
+        self._observe_acts, self._misheard = config.observe_acts, bool(config.word_error_rate)
         self._conversation = Conversation(config.words_per_second, spans)
         self._annotator = Annotator(storyboard.landmarks[subgoal.landmark].name for subgoal in storyboard.subgoals)
         self._words, rng = np.random.default_rng(words), np.random.default_rng(styles)
@@ -80,52 +84,52 @@ class DialogueChannel:
 
     @property
     def exchanges(self) -> int:
-        """How many exchanges there were."""
+        """Number of exchanges so far."""
         return len(self._annotator.exchanges)
 
     @property
     def transactions(self) -> int:
-        """How many transactions there were."""
+        """Number of transactions so far."""
         return len(self._annotator.transactions)
 
     def say(self, role: Role, speech: Speech, now: float) -> str | None:
-        """Begins an utterance at a time [s], or goes on with one; returns the reason where it is refused."""
+        """Starts or continues an utterance at a time [s]; returns the reason of a refusal."""
         text = speech.text.strip() or self._worded(speech.act, role)
         return self._conversation.say(role, Span(text, speech.act), now)
 
     def note(self, landmark: LandmarkName, status: GoalStatus) -> None:
-        """Takes note of what became of a place, which ends transactions."""
+        """Updates the annotation with a change of a subgoal's status, which ends transactions."""
         self._annotator.note(landmark, status)
 
-    def deliver(self, now: float) -> list[HeardUtterance]:
-        """Hands out the utterances whose words are over at a time [s], in the order in which they began."""
-        heard = [self._hear(utterance) for utterance in self._conversation.deliver(now)]
+    def deliver(self, now: float) -> list[DeliveredUtterance]:
+        """Returns the utterances that are over at a time [s], in the order in which they started."""
+        delivered = [self._hear(utterance) for utterance in self._conversation.deliver(now)]
         self._annotator.tick(now)
-        return heard
+        return delivered
 
     def speaking(self, now: float) -> dict[Role, float]:
-        """For how long each role still speaks at a time [s]."""
+        """Returns the remaining speaking time of each role at a time [s]."""
         return {role: self._conversation.speaking(role, now) for role in AGENT_ROLES}
 
     def _worded(self, act: DialogueAct, role: Role) -> str:
-        """Words for an act that came without, in the speaker's style."""
+        """Returns words for an act, in the style of the speaker."""
         return plain_text(word_act(act, role, self._words, style=self._styles[role]), UTTERANCE_LENGTH)
 
-    def _hear(self, utterance: Utterance) -> HeardUtterance:
+    def _hear(self, utterance: Utterance) -> DeliveredUtterance:
         heard = self._recogniser.hear(utterance)
-        # The Co-Wizard's beliefs are of what it takes itself, and the human, to have said.
+        # The Co-Wizard understands its own utterances as spoken, and those of the participant as recognised.
         understood = self._understood(utterance if utterance.speaker is Role.CO_WIZARD else heard)
         records = self._records(utterance, heard)
         self.said.append(utterance)
-        return HeardUtterance(said=utterance, heard=heard, understood=understood, records=records)
+        return DeliveredUtterance(said=utterance, heard=heard, understood=understood, records=records)
 
     def _understood(self, utterance: Utterance) -> tuple[DialogueAct, ...]:
-        """What the Co-Wizard may take from an utterance: its acts, or where they do not show, what words sound like."""
-        if self._acts_show:
+        """Returns the acts of an utterance, or those classified from its words where acts are not observed."""
+        if self._observe_acts:
             return utterance.acts
         return tuple(span.act for span in guess_spans(utterance.text))
 
-    def _records(self, utterance: Utterance, heard: Utterance) -> tuple[dict[str, Any], ...]:
+    def _records(self, utterance: Utterance, heard: Utterance) -> tuple[SpanRecord, ...]:
         exchanges, transaction = self._annotator.update(utterance)
         transcript = {"recognised": heard.text} if self._misheard else {}
         return tuple(

@@ -1,10 +1,10 @@
-"""Carries out the Ad-Wizard's exceptions, or tells why not: nothing may make the task impossible."""
+"""Execution of the Ad-Wizard's exceptions. An exception that could make the task impossible is refused."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -20,38 +20,45 @@ from dorothie_gym.spaces import AdWizardAction
 from dorothie_gym.tasks import TaskState
 
 FROM_START = 30.0
-"""A prop stands at least this far behind the start of its lane [m], so that the car can turn round before it."""
+"""Least distance of a prop from the start of its lane [m]; it leaves room for a U-turn in front of the prop."""
 
 FROM_END = 8.0
-"""And this far before its end [m]."""
+"""Least distance of a prop from the end of its lane [m]."""
 
 FROM_SITE = 25.0
-"""And this far along the lane from any landmark's waypoint [m]: the car has to be able to stop there."""
+"""Least distance of a prop from a waypoint along the lane [m]; the ego must be able to stop at the waypoint."""
 
 FROM_CAR = 25.0
-"""Nothing appears closer to the car than this [m], nor than it can stop, and turn round, before."""
+"""Least distance of anything new from the ego, beyond its stopping distance [m]; it leaves room for a U-turn."""
 
 FROM_VEHICLE = 6.0
-"""A prop appears no closer to a vehicle's middle than this [m]."""
+"""Least distance of a new prop from the centre of a vehicle [m]."""
 
 FROM_PROP = 0.5
-"""And leaves this much room around it to other props [m]."""
+"""Least gap between two props [m]."""
 
 FROM_WAYPOINT = 8.0
-"""No vehicle appears closer along the lane to a landmark's waypoint than this [m]."""
+"""Least distance of a new vehicle from a waypoint along the lane [m]."""
 
 SPAWN_STEP = 3.5
-"""Places for newcomers are looked for at this distance along the lanes [m]."""
+"""Distance between the candidate places of new actors along a lane [m]."""
 
-MOST = 30
-"""Vehicles, and pedestrians, that spawning fills a town up to."""
+MAX_SPAWNED = 30
+"""Largest number of vehicles, and of pedestrians, up to which spawning fills a town."""
 
-Outcome: TypeAlias = str | dict[str, Any]
-"""A reason for a refusal, or what was done, for the log."""
+EventData: TypeAlias = dict[str, object]
+Outcome: TypeAlias = str | EventData
+"""Reason of a refusal, or the event data of an executed exception."""
 
 
 class ExceptionExecutor:
-    """The Ad-Wizard's hands in the world and the task."""
+    """Executes exceptions in the world and the task of a session.
+
+    Args:
+        world: simulated world.
+        task: progress in the storyboard.
+        max_props: largest number of props.
+    """
 
     def __init__(self, world: World, task: TaskState, max_props: int) -> None:
         self._world, self._task, self._max_props = world, task, max_props
@@ -70,7 +77,7 @@ class ExceptionExecutor:
         }
 
     def execute(self, action: AdWizardAction) -> Outcome:
-        """Carries out an exception other than NONE."""
+        """Executes an exception other than NONE; returns its event data, or the reason of a refusal."""
         return self._handlers[action.exception](action)
 
     # --- environment ------------------------------------------------------------------------------------------------
@@ -91,8 +98,8 @@ class ExceptionExecutor:
             return "nobody was to come: count is 0"
         crowd = world.actors.vehicles if action.exception is ExceptionKind.SPAWN_VEHICLES else world.actors.pedestrians
         there = len(crowd)
-        if there >= MOST:
-            return f"there are {MOST} of them in the town already"
+        if there >= MAX_SPAWNED:
+            return f"there are {MAX_SPAWNED} of them in the town already"
         middle = world.town.lanes[action.place.lane].position(action.place.metres)
         half = max(float(action.extent), 5.0)
         driving = action.exception is ExceptionKind.SPAWN_VEHICLES
@@ -102,7 +109,7 @@ class ExceptionExecutor:
         )
         done = 0
         for k in order:
-            if done == action.count or there + done >= MOST:
+            if done == action.count or there + done >= MAX_SPAWNED:
                 break
             lane, station = candidates[int(k)]
             if driving:
@@ -115,7 +122,7 @@ class ExceptionExecutor:
         return {"asked": action.count, "count": done, **dict(zip(("x0", "x1", "y0", "y1"), corners, strict=True))}
 
     def _places_within(self, middle: Array, half: float, *, driving: bool) -> list[tuple[int, float]]:
-        """Places in a square where somebody may appear: on lanes but no landmark's waypoint, or at the right kerb."""
+        """Returns candidate places in a square: on lanes away from waypoints for vehicles, else at the right kerb."""
         world, town = self._world, self._world.town
         places = []
         for lane in town.lanes:
@@ -188,7 +195,7 @@ class ExceptionExecutor:
     def _message(self, action: AdWizardAction) -> Outcome:
         return {} if action.message else "the message is empty"
 
-    # --- what must not be -------------------------------------------------------------------------------------------
+    # --- checks -----------------------------------------------------------------------------------------------------
 
     def _prop(self, item: int) -> Prop | None:
         props = self._world.actors.props
@@ -204,14 +211,14 @@ class ExceptionExecutor:
         return None
 
     def _stopping_distance(self) -> float:
-        """Way in which the car stops, on the road as wet as it is [m]."""
+        """Returns the stopping distance of the ego at the present wetness of the road [m]."""
         return self._world.weather.braking_distance(float(self._world.car.speed), PLANNED_BRAKING)
 
     def _unsafe(self, action: AdWizardAction, kind: PropKind, *, without: Prop | None) -> str | None:
-        """Why a prop must not stand at a place.
+        """Returns the reason why a prop must not stand at a place, or None.
 
-        The checks are about every site of the town and not about those of the live subgoals only: otherwise a refusal
-        would tell where hidden landmarks are. Whatever is reachable at all stays reachable.
+        The checks cover every site of the town, not only those of the live subgoals: a refusal must not reveal hidden
+        landmarks. Every reachable site stays reachable.
         """
         world, town = self._world, self._world.town
         lane = town.lanes[action.place.lane]

@@ -1,4 +1,4 @@
-"""Which actions would not be refused: masks in the form that `Dict.sample(mask=...)` takes."""
+"""Action masks of the three roles, in the form that `Dict.sample(mask=...)` takes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from dorothie_gym.tasks import TaskState
 
 Mask = NDArray[np.int8]
 
-EVERY_TIME = (
+ALWAYS_FEASIBLE = (
     ExceptionKind.NONE,
     ExceptionKind.WEATHER,
     ExceptionKind.SPAWN_VEHICLES,
@@ -28,14 +28,15 @@ EVERY_TIME = (
     ExceptionKind.SENSOR_FAULT,
     ExceptionKind.MESSAGE,
 )
-"""Exceptions that are always worth trying."""
+"""Exceptions that are feasible at any time for some arguments."""
 
 
 class ActionMasks:
-    """Masks of the three roles: what depends on the town once, what depends on the moment each time.
+    """Action masks of a session.
 
-    Fields are masked one by one, so an action that passes may still be refused for the way its fields combine. Boxes,
-    texts and multi-binary fields take no mask (None).
+    Fields are masked independently, so an action inside the mask may still be refused for a combination of its fields.
+    Box, text and multi-binary fields have no mask (None). Templates of the masks are updated when the ego, the props or
+    the task have changed.
     """
 
     def __init__(self, world: World, task: TaskState, limits: SpaceLimits, junction: UpcomingJunction) -> None:
@@ -58,25 +59,25 @@ class ActionMasks:
                 buffer.template["plan"][:, len(town.junctions) + 1 :] = 0
             self._buffers[role] = buffer
         self._buffers[Role.AD_WIZARD].template["exception"][:] = 0
-        self._buffers[Role.AD_WIZARD].template["exception"][[int(kind) for kind in EVERY_TIME]] = 1
-        self._state: tuple[Any, ...] = ()  # of the car, and what there is in the town, that the forms are of
-        self._there = (-1, -1)
-        self._beside: dict[int, tuple[bool, ...]] = {}  # whether a lane has one to its left, and to its right
+        self._buffers[Role.AD_WIZARD].template["exception"][[int(kind) for kind in ALWAYS_FEASIBLE]] = 1
+        self._state: tuple[Any, ...] = ()  # state of the ego that the template belongs to
+        self._task_state = (-1, -1)
+        self._beside: dict[int, tuple[bool, ...]] = {}  # whether there is a lane to the left and to the right, by lane
 
     def mask(self, role: Role) -> dict[str, Any]:
-        """The mask of a role's action space now; it is its taker's to change."""
+        """Returns the mask of a role's action space at the present decision; the caller owns it."""
         if role is Role.CO_WIZARD:
-            self._note_car()
+            self._update_physical()
         elif role is Role.AD_WIZARD:
-            self._note_town()
+            self._update_exceptions()
         fields = self._buffers[role].copy()
         fields.update(self._unmasked[role])
         if role is Role.CO_WIZARD:
             fields["plan"] = tuple(fields["plan"])
         return fields
 
-    def _note_car(self) -> None:
-        """What the car may be told to do, and with which angles, when anything that this depends on has changed."""
+    def _update_physical(self) -> None:
+        """Updates the masks of physical actions and their angles if the state of the ego has changed."""
         planner, speed, cruise = self._world.planner, float(self._world.car.speed), self._world.ego.cruise
         state = (
             planner.path, planner.s, planner.held, planner.manoeuvre, planner.roadblock, planner.props, speed, cruise
@@ -96,7 +97,7 @@ class ActionMasks:
         leaves = not busy and not committed and (planner.held or planner.manoeuvre[0] is not None)
         physical[PhysicalAction.LANE_FOLLOW] = leaves
         physical[PhysicalAction.LANE_SWITCH] = left or right
-        # a U-turn begins on the leftmost lane
+        # A U-turn starts from the leftmost lane.
         physical[PhysicalAction.U_TURN] = not busy and not beside_left and planner.may_turn_round(speed)
         physical[PhysicalAction.J_TURN] = bool(exits)
         physical[PhysicalAction.STOP] = not planner.held
@@ -117,12 +118,12 @@ class ActionMasks:
             found = self._beside[lane] = tuple(town.neighbour(lane, side) is not None for side in SIDES)
         return found
 
-    def _note_town(self) -> None:
-        """What the Ad-Wizard may do with props and the task, when those have changed."""
+    def _update_exceptions(self) -> None:
+        """Updates the mask of exceptions if props or task have changed."""
         task, props = self._task, len(self._world.actors.props)
-        if (task.version, props) == self._there:
+        if (task.version, props) == self._task_state:
             return
-        self._there = task.version, props
+        self._task_state = task.version, props
         form = self._buffers[Role.AD_WIZARD].template["exception"]
         form[ExceptionKind.PLACE_PROP] = props < self._limits.props
         form[ExceptionKind.MOVE_PROP] = form[ExceptionKind.DELETE_PROP] = props > 0
@@ -132,7 +133,7 @@ class ActionMasks:
 
 
 def _shape(space: spaces.Space[Any]) -> Shape | None:
-    """Shape of the mask of a field, if it takes one; the choices of a multi-discrete one are all as many."""
+    """Returns the shape of a field's mask; all entries of a multi-discrete field have the same number of choices."""
     if isinstance(space, spaces.Discrete):
         return (int(space.n),)
     if isinstance(space, spaces.MultiDiscrete):

@@ -1,7 +1,7 @@
-"""Compiled: where things are along the planned path and around the car.
+"""Compiled measurements along the planned path and of the actors around the ego.
 
-A path is given by the distances along it `s` (n,) and the positions `points` (n, 2) of its points [m]; the results are
-those of `dorothie_gym.sim.ego.path.Path`.
+A path is given by its points: distances along the path `s` (n,) [m] and positions `points` (n, 2) [m]. The results
+agree with those of `dorothie_gym.sim.ego.path.Path`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from dorothie_gym.sim.world import SensorArrays, World
 
 @allocating
 def _index_at(s: Array, at: float) -> int:
-    """Number of the point at or before a distance along the path."""
+    """Returns the index of the point at or before a distance along the path."""
     low, high = 0, len(s)
     while low < high:
         middle = (low + high) // 2
@@ -34,16 +34,16 @@ def _index_at(s: Array, at: float) -> int:
 
 @allocating
 def next_choice(lanes: NDArray[np.int64], here: int, chooses: NDArray[np.bool_]) -> int:
-    """Number of the last point of a path that is on the next lane with a choice at its end; -1 if there is none.
+    """Returns the index of the last path point on the next lane that ends at a choice of exits; -1 if there is none.
 
     Args:
-        lanes: of the points of the path (n,).
-        here: point of the path to begin with.
-        chooses: of each lane of the town.
+        lanes: lanes of the path points (n,).
+        here: index of the first path point to look at.
+        chooses: whether the lane ends at a choice of exits, for each lane of the town.
     """
     for k in range(here, len(lanes)):
         if chooses[lanes[k]]:
-            for last in range(len(lanes) - 1, k, -1):  # the lane may come again, round a block
+            for last in range(len(lanes) - 1, k, -1):  # a path around a block may visit the lane twice
                 if lanes[last] == lanes[k]:
                     return last
             return k
@@ -52,7 +52,7 @@ def next_choice(lanes: NDArray[np.int64], here: int, chooses: NDArray[np.bool_])
 
 @allocating
 def write_lanes(lanes: NDArray[np.int64], here: int, table: NDArray[np.int64]) -> None:
-    """Writes the lanes of a path from a point of it on, each once, in order, as one more than their numbers."""
+    """Writes the lanes of a path from a point on, in order and without repetition, as 1 + lane number."""
     row, last = 0, -1
     for k in range(here, len(lanes)):
         if row == len(table):
@@ -65,17 +65,17 @@ def write_lanes(lanes: NDArray[np.int64], here: int, table: NDArray[np.int64]) -
 
 @allocating
 def progress_on_path(s: Array, points: Array, x: float, y: float, near: float, window: float) -> float:
-    """Distance along a path [m] of its closest place to a position, looked for around a known place.
+    """Returns the distance along a path [m] of its point closest to a position, searched around a known distance.
 
-    Before its first and after its last point the path goes on straight.
+    The path is extended straight before its first and after its last point.
 
     Args:
         s: see above.
         points: see above.
         x: position [m].
         y: position [m].
-        near: distance along the path close to the answer [m].
-        window: how far from `near` to look [m].
+        near: centre of the search along the path [m].
+        window: half width of the search [m].
     """
     end = len(s) - 1
     best, answer = math.inf, near
@@ -102,7 +102,7 @@ def write_waypoints(s: Array, points: Array, heading: float, start: float, spaci
         heading: of the path at its start, before which it goes on straight [rad].
         start: distance along the path [m].
         spacing: from one to the next, and from the start to the first [m].
-        table: what is written: positions (m, 2) [m].
+        table: table that is written: positions (m, 2) [m].
     """
     end = len(s) - 1
     for row in range(len(table)):
@@ -132,20 +132,20 @@ def write_objects(
     objects: Array,
     believed: Array,
 ) -> None:
-    """Looks at all bodies from the car, and writes those that are perceived as rows of `ObjectColumn`.
+    """Writes the bodies that the ego perceives as rows of `ObjectColumn`.
 
     Args:
-        senses: what the car sees with, and what there is to be seen (numba takes records in tuples more quickly).
+        senses: records of sensors and bodies (numba unpacks records in tuples faster).
         frame: present frame.
-        x: where the car is [m].
-        y: where the car is [m].
-        heading: of the car [rad].
-        believed_x: where it believes itself to be [m].
-        believed_y: where it believes itself to be [m].
-        cosine: of the angle from its heading to the one it believes to have.
-        sine: of the same.
-        objects: what is written (m, 8): bodies where they seem to be from the true pose,
-        believed: and where they seem to be from the believed one.
+        x: true position of the ego [m].
+        y: true position of the ego [m].
+        heading: true heading of the ego [rad].
+        believed_x: estimated position [m].
+        believed_y: estimated position [m].
+        cosine: cosine of the angle from the true to the estimated heading.
+        sine: sine of that angle.
+        objects: table that is written (m, 8): perceived bodies relative to the true pose.
+        believed: table that is written (m, 8): perceived bodies relative to the estimated pose.
     """
     car = senses.vehicles[0]
     count = see(
@@ -178,24 +178,24 @@ def write_path(
     path_lanes: NDArray[np.int64],
     believed_waypoints: Array,
 ) -> float:
-    """Writes what is shown of a path, as it is and as it seems from a believed position, in one call.
+    """Writes the observed part of a path, from the true and from the estimated position, in one call.
 
     Args:
         s: see above.
         points: see above.
-        lanes: of the points (n,).
-        heading: of the path at its start [rad].
-        near: where on the path the car is [m].
-        spacing: of the waypoints [m].
-        x: where the car believes itself to be [m].
-        y: where the car believes itself to be [m].
-        window: how far from `near` that may be [m].
-        waypoints: `write_waypoints` from where the car is.
-        path_lanes: `write_lanes` from where the car is.
-        believed_waypoints: `write_waypoints` from where it believes itself to be.
+        lanes: lanes of the points (n,).
+        heading: heading at the start of the path [rad].
+        near: true distance of the ego along the path [m].
+        spacing: distance between waypoints [m].
+        x: estimated position of the ego [m].
+        y: estimated position of the ego [m].
+        window: half width of the search for the estimated position around `near` [m].
+        waypoints: `write_waypoints` from the true position.
+        path_lanes: `write_lanes` from the true position.
+        believed_waypoints: `write_waypoints` from the estimated position.
 
     Returns:
-        Where on the path the car believes itself to be [m].
+        Estimated distance of the ego along the path [m].
     """
     progress = progress_on_path(s, points, x, y, near, window)
     write_waypoints(s, points, heading, near, spacing, waypoints)
@@ -204,21 +204,21 @@ def write_path(
     return progress
 
 
-# --- Where things are as the Co-Wizard has it: around the car where it believes itself to be, not where i ------------
+# --- measurements from the true and the estimated pose ----------------------------------------------------------------
 
 SEARCH = 6.0
-"""Places on the path are looked for this far around where they should be [m], and twice the error of the estimate."""
+"""Half width of the search for a place on the path [m], to which twice the error of the pose estimate is added."""
 
 
 class EgoMeasurements:
-    """Places told from the true and from the estimated pose.
+    """Measurements from the true and the estimated pose of the ego at one decision.
 
-    What the car sees is relative to the car, so on the map it is as far off as the car itself; what is on the map lies
-    where the map says, and how far it is follows from the estimate.
+    Perceived bodies are measured relative to the ego, so their believed positions have the error of the pose estimate.
+    Places on the map are exact, and distances to them have the error of the estimate.
 
     Attributes:
-        pose: estimate (x, y, heading) [m, m, rad].
-        progress: where on its planned path the car believes itself to be [m]; where it is until `write_path`.
+        pose: estimated pose (x, y, heading) [m, m, rad].
+        progress: estimated distance along the planned path [m]; the true distance before `write_path`.
     """
 
     def __init__(self, world: World) -> None:
@@ -234,14 +234,14 @@ class EgoMeasurements:
     def write_path(
         self, spacing: float, waypoints: Array, path_lanes: NDArray[Any], believed_waypoints: Array
     ) -> None:  # fmt: skip
-        """Writes what is shown of the planned path.
+        """Writes the observed part of the planned path.
 
         Args:
-            spacing: of the waypoints along the path [m].
-            waypoints: points ahead of where the car is (n, 2) [m].
-            path_lanes: lanes from there on (n,), as one more than their numbers.
-            believed_waypoints: points ahead of where it believes itself to be (n, 2) [m]. Before its start, which is
-                where the car truly was when it was laid, the path goes on straight.
+            spacing: distance between waypoints along the path [m].
+            waypoints: points ahead of the true position (n, 2) [m].
+            path_lanes: lanes from the true position on (n,), as 1 + lane number.
+            believed_waypoints: points ahead of the estimated position (n, 2) [m]. The path is extended straight before
+                its start.
         """
         path = self._path
         error = math.hypot(self._x - self._true_x, self._y - self._true_y)
@@ -251,9 +251,9 @@ class EgoMeasurements:
         )  # fmt: skip
 
     def write_objects(self, objects: Array, believed: Array) -> None:
-        """Writes bodies that the car perceives where they are into one table, where they are believed into another.
+        """Writes the perceived bodies into two tables, at their true and at their believed positions.
 
-        Distance and bearing in both are those from the car.
+        Distance and bearing in both tables are relative to the ego.
         """
         turn = self._heading - self._true_heading
         write_objects(
@@ -262,5 +262,5 @@ class EgoMeasurements:
         )  # fmt: skip
 
     def distance_left(self, distance: float) -> float:
-        """How far something on the path seems to be [m] that is `distance` ahead of where the car is."""
+        """Returns the estimated distance of a place on the path that is `distance` ahead of the true position [m]."""
         return max(distance - (self.progress - self._near), 0.0)

@@ -1,4 +1,4 @@
-"""What happens in an environment, handed to a writer decision by decision; the environment does not know of it."""
+"""Recorder of a session in progress: events, frames, actions and surroundings, decision by decision."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from dorothie_gym.spaces import ActionDict, SpaceLimits, action_space, noop
 
 _ACTOR_KINDS = np.full(max(Kind) + 1, -1, dtype=np.int64)
 _ACTOR_KINDS[Kind.CAR], _ACTOR_KINDS[Kind.CYCLIST] = ActorKind.VEHICLE, ActorKind.CYCLIST
-"""By `Kind` of a vehicle; -1 for places that are empty and for the car itself."""
+"""Kind of actor by `Kind` of a vehicle; -1 for empty records and for the ego."""
 
 _PLACE = ("key", "x", "y", "heading")
 
 
 def actors_around(world: World) -> NDArray[np.void]:
-    """Returns everybody and everything on the road besides the car as rows of `ACTOR_DTYPE` (n,)."""
+    """Returns vehicles, pedestrians and props without the ego as rows of `ACTOR_DTYPE` (n,)."""
     state = world.actors.arrays
     vehicles, pedestrians, props = plain(state.vehicles), plain(state.pedestrians), plain(state.props)
     kinds = _ACTOR_KINDS[vehicles["kind"]]
@@ -59,11 +59,11 @@ def actors_around(world: World) -> NDArray[np.void]:
 
 
 _CLOSE = 1e-3
-"""So shortly before a light changes it is looked at anew: sums of durations are not exact [s]."""
+"""Time before a change of phase from which the colours are computed again [s]; sums of durations are not exact."""
 
 
 class LightStates:
-    """What the traffic lights of a town show; put together anew only when one of them has changed.
+    """Colours of the traffic lights of a town, computed again only after a change.
 
     Args:
         town: the town.
@@ -75,7 +75,7 @@ class LightStates:
         self._states: dict[int, LightColour] = {}
 
     def at(self, time: float) -> dict[int, LightColour]:
-        """Returns the colours at a simulated time [s] by id of the signal; not to be modified."""
+        """Returns the colours at a simulated time [s] by id of the signal; the caller must not modify them."""
         if not self._since <= time < self._until:
             remaining = (_remaining(programme, time) for programme in self._programmes)
             self._since, self._until = time, time + min(remaining, default=math.inf) - _CLOSE
@@ -85,13 +85,13 @@ class LightStates:
 
 
 def _remaining(programme: LightProgramme, time: float) -> float:
-    """How long the present phase still lasts [s]."""
+    """Returns the remaining time of the present phase [s]."""
     now = (time - programme.offset) % programme.cycle
     ends = itertools.accumulate(phase.duration for phase in programme.phases)
     return next((end - now for end in ends if now < end), 0.0)
 
 
-# --- Actions of a decision, written down without what says nothing, and put together again ---------------------------
+# --- compact actions --------------------------------------------------------------------------------------------------
 
 
 @lru_cache(maxsize=16)
@@ -105,11 +105,11 @@ def _arrays(role: Role, limits: SpaceLimits) -> frozenset[str]:
 
 
 def compact(actions: Mapping[str, Mapping[str, Any]], limits: SpaceLimits) -> dict[Role, dict[str, Any]]:
-    """Returns actions as a `Decision` keeps them.
+    """Returns actions in the compact form of `Decision`: fields without effect are left out.
 
     Args:
-        actions: actions of the roles that the environment has taken, by agent.
-        limits: sizes of its spaces.
+        actions: valid actions of the roles, by agent.
+        limits: sizes of the action spaces.
     """
     found = {}
     for role in AGENT_ROLES:
@@ -128,16 +128,16 @@ def compact(actions: Mapping[str, Mapping[str, Any]], limits: SpaceLimits) -> di
 
 
 def expand(decision: Decision, limits: SpaceLimits) -> dict[str, ActionDict]:
-    """Returns the actions of a decision as the environment takes them, by agent.
+    """Returns the actions of a recorded decision in the action spaces, by agent.
 
     Raises:
-        SessionError: a role has no such field, or it holds what it cannot hold.
+        SessionError: a role has no such field, or a value is outside its range.
     """
     return {str(role): _expanded(decision, role, limits) for role in AGENT_ROLES}
 
 
 def idle_actions(limits: SpaceLimits) -> dict[str, ActionDict]:
-    """Returns the actions of a decision in which nobody does anything, by agent."""
+    """Returns the actions without effect of all roles, by agent."""
     return {str(role): _idle(role, limits) for role in AGENT_ROLES}
 
 
@@ -182,11 +182,11 @@ def _is_flags(role: Role, name: str, limits: SpaceLimits) -> bool:
     return isinstance(action_space(role, limits)[name], spaces.MultiBinary)
 
 
-# --- What happens in an environment, handed to a writer decision by decision; the environment does not kn ------------
+# --- recorder ---------------------------------------------------------------------------------------------------------
 
 
 class SessionRecorder:
-    """Records what the roles decide, what comes of it, and once a decision what is around the car.
+    """Records the actions of the roles, the events and frames that follow, and the surroundings at each decision.
 
     Args:
         engine: an engine that has just been reset; the events of the reset are recorded at once.
@@ -200,13 +200,13 @@ class SessionRecorder:
         self._append()
 
     def record(self, actions: Mapping[str, Mapping[str, Any]]) -> None:
-        """Records a decision after it has been played.
+        """Records a decision after the engine has played it.
 
         Args:
-            actions: what the environment was given, by agent.
+            actions: actions that were played, by agent.
 
         Raises:
-            SessionError: something of it cannot be written.
+            SessionError: a value cannot be written.
             OSError: the folder cannot be written.
         """
         self._writer.add_decision(self._frame, compact(actions, self._engine.limits))

@@ -1,4 +1,4 @@
-"""What a session begins with, drawn from its seed: storyboard, street names, departure."""
+"""Scenario of a session, drawn from its seed: storyboard, street names, departure."""
 
 from __future__ import annotations
 
@@ -12,19 +12,21 @@ from dorothie_gym.ontology import StreetName
 from dorothie_gym.recording import SessionHeader
 from dorothie_gym.tasks import Storyboard, StoryboardTemplate, bind, load_template, template_names
 
-NAMES = tuple(name for name in StreetName if name not in (StreetName.UNKNOWN, StreetName.QUERIED, StreetName.HIGHWAY))
-"""The fourteen names that are given to streets."""
+STREET_NAMES = tuple(
+    name for name in StreetName if name not in (StreetName.UNKNOWN, StreetName.QUERIED, StreetName.HIGHWAY)
+)
+"""The fourteen names that are drawn for streets."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scenario:
-    """Everything a session begins with.
+    """Initial conditions of a session.
 
     Attributes:
-        seed: what it was drawn from.
+        seed: seed of the scenario, and of the session.
         storyboard: the task, bound to places of the town.
         street_names: name of each street of the town.
-        departure: lane and distance along it [m] where the car stands.
+        departure: lane of the parked ego and the distance along it [m].
     """
 
     seed: int
@@ -34,12 +36,12 @@ class Scenario:
 
 
 def draw_scenario(town: Town, template: StoryboardTemplate | None, seed: int) -> Scenario:
-    """Draws a scenario; the same for the same town, template and seed.
+    """Draws a scenario; equal arguments give equal scenarios.
 
     Args:
-        town: the map; it needs at least as many sites as the storyboard has landmarks, and one to depart from.
-        template: the storyboard's template; None draws one of those that are shipped.
-        seed: any whole number >= 0.
+        town: the map, with at least one site for each landmark of the storyboard and one for the departure.
+        template: template of the storyboard; None draws one of the shipped templates.
+        seed: any integer >= 0.
 
     Raises:
         StoryboardError: the template does not fit the town.
@@ -61,8 +63,8 @@ def draw_scenario(town: Town, template: StoryboardTemplate | None, seed: int) ->
 
 
 def _name_streets(town: Town, rng: np.random.Generator) -> tuple[StreetName, ...]:
-    """Names shuffled over the streets; a ring road called Highway keeps its name, streets beyond the 14 have none."""
-    shuffled = [NAMES[int(i)] for i in rng.permutation(len(NAMES))]
+    """Returns shuffled names; a street named Highway keeps its name, streets beyond the fourteenth have no name."""
+    shuffled = [STREET_NAMES[int(i)] for i in rng.permutation(len(STREET_NAMES))]
     names: list[StreetName] = []
     for street in town.streets:
         if street.name == StreetName.HIGHWAY.label:
@@ -72,16 +74,13 @@ def _name_streets(town: Town, rng: np.random.Generator) -> tuple[StreetName, ...
     return tuple(names)
 
 
-# --- What is kept of a session before it begins ----------------------------------------------------------------------
-
-
 def header_of(scenario: Scenario, town: str, config: EnvConfig) -> SessionHeader:
-    """The header of a session.
+    """Returns the header of a session's record.
 
     Args:
-        scenario: what the session begins with.
+        scenario: scenario of the session.
         town: name of the town.
-        config: settings of the environment.
+        config: settings of the session.
     """
     storyboard = scenario.storyboard
     return SessionHeader(

@@ -1,4 +1,4 @@
-"""What lies ahead of the car on its planned path: the next junction where there is a choice."""
+"""Next junction with a choice of exits on the planned path of the ego."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from dorothie_gym.spaces import ExitColumn
 
 
 class TurnOptions(NamedTuple):
-    """Turn options at a junction.
+    """Exits at a junction.
 
     Attributes:
-        exits: ways on, from right to left.
-        rows: the same as rows of `ExitColumn` (n, 6), the distance still to be filled in.
-        distance: to the junction along the path [m].
-        lane: at whose end it is; -1 where there is none.
+        exits: exits from right to left.
+        rows: the exits as rows of `ExitColumn` (n, 6); the column of the distance is not filled in.
+        distance: distance to the junction along the path [m].
+        lane: lane that ends at the junction; -1 if there is none.
     """
 
     exits: tuple[Exit, ...]
@@ -34,21 +34,21 @@ NO_TURN_OPTIONS = TurnOptions((), np.zeros((0, len(ExitColumn))), 0.0, -1)
 
 
 class UpcomingJunction:
-    """The path ahead of the car in a session; its answers are those of the planner (`LocalPlanner`)."""
+    """Finds the next junction with a choice; the results agree with those of `LocalPlanner`."""
 
     def __init__(self, world: World) -> None:
         town = self._town = world.town
         self._planner = world.planner
         self._numbers = {junction.id: k for k, junction in enumerate(town.junctions)}
         self._rows: dict[int, Array] = {}
-        self._path: Path | None = None  # of which, and of where on it, the options are known
+        self._path: Path | None = None  # path and position of the cached options
         self._s = 0.0
         self._options = NO_TURN_OPTIONS
-        # lanes outside junctions at whose end a turn has to be chosen
+        # Lanes outside junctions that end at a choice of exits.
         self._chooses = np.array([not lane.in_junction and _is_choice(town.exits(lane.id)) for lane in town.lanes])
 
     def options(self) -> TurnOptions:
-        """Turn options at the next junction with a choice; none where the path comes to none."""
+        """Returns the exits at the next junction with a choice, or `NO_TURN_OPTIONS`."""
         planner = self._planner
         if planner.path is not self._path or planner.s != self._s:
             self._path, self._s = planner.path, planner.s

@@ -62,7 +62,7 @@ class DrivingSession:
         exits: exits of the town's junctions.
         instructor: built-in participant.
         heard: last instruction, as the Co-Wizard remembers it.
-        seen: present observations of all roles.
+        seen: present observations of the roles that act on them.
         reward: reward of the last decision.
         terms: its terms.
         terminated: whether the destination was reached, or the participant gave up.
@@ -80,7 +80,9 @@ class DrivingSession:
         self._plans = self._adversary.initial_state(seed, town) if self._adversary is not None else None
         self.heard, self._notes = HeardInstruction(), list[Mental]()
         self._aim: tuple[Place | None, tuple[Place, ...]] = (None, ())  # goal and roadblocks that `_nearest` refers to
-        self.seen: Mapping[str, Observation] = session.observations()
+        observing = (Role.PARTICIPANT, Role.CO_WIZARD)
+        self._observing = observing if self._adversary is None else (*observing, Role.AD_WIZARD)
+        self.seen: Mapping[str, Observation] = session.observations(self._observing)
         marks = read_landmarks(self.seen[Role.CO_WIZARD], town)  # those on its map, for the whole session
         self._known = frozenset(mark.place for mark in marks)
         self._rules_broken, self._collisions = self._count_infractions(), 0
@@ -128,7 +130,7 @@ class DrivingSession:
             action = replace(action, mental=self._notes.pop(0))
         reached = self._count_reached()
         self.session.step({Role.PARTICIPANT: _SILENCE, Role.CO_WIZARD: action, Role.AD_WIZARD: self.interfere()})
-        before, self.seen = self.seen, self.session.observations()
+        before, self.seen = self.seen, self.session.observations(self._observing)
         self.heard = self.heard.driven_on(before[Role.CO_WIZARD], self.seen[Role.CO_WIZARD])
         progress = self._progress()
         self._listen()

@@ -85,6 +85,7 @@ class SingleRole(gym.Env[Observation, ActionDict]):
         self.observation_space = deepcopy(observation_space(self.role, limits, self.engine.config.observe_acts))
         self.action_space = deepcopy(action_space(self.role, limits))
         self.partners = self._cast(partners or {})
+        self._observing = (self.role, *(role for role, policy in self.partners.items() if policy.observes))
         self._states: dict[Role, Any] = {}
 
     @property
@@ -110,7 +111,7 @@ class SingleRole(gym.Env[Observation, ActionDict]):
             for role, policy in self.partners.items()
         }
         self._render_window()
-        return observations[self.role], self.engine.info(self.role)
+        return observations.of(self._observing)[self.role], self.engine.info(self.role)
 
     def step(self, action: Mapping[str, Any]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Plays one decision of all roles.
@@ -121,10 +122,10 @@ class SingleRole(gym.Env[Observation, ActionDict]):
         """
         if not self._states or self.engine.over:
             raise ResetNeeded("no session is being played: call reset() first")
-        observations = self.engine.observations.of()
+        observations = self.engine.observations.of(self._observing)
         actions: dict[str, Mapping[str, Any]] = {self.role: action}
         for role, policy in self.partners.items():
-            actions[role], self._states[role] = policy.step(observations[role], self._states[role])
+            actions[role], self._states[role] = policy.step(observations.get(role, {}), self._states[role])
         outcome = self.engine.step(actions)
         terms = outcome.reward_terms[self.role]
         info = self.engine.info(self.role, terms)
@@ -132,7 +133,8 @@ class SingleRole(gym.Env[Observation, ActionDict]):
             info["is_success"] = self.engine.session.success
         self._render_window()
         reward = float(sum(terms.values()))
-        return self.engine.observations[self.role], reward, outcome.terminated, outcome.truncated, info
+        observation = self.engine.observations.of((self.role,) if self.engine.over else self._observing)[self.role]
+        return observation, reward, outcome.terminated, outcome.truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draws the aerial view, see `DuoWizardEnv.render`."""

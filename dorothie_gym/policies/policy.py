@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, ClassVar, Final, Generic, TypeVar
 
 import numpy as np
 
@@ -26,9 +26,12 @@ class Policy(ABC, Generic[State]):
     """Chooses the actions of a role from its observations.
 
     Attributes:
+        observes: whether `step` reads the observation; a policy that does not is given an empty one.
         role: role that the policy acts for.
         limits: sizes of the role's spaces.
     """
+
+    observes: ClassVar[bool] = True
 
     def __init__(self, role: Role, limits: SpaceLimits | None = None) -> None:
         """Prepares a policy for `role`; the sizes of the spaces default to those of `SpaceLimits`."""

@@ -39,6 +39,8 @@ class DrawCount:
 class SilentPolicy(Policy[None]):
     """Says and does nothing."""
 
+    observes = False
+
     def initial_state(self, seed: int, town: Town) -> None:
         """Returns None: the policy has no state."""
 
@@ -49,6 +51,8 @@ class SilentPolicy(Policy[None]):
 
 class RandomPolicy(Policy[DrawCount]):
     """Samples the action space; the environment words the utterances."""
+
+    observes = False
 
     def __init__(self, role: Role, limits: SpaceLimits | None = None) -> None:
         """Prepares a policy for `role`, with a copy of its action space."""

@@ -62,16 +62,17 @@ def play_session(
     engine = host.engine
     host.reset(seed=seed)
     states = {role: policies[role].initial_state(policy_seed(seed, role), engine.town) for role in AGENT_ROLES}
+    observing = [role for role in AGENT_ROLES if policies[role].observes]
     with ExitStack() as stack:
         writer = None if folder is None else stack.enter_context(SessionWriter(folder, engine.session_header()))
         recorder = None if writer is None else SessionRecorder(engine, writer)
         if on_step is not None:
             on_step(engine)
         while not engine.over:
-            observations = engine.observations.of()
+            observations = engine.observations.of(observing)
             actions = {}
             for role in AGENT_ROLES:
-                actions[str(role)], states[role] = policies[role].step(observations[role], states[role])
+                actions[str(role)], states[role] = policies[role].step(observations.get(role, {}), states[role])
             host.step(actions)
             if recorder is not None:
                 recorder.record(actions)

@@ -17,7 +17,9 @@ from dorothie_gym.spaces import SpaceLimits, noop, observation_space
 
 
 class Note(SilentPolicy):
-    """Notes what it is given."""
+    """Silent policy that records its seeds and observations."""
+
+    observes = True
 
     def __init__(self, role: Role) -> None:
         super().__init__(role)
