@@ -21,7 +21,7 @@ from dorothie_gym.analysis import (
     PAPER,
     Handled,
     Units,
-    census_of,
+    corpus_stats_of,
     handling,
     inconsistencies,
     phenomena_of,
@@ -132,7 +132,7 @@ def transcripts(first_seed: int) -> str:
 def figures(root: Path) -> str:
     """Returns the figures of a corpus as Markdown."""
     corpus = Corpus.load(root)
-    facts = census_of(corpus).to_json()
+    facts = corpus_stats_of(corpus).to_json()
     made = json.loads((root / "generation.json").read_text(encoding="utf-8"))
     consistent = sum(not inconsistencies(session) for session in corpus)
     command = f"dorothie-gym generate --sessions {made['sessions']} --seed {made['seed']} --out CORPUS"

@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from dorothie_gym import EnvConfig
-from dorothie_gym.analysis import census_of
+from dorothie_gym.analysis import corpus_stats_of
 from dorothie_gym.ontology import DialogueMove, Role
 from dorothie_gym.recording import Corpus
 from dorothie_gym.rollout import generate_corpus
@@ -51,7 +51,7 @@ def main() -> None:
     config = EnvConfig(max_seconds=options.seconds)
     generate_corpus(options.out, sessions=options.sessions, seed=options.seed, config=config)
     corpus = Corpus.load(options.out)
-    for key, value in census_of(corpus).counts.to_json().items():
+    for key, value in corpus_stats_of(corpus).counts.to_json().items():
         print(f"{key:28}{value:.3f}" if isinstance(value, float) else f"{key:28}{value}")
     words = [len(utterance.text.split()) for session in corpus for utterance in session.utterances()]
     print(f"{'words per utterance':28}{np.mean(words):.2f}")

@@ -1,19 +1,19 @@
 """Corpus analysis: counts, profiles, phenomena, consistency and agreement, all derived from the events."""
 
 from dorothie_gym.analysis.agreement import Agreement, agreement, inconsistencies
-from dorothie_gym.analysis.behaviour import CLAIMS, Claim, Verdict, verdicts_of
+from dorothie_gym.analysis.behaviour import CLAIMS, BehaviourClaim, BehaviourVerdict, verdicts_of
 from dorothie_gym.analysis.corpus_stats import (
     PAPER,
     PAPER_FOLDS,
-    Census,
+    CorpusStats,
     Counts,
-    census_of,
+    corpus_stats_of,
     faults_of_corpus,
     phenomena_of,
 )
 from dorothie_gym.analysis.exception_attribution import Handled, handled_by, handling, handling_of_events
 from dorothie_gym.analysis.majority_baselines import Anchors, anchors_of
-from dorothie_gym.analysis.phenomena import PHENOMENA, Finding, Phenomenon, Talk
+from dorothie_gym.analysis.phenomena import PHENOMENA, DialogueView, Occurrence, Phenomenon
 from dorothie_gym.analysis.profiles import Profile, Profiles
 from dorothie_gym.analysis.units import SaidUnit, Units
 
@@ -24,21 +24,21 @@ __all__ = [
     "PHENOMENA",
     "Agreement",
     "Anchors",
-    "Census",
-    "Claim",
+    "CorpusStats",
+    "BehaviourClaim",
     "Counts",
-    "Finding",
+    "Occurrence",
     "Handled",
     "Phenomenon",
     "Profile",
     "Profiles",
     "SaidUnit",
-    "Talk",
+    "DialogueView",
     "Units",
-    "Verdict",
+    "BehaviourVerdict",
     "agreement",
     "anchors_of",
-    "census_of",
+    "corpus_stats_of",
     "faults_of_corpus",
     "handled_by",
     "handling",

@@ -104,7 +104,7 @@ Figure: TypeAlias = Callable[[Totals], NDArray[np.float64]]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Claim:
+class BehaviourClaim:
     """Claim of the paper about the dialogue of people and cars.
 
     Attributes:
@@ -119,7 +119,7 @@ class Claim:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verdict:
+class BehaviourVerdict:
     """Evidence of a corpus for a claim.
 
     Attributes:
@@ -128,7 +128,7 @@ class Verdict:
         low, high: ends of its interval; None likewise.
     """
 
-    claim: Claim
+    claim: BehaviourClaim
     difference: float | None
     low: float | None
     high: float | None
@@ -144,7 +144,9 @@ class Verdict:
         return {"name": self.claim.name, "title": self.claim.title, **{name: getattr(self, name) for name in names}}
 
 
-def verdicts_of(sessions: Iterable[Session], *, resamples: int = RESAMPLES, seed: int = 0) -> tuple[Verdict, ...]:
+def verdicts_of(
+    sessions: Iterable[Session], *, resamples: int = RESAMPLES, seed: int = 0
+) -> tuple[BehaviourVerdict, ...]:
     """Returns the evidence of sessions for each of the `CLAIMS`.
 
     The interval is that of the percentile bootstrap over sessions; samples with an undefined figure are left out. It is
@@ -159,7 +161,7 @@ def verdicts_of(sessions: Iterable[Session], *, resamples: int = RESAMPLES, seed
     for session in sessions:
         tally.add(Units(session))
     if not tally.sessions:
-        return tuple(Verdict(claim=claim, difference=None, low=None, high=None) for claim in CLAIMS)
+        return tuple(BehaviourVerdict(claim=claim, difference=None, low=None, high=None) for claim in CLAIMS)
     count = tally.sessions
     whole = tally.totals(np.ones((1, count)))
     drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=resamples)
@@ -167,15 +169,15 @@ def verdicts_of(sessions: Iterable[Session], *, resamples: int = RESAMPLES, seed
     return tuple(_verdict(claim, whole, totals if count > 1 else None) for claim in CLAIMS)
 
 
-def _verdict(claim: Claim, whole: Totals, drawn: Totals | None) -> Verdict:
+def _verdict(claim: BehaviourClaim, whole: Totals, drawn: Totals | None) -> BehaviourVerdict:
     difference = float(claim.figure(whole)[0])
     if np.isnan(difference):
-        return Verdict(claim=claim, difference=None, low=None, high=None)
+        return BehaviourVerdict(claim=claim, difference=None, low=None, high=None)
     figures = np.full(1, np.nan) if drawn is None else claim.figure(drawn)
     if np.isnan(figures).mean() >= MOST:
-        return Verdict(claim=claim, difference=difference, low=None, high=None)
+        return BehaviourVerdict(claim=claim, difference=difference, low=None, high=None)
     low, high = np.nanquantile(figures, ((1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0))
-    return Verdict(claim=claim, difference=difference, low=float(low), high=float(high))
+    return BehaviourVerdict(claim=claim, difference=difference, low=float(low), high=float(high))
 
 
 # --- Claims ----------------------------------------------------------------------------------------------------------
@@ -205,21 +207,23 @@ def _instructs(slot: Slot, kind: Handled) -> Iterable[Key]:
     return (("instruct", kind, slot),)
 
 
-def _claim(name: str, title: str, kind: Handled, keys: Callable[[Handled], Iterable[Key]], sign: float = 1.0) -> Claim:
-    return Claim(name=name, title=title, figure=partial(_more, kind, keys, sign))
+def _claim(
+    name: str, title: str, kind: Handled, keys: Callable[[Handled], Iterable[Key]], sign: float = 1.0
+) -> BehaviourClaim:
+    return BehaviourClaim(name=name, title=title, figure=partial(_more, kind, keys, sign))
 
 
 _INSTRUCT, _EXPLAIN = (DialogueMove.INSTRUCT,), (DialogueMove.EXPLAIN,)
 _GROUNDING = (DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM)
 _ASK, _INFORM = MoveGroup.ASK.moves, MoveGroup.INFORM.moves
 
-CLAIMS: Final[tuple[Claim, ...]] = (
-    Claim(
+CLAIMS: Final[tuple[BehaviourClaim, ...]] = (
+    BehaviourClaim(
         name="human_mostly_instructs",
         title="humans: mostly Instruct",
         figure=partial(_mostly, _HUMAN, _INSTRUCT),
     ),
-    Claim(
+    BehaviourClaim(
         name="car_mostly_grounds",
         title="car: mostly Acknowledge, Confirm",
         figure=partial(_mostly, _CAR, _GROUNDING),

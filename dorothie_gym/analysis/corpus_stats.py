@@ -12,7 +12,7 @@ from typing import Any, Final
 from dorothie_gym.analysis.agreement import inconsistencies
 from dorothie_gym.analysis.diversity import has_language_models, plain, repetition, trigram_perplexity, words_of
 from dorothie_gym.analysis.majority_baselines import Anchors
-from dorothie_gym.analysis.phenomena import PHENOMENA, Phenomenon, Talk
+from dorothie_gym.analysis.phenomena import PHENOMENA, DialogueView, Phenomenon
 from dorothie_gym.analysis.profiles import Profiles
 from dorothie_gym.analysis.units import Units
 from dorothie_gym.ontology import PhysicalAction, Role
@@ -158,7 +158,7 @@ def _spoken_seconds(stretches: Iterable[tuple[float, float]]) -> float:
 
 
 @dataclass
-class Census:
+class CorpusStats:
     """Statistics of a corpus.
 
     Attributes:
@@ -205,9 +205,9 @@ class Census:
         return {**self.counts.to_json(), "anchors": self.anchors.to_json(), "diversity": self.diversity()}
 
 
-def census_of(corpus: Corpus) -> Census:
+def corpus_stats_of(corpus: Corpus) -> CorpusStats:
     """Returns the statistics of a corpus; raises `SessionError` if a session cannot be read."""
-    census = Census()
+    census = CorpusStats()
     for entry in corpus.entries:
         census.add(entry.load(), entry.fold)
     return census
@@ -223,7 +223,7 @@ def phenomena_of(sessions: Iterable[Session]) -> list[dict[str, Any]]:
     """
     rows = [_Row(phenomenon) for phenomenon in PHENOMENA]
     for session in sessions:
-        talk = Talk(session)
+        talk = DialogueView(session)
         for row in rows:
             row.add(talk)
     return [row.to_json() for row in rows]
@@ -245,7 +245,7 @@ class _Row:
         self.forms = dict.fromkeys(phenomenon.forms, 0)
         self.example: dict[str, Any] | None = None
 
-    def add(self, talk: Talk) -> None:
+    def add(self, talk: DialogueView) -> None:
         if not self.phenomenon.has_cause(talk):
             return
         self.sessions += 1

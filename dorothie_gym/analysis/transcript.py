@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, Final
 
-from dorothie_gym.analysis import PHENOMENA, Handled, Talk, Units, handling
+from dorothie_gym.analysis import PHENOMENA, DialogueView, Handled, Units, handling
 from dorothie_gym.ontology import MentalAction, Role
 from dorothie_gym.recording.events import INFRACTIONS, Event, EventType, UtteranceRecord, action_record
 from dorothie_gym.recording.session import Session
@@ -89,7 +89,7 @@ def _facts(session: Session) -> Iterator[str]:
     if session.summary:
         ended = "success" if session.summary.get("success") else "no success"
         yield f"- Ended with {ended} ({session.summary.get('reason', '-')})."
-    talk = Talk(session)
+    talk = DialogueView(session)
     found = Counter({each.number: sum(1 for _ in each.find(talk)) for each in PHENOMENA if each.has_cause(talk)})
     shown = ", ".join(f"{number} ({count})" for number, count in sorted(found.items()) if count)
     yield f"- Phenomena (count): {shown or '-'}."

@@ -107,9 +107,9 @@ def _check_choice(folder: Path | None, kappa: object, **chosen: bool) -> None:
 
 
 def _count(corpus: Corpus, picture: Path | None, *, as_json: bool) -> None:
-    from dorothie_gym.analysis import census_of
+    from dorothie_gym.analysis import corpus_stats_of
 
-    census = census_of(corpus)
+    census = corpus_stats_of(corpus)
     if picture is not None:
         from dorothie_gym.analysis.profile_charts import draw_profiles
 

@@ -55,8 +55,8 @@ from dorothie_gym.recording.surroundings import (
     LIGHT_STATES,
     WEATHER_DTYPE,
     ActorKind,
-    Scene,
     SceneTable,
+    Surroundings,
 )
 from dorothie_gym.recording.trajectory import (
     NO_LANE,
@@ -99,7 +99,7 @@ __all__ = [
     "ObjectKind",
     "Point",
     "ReadReport",
-    "Scene",
+    "Surroundings",
     "SceneTable",
     "Session",
     "SessionError",

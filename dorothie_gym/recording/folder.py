@@ -41,7 +41,7 @@ from dorothie_gym.recording.json_io import (
     to_line,
     to_page,
 )
-from dorothie_gym.recording.surroundings import Scene
+from dorothie_gym.recording.surroundings import Surroundings
 from dorothie_gym.recording.trajectory import TRAJECTORY_DTYPE, Trajectory, check_rising
 from dorothie_gym.recording.validation import ReadReport
 
@@ -116,7 +116,7 @@ class FolderContent:
     header: SessionHeader
     events: tuple[Event, ...]
     trajectory: Trajectory
-    scene: Scene
+    scene: Surroundings
     summary: Mapping[str, Any] | None
     complete: bool
     report: ReadReport
@@ -151,7 +151,7 @@ def _read_events(path: Path) -> tuple[tuple[Event, ...], bool]:
     return tuple(decode_event(line, f"{path}, line {number}") for number, line in enumerate(lines, start=1)), torn
 
 
-def _read_frames(folder: Path, over: bool, report: ReadReport) -> tuple[Trajectory, Scene, bool]:
+def _read_frames(folder: Path, over: bool, report: ReadReport) -> tuple[Trajectory, Surroundings, bool]:
     """Returns the frames, and whether they are complete."""
     journal = folder / JOURNAL_FILE
     if journal.exists() and not over:
@@ -162,7 +162,7 @@ def _read_frames(folder: Path, over: bool, report: ReadReport) -> tuple[Trajecto
         return *read_frames(folder / FRAMES_FILE, report), True
     if over:
         raise SessionError(f"{folder / FRAMES_FILE}: is missing, though the session is over")
-    return np.empty(0, dtype=TRAJECTORY_DTYPE), Scene(), False
+    return np.empty(0, dtype=TRAJECTORY_DTYPE), Surroundings(), False
 
 
 def _note_unknown(header: SessionHeader, events: tuple[Event, ...], report: ReadReport) -> None:

@@ -25,8 +25,8 @@ from dorothie_gym.recording.surroundings import (
     WEATHER_DTYPE,
     ActorKind,
     Rows,
-    Scene,
     SceneTable,
+    Surroundings,
 )
 from dorothie_gym.recording.trajectory import (
     OPEN_COLUMNS,
@@ -59,7 +59,7 @@ _SMOOTH: Final = (
 """Columns that change little from row to row: splitting their bytes compresses better."""
 
 
-def write_frames(path: Path, trajectory: Trajectory, scene: Scene) -> None:
+def write_frames(path: Path, trajectory: Trajectory, scene: Surroundings) -> None:
     """Writes the file atomically.
 
     Raises:
@@ -94,7 +94,7 @@ def write_frames(path: Path, trajectory: Trajectory, scene: Scene) -> None:
         )
 
 
-def read_frames(path: Path, report: ReadReport) -> tuple[Trajectory, Scene]:
+def read_frames(path: Path, report: ReadReport) -> tuple[Trajectory, Surroundings]:
     """Returns trajectory and scene of the file.
 
     Args:
@@ -121,7 +121,7 @@ def read_frames(path: Path, report: ReadReport) -> tuple[Trajectory, Scene]:
             if name not in TRAJECTORY_COLUMNS and name not in _TABLES:
                 report.keep(f"{path.name}: column {name!r}")
                 columns[name] = _further(arrow.column(name))
-    return trajectory, Scene(columns=columns, **tables)
+    return trajectory, Surroundings(columns=columns, **tables)
 
 
 @contextmanager
@@ -329,7 +329,7 @@ def encode_block(kind: bytes, frame: int, rows: NDArray[Any]) -> bytes:
     return _HEAD.pack(kind, len(content), zlib.crc32(content)) + content
 
 
-def read_journal(path: Path) -> tuple[Trajectory, Scene]:
+def read_journal(path: Path) -> tuple[Trajectory, Surroundings]:
     """Returns trajectory and scene of a journal up to its last complete block.
 
     Raises:
@@ -341,7 +341,7 @@ def read_journal(path: Path) -> tuple[Trajectory, Scene]:
         blocks[kind].append((frame, body))
     cars = np.frombuffer(b"".join(body for _, body in blocks[CAR]), dtype=DTYPES[CAR])
     tables = {kind: _table_journal(blocks[kind], DTYPES[kind]) for kind in (ACTORS, LIGHTS, WEATHER)}
-    scene = Scene(actors=tables[ACTORS], lights=tables[LIGHTS], weather=tables[WEATHER])
+    scene = Surroundings(actors=tables[ACTORS], lights=tables[LIGHTS], weather=tables[WEATHER])
     return trajectory_of(cars.reshape(-1, len(TRAJECTORY_COLUMNS))), scene
 
 

@@ -22,7 +22,7 @@ from dorothie_gym.errors import OntologyError
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import PhysicalAction, WeatherParameter
 from dorothie_gym.recording.session import Session
-from dorothie_gym.recording.surroundings import Scene, SceneTable
+from dorothie_gym.recording.surroundings import SceneTable, Surroundings
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT
 from dorothie_gym.sim.weather import Weather
 
@@ -57,7 +57,7 @@ FACING: Final = 90.0
 
 
 def perceived(
-    scene: Scene, pose: Array, frames: NDArray[np.int64], switches: Switches, town: Town | None
+    scene: Surroundings, pose: Array, frames: NDArray[np.int64], switches: Switches, town: Town | None
 ) -> Iterator[tuple[int, NDArray[np.int64], Array]]:
     """Yields for each look the frame (int), kinds (k,) and values (k, 8) of the perceived objects, the nearest first.
 
@@ -102,7 +102,7 @@ def last_perceived(session: Session, frame: int, town: Town | None) -> tuple[NDA
     there = trajectory[row : row + 1]
     pose = np.stack([there["x"], there["y"], np.degrees(there["heading"])], axis=1)
     now = int(look.frames[0])
-    scene = Scene(actors=look, lights=_last(scene.lights, now), weather=_last(scene.weather, now))
+    scene = Surroundings(actors=look, lights=_last(scene.lights, now), weather=_last(scene.weather, now))
     (_, kinds, values), *_ = perceived(scene, pose, look.frames, light_switches(session), town)
     return kinds, values
 
@@ -135,7 +135,7 @@ def _actors(table: SceneTable, at: Array) -> tuple[NDArray[np.int64], NDArray[np
 
 
 def _lights(
-    scene: Scene, looks: NDArray[np.int64], at: Array, town: Town | None
+    scene: Surroundings, looks: NDArray[np.int64], at: Array, town: Town | None
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
     """Returns look, kind and values of the lights that the car drives towards."""
     table, lines = scene.lights, {} if town is None else stop_lines(town)

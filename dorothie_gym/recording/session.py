@@ -27,7 +27,7 @@ from dorothie_gym.recording.events import (
 from dorothie_gym.recording.file_names import safe_name
 from dorothie_gym.recording.folder import digest_of, read_folder, save_folder
 from dorothie_gym.recording.header import SessionHeader
-from dorothie_gym.recording.surroundings import Scene
+from dorothie_gym.recording.surroundings import Surroundings
 from dorothie_gym.recording.trajectory import TRAJECTORY_DTYPE, Trajectory
 from dorothie_gym.recording.validation import ReadReport, faults_of
 from dorothie_gym.sim.config import FRAME_RATE
@@ -56,7 +56,7 @@ class Session:
     summary: Mapping[str, Any] | None = None
     complete: bool = True
     name: str = ""
-    scene: Scene = field(default_factory=Scene)
+    scene: Surroundings = field(default_factory=Surroundings)
     pictures: Mapping[int, Path] = field(default_factory=dict)
     decisions: tuple[Decision, ...] | None = None
     report: ReadReport = field(default_factory=ReadReport)

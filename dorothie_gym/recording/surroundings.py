@@ -104,7 +104,7 @@ def _nothing(dtype: np.dtype[Any]) -> Any:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Scene:
+class Surroundings:
     """Surroundings of the car; each table may be empty.
 
     Attributes:
@@ -120,15 +120,15 @@ class Scene:
     weather: SceneTable = _nothing(WEATHER_DTYPE)
     columns: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
-    def at_frames(self, frames: NDArray[np.int64]) -> Scene:
+    def at_frames(self, frames: NDArray[np.int64]) -> Surroundings:
         """Returns the records at the given frames, without further columns."""
-        return Scene(
+        return Surroundings(
             actors=self.actors.at_frames(frames),
             lights=self.lights.at_frames(frames),
             weather=self.weather.at_frames(frames),
         )
 
-    def equals(self, other: Scene) -> bool:
+    def equals(self, other: Surroundings) -> bool:
         """Returns whether two scenes hold the same records."""
         return (
             self.actors.equals(other.actors)

@@ -18,7 +18,7 @@ from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
 from dorothie_gym.policies.policy import policy_seed
-from dorothie_gym.recording import Event, Point, Scene, SceneTable, Session, Task, task_points, trajectory_of
+from dorothie_gym.recording import Event, Point, SceneTable, Session, Surroundings, Task, task_points, trajectory_of
 from dorothie_gym.recording.surroundings import Rows, light_rows, weather_rows
 from dorothie_gym.spaces import SpaceLimits, StepInfo
 
@@ -170,11 +170,11 @@ class _Record:
             )
         return self._session
 
-    def _scene(self) -> Scene:
+    def _scene(self) -> Surroundings:
         if not self._snapshots:
-            return Scene()
+            return Surroundings()
         frames = np.array([snapshot.frame for snapshot in self._snapshots], dtype=np.int64)
-        return Scene(
+        return Surroundings(
             actors=_table(frames, [snapshot.actors for snapshot in self._snapshots]),
             lights=_table(frames, [snapshot.lights for snapshot in self._snapshots]),
             weather=_table(frames, [snapshot.weather for snapshot in self._snapshots]),

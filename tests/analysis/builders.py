@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
-from dorothie_gym.analysis import Talk
+from dorothie_gym.analysis import DialogueView
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueAct,
@@ -28,7 +28,7 @@ HUMAN, CAR = Role.PARTICIPANT, Role.CO_WIZARD
 KFC, IKEA, COCO, HOUSE = LandmarkName.KFC, LandmarkName.IKEA, LandmarkName.COCO, LandmarkName.HOUSE
 FULLER, BAITS = StreetName.FULLER, StreetName.BAITS
 
-Make: TypeAlias = Callable[[], Talk]
+Make: TypeAlias = Callable[[], DialogueView]
 Span: TypeAlias = tuple[str, DialogueAct]
 
 
@@ -99,8 +99,8 @@ def drive(*parts: Sequence[Event], seconds: float = 60.0, **header: Any) -> Sess
     return session([event for part in parts for event in part], frames=round(seconds * FRAME_RATE), **header)
 
 
-def talk(*parts: Sequence[Event], seconds: float = 60.0, **header: Any) -> Talk:
-    return Talk(drive(*parts, seconds=seconds, **header))
+def talk(*parts: Sequence[Event], seconds: float = 60.0, **header: Any) -> DialogueView:
+    return DialogueView(drive(*parts, seconds=seconds, **header))
 
 
 def _event(time: float, kind: EventType, source: Role, data: dict[str, Any]) -> Event:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from dorothie_gym.analysis import CLAIMS, Verdict, verdicts_of
+from dorothie_gym.analysis import CLAIMS, BehaviourVerdict, verdicts_of
 from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, LandmarkName, ObjectClass
 from dorothie_gym.recording import Event, Session
 from tests.analysis.builders import M, car, drive, exception, human
@@ -40,7 +40,7 @@ def as_in_the_paper(quiet: int = 3) -> Session:
     )
 
 
-def verdicts(sessions: Sequence[Session]) -> dict[str, Verdict]:
+def verdicts(sessions: Sequence[Session]) -> dict[str, BehaviourVerdict]:
     return {verdict.claim.name: verdict for verdict in verdicts_of(sessions, resamples=200)}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dorothie_gym.analysis import PHENOMENA, Phenomenon, Talk
+from dorothie_gym.analysis import PHENOMENA, DialogueView, Phenomenon
 from dorothie_gym.ontology import (
     LandmarkName,
     MentalAction,
@@ -40,7 +40,7 @@ from tests.analysis.builders import (
 from tests.analysis.decoys import DECOYS, OTHERS
 
 
-def _misheard(answer: LandmarkName) -> Talk:
+def _misheard(answer: LandmarkName) -> DialogueView:
     return talk(
         human(1.0, "drive up to ikea", M.INSTRUCT, IKEA, recognised="drive up to a key"),
         car(4.0, "on the way to that one", M.CONFIRM, answer),
@@ -48,7 +48,7 @@ def _misheard(answer: LandmarkName) -> Talk:
     )
 
 
-def _roadblock(*, anew: bool) -> Talk:
+def _roadblock(*, anew: bool) -> DialogueView:
     return talk(
         exception(1.0, "place_prop", x=60.0, y=0.0),
         car(8.0, "something lies across our lane", M.EXPLAIN, OBJ.STATIC),

@@ -15,9 +15,9 @@ from dorothie_gym.recording import (
     WEATHER_DTYPE,
     ActorKind,
     ObjectKind,
-    Scene,
     SceneTable,
     Session,
+    Surroundings,
     Task,
     trajectory_of,
 )
@@ -52,7 +52,7 @@ def now(recorded: Session) -> tuple[list[int], np.ndarray]:  # type: ignore[type
 
 def test_objects_are_relative_to_the_car() -> None:
     """The car looks south, y grows southwards: what is east of it is to its left."""
-    scene = Scene(actors=one_look(np.concatenate([
+    scene = Surroundings(actors=one_look(np.concatenate([
         actor(ActorKind.PEDESTRIAN, 40.0, 10.0, 0.0), actor(ActorKind.VEHICLE, 10.0, 22.0, math.pi / 2),
     ])))  # fmt: skip
     kinds, values = now(replace(standing(10.0, 10.0, math.pi / 2), scene=scene))
@@ -63,7 +63,7 @@ def test_objects_are_relative_to_the_car() -> None:
 
 def test_only_what_is_within_sight_is_perceived() -> None:
     near, far = (
-        replace(standing(0.0, 0.0, 0.0), scene=Scene(actors=one_look(actor(ActorKind.VEHICLE, x, 0.0))))
+        replace(standing(0.0, 0.0, 0.0), scene=Surroundings(actors=one_look(actor(ActorKind.VEHICLE, x, 0.0))))
         for x in (CLEAR_SIGHT - 0.1, CLEAR_SIGHT + 0.1)
     )
     assert now(near)[0] == [ObjectKind.VEHICLE]
@@ -76,7 +76,7 @@ def test_fog_hides_and_lamps_help_in_the_dark() -> None:
     dark, lit = weather.sight(lights=False), weather.sight(lights=True)
     assert dark < lit
     table = one_look(np.array([tuple(weather.values.values())], dtype=WEATHER_DTYPE))
-    scene = Scene(actors=one_look(actor(ActorKind.PROP, (dark + lit) / 2, 0.0)), weather=table)
+    scene = Surroundings(actors=one_look(actor(ActorKind.PROP, (dark + lit) / 2, 0.0)), weather=table)
     recorded = replace(standing(0.0, 0.0, 0.0), scene=scene)
     assert now(recorded)[0] == []
     switched = physical(3, PhysicalAction.LIGHT_CHANGE, up=True, flagged=False)
@@ -88,7 +88,7 @@ def test_lights_are_read_by_whoever_comes_towards_them() -> None:
     signal, (x, y, heading) = next(iter(sorted(stop_lines(town).items())))
     ahead = math.radians(heading)
     lights = one_look(np.array([(signal, 2)], dtype=LIGHT_DTYPE))
-    scene = Scene(actors=one_look(np.empty(0, dtype=ACTOR_DTYPE)), lights=lights)
+    scene = Surroundings(actors=one_look(np.empty(0, dtype=ACTOR_DTYPE)), lights=lights)
     place = x - 20.0 * math.cos(ahead), y - 20.0 * math.sin(ahead)
     towards = replace(standing(*place, ahead), scene=scene)
     towards = replace(towards, header=replace(towards.header, town="brookside"))
@@ -102,11 +102,11 @@ def test_lights_are_read_by_whoever_comes_towards_them() -> None:
 def test_sessions_without_surroundings_say_so() -> None:
     columns = columns_of(standing(0.0, 0.0, 0.0))
     assert columns.sessions.has_objects.tolist() == [False]
-    seen = replace(standing(0.0, 0.0, 0.0), scene=Scene(actors=one_look(np.empty(0, dtype=ACTOR_DTYPE))))
+    seen = replace(standing(0.0, 0.0, 0.0), scene=Surroundings(actors=one_look(np.empty(0, dtype=ACTOR_DTYPE))))
     assert columns_of(seen).sessions.has_objects.tolist() == [True]
 
 
 @pytest.mark.parametrize("frame", [60, 63, 75])
 def test_a_look_at_or_after_the_point_is_not_seen(frame: int) -> None:
-    scene = Scene(actors=one_look(actor(ActorKind.VEHICLE, 5.0, 0.0), frame))
+    scene = Surroundings(actors=one_look(actor(ActorKind.VEHICLE, 5.0, 0.0), frame))
     assert now(replace(standing(0.0, 0.0, 0.0), scene=scene))[0] == []

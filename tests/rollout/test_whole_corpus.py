@@ -15,8 +15,8 @@ from dorothie_gym.analysis import (
     CLAIMS,
     PAPER,
     PAPER_FOLDS,
-    Verdict,
-    census_of,
+    BehaviourVerdict,
+    corpus_stats_of,
     faults_of_corpus,
     phenomena_of,
     verdicts_of,
@@ -48,16 +48,16 @@ def corpus(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
 
 @pytest.fixture(scope="module")
 def facts(corpus: Corpus) -> dict[str, Any]:
-    return census_of(corpus).to_json()
+    return corpus_stats_of(corpus).to_json()
 
 
 @pytest.fixture(scope="module")
-def verdicts(corpus: Corpus) -> Mapping[str, Verdict]:
+def verdicts(corpus: Corpus) -> Mapping[str, BehaviourVerdict]:
     return {verdict.claim.name: verdict for verdict in verdicts_of(corpus)}
 
 
 @pytest.mark.parametrize("claim", [claim.name for claim in CLAIMS])
-def test_people_and_cars_behave_as_the_paper_reports(claim: str, verdicts: Mapping[str, Verdict]) -> None:
+def test_people_and_cars_behave_as_the_paper_reports(claim: str, verdicts: Mapping[str, BehaviourVerdict]) -> None:
     verdict = verdicts[claim]
     assert verdict.holds, f"{verdict.claim.title}: {verdict.difference} [{verdict.low}, {verdict.high}]"
 

@@ -6,7 +6,7 @@ from functools import partial
 from typing import Final
 
 from dorothie_gym.analysis.phenomena import changes, questions, ways
-from dorothie_gym.analysis.phenomena.dialogue_view import Phenomenon, Query, Talk, both_speak
+from dorothie_gym.analysis.phenomena.dialogue_view import DialogueView, Phenomenon, Query, both_speak
 from dorothie_gym.ontology import ExceptionKind
 
 _TALK = "both sides speak"
@@ -21,7 +21,7 @@ def _task(number: int, title: str, kind: ExceptionKind, cause: str, find: Query,
     return Phenomenon(number=number, title=title, cause=cause, has_cause=happens, find=find, forms=forms)
 
 
-def _happens(kind: ExceptionKind, talk: Talk) -> bool:
+def _happens(kind: ExceptionKind, talk: DialogueView) -> bool:
     return changes.task_exception(talk, kind)
 
 

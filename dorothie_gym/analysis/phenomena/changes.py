@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Mapping
 from types import MappingProxyType
 
 from dorothie_gym.analysis.exception_attribution import OBSTACLES
-from dorothie_gym.analysis.phenomena.dialogue_view import CAR, HUMAN, Finding, Talk, Turn, labels
+from dorothie_gym.analysis.phenomena.dialogue_view import CAR, HUMAN, DialogueView, Occurrence, Turn, labels
 from dorothie_gym.analysis.phenomena.ways import asks_where_next
 from dorothie_gym.ontology import (
     ActionValue,
@@ -44,7 +44,7 @@ SOON = 60.0
 """Time within which a roadblock, or an unknown place, is settled [s]."""
 
 
-def hidden_place(talk: Talk) -> Iterator[Finding]:
+def hidden_place(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 8: the car says that it does not know a place, the participant describes it, the car marks a guess."""
     for turn in talk.by(CAR, M.EXPLAIN, M.QUERY_W, M.QUERY_YN, M.CHECK, M.CONFUSE, M.REPLY_N):
         unknown = turn.mentions(GoalStatus.UNKNOWN) and labels(turn.names(Slot.LANDMARK)) & talk.hidden_goals
@@ -57,7 +57,7 @@ def hidden_place(talk: Talk) -> Iterator[Finding]:
         if talk.believed(MentalAction.KNOWLEDGE_UPDATE, since=since, until=described.end + SOON):
             steps = talk.answers(turn, M.INSTRUCT, within=3 * SOON)
             refined = any(a.number > described.number and a.names(Slot.ACTION) for a in steps)
-            yield Finding(turn, "described, refined" if refined else "described")
+            yield Occurrence(turn, "described, refined" if refined else "described")
 
 
 def _describes(turn: Turn, places: Collection[str]) -> bool:
@@ -66,12 +66,12 @@ def _describes(turn: Turn, places: Collection[str]) -> bool:
     return tells and bool(turn.names(Slot.STREET) or labels(turn.names(Slot.LANDMARK)) - frozenset(places))
 
 
-def has_hidden_goal(talk: Talk) -> bool:
+def has_hidden_goal(talk: DialogueView) -> bool:
     """Returns whether a subgoal's landmark is hidden from the car."""
     return bool(talk.hidden_goals)
 
 
-def roadblock(talk: Talk) -> Iterator[Finding]:
+def roadblock(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 9: the car reports an object across the road, another way is discussed and taken."""
     for turn in talk.by(CAR, M.EXPLAIN):
         if not any(set(act.slots) & set(OBSTACLES) for act in turn.doing(M.EXPLAIN)):
@@ -83,21 +83,21 @@ def roadblock(talk: Talk) -> Iterator[Finding]:
         told = next((t for t in following if t.speaker is HUMAN and t.does(M.INSTRUCT, M.REPLY_W)), None)
         first = proposal or told
         if first is not None and _goes_another_way(talk, since=turn.start, until=first.end + SOON):
-            yield Finding(turn, "proposed" if proposal is not None else "told")
+            yield Occurrence(turn, "proposed" if proposal is not None else "told")
 
 
-def _goes_another_way(talk: Talk, *, since: float, until: float) -> bool:
+def _goes_another_way(talk: DialogueView, *, since: float, until: float) -> bool:
     around = (PhysicalAction.U_TURN, PhysicalAction.J_TURN, PhysicalAction.LANE_SWITCH)
     anew = talk.believed(MentalAction.PLAN_UPDATE, since=since, until=until)
     return anew or talk.did(*around, since=since, until=until)
 
 
-def meets_roadblock(talk: Talk) -> bool:
+def meets_roadblock(talk: DialogueView) -> bool:
     """Returns whether the car comes near an object that the Ad-Wizard put on the road."""
     return bool(talk.met_roadblocks)
 
 
-def dim_weather(talk: Talk) -> Iterator[Finding]:
+def dim_weather(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 10: in fog, rain or at night the participant asks for less speed or more light, and the car responds."""
     stretches = tuple(_dim(talk))
     wishes = (
@@ -110,15 +110,15 @@ def dim_weather(talk: Talk) -> Iterator[Finding]:
         for value, words, action, up, form in wishes:
             done = talk.switched(action, up, since=turn.start, until=turn.end + 15.0)
             if turn.mentions(value) and (done or (turn.says(words) and talk.answered(turn))):
-                yield Finding(turn, form)
+                yield Occurrence(turn, form)
 
 
-def has_dim_weather(talk: Talk) -> bool:
+def has_dim_weather(talk: DialogueView) -> bool:
     """Returns whether the Ad-Wizard causes fog, rain or night, with time left for the dialogue."""
     return any(talk.session.duration - since > 10.0 for since, _ in _dim(talk))
 
 
-def _dim(talk: Talk) -> Iterator[tuple[float, float]]:
+def _dim(talk: DialogueView) -> Iterator[tuple[float, float]]:
     """Returns the stretches of time [s] with fog, rain or night, each from an exception until its end."""
     since: dict[WeatherParameter, float] = {}
     for event in talk.exceptions(ExceptionKind.WEATHER):
@@ -134,17 +134,17 @@ def _dim(talk: Talk) -> Iterator[tuple[float, float]]:
     yield from ((begun, math.inf) for begun in since.values())
 
 
-def task_added(talk: Talk) -> Iterator[Finding]:
+def task_added(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 11: the participant names a new task; the car takes it up, or asks when."""
     for _, turn in _told(talk, ExceptionKind.TASK_TRIGGER, M.INSTRUCT, M.EXPLAIN):
         question = next(talk.answers(turn, M.QUERY_W, M.QUERY_YN, M.CHECK), None)
         if question is not None and talk.answered(question):
-            yield Finding(turn, "negotiated")
+            yield Occurrence(turn, "negotiated")
         elif talk.answered(turn):
-            yield Finding(turn, "taken up")
+            yield Occurrence(turn, "taken up")
 
 
-def task_changed(talk: Talk) -> Iterator[Finding]:
+def task_changed(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 12: the participant replaces one place by another, and the car takes it up."""
     for event in talk.exceptions(ExceptionKind.TASK_CHANGE):
         for turn in talk.by(HUMAN, M.INSTRUCT, M.EXPLAIN):
@@ -154,18 +154,18 @@ def task_changed(talk: Talk) -> Iterator[Finding]:
             if str(event.data.get("landmark")) not in labels(places):
                 continue
             if len(places) > 1 and turn.mentions(GoalStatus.ABANDONED, GoalStatus.ONGOING, GoalStatus.PENDING):
-                yield Finding(turn, "both named")
+                yield Occurrence(turn, "both named")
             elif turn.mentions(GoalStatus.ABANDONED) or _gave_up(talk, turn):
-                yield Finding(turn, "in two steps")
+                yield Occurrence(turn, "in two steps")
 
 
-def _gave_up(talk: Talk, turn: Turn) -> bool:
+def _gave_up(talk: DialogueView, turn: Turn) -> bool:
     """Returns whether a place is given up right before or after the new one is named."""
     around = [*talk.before(turn, within=20.0), *talk.later(turn, within=20.0)]
     return any(other.speaker is HUMAN and other.mentions(GoalStatus.ABANDONED) for other in around)
 
 
-def task_deleted(talk: Talk) -> Iterator[Finding]:
+def task_deleted(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 13: the participant gives up a task, and may resume it later."""
     for _, turn in _told(talk, ExceptionKind.TASK_DELETE):
         if not turn.mentions(GoalStatus.ABANDONED):
@@ -174,10 +174,10 @@ def task_deleted(talk: Talk) -> Iterator[Finding]:
         resumed = any(
             other.number > turn.number and other.names(Slot.LANDMARK) & given_up for other in talk.by(HUMAN, M.INSTRUCT)
         )
-        yield Finding(turn, "resumed" if resumed else "given up")
+        yield Occurrence(turn, "resumed" if resumed else "given up")
 
 
-def _told(talk: Talk, kind: ExceptionKind, *moves: DialogueMove) -> Iterator[tuple[Event, Turn]]:
+def _told(talk: DialogueView, kind: ExceptionKind, *moves: DialogueMove) -> Iterator[tuple[Event, Turn]]:
     """Yields the participant's turns with one of the moves that name the landmark of an earlier task exception."""
     for event in talk.exceptions(kind):
         for turn in talk.by(HUMAN, *moves):
@@ -185,12 +185,12 @@ def _told(talk: Talk, kind: ExceptionKind, *moves: DialogueMove) -> Iterator[tup
                 yield event, turn
 
 
-def task_exception(talk: Talk, kind: ExceptionKind) -> bool:
+def task_exception(talk: DialogueView, kind: ExceptionKind) -> bool:
     """Returns whether the Ad-Wizard changes the task in this way, with time left for the dialogue."""
     return any(talk.session.duration - event.time > 10.0 for event in talk.exceptions(kind))
 
 
-def completion(talk: Talk) -> Iterator[Finding]:
+def completion(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 14: the participant says that a task is done, or the car asks for the next destination."""
     for event in _completed(talk):
         for turn in talk.turns:
@@ -199,23 +199,23 @@ def completion(talk: Talk) -> Iterator[Finding]:
             places = labels(turn.names(Slot.LANDMARK))
             is_it = not places or str(event.data.get("landmark")) in places
             if turn.speaker is HUMAN and turn.mentions(GoalStatus.COMPLETE) and turn.does(M.EXPLAIN) and is_it:
-                yield Finding(turn, "told")
+                yield Occurrence(turn, "told")
             elif turn.speaker is CAR and asks_where_next(talk, turn.number):
-                yield Finding(turn, "asked")
+                yield Occurrence(turn, "asked")
 
 
-def completes(talk: Talk) -> bool:
+def completes(talk: DialogueView) -> bool:
     """Returns whether a subgoal is reached before the end of the drive."""
     return any(True for _ in _completed(talk))
 
 
-def _completed(talk: Talk) -> Iterator[Event]:
+def _completed(talk: DialogueView) -> Iterator[Event]:
     for event in talk.session.of_type(EventType.SUBGOAL):
         if event.data.get("status") == GoalStatus.COMPLETE.label and talk.session.duration - event.time > 5.0:
             yield event
 
 
-def negotiation(talk: Talk) -> Iterator[Finding]:
+def negotiation(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 23: the car makes a proposal with a reason; the participant agrees, or insists on another action."""
     for turn in talk.by(CAR, M.QUERY_YN, M.CHECK):
         proposes = any(
@@ -226,10 +226,10 @@ def negotiation(talk: Talk) -> Iterator[Finding]:
             continue
         answer = next(talk.replies(turn, M.REPLY_Y, M.REPLY_N, M.CONFIRM, M.INSTRUCT, M.ACKNOWLEDGE), None)
         if answer is not None:
-            yield Finding(turn, "accepted" if answer.does(M.REPLY_Y, M.CONFIRM, M.ACKNOWLEDGE) else "insisted")
+            yield Occurrence(turn, "accepted" if answer.does(M.REPLY_Y, M.CONFIRM, M.ACKNOWLEDGE) else "insisted")
 
 
-def _has_grounds(talk: Talk, turn: Turn) -> bool:
+def _has_grounds(talk: DialogueView, turn: Turn) -> bool:
     """Returns whether the car gives the reason of a proposal: soon after a change, or by a comparison."""
     grounds = [turn, *(other for other in talk.before(turn, within=10.0) if other.speaker is CAR)]
     grounds = [other for other in grounds if other.does(M.EXPLAIN)]
@@ -238,7 +238,7 @@ def _has_grounds(talk: Talk, turn: Turn) -> bool:
     return any(fresh or other.says(_COMPARES) or turn.says(_COMPARES) for other in grounds)
 
 
-def gives_cause_to_negotiate(talk: Talk) -> bool:
+def gives_cause_to_negotiate(talk: DialogueView) -> bool:
     """Returns whether a roadblock is met or the task changes."""
     kinds = (ExceptionKind.TASK_TRIGGER, ExceptionKind.TASK_CHANGE)
     return meets_roadblock(talk) or any(task_exception(talk, kind) for kind in kinds)

@@ -96,7 +96,7 @@ class Turn:
         )
 
 
-class Talk:
+class DialogueView:
     """Turns of participant and Co-Wizard in a session, and its events.
 
     Attributes:
@@ -267,14 +267,14 @@ HUMAN, CAR = Role.PARTICIPANT, Role.CO_WIZARD
 
 
 @dataclass(frozen=True)
-class Finding:
+class Occurrence:
     """Occurrence of a phenomenon: its first turn, and its form."""
 
     turn: Turn
     form: str
 
 
-Query: TypeAlias = Callable[[Talk], Iterator[Finding]]
+Query: TypeAlias = Callable[[DialogueView], Iterator[Occurrence]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -293,11 +293,11 @@ class Phenomenon:
     number: int
     title: str
     cause: str
-    has_cause: Callable[[Talk], bool]
+    has_cause: Callable[[DialogueView], bool]
     find: Query
     forms: tuple[str, ...]
 
 
-def both_speak(talk: Talk) -> bool:
+def both_speak(talk: DialogueView) -> bool:
     """Returns whether both sides speak."""
     return {HUMAN, CAR} <= {turn.speaker for turn in talk.turns}

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 
 from dorothie_gym.analysis.diversity import plain, words_of
-from dorothie_gym.analysis.phenomena.dialogue_view import CAR, HUMAN, Finding, Talk, Turn
+from dorothie_gym.analysis.phenomena.dialogue_view import CAR, HUMAN, DialogueView, Occurrence, Turn
 from dorothie_gym.analysis.phenomena.ways import asks_why
 from dorothie_gym.dialogue.exchanges import EXPECTATIONS, PATIENCE
 from dorothie_gym.ontology import DialogueMove, PhysicalAction, Slot, SlotValue
@@ -27,58 +27,58 @@ _YES_NO: Mapping[DialogueMove, str] = MappingProxyType(
 )
 
 
-def yes_no(talk: Talk) -> Iterator[Finding]:
+def yes_no(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 5: the car asks a yes/no question; the participant says yes, no, or is not sure."""
     for turn in talk.by(CAR, M.QUERY_YN):
         answer = next(talk.replies(turn, *_YES_NO), None)
         if answer is not None:
-            yield Finding(turn, next(_YES_NO[act.move] for act in answer.doing(*_YES_NO)))
+            yield Occurrence(turn, next(_YES_NO[act.move] for act in answer.doing(*_YES_NO)))
 
 
-def check(talk: Talk) -> Iterator[Finding]:
+def check(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 6: the car checks an assumption, and the participant confirms or denies it."""
     for turn in talk.by(CAR, M.CHECK):
         answer = next(talk.replies(turn, M.CONFIRM, M.REPLY_Y, M.REPLY_N, M.CLARIFY), None)
         if answer is not None:
-            yield Finding(turn, "confirmed" if answer.does(M.CONFIRM, M.REPLY_Y) else "denied")
+            yield Occurrence(turn, "confirmed" if answer.does(M.CONFIRM, M.REPLY_Y) else "denied")
 
 
-def align(talk: Talk) -> Iterator[Finding]:
+def align(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 7: a speaker asks for understanding: it is confirmed, or the utterance is rephrased."""
     for turn in talk.turns:
         if not turn.does(M.ALIGN):
             continue
         if talk.replied(turn, M.ACKNOWLEDGE, M.REPLY_Y):
-            yield Finding(turn, "understood")
+            yield Occurrence(turn, "understood")
             continue
         puzzled = next(talk.replies(turn, M.CONFUSE, M.REPLY_N), None)
         if puzzled is not None and talk.answered(puzzled, M.CLARIFY, M.INSTRUCT):
-            yield Finding(turn, "repaired")
+            yield Occurrence(turn, "repaired")
 
 
-def perception(talk: Talk) -> Iterator[Finding]:
+def perception(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 15: the participant asks whether the car sees an object, and the car answers."""
     for turn in talk.by(HUMAN, M.QUERY_YN):
         if not any(act.values(Slot.OBJECT) for act in turn.doing(M.QUERY_YN)):
             continue
         answer = next(talk.replies(turn, M.REPLY_Y, M.REPLY_N, M.REPLY_U), None)
         if answer is not None:
-            yield Finding(turn, "seen" if answer.does(M.REPLY_Y) else "not seen")
+            yield Occurrence(turn, "seen" if answer.does(M.REPLY_Y) else "not seen")
 
 
-def reason(talk: Talk) -> Iterator[Finding]:
+def reason(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 16: the participant asks for the reason of an action, and the car gives it."""
     for turn in talk.by(HUMAN, M.QUERY_W, M.QUERY_YN):
         if asks_why(turn) and talk.replied(turn, M.REPLY_W, M.EXPLAIN):
-            yield Finding(turn, "explained")
+            yield Occurrence(turn, "explained")
 
 
-def acts_by_itself(talk: Talk) -> bool:
+def acts_by_itself(talk: DialogueView) -> bool:
     """Returns whether the car acts in a way that calls for a reason: stops for a hazard, or turns round."""
     return talk.happened(EventType.HAZARD_STOP) or talk.did(PhysicalAction.U_TURN)
 
 
-def overlap(talk: Talk) -> Iterator[Finding]:
+def overlap(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 19: both speakers begin an exchange while the other is speaking, and both are answered."""
     begun = sorted(_answered_exchanges(talk), key=lambda turn: turn.number)
     for k, first in enumerate(begun):
@@ -86,11 +86,11 @@ def overlap(talk: Talk) -> Iterator[Finding]:
             if other.start >= first.end:
                 break
             if first.speaker is not other.speaker:
-                yield Finding(first, "both answered")
+                yield Occurrence(first, "both answered")
                 break
 
 
-def _answered_exchanges(talk: Talk) -> Iterator[Turn]:
+def _answered_exchanges(talk: DialogueView) -> Iterator[Turn]:
     """Returns the turns that open an exchange in which the other speaker takes part."""
     opened: dict[int | None, Turn] = {}
     answered: dict[int | None, Turn] = {}
@@ -105,14 +105,14 @@ def _answered_exchanges(talk: Talk) -> Iterator[Turn]:
     return (opener for opener in answered.values() if opener.does(*EXPECTATIONS))
 
 
-def irrelevant(talk: Talk) -> Iterator[Finding]:
+def irrelevant(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 20: talk unrelated to the drive."""
     for turn in talk.turns:
         if turn.does(M.IRRELEVANT):
-            yield Finding(turn, "human" if turn.speaker is HUMAN else "car")
+            yield Occurrence(turn, "human" if turn.speaker is HUMAN else "car")
 
 
-def abandoned(talk: Talk) -> Iterator[Finding]:
+def abandoned(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 21: a question gets no answer for ten seconds, and is rephrased or dropped."""
     said_by_both: dict[int | None, set[object]] = {}
     for turn in talk.turns:
@@ -126,10 +126,10 @@ def abandoned(talk: Talk) -> Iterator[Finding]:
         answered = talk.answers(turn, *(set(M) - {M.IRRELEVANT, M.ALIGN}), within=PATIENCE)
         if any(not other.does(*EXPECTATIONS) for other in answered):
             continue
-        yield Finding(turn, "asked again" if _asked_again(talk, turn) else "dropped")
+        yield Occurrence(turn, "asked again" if _asked_again(talk, turn) else "dropped")
 
 
-def _asked_again(talk: Talk, turn: Turn) -> bool:
+def _asked_again(talk: DialogueView, turn: Turn) -> bool:
     slots = {value.slot for act in turn.doing(*QUESTIONS) for value in act.slots}
     for other in talk.later(turn, within=AGAIN):
         if other.speaker is turn.speaker and other.does(*QUESTIONS) and plain(other.text) != plain(turn.text):
@@ -138,12 +138,12 @@ def _asked_again(talk: Talk, turn: Turn) -> bool:
     return False
 
 
-def somebody_asks(talk: Talk) -> bool:
+def somebody_asks(talk: DialogueView) -> bool:
     """Returns whether there is a question."""
     return any(turn.does(*QUESTIONS) for turn in talk.turns)
 
 
-def speech_trouble(talk: Talk) -> Iterator[Finding]:
+def speech_trouble(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 24: the recogniser misheard the participant, the car's answer shows it, and the participant corrects it.
 
     The car's answer shows confusion, or a name that was not said; the participant then clarifies, denies, or repeats
@@ -157,17 +157,17 @@ def speech_trouble(talk: Talk) -> Iterator[Finding]:
             got = answer.names(Slot.LANDMARK) | answer.names(Slot.STREET)
             mistaken = bool(got) and not got & _said_lately(talk, turn)
             if (puzzled or mistaken) and _put_right(talk, turn, answer):
-                yield Finding(turn, "not understood" if puzzled else "misunderstood")
+                yield Occurrence(turn, "not understood" if puzzled else "misunderstood")
                 break
 
 
-def _said_lately(talk: Talk, turn: Turn) -> frozenset[SlotValue]:
+def _said_lately(talk: DialogueView, turn: Turn) -> frozenset[SlotValue]:
     """Returns the places that were named in a turn, or by any speaker shortly before it."""
     turns = [turn, *talk.before(turn, within=LATELY)]
     return frozenset(value for each in turns for slot in (Slot.LANDMARK, Slot.STREET) for value in each.names(slot))
 
 
-def _put_right(talk: Talk, turn: Turn, answer: Turn) -> bool:
+def _put_right(talk: DialogueView, turn: Turn, answer: Turn) -> bool:
     for repair in talk.answers(answer):
         if repair.does(M.CLARIFY, M.REPLY_N):
             return True
@@ -182,6 +182,6 @@ def misheard(turn: Turn) -> bool:
     return turn.recognised is not None and words_of(turn.recognised) != words_of(turn.text)
 
 
-def somebody_misheard(talk: Talk) -> bool:
+def somebody_misheard(talk: DialogueView) -> bool:
     """Returns whether the participant was misheard."""
     return any(misheard(turn) for turn in talk.by(HUMAN))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from dorothie_gym.analysis.phenomena.dialogue_view import CAR, HUMAN, Finding, Talk, Turn, asks_for, named
+from dorothie_gym.analysis.phenomena.dialogue_view import CAR, HUMAN, DialogueView, Occurrence, Turn, asks_for, named
 from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, LandmarkName, PhysicalAction, Slot
 
 M = DialogueMove
@@ -43,41 +43,41 @@ _NOT_A_PLACE = re.compile(
 )
 
 
-def goal_level(talk: Talk) -> Iterator[Finding]:
+def goal_level(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 1: the participant instructs by naming a place, and the car takes it up."""
     for turn in talk.by(HUMAN, M.INSTRUCT):
         goals = [act for act in turn.doing(M.INSTRUCT) if named(act, Slot.LANDMARK) and not act.slots & _NOT_TO_BE]
         if goals and talk.replied(turn, *_TAKEN_UP):
-            yield Finding(turn, "goal")
+            yield Occurrence(turn, "goal")
 
 
-def step_level(talk: Talk) -> Iterator[Finding]:
+def step_level(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 2: the participant instructs the next step without naming a place, and the car takes it up."""
     for turn in talk.by(HUMAN, M.INSTRUCT):
         steps = [act for act in turn.doing(M.INSTRUCT) if named(act, Slot.ACTION) & set(STEPS)]
         if steps and not turn.names(Slot.LANDMARK) and talk.replied(turn, *_TAKEN_UP):
-            yield Finding(turn, "step")
+            yield Occurrence(turn, "step")
 
 
-def two_acts(talk: Talk) -> Iterator[Finding]:
+def two_acts(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 3: an utterance of the participant holds two different acts."""
     for turn in talk.by(HUMAN):
         if len({act.move for act in turn.acts} - {M.IRRELEVANT}) > 1:
-            yield Finding(turn, "two acts")
+            yield Occurrence(turn, "two acts")
 
 
-def asked_at_junction(talk: Talk) -> Iterator[Finding]:
+def asked_at_junction(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 4: the car asks for the direction, and the participant gives it."""
     for turn in talk.by(CAR, M.QUERY_W):
         if not any(asks_for(act, Slot.ACTION, Slot.STREET) for act in turn.doing(M.QUERY_W)):
             continue
         for answer in talk.replies(turn, M.REPLY_W, M.INSTRUCT):
             if answer.names(Slot.ACTION) & _WAYS or answer.names(Slot.STREET):
-                yield Finding(turn, "told")
+                yield Occurrence(turn, "told")
                 break
 
 
-def plan_on_request(talk: Talk) -> Iterator[Finding]:
+def plan_on_request(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 17: the participant asks for the route, and the car names turns or streets."""
     for turn in talk.by(HUMAN, M.QUERY_W):
         asks = any(asks_for(act, Slot.ACTION, Slot.STREET) for act in turn.doing(M.QUERY_W))
@@ -86,40 +86,40 @@ def plan_on_request(talk: Talk) -> Iterator[Finding]:
         for answer in talk.replies(turn, M.REPLY_W):
             told = {value for act in answer.doing(M.REPLY_W, M.EXPLAIN) for value in act.slots}
             if answer.names(Slot.STREET) or told & set(STEPS):
-                yield Finding(turn, "described")
+                yield Occurrence(turn, "described")
                 break
 
 
-def wrong_turn(talk: Talk) -> Iterator[Finding]:
+def wrong_turn(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 18: the participant reports a wrong turn, and the car answers or corrects it."""
     for turn in talk.by(HUMAN, *_OBJECTS):
         turned = talk.did(*_TURNS, since=turn.start - 45.0, until=turn.end)
         if not turn.says(_WRONG, *_OBJECTS) or not turned:
             continue
         if talk.did(PhysicalAction.U_TURN, since=turn.start, until=turn.end + 30.0):
-            yield Finding(turn, "corrected")
+            yield Occurrence(turn, "corrected")
         elif talk.answered(turn):
-            yield Finding(turn, "answered")
+            yield Occurrence(turn, "answered")
 
 
 _OBJECTS = (M.EXPLAIN, M.REPLY_N, M.INSTRUCT, M.CLARIFY)
 _TURNS = (PhysicalAction.J_TURN, PhysicalAction.U_TURN, PhysicalAction.LANE_SWITCH)
 
 
-def turns_at_junctions(talk: Talk) -> bool:
+def turns_at_junctions(talk: DialogueView) -> bool:
     """Returns whether the car turned at a junction."""
     return talk.did(PhysicalAction.J_TURN)
 
 
-def references(talk: Talk) -> Iterator[Finding]:
+def references(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 22: a place is referred to by position or time instead of its name."""
     for turn in talk.turns:
         spans = (span for act, span in zip(turn.acts, turn.spans, strict=True) if act.move is not M.IRRELEVANT)
         if any(_REFERENCE.search(_NOT_A_PLACE.sub(" ", span.casefold().replace("’", "'"))) for span in spans):
-            yield Finding(turn, "human" if turn.speaker is HUMAN else "car")
+            yield Occurrence(turn, "human" if turn.speaker is HUMAN else "car")
 
 
-def asks_where_next(talk: Talk, number: int) -> bool:
+def asks_where_next(talk: DialogueView, number: int) -> bool:
     """Returns whether the turn of a number asks for the next destination."""
     return any(LandmarkName.QUERIED in act.slots for act in talk.turns[number].doing(M.QUERY_W))
 

@@ -22,9 +22,9 @@ from dorothie_gym.recording import (
     WEATHER_DTYPE,
     ActorKind,
     LandmarkRow,
-    Scene,
     SceneTable,
     SessionHeader,
+    Surroundings,
     Trajectory,
 )
 from dorothie_gym.recording.surroundings import LIGHT_DTYPE, Rows, light_rows
@@ -129,13 +129,13 @@ def way_of(glimpses: Sequence[Glimpse]) -> Trajectory:
     return rows
 
 
-def scene_of(glimpses: Sequence[Glimpse]) -> Scene:
+def scene_of(glimpses: Sequence[Glimpse]) -> Surroundings:
     """Returns what was around the car at the glimpses of which the way has a row."""
     seen = [
         glimpse for glimpse in glimpses if glimpse.frame >= FRAMES_PER_TENTH and glimpse.frame % FRAMES_PER_TENTH == 0
     ]
     frames = np.array([glimpse.frame for glimpse in seen], dtype=np.int64)
-    return Scene(
+    return Surroundings(
         actors=_table(frames, [glimpse.actors for glimpse in seen], ACTOR_DTYPE),
         lights=_table(frames, [glimpse.lights for glimpse in seen], LIGHT_DTYPE),
         weather=_table(frames, [glimpse.weather for glimpse in seen], WEATHER_DTYPE),

@@ -9,7 +9,16 @@ from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology import parse_landmark, parse_street
 from dorothie_gym.recording.header import LandmarkRow, SessionHeader, SubgoalRow
 from dorothie_gym.recording.json_io import Fields
-from dorothie_gym.recording.sdn.files import CONFIG_FILE, DIALOG_FILE, OURS, Row, SdnLayout, number_of, plain, whole_of
+from dorothie_gym.recording.sdn.files import (
+    CONFIG_FILE,
+    DIALOG_FILE,
+    OURS,
+    JsonObject,
+    SdnLayout,
+    number_of,
+    plain,
+    whole_of,
+)
 from dorothie_gym.recording.sdn.maps import SdnMap
 from dorothie_gym.recording.validation import ReadReport
 
@@ -20,14 +29,14 @@ _KNOWN: Final = {
 _UNKNOWN: Final = "Unknown"
 
 
-def town_of(config: Row) -> str:
+def town_of(config: JsonObject) -> str:
     """Returns the name of the town; empty if the configuration has none."""
     name = _environment(config).get("map", config.get("map"))
     return name.rpartition("/")[2] if isinstance(name, str) else ""
 
 
 def header_of(
-    config: Row, task: Row, layout: SdnLayout, place: SdnMap, first_frame: int, report: ReadReport
+    config: JsonObject, task: JsonObject, layout: SdnLayout, place: SdnMap, first_frame: int, report: ReadReport
 ) -> SessionHeader:
     """Returns the header of a session.
 
@@ -61,7 +70,7 @@ def header_of(
     )
 
 
-def _note_fields(config: Row, environment: Row, file: str, report: ReadReport) -> None:
+def _note_fields(config: JsonObject, environment: JsonObject, file: str, report: ReadReport) -> None:
     for values, where in ((config, ""), (environment, "environment.")):
         for name in values:
             if name not in _KNOWN:
@@ -71,12 +80,12 @@ def _note_fields(config: Row, environment: Row, file: str, report: ReadReport) -
             report.miss(f"{file}: environment.{name}")
 
 
-def _environment(config: Row) -> Row:
+def _environment(config: JsonObject) -> JsonObject:
     environment = config.get("environment")
     return environment if isinstance(environment, Mapping) else {}
 
 
-def _rows(value: Any) -> list[Row]:
+def _rows(value: Any) -> list[JsonObject]:
     items = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
     return [item for item in items if isinstance(item, Mapping)]
 
@@ -96,7 +105,7 @@ def _streets(names: Any, report: ReadReport) -> list[str]:
     return streets
 
 
-def _dig(row: Row, *path: str) -> Row:
+def _dig(row: JsonObject, *path: str) -> JsonObject:
     """Returns the object at a path of fields, each of which may be missing."""
     for name in path:
         below = row.get(name)
@@ -104,7 +113,7 @@ def _dig(row: Row, *path: str) -> Row:
     return row
 
 
-def _landmark(row: Row, place: SdnMap, hidden: frozenset[str], report: ReadReport) -> LandmarkRow:
+def _landmark(row: JsonObject, place: SdnMap, hidden: frozenset[str], report: ReadReport) -> LandmarkRow:
     """Returns a landmark of the release layout (`wp`) or of the sample layout (`location`)."""
     name = _landmark_name(row, report)
     location = _dig(row, "wp", "Transform", "Location")
@@ -128,7 +137,7 @@ def _landmark(row: Row, place: SdnMap, hidden: frozenset[str], report: ReadRepor
     )
 
 
-def _landmark_name(row: Row, report: ReadReport) -> str:
+def _landmark_name(row: JsonObject, report: ReadReport) -> str:
     for field in ("name", "asset"):
         try:
             return parse_landmark(row.get(field, "")).label
@@ -138,13 +147,13 @@ def _landmark_name(row: Row, report: ReadReport) -> str:
     return _UNKNOWN
 
 
-def _hidden(task: Row) -> frozenset[str]:
+def _hidden(task: JsonObject) -> frozenset[str]:
     names = task.get("hidden_from_wizard", task.get("hidden_from_co_wizard"))
     found = (_resolve(name, task) for name in (names if isinstance(names, list) else ()))
     return frozenset(name for name in found if name is not None)
 
 
-def _resolve(destination: Any, task: Row) -> str | None:
+def _resolve(destination: Any, task: JsonObject) -> str | None:
     """Returns the landmark of a storyboard's destination: a name, or a variable that is assigned to one."""
     if not isinstance(destination, str):
         return None
@@ -159,7 +168,9 @@ def _resolve(destination: Any, task: Row) -> str | None:
     return None
 
 
-def _subgoals(config: Row, task: Row, landmarks: list[LandmarkRow], report: ReadReport) -> list[SubgoalRow]:
+def _subgoals(
+    config: JsonObject, task: JsonObject, landmarks: list[LandmarkRow], report: ReadReport
+) -> list[SubgoalRow]:
     numbers = {landmark["name"]: k for k, landmark in reversed(list(enumerate(landmarks)))}
     subgoals = []
     for row in _rows(task.get("subgoals")) or _rows(_dig(config, "task").get("subgoals")):

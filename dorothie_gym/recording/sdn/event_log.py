@@ -23,7 +23,7 @@ from dorothie_gym.ontology import (
     parse_role,
 )
 from dorothie_gym.recording.events import Event, EventType, check_event
-from dorothie_gym.recording.sdn.files import MORE, OURS, Row, frame_of, more_of, number_of, plain, whole_of
+from dorothie_gym.recording.sdn.files import MORE, OURS, JsonObject, frame_of, more_of, number_of, plain, whole_of
 from dorothie_gym.recording.sdn.moves import MoveReader, read_speech
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.recording.validation import ReadReport
@@ -53,7 +53,7 @@ class DeedReader:
     roads: dict[int, int] = field(default_factory=dict)
     turns: int = 0
 
-    def physical(self, val: Row) -> dict[str, Any]:
+    def physical(self, val: JsonObject) -> dict[str, Any]:
         """Returns the data of a physical action, with the angle of a JTurn as in the file.
 
         Raises:
@@ -81,7 +81,7 @@ class DeedReader:
             self.report.miss(f"argument of {action.label}")
         return {"action": action.label, "angle": angle, "up": up}
 
-    def belief(self, val: Row) -> dict[str, Any]:
+    def belief(self, val: JsonObject) -> dict[str, Any]:
         """Returns the data of a belief update; unknown arguments are kept.
 
         Raises:
@@ -103,7 +103,7 @@ class DeedReader:
             return {"action": action.label, "sdn": plain(dict(val))}
         return {"action": action.label, **arguments}
 
-    def _turn(self, val: Row) -> float | None:
+    def _turn(self, val: JsonObject) -> float | None:
         turn = self.turns
         self.turns += 1
         value = val.get("slot_val")
@@ -190,7 +190,7 @@ FOREIGN: Final = "sdn:"
 """Prefix of the type of a row that is kept unchanged."""
 
 
-def sorted_rows(rows: Sequence[Row], name: str, report: ReadReport) -> list[Row]:
+def sorted_rows(rows: Sequence[JsonObject], name: str, report: ReadReport) -> list[JsonObject]:
     """Returns the rows with a frame and a type, in order of their frames."""
     usable = [row for row in rows if frame_of(row) is not None and isinstance(row.get("type"), str)]
     report.repair(f"{name}: rows without a frame or a type were left out", len(rows) - len(usable))
@@ -214,7 +214,7 @@ class LogReader:
     """
 
     def __init__(
-        self, rows: Sequence[Row], first_frame: int, name: str, report: ReadReport, *, audio: bool = True
+        self, rows: Sequence[JsonObject], first_frame: int, name: str, report: ReadReport, *, audio: bool = True
     ) -> None:
         self._rows = rows
         self._first = first_frame
@@ -230,7 +230,7 @@ class LogReader:
         """Returns the events, in the order of the rows."""
         return [self._event(row) for row in self._rows if _type(row) != SPEECH]
 
-    def _event(self, row: Row) -> Event:
+    def _event(self, row: JsonObject) -> Event:
         frame, kind = frame_of(row) or 0, _KINDS.get(_type(row))
         try:
             if isinstance(row.get(OURS), Mapping):
@@ -248,7 +248,7 @@ class LogReader:
             return self._unknown(row, frame, str(error))
         return event
 
-    def _read(self, kind: EventType, row: Row, frame: int, source: Role) -> tuple[dict[str, Any], bool]:
+    def _read(self, kind: EventType, row: JsonObject, frame: int, source: Role) -> tuple[dict[str, Any], bool]:
         """Returns the data of a row, and whether it is a prediction point."""
         val = row.get("val")
         val = val if isinstance(val, Mapping) else {}
@@ -262,20 +262,20 @@ class LogReader:
             return data, self._flag(row, source is Role.CO_WIZARD and navigates)
         return {**self.deeds.belief(val), **more_of(val)}, self._flag(row, False)
 
-    def _flag(self, row: Row, otherwise: bool) -> bool:
+    def _flag(self, row: JsonObject, otherwise: bool) -> bool:
         if "flag" not in row:
             self._report.miss(f"{self._name}: flag (taken from the kind of event)")
             return otherwise
         return str(row["flag"]).strip().casefold() in ("true", "1", "1.0")
 
-    def _rest(self, row: Row, kind: str) -> dict[str, Any]:
+    def _rest(self, row: JsonObject, kind: str) -> dict[str, Any]:
         """Returns the unknown fields of a row."""
         rest = {name: value for name, value in row.items() if name not in _FIELDS}
         for name in rest:
             self._report.keep(f"{self._name}: field {str(name)!r} of {kind}")
         return {"sdn": plain(rest)} if rest else {}
 
-    def _ours(self, row: Row, frame: int) -> Event:
+    def _ours(self, row: JsonObject, frame: int) -> Event:
         """Returns an event of this package that the layout cannot represent."""
         ours = row[OURS]
         name = str(plain(row["type"])).strip()
@@ -292,7 +292,7 @@ class LogReader:
         check_event(event, f"{self._name}, frame {frame}")
         return event
 
-    def _unknown(self, row: Row, frame: int, reason: str) -> Event:
+    def _unknown(self, row: JsonObject, frame: int, reason: str) -> Event:
         name = str(plain(row["type"])).strip()[:80]
         self._report.keep(f"{self._name}: row of type {name!r} ({reason.strip(': ')[:120]})")
         rest = {key: value for key, value in row.items() if key not in ("frame", "type")}
@@ -308,7 +308,7 @@ class LogReader:
         return FRAMES_PER_TENTH * max(frame - self._first, 0)
 
 
-def role_of(row: Row) -> Role | None:
+def role_of(row: JsonObject) -> Role | None:
     """Returns the role that is the source of a row; None for an unknown name."""
     try:
         return parse_role(row["from"].strip())
@@ -316,5 +316,5 @@ def role_of(row: Row) -> Role | None:
         return None
 
 
-def _type(row: Row) -> str:
+def _type(row: JsonObject) -> str:
     return str(row["type"]).strip().casefold()

@@ -70,7 +70,7 @@ def expected_files(layout: SdnLayout) -> tuple[str, ...]:
 
 # --- JSON and CSV ----------------------------------------------------------------------------------------------------
 
-Row: TypeAlias = Mapping[str, Any]
+JsonObject: TypeAlias = Mapping[str, Any]
 
 _SPACE: Final = re.compile(r"[ \t\n\r]*")
 
@@ -137,12 +137,12 @@ def _check_count(count: int, path: Path) -> None:
         raise SessionError(f"{path}: holds more than {MAX_EVENTS} items, which no session does; it is not read")
 
 
-def read_rows(path: Path, report: ReadReport) -> list[Row]:
+def read_rows(path: Path, report: ReadReport) -> list[JsonObject]:
     """Returns the objects of a JSON list in a file; other items are left out, which is reported."""
     return objects(read_list(path, report), path.name, report)
 
 
-def objects(items: list[Any], name: str, report: ReadReport) -> list[Row]:
+def objects(items: list[Any], name: str, report: ReadReport) -> list[JsonObject]:
     """Returns the objects among the items; others are left out, which is reported."""
     rows = [item for item in items if isinstance(item, Mapping)]
     report.repair(f"{name}: items that are no objects were left out", len(items) - len(rows))
@@ -178,7 +178,7 @@ def whole_of(value: Any) -> int | None:
     return int(number) if number is not None and number == int(number) and abs(number) < 2**53 else None
 
 
-def frame_of(row: Row) -> int | None:
+def frame_of(row: JsonObject) -> int | None:
     """Returns the frame (10 Hz) of a row; None without a valid one."""
     frame = whole_of(row.get("frame"))
     return frame if frame is not None and 0 <= frame < MAX_FRAME else None
@@ -206,7 +206,7 @@ def plain(value: Any, depth: int = MAX_DEPTH - 8) -> Any:
     return value
 
 
-def more_of(values: Row) -> dict[str, Any]:
+def more_of(values: JsonObject) -> dict[str, Any]:
     """Returns the fields of events that this package's writer adds to those of the layout."""
     more = values.get(MORE)
     return dict(plain(more)) if isinstance(more, Mapping) else {}

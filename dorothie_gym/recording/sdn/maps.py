@@ -16,7 +16,7 @@ FAR: Final = 10.0
 
 
 @dataclass(frozen=True)
-class Place:
+class LanePosition:
     """Position in the town: lane (-1: none), distance along it [m], street (-1: none)."""
 
     lane: int = NO_LANE
@@ -37,17 +37,17 @@ class SdnMap:
         for lane in town.lanes if town is not None else ():
             self._by_ids[lane.road_id, lane.lane_id].append(lane.id)
 
-    def locate(self, x: float, y: float, road: int | None = None, lane: int | None = None) -> Place:
+    def locate(self, x: float, y: float, road: int | None = None, lane: int | None = None) -> LanePosition:
         """Returns the position closest to (x, y) [m], on lanes with the given numbers if the town has them."""
         if self.town is None:
-            return Place()
+            return LanePosition()
         known = self._by_ids.get((road, lane)) if road is not None and lane is not None else None
         position = np.array([x, y])
         found = [(*self.town.lanes[k].project(position), k) for k in known or range(len(self.town.lanes))]
         station, lateral, number = min(found, key=lambda item: (abs(item[1]), item[2]))
         if known is None and abs(lateral) > FAR:
-            return Place()
-        return Place(number, station, self.town.lanes[number].street)
+            return LanePosition()
+        return LanePosition(number, station, self.town.lanes[number].street)
 
     def lane_of(self, x: float, y: float, road: int, lane: int) -> int:
         """Returns the lane with the given numbers at (x, y), or -1; fast enough for every frame."""

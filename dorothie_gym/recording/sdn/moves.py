@@ -13,7 +13,7 @@ from dorothie_gym.ontology import DialogueAct, Role, parse_act, parse_move, pars
 from dorothie_gym.ontology import parse_slot as slot_of
 from dorothie_gym.recording.sdn.files import (
     MORE,
-    Row,
+    JsonObject,
     frame_of,
     more_of,
     number_of,
@@ -70,10 +70,10 @@ class MoveReader:
         self._transaction = -1
         self._open = {"exchange": False, "transaction": False}
 
-    def release(self, row: Row, frame: int, speaker: Role) -> dict[str, Any]:
+    def release(self, row: JsonObject, frame: int, speaker: Role) -> dict[str, Any]:
         """Returns the data of a row of the release layout; raises `OntologyError` for an unknown move."""
         given = row.get("act")
-        act: Row = given if isinstance(given, Mapping) else {"move": given}
+        act: JsonObject = given if isinstance(given, Mapping) else {"move": given}
         text = transcript_of(row.get("utterance_gt"), self._report)
         recognised = transcript_of(row.get("utterance"), self._report)
         if text is None:
@@ -93,7 +93,7 @@ class MoveReader:
             data["sdn_act"] = plain(rest)
         return data
 
-    def sample(self, row: Row, val: Row, frame: int, speaker: Role) -> dict[str, Any]:
+    def sample(self, row: JsonObject, val: JsonObject, frame: int, speaker: Role) -> dict[str, Any]:
         """Returns the data of a row of the sample layout, which marks the ends of exchanges and transactions."""
         for name, mark in (("exchange", "g"), ("transaction", "t")):
             if val.get(f"is_so{mark}") is True:
@@ -110,7 +110,7 @@ class MoveReader:
                 self._open[name] = False
         return data
 
-    def _said(self, row: Row, act: Row, frame: int, speaker: Role, text: str) -> dict[str, Any]:
+    def _said(self, row: JsonObject, act: JsonObject, frame: int, speaker: Role, text: str) -> dict[str, Any]:
         parsed = self._parse(act)
         stretch = self._stretch(row, frame, speaker)
         file = stretch.file if stretch is not None else None
@@ -135,7 +135,7 @@ class MoveReader:
             data["audio"] = str(plain(file))
         return {**data, **more_of(act)}
 
-    def _parse(self, act: Row) -> DialogueAct:
+    def _parse(self, act: JsonObject) -> DialogueAct:
         move, slots = act.get("move"), act.get("slots")
         slots = slots if isinstance(slots, Mapping) else {}
         try:
@@ -151,7 +151,7 @@ class MoveReader:
                     self._report.keep(f"slot value {str(slot)[:40]}={str(value)[:40]} (left out)")
         return parse_act(str(move), known)
 
-    def _stretch(self, row: Row, frame: int, speaker: Role) -> Speech | None:
+    def _stretch(self, row: JsonObject, frame: int, speaker: Role) -> Speech | None:
         file = row.get("utterance_filename")
         if isinstance(file, str) and file in self._files:
             return self._files[file]
@@ -164,7 +164,7 @@ class MoveReader:
         best = min(near, default=None)
         return self._files[best[2]] if best is not None and best[0] <= NEAR else None
 
-    def _times(self, act: Row, stretch: Speech | None, frame: int, text: str) -> tuple[float, float]:
+    def _times(self, act: JsonObject, stretch: Speech | None, frame: int, text: str) -> tuple[float, float]:
         start, end = number_of(act.get("start")), number_of(act.get("end"))
         if start is not None and end is not None:
             return start, end
@@ -175,7 +175,7 @@ class MoveReader:
         return round(over - max(len(text.split()), 1) / WORDS_A_SECOND, 3), over
 
 
-def read_speech(rows: Iterable[Row], report: ReadReport, speaker_of: Any) -> tuple[Speech, ...]:
+def read_speech(rows: Iterable[JsonObject], report: ReadReport, speaker_of: Any) -> tuple[Speech, ...]:
     """Returns the stretches of speech; the log has a row for every frame of each."""
     found: dict[str, Speech] = {}
     for row in rows:

@@ -19,7 +19,7 @@ from dorothie_gym.recording.sdn.files import (
     PLACES_FILE,
     SCENE_FILE,
     TASK_FILE,
-    Row,
+    JsonObject,
     SdnLayout,
     detect_layout,
     expected_files,
@@ -31,7 +31,7 @@ from dorothie_gym.recording.sdn.files import (
 )
 from dorothie_gym.recording.sdn.maps import SdnMap
 from dorothie_gym.recording.sdn.plan_files import ViewReader
-from dorothie_gym.recording.sdn.trajectory import Places, read_places, read_scene, trajectory_of_places
+from dorothie_gym.recording.sdn.trajectory import CarPoses, read_places, read_scene, trajectory_of_places
 from dorothie_gym.recording.sdn.turn_angles import SignVote, vote, with_roads, with_sign
 from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.towns import find_town
@@ -46,11 +46,11 @@ class RawSession:
     """Content of the files; angles of JTurns have the sign of the file."""
 
     layout: SdnLayout
-    config: Row
-    task: Row
+    config: JsonObject
+    task: JsonObject
     header: SessionHeader
     events: list[Event]
-    places: Places
+    places: CarPoses
     first_frame: int
     place: SdnMap
     report: ReadReport
@@ -157,7 +157,7 @@ def settle_sign(folders: Iterable[Path | str]) -> SignVote:
     return result
 
 
-def _object(folder: Path, name: str, report: ReadReport) -> Row:
+def _object(folder: Path, name: str, report: ReadReport) -> JsonObject:
     """Returns the JSON object of a file; empty if the file is missing."""
     if not (folder / name).is_file():
         report.miss(name)
@@ -168,7 +168,7 @@ def _object(folder: Path, name: str, report: ReadReport) -> Row:
     return value
 
 
-def _log_rows(path: Path, report: ReadReport) -> tuple[list[Row], Row]:
+def _log_rows(path: Path, report: ReadReport) -> tuple[list[JsonObject], JsonObject]:
     """Returns the rows of a log, and the fields around them if the log is no plain list (as in the hub layout).
 
     Rows are the objects with a field 'frame', or in a list with such objects: of the list, if the file holds one, else
@@ -179,7 +179,7 @@ def _log_rows(path: Path, report: ReadReport) -> tuple[list[Row], Row]:
         return objects(value, path.name, report), {}
     if not isinstance(value, Mapping):
         raise SessionError(f"{path}: a JSON list of events is expected")
-    rows: list[Row] = []
+    rows: list[JsonObject] = []
     around: dict[str, Any] = {}
     for name, items in value.items():
         given = items if isinstance(items, list) else [items]
@@ -193,7 +193,7 @@ def _log_rows(path: Path, report: ReadReport) -> tuple[list[Row], Row]:
     return rows, around
 
 
-def _first_frame(config: Row, rows: list[Row], places: Places) -> int:
+def _first_frame(config: JsonObject, rows: list[JsonObject], places: CarPoses) -> int:
     """Returns the first frame (10 Hz) of a session."""
     seen = [frame_of(row) or 0 for row in rows[:1]] + places.frames[:1].tolist()
     first = min(seen, default=0)

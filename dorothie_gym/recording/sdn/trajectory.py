@@ -16,7 +16,7 @@ from dorothie_gym.recording.frames import read_frames, write_frames
 from dorothie_gym.recording.sdn.files import number_of, read_csv
 from dorothie_gym.recording.sdn.maps import SdnMap
 from dorothie_gym.recording.session import Session
-from dorothie_gym.recording.surroundings import Scene
+from dorothie_gym.recording.surroundings import Surroundings
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH, NO_LANE, TENTHS, TRAJECTORY_DTYPE, Trajectory
 from dorothie_gym.recording.validation import ReadReport
 
@@ -34,7 +34,7 @@ MOVED: Final = 0.2
 
 
 @dataclass(frozen=True)
-class Places:
+class CarPoses:
     """Poses of the car.
 
     Attributes:
@@ -54,7 +54,7 @@ class Places:
     further: dict[str, NDArray[np.float64]]
 
 
-def read_places(path: Path, report: ReadReport) -> Places:
+def read_places(path: Path, report: ReadReport) -> CarPoses:
     """Returns the poses of the file.
 
     The file ends at a second header line. Rows with a missing number are left out, rows out of order are sorted, and
@@ -112,7 +112,7 @@ def _numbers(path: Path, lines: list[list[str]], start: int, names: list[str], r
     return np.delete(table, again, axis=0)
 
 
-def _places(table: NDArray[np.float64], names: list[str]) -> Places:
+def _places(table: NDArray[np.float64], names: list[str]) -> CarPoses:
     columns = {name: table[:, k] for k, name in enumerate(names)}
     x, y, yaw = columns["x"], columns["y"], columns["yaw"]
     missing = np.full(len(table), -1.0)
@@ -120,7 +120,7 @@ def _places(table: NDArray[np.float64], names: list[str]) -> Places:
         name: np.nan_to_num(columns.get(name, missing), nan=-1.0, posinf=-1.0, neginf=-1.0).clip(-(2**40), 2**40)
         for name in _IDS
     }
-    return Places(
+    return CarPoses(
         frames=columns["frame"].astype(np.int64),
         x=x,
         y=y,
@@ -140,7 +140,7 @@ def _is_radians(x: NDArray[np.float64], y: NDArray[np.float64], yaw: NDArray[np.
     return bool(np.mean(np.cos(looked - course)) > np.mean(np.cos(np.radians(looked) - course)))
 
 
-def trajectory_of_places(places: Places, first_frame: int, place: SdnMap) -> tuple[Trajectory, Scene]:
+def trajectory_of_places(places: CarPoses, first_frame: int, place: SdnMap) -> tuple[Trajectory, Surroundings]:
     """Returns a trajectory in frames of 30 Hz: speed from the motion, unknown controls, ids as further columns.
 
     Args:
@@ -164,7 +164,7 @@ def trajectory_of_places(places: Places, first_frame: int, place: SdnMap) -> tup
     else:
         each = zip(places.x.tolist(), places.y.tolist(), roads, lanes, strict=True)
         trajectory["lane"] = [place.lane_of(*row) for row in each]
-    return trajectory, Scene(columns={**places.ids, **places.further})
+    return trajectory, Surroundings(columns={**places.ids, **places.further})
 
 
 # --- Surroundings, an addition of this package to the release layout -------------------------------------------------
@@ -182,7 +182,7 @@ def write_scene(path: Path, session: Session) -> None:
         write_frames(path, trajectory, scene)
 
 
-def read_scene(path: Path, scene: Scene, trajectory: Trajectory, report: ReadReport) -> Scene:
+def read_scene(path: Path, scene: Surroundings, trajectory: Trajectory, report: ReadReport) -> Surroundings:
     """Returns a scene with the surroundings from the file, at the frames of a trajectory.
 
     Args:

@@ -12,7 +12,7 @@ from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.recording.events import Event, EventType
 from dorothie_gym.recording.sdn.maps import SdnMap
-from dorothie_gym.recording.sdn.trajectory import Places
+from dorothie_gym.recording.sdn.trajectory import CarPoses
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 
 SHARP: Final = 30.0
@@ -55,7 +55,7 @@ class SignVote:
         }
 
 
-def vote(events: Sequence[Event], places: Places, first_frame: int) -> SignVote:
+def vote(events: Sequence[Event], places: CarPoses, first_frame: int) -> SignVote:
     """Returns the vote of a session's JTurns, with angles as in the file."""
     result = SignVote()
     for event in events:
@@ -68,7 +68,7 @@ def vote(events: Sequence[Event], places: Places, first_frame: int) -> SignVote:
     return result
 
 
-def _turn_after(places: Places, frame: int) -> float | None:
+def _turn_after(places: CarPoses, frame: int) -> float | None:
     """Returns the angle of the car's turn at the next junction [degrees, positive left]; None without one."""
     start = int(np.searchsorted(places.frames, frame))
     end = int(np.searchsorted(places.frames, frame + SOON))
@@ -91,7 +91,7 @@ def with_sign(events: Sequence[Event], sign: SignVote) -> list[Event]:
 
 
 def with_roads(
-    events: Sequence[Event], roads: dict[int, int], places: Places, first_frame: int, place: SdnMap
+    events: Sequence[Event], roads: dict[int, int], places: CarPoses, first_frame: int, place: SdnMap
 ) -> tuple[list[Event], int]:
     """Computes the angles of the JTurns that name a road.
 
@@ -117,7 +117,7 @@ def with_roads(
     return result, unknown
 
 
-def _lane_at(places: Places, frame: int, place: SdnMap) -> int:
+def _lane_at(places: CarPoses, frame: int, place: SdnMap) -> int:
     if not len(places.frames):
         return -1
     k = max(int(np.searchsorted(places.frames, frame, side="right")) - 1, 0)

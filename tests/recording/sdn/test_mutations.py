@@ -14,7 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from dorothie_gym.analysis import PHENOMENA, Talk, inconsistencies
+from dorothie_gym.analysis import PHENOMENA, DialogueView, inconsistencies
 from dorothie_gym.errors import SessionError
 from dorothie_gym.recording import Session, read_session
 from tests.recording.builders import write
@@ -115,7 +115,7 @@ def test_what_is_damaged_is_read_or_refused_in_one_sentence(
         assert str(folder) in str(error) and "\n" not in str(error) and len(str(error)) < 600
         return
     session.check()
-    heard = Talk(session)
+    heard = DialogueView(session)
     inconsistencies(session, heard.units)
     for phenomenon in PHENOMENA:
         if phenomenon.has_cause(heard):

@@ -13,7 +13,7 @@ import pytest
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import PhysicalAction, Role
-from dorothie_gym.recording import Event, EventType, Scene, SceneTable, Session
+from dorothie_gym.recording import Event, EventType, SceneTable, Session, Surroundings
 from dorothie_gym.recording.sdn import SignVote, read_sdn, settle_sign, write_sdn
 from dorothie_gym.recording.sdn.files import SCENE_FILE
 from dorothie_gym.recording.surroundings import light_rows
@@ -221,7 +221,7 @@ def test_what_was_around_the_car_comes_back(tmp_path: Path) -> None:
     around = np.concatenate([actors(k % 3, seed=k) for k in range(len(frames))])
     offsets = np.concatenate(([0], np.cumsum([k % 3 for k in range(len(frames))])))
     shown = [light_rows(lights(int(frame))) for frame in frames]
-    scene = Scene(
+    scene = Surroundings(
         actors=SceneTable(frames, offsets, around),
         lights=SceneTable(frames, np.arange(len(frames) + 1) * 2, np.concatenate(shown)),
     )
@@ -236,14 +236,14 @@ def test_what_was_around_the_car_comes_back(tmp_path: Path) -> None:
 
 def test_surroundings_between_the_frames_that_are_left_go_with_them(tmp_path: Path) -> None:
     frames = np.array([3, 4, 6])
-    scene = Scene(actors=SceneTable(frames, np.array([0, 1, 2, 3]), actors(3)))
+    scene = Surroundings(actors=SceneTable(frames, np.array([0, 1, 2, 3]), actors(3)))
     again = read_sdn(write_sdn(replace(session(talk()), scene=scene), tmp_path / "log_1"))
     assert again.scene.actors.frames.tolist() == [3, 6]
     assert again.scene.actors.rows["key"].tolist() == [100, 102]
 
 
 def test_a_damaged_file_of_surroundings_is_named(tmp_path: Path) -> None:
-    scene = Scene(actors=SceneTable(np.array([3]), np.array([0, 1]), actors(1)))
+    scene = Surroundings(actors=SceneTable(np.array([3]), np.array([0, 1]), actors(1)))
     folder = write_sdn(replace(session(talk()), scene=scene), tmp_path / "log_1")
     (folder / SCENE_FILE).write_bytes(b"PAR1 no")
     with pytest.raises(SessionError, match=SCENE_FILE):
