@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -234,7 +235,7 @@ def faults_of_corpus(corpus: Corpus) -> dict[str, tuple[str, ...]]:
     return {_name(corpus, entry.path): inconsistencies(entry.load()) for entry in corpus.entries}
 
 
-def _name(corpus: Corpus, path: Any) -> str:
+def _name(corpus: Corpus, path: Path) -> str:
     return str(path.relative_to(corpus.root)) if path != corpus.root else path.resolve().name
 
 
@@ -243,7 +244,7 @@ class _Row:
         self.phenomenon = phenomenon
         self.sessions = self.occurs = 0
         self.forms = dict.fromkeys(phenomenon.forms, 0)
-        self.example: dict[str, Any] | None = None
+        self.example: dict[str, object] | None = None
 
     def add(self, talk: DialogueView) -> None:
         if not self.phenomenon.has_cause(talk):

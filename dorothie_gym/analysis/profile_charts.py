@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 from textwrap import wrap
-from typing import Any, Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.analysis.corpus_stats import Counts
 from dorothie_gym.analysis.exception_attribution import Handled
 from dorothie_gym.analysis.profiles import CLASSES, SLOTS, Profile, Profiles
 from dorothie_gym.ontology import DialogueMove, Role
 from dorothie_gym.rendering.charts import GRID, INK, SHEET, SOFT, empty_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 SIZE: Final = (12.0, 9.2)
 """Width and height of the picture [inches]."""
@@ -55,7 +59,7 @@ def draw_profiles(profiles: Profiles, counts: Counts, title: str, path: Path) ->
         figure.savefig(path, format="png")
 
 
-def _words(figure: Any, counts: Counts, title: str) -> None:
+def _words(figure: Figure, counts: Counts, title: str) -> None:
     figure.text(0.06, 0.95, title, fontsize=15, weight="bold")
     line = (
         f"{_number(counts.sessions, 'session')} · {_number(counts.utterances, 'utterance')} · "
@@ -68,7 +72,7 @@ def _number(count: int, noun: str) -> str:
     return f"{count:,} {noun}{'' if count == 1 else 's'}"
 
 
-def _per_transaction(moves: Any, slots: Any, profile: Profile) -> None:
+def _per_transaction(moves: Axes, slots: Axes, profile: Profile) -> None:
     shown = [move for move in DialogueMove if move is not DialogueMove.IRRELEVANT] + [DialogueMove.IRRELEVANT]
     light, dark = _COLOURS[Handled.NONE]
     for k, (role, name) in enumerate(_SPEAKERS):
@@ -84,7 +88,7 @@ def _per_transaction(moves: Any, slots: Any, profile: Profile) -> None:
     moves.legend(frameon=True, facecolor=SHEET, edgecolor=SHEET, framealpha=1.0, fontsize=9, loc="upper right")
 
 
-def _per_exchange(moves: Any, slots: Any, profiles: Profiles) -> None:
+def _per_exchange(moves: Axes, slots: Axes, profiles: Profiles) -> None:
     width = 0.13
     bars = [(kind, k, role) for kind in Handled for k, (role, _) in enumerate(_SPEAKERS)]
     for place, (kind, k, role) in enumerate(bars):
@@ -110,12 +114,12 @@ def _class_label(name: str) -> str:
     return "\n".join([name, *wrap(", ".join(moves), LETTERS)])
 
 
-def _give_room(axes: Any, times: float = 1.22) -> None:
+def _give_room(axes: Axes, times: float = 1.22) -> None:
     """Leaves room above the bars, for the legend if there is one."""
     axes.set_ylim(0.0, axes.get_ylim()[1] * times)
 
 
-def _dress(axes: Any, title: str, labels: list[str], *, slanted: bool = False) -> None:
+def _dress(axes: Axes, title: str, labels: list[str], *, slanted: bool = False) -> None:
     axes.set_facecolor(SHEET)
     axes.set_title(title, loc="left", fontsize=11, color=INK, pad=10)
     axes.set_xticks(range(len(labels)), labels, fontsize=9 if "\n" not in "".join(labels) else 7.5, color=INK)

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Any, Final
+from typing import Final
 
 from dorothie_gym.analysis import PHENOMENA, DialogueView, Handled, Units, handling
 from dorothie_gym.ontology import MentalAction, Role
@@ -168,7 +168,7 @@ def _together(lines: Iterable[TranscriptLine]) -> Iterator[TranscriptLine]:
         yield TranscriptLine(time=same[0].time, speaker=speaker, text=text, said=False)
 
 
-def _escaped(text: Any) -> str:
+def _escaped(text: object) -> str:
     """Returns a text escaped for a Markdown table."""
     clean = " ".join(str(text).split())
     for letter in "\\|*_<>`":

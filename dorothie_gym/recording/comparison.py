@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -278,7 +278,7 @@ def _shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
-def _first_row(one: NDArray[Any], other: NDArray[Any]) -> int | None:
+def _first_row(one: NDArray[np.generic], other: NDArray[np.generic]) -> int | None:
     """Returns the first row whose bits differ."""
     if one.dtype == object or other.dtype == object:
         return next((k for k, (a, b) in enumerate(zip(one, other, strict=True)) if a != b), None)

@@ -48,7 +48,7 @@ def manifest_row(session: Session, folder: Path, root: Path) -> dict[str, Any]:
     }
 
 
-def write_manifest(root: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
+def write_manifest(root: Path, rows: Sequence[Mapping[str, object]]) -> Path:
     """Writes the manifest of a corpus, rows sorted by path, with a hash of all rows.
 
     Returns:
@@ -113,7 +113,7 @@ def _relative(folder: Path, root: Path) -> str:
     return folder.absolute().relative_to(root.absolute()).as_posix()
 
 
-def _digest(rows: Sequence[Mapping[str, Any]]) -> str:
+def _digest(rows: Sequence[Mapping[str, object]]) -> str:
     lines = (f"{row['sha256']}  {row['path']}\n" for row in rows)
     return hashlib.sha256("".join(lines).encode("utf-8", "surrogateescape")).hexdigest()
 

@@ -352,7 +352,7 @@ def decode_event(line: str, where: str) -> Event:
     return event_of(from_line(line, where), where)
 
 
-def event_of(values: Mapping[str, Any], where: str) -> Event:
+def event_of(values: Mapping[str, object], where: str) -> Event:
     """Returns the event of a line's fields.
 
     A type unknown to this version gives an event of type `OTHER`; unknown fields become its `extra`.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.files import replacing
 from dorothie_gym.ontology import VECTOR_SLOTS, Role
@@ -82,7 +82,7 @@ def _utterance_schema() -> pa.Schema:
     )
 
 
-def _utterance_rows(fold: Fold | None, session: Session) -> Iterator[dict[str, Any]]:
+def _utterance_rows(fold: Fold | None, session: Session) -> Iterator[dict[str, object]]:
     for utterance in session.utterances():
         for number, move in enumerate(utterance.moves):
             labels = move.act.slot_labels()
@@ -124,7 +124,7 @@ def _decision_schema() -> pa.Schema:
     )
 
 
-def _decision_rows(fold: Fold | None, session: Session) -> Iterator[dict[str, Any]]:
+def _decision_rows(fold: Fold | None, session: Session) -> Iterator[dict[str, object]]:
     for point in nfd_points(session):
         view, past = point.view, point.view.actions[-HISTORY:]
         car = view.car
@@ -142,7 +142,7 @@ def _decision_rows(fold: Fold | None, session: Session) -> Iterator[dict[str, An
         }
 
 
-def _start(fold: Fold | None, session: Session, event: int) -> dict[str, Any]:
+def _start(fold: Fold | None, session: Session, event: int) -> dict[str, object]:
     name = None if fold is None else fold.value
     return {"fold": name, "session": session.name, "town": session.header.town, "event": event}
 

@@ -258,7 +258,7 @@ def digest_of(session: Session) -> str:
     return content.hexdigest()
 
 
-def _bytes(values: NDArray[Any]) -> bytes:
+def _bytes(values: NDArray[np.generic]) -> bytes:
     if values.dtype.kind not in "biuf":
         return to_line(canonical(values.tolist(), "column")).encode()
     if values.dtype.kind == "f":

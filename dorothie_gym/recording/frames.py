@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -213,7 +213,7 @@ def _field(rows: Rows, name: str) -> pa.Array:
 def _table(
     column: pa.ChunkedArray,
     name: str,
-    dtype: np.dtype[Any],
+    dtype: np.dtype[np.void],
     frames: NDArray[np.int64],
     path: Path,
     report: ReadReport,
@@ -239,7 +239,7 @@ def _table(
     return SceneTable(recorded, offsets, _rows(values, name, dtype, path, report))
 
 
-def _rows(values: pa.StructArray, name: str, dtype: np.dtype[Any], path: Path, report: ReadReport) -> Rows:
+def _rows(values: pa.StructArray, name: str, dtype: np.dtype[np.void], path: Path, report: ReadReport) -> Rows:
     rows = np.empty(len(values), dtype=dtype)
     given = [field.name for field in values.type]
     for field in given:
@@ -261,7 +261,7 @@ def _numbers(column: pa.Array, field: str, path: Path) -> NDArray[np.int64]:
 
     if not pa.types.is_dictionary(column.type):
         column = column.dictionary_encode()
-    words: Sequence[Any] = column.dictionary.to_pylist()
+    words: Sequence[str] = column.dictionary.to_pylist()
     known = {word: number for number, word in enumerate(_WORDS[field])}
     numbers = np.array([known.get(word, _FALLBACK.get(field, -1)) for word in words], dtype=np.int64)
     if np.any(numbers < 0):
@@ -272,12 +272,12 @@ def _numbers(column: pa.Array, field: str, path: Path) -> NDArray[np.int64]:
     return result
 
 
-def _further(column: pa.ChunkedArray) -> NDArray[Any]:
+def _further(column: pa.ChunkedArray) -> NDArray[np.generic]:
     """Returns an unknown column as an array."""
     import pyarrow as pa
 
     if column.null_count == 0 and pa.types.is_primitive(column.type):
-        values: NDArray[Any] = column.to_numpy()
+        values: NDArray[np.generic] = column.to_numpy()
         return values
     objects = np.empty(len(column), dtype=object)
     objects[:] = column.to_pylist()
@@ -305,7 +305,7 @@ ACTORS: Final = b"ACTR"
 LIGHTS: Final = b"LGHT"
 WEATHER: Final = b"WTHR"
 
-DTYPES: Final[Mapping[bytes, np.dtype[Any]]] = MappingProxyType(
+DTYPES: Final[Mapping[bytes, np.dtype[np.generic]]] = MappingProxyType(
     {
         CAR: np.dtype("<f8"),
         ACTORS: ACTOR_DTYPE.newbyteorder("<"),
@@ -323,7 +323,7 @@ _HEAD: Final = struct.Struct("<4sII")
 _FRAME: Final = struct.Struct("<q")
 
 
-def encode_block(kind: bytes, frame: int, rows: NDArray[Any]) -> bytes:
+def encode_block(kind: bytes, frame: int, rows: NDArray[np.generic]) -> bytes:
     """Returns the block of contiguous rows that were recorded at a frame, or, for the car, from that frame on."""
     content = _FRAME.pack(frame) + (rows if sys.byteorder == "little" else rows.astype(DTYPES[kind])).tobytes()
     return _HEAD.pack(kind, len(content), zlib.crc32(content)) + content
@@ -358,7 +358,7 @@ def _blocks(content: bytes) -> Iterator[tuple[bytes, int, bytes]]:
         yield kind, _FRAME.unpack_from(body)[0], bytes(body[_FRAME.size :])
 
 
-def _table_journal(blocks: list[tuple[int, bytes]], dtype: np.dtype[Any]) -> SceneTable:
+def _table_journal(blocks: list[tuple[int, bytes]], dtype: np.dtype[np.generic]) -> SceneTable:
     frames = np.array([frame for frame, _ in blocks], dtype=np.int64)
     sizes = [len(body) // dtype.itemsize for _, body in blocks]
     offsets = np.concatenate(([0], np.cumsum(sizes))).astype(np.int64)

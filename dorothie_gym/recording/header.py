@@ -69,7 +69,7 @@ class LandmarkRow(TypedDict):
     y: float
     street: int
     hidden: bool
-    extra: NotRequired[Mapping[str, Any]]
+    extra: NotRequired[Mapping[str, object]]
 
 
 class SubgoalRow(TypedDict):
@@ -84,7 +84,7 @@ class SubgoalRow(TypedDict):
     trigger: bool
     delete: bool
     change: str | None
-    extra: NotRequired[Mapping[str, Any]]
+    extra: NotRequired[Mapping[str, object]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,13 +148,13 @@ class SessionHeader:
 
     def to_json(self) -> dict[str, Any]:
         """Returns the header in JSON types, fields in a fixed order."""
-        fields: dict[str, Any] = {name: canonical(getattr(self, name), f"header.{name}") for name in _NAMES}
+        fields: dict[str, object] = {name: canonical(getattr(self, name), f"header.{name}") for name in _NAMES}
         lane, station = self.departure
         extra = canonical(self.extra, "header.extra")
         return {**fields, "departure": {"lane": lane, "station": station}, **extra}
 
     @classmethod
-    def from_json(cls, values: Mapping[str, Any], where: str = "header") -> SessionHeader:
+    def from_json(cls, values: Mapping[str, object], where: str = "header") -> SessionHeader:
         """Returns the header of a JSON object; unknown fields become `extra`.
 
         Args:
@@ -234,7 +234,7 @@ def _landmark(row: Fields) -> LandmarkRow:
     return landmark
 
 
-def _extra(row: Fields, known: frozenset[str]) -> dict[str, Any]:
+def _extra(row: Fields, known: frozenset[str]) -> dict[str, object]:
     """Returns the unknown fields of a row, merged with its field `extra`."""
     return {**(row.if_given("extra", row.mapping) or {}), **row.others({*known, "extra"})}
 

@@ -19,7 +19,7 @@ MAX_DEPTH: Final = 40
 """Deepest nesting of a session's values."""
 
 
-def canonical(value: Any, where: str, depth: int = MAX_DEPTH) -> Any:
+def canonical(value: object, where: str, depth: int = MAX_DEPTH) -> Any:
     """Returns `value` in plain JSON types: mappings as dicts with sorted keys, tuples as lists, numpy as Python.
 
     Args:
@@ -62,19 +62,19 @@ def _canonical_text(value: str, where: str) -> str:
     return str(value)  # a member of a StrEnum becomes its text
 
 
-def _canonical_mapping(value: Mapping[Any, Any], where: str, depth: int) -> dict[str, Any]:
+def _canonical_mapping(value: Mapping[Any, object], where: str, depth: int) -> dict[str, Any]:
     for key in value:
         if not isinstance(key, str):
             raise SessionError(f"{where} has the key {key!r}; keys must be texts")
     return {_canonical_text(key, where): canonical(value[key], f"{where}.{key}", depth) for key in sorted(value)}
 
 
-def to_line(value: Any) -> str:
+def to_line(value: object) -> str:
     """Returns canonical JSON on one line, without a line break at the end."""
     return json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
 
 
-def to_page(value: Any) -> str:
+def to_page(value: object) -> str:
     """Returns canonical JSON on several lines, with a line break at the end."""
     return json.dumps(value, ensure_ascii=False, allow_nan=False, indent=1) + "\n"
 
@@ -150,7 +150,7 @@ class Fields:
         where: file and line, which every message begins with.
     """
 
-    def __init__(self, values: Mapping[str, Any], where: str) -> None:
+    def __init__(self, values: Mapping[str, object], where: str) -> None:
         self._values = values
         self.where = where
 

@@ -69,7 +69,7 @@ class SceneTable:
     rows: Rows
 
     @classmethod
-    def empty(cls, dtype: np.dtype[Any]) -> Self:
+    def empty(cls, dtype: np.dtype[np.void]) -> Self:
         """Returns a table without records."""
         return cls(np.empty(0, dtype=np.int64), np.zeros(1, dtype=np.int64), np.empty(0, dtype=dtype))
 
@@ -99,7 +99,7 @@ class SceneTable:
         )
 
 
-def _nothing(dtype: np.dtype[Any]) -> Any:
+def _nothing(dtype: np.dtype[np.void]) -> Any:
     return field(default_factory=lambda: SceneTable.empty(dtype))
 
 
@@ -118,7 +118,7 @@ class Surroundings:
     actors: SceneTable = _nothing(ACTOR_DTYPE)
     lights: SceneTable = _nothing(LIGHT_DTYPE)
     weather: SceneTable = _nothing(WEATHER_DTYPE)
-    columns: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    columns: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)
 
     def at_frames(self, frames: NDArray[np.int64]) -> Surroundings:
         """Returns the records at the given frames, without further columns."""
@@ -202,7 +202,7 @@ def light_rows(lights: Mapping[int, LightColour | str]) -> Rows:
     return rows
 
 
-def weather_rows(weather: Mapping[Any, float]) -> Rows:
+def weather_rows(weather: Mapping[WeatherParameter | str, float]) -> Rows:
     """Returns the ten parameters as one row of `WEATHER_DTYPE`.
 
     Raises:

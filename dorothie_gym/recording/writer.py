@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from dorothie_gym.errors import SessionError
 from dorothie_gym.files import PART, write_atomically
 from dorothie_gym.maps import LightColour
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology import Role, WeatherParameter
 from dorothie_gym.recording.action_log import Decision, encode_decision
 from dorothie_gym.recording.events import Event, encode_event
 from dorothie_gym.recording.file_names import (
@@ -63,7 +63,7 @@ class SessionWriter:
         self._last_frame = -1
         self._frames: set[float] = set()
         self._lights: tuple[Mapping[int, LightColour | str], Rows] | None = None
-        self._weather: tuple[Mapping[Any, float], Rows] | None = None
+        self._weather: tuple[Mapping[WeatherParameter | str, float], Rows] | None = None
         self._recorded = {ACTORS: -1, LIGHTS: -1, WEATHER: -1}
         self._last_decision = -1
 
@@ -93,7 +93,7 @@ class SessionWriter:
         """Appends frames of the car, (n, 9) float64 as in `TRAJECTORY_COLUMNS`; raises `SessionError` as `append`."""
         self.append((), frames)
 
-    def add_decision(self, frame: int, actions: Mapping[Role, Mapping[str, Any]]) -> None:
+    def add_decision(self, frame: int, actions: Mapping[Role, Mapping[str, object]]) -> None:
         """Appends the actions of the roles at a frame, see `Decision`; nothing is written without an action.
 
         From the first call on, the session counts as one with recorded decisions.
@@ -126,7 +126,7 @@ class SessionWriter:
             self._lights = dict(lights), light_rows(lights)
         self._add(LIGHTS, frame, self._lights[1])
 
-    def add_weather(self, frame: int, weather: Mapping[Any, float]) -> None:
+    def add_weather(self, frame: int, weather: Mapping[WeatherParameter | str, float]) -> None:
         """Appends the ten weather parameters at a frame; raises `SessionError` as `add_actors`."""
         if self._weather is None or self._weather[0] != weather:
             self._weather = dict(weather), weather_rows(weather)
@@ -147,7 +147,7 @@ class SessionWriter:
         pictures.mkdir(exist_ok=True)
         write_atomically(pictures / picture_name(frame), png)
 
-    def finish(self, outcome: Mapping[str, Any]) -> None:
+    def finish(self, outcome: Mapping[str, object]) -> None:
         """Writes the outcome, which completes the session, and closes it.
 
         The journal is converted into `frames.parquet` and removed; last, `session.json` is replaced atomically.
@@ -213,7 +213,7 @@ class SessionWriter:
         self._write(kind, int(frame), rows)
         self._recorded[kind] = int(frame)
 
-    def _write(self, kind: bytes, frame: int, rows: NDArray[Any]) -> None:
+    def _write(self, kind: bytes, frame: int, rows: NDArray[np.generic]) -> None:
         self._journal.write(encode_block(kind, frame, rows))
         self._journal.flush()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology import parse_landmark, parse_street
@@ -85,16 +85,16 @@ def _environment(config: JsonObject) -> JsonObject:
     return environment if isinstance(environment, Mapping) else {}
 
 
-def _rows(value: Any) -> list[JsonObject]:
+def _rows(value: object) -> list[JsonObject]:
     items = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
     return [item for item in items if isinstance(item, Mapping)]
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     return str(plain(value)) if isinstance(value, str) else ""
 
 
-def _streets(names: Any, report: ReadReport) -> list[str]:
+def _streets(names: object, report: ReadReport) -> list[str]:
     streets = []
     for name in names if isinstance(names, list) else ():
         try:
@@ -153,7 +153,7 @@ def _hidden(task: JsonObject) -> frozenset[str]:
     return frozenset(name for name in found if name is not None)
 
 
-def _resolve(destination: Any, task: JsonObject) -> str | None:
+def _resolve(destination: object, task: JsonObject) -> str | None:
     """Returns the landmark of a storyboard's destination: a name, or a variable that is assigned to one."""
     if not isinstance(destination, str):
         return None

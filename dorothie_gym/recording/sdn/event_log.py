@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
 from dorothie_gym.errors import OntologyError, SessionError
 from dorothie_gym.ontology import (
@@ -53,7 +53,7 @@ class DeedReader:
     roads: dict[int, int] = field(default_factory=dict)
     turns: int = 0
 
-    def physical(self, val: JsonObject) -> dict[str, Any]:
+    def physical(self, val: JsonObject) -> dict[str, object]:
         """Returns the data of a physical action, with the angle of a JTurn as in the file.
 
         Raises:
@@ -81,7 +81,7 @@ class DeedReader:
             self.report.miss(f"argument of {action.label}")
         return {"action": action.label, "angle": angle, "up": up}
 
-    def belief(self, val: JsonObject) -> dict[str, Any]:
+    def belief(self, val: JsonObject) -> dict[str, object]:
         """Returns the data of a belief update; unknown arguments are kept.
 
         Raises:
@@ -89,7 +89,7 @@ class DeedReader:
         """
         action = parse_mental_action(str(val.get("act")))
         value = val.get("slot_val")
-        arguments: dict[str, Any] | None = {}
+        arguments: dict[str, object] | None = {}
         if action is MentalAction.PLAN_UPDATE:
             arguments = plan_of(value)
         elif action is MentalAction.GOAL_UPDATE:
@@ -115,7 +115,7 @@ class DeedReader:
         angle = number_of(value)
         return None if angle is None else (angle + 180.0) % 360.0 - 180.0
 
-    def _side(self, value: Any) -> float | None:
+    def _side(self, value: object) -> float | None:
         number = whole_of(value)
         self.lane_switches[str(value)[:20]] += 1
         if number is None or number not in (1, RIGHT, LEFT):
@@ -123,23 +123,23 @@ class DeedReader:
         return LANE_SWITCH_RIGHT if number == RIGHT else LANE_SWITCH_LEFT
 
 
-def plan_of(value: Any) -> dict[str, Any] | None:
+def plan_of(value: object) -> dict[str, object] | None:
     """Returns the junctions of a plan; None if the value is no plan."""
     items = value if isinstance(value, list) else [value]
     junctions = [whole_of(item) for item in items]
     return None if None in junctions else {"junctions": junctions}
 
 
-def goals_of(value: Any) -> dict[str, Any] | None:
+def goals_of(value: object) -> dict[str, object] | None:
     """Returns the landmarks of goals; None if the value holds none."""
     items = value if isinstance(value, list) else [value]
     try:
-        return {"landmarks": [parse_landmark(item).label for item in items]}
+        return {"landmarks": [parse_landmark(str(item)).label for item in items]}
     except OntologyError:
         return None
 
 
-def _status_of(value: Any) -> dict[str, Any] | None:
+def _status_of(value: object) -> dict[str, object] | None:
     if isinstance(value, Mapping):
         value = [value.get("landmark"), value.get("status")]
     if not isinstance(value, list) or len(value) != 2:
@@ -150,7 +150,7 @@ def _status_of(value: Any) -> dict[str, Any] | None:
         return None
 
 
-def _guess_of(value: Any) -> dict[str, Any] | None:
+def _guess_of(value: object) -> dict[str, object] | None:
     if isinstance(value, Mapping):
         landmark = value.get("landmark")
         value = [value.get("x"), value.get("y"), *([] if landmark is None else [landmark])]
@@ -159,7 +159,7 @@ def _guess_of(value: Any) -> dict[str, Any] | None:
     x, y = number_of(value[0]), number_of(value[1])
     if x is None or y is None:
         return None
-    guess: dict[str, Any] = {"x": x, "y": y}
+    guess: dict[str, object] = {"x": x, "y": y}
     if len(value) == 3 and isinstance(value[2], str):
         try:
             guess["landmark"] = parse_landmark(value[2]).label
@@ -248,7 +248,7 @@ class LogReader:
             return self._unknown(row, frame, str(error))
         return event
 
-    def _read(self, kind: EventType, row: JsonObject, frame: int, source: Role) -> tuple[dict[str, Any], bool]:
+    def _read(self, kind: EventType, row: JsonObject, frame: int, source: Role) -> tuple[dict[str, object], bool]:
         """Returns the data of a row, and whether it is a prediction point."""
         val = row.get("val")
         val = val if isinstance(val, Mapping) else {}
@@ -258,7 +258,7 @@ class LogReader:
             return data, self._flag(row, source in (Role.PARTICIPANT, Role.CO_WIZARD))
         if kind is EventType.PHYSICAL_ACTION:
             data = {**self.deeds.physical(val), **more_of(val)}
-            navigates = parse_physical_action(data["action"]) in NAVIGATION_ACTIONS
+            navigates = parse_physical_action(str(data["action"])) in NAVIGATION_ACTIONS
             return data, self._flag(row, source is Role.CO_WIZARD and navigates)
         return {**self.deeds.belief(val), **more_of(val)}, self._flag(row, False)
 
@@ -268,7 +268,7 @@ class LogReader:
             return otherwise
         return str(row["flag"]).strip().casefold() in ("true", "1", "1.0")
 
-    def _rest(self, row: JsonObject, kind: str) -> dict[str, Any]:
+    def _rest(self, row: JsonObject, kind: str) -> dict[str, object]:
         """Returns the unknown fields of a row."""
         rest = {name: value for name, value in row.items() if name not in _FIELDS}
         for name in rest:

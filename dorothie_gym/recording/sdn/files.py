@@ -161,7 +161,7 @@ def read_csv(path: Path, limit: int) -> list[list[str]]:
     return [[part.strip() for part in line.split(",")] if line.strip() else [] for line in text.split("\n")]
 
 
-def number_of(value: Any) -> float | None:
+def number_of(value: object) -> float | None:
     """Returns the finite number of a field, given as a number or as text; None without one."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         return None
@@ -172,7 +172,7 @@ def number_of(value: Any) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def whole_of(value: Any) -> int | None:
+def whole_of(value: object) -> int | None:
     """Returns the whole number of a field, of a magnitude below 2^53; None without one."""
     number = number_of(value)
     return int(number) if number is not None and number == int(number) and abs(number) < 2**53 else None
@@ -184,7 +184,7 @@ def frame_of(row: JsonObject) -> int | None:
     return frame if frame is not None and 0 <= frame < MAX_FRAME else None
 
 
-def transcript_of(value: Any, report: ReadReport) -> str | None:
+def transcript_of(value: object, report: ReadReport) -> str | None:
     """Returns a transcript with plain apostrophes; None without one."""
     if not isinstance(value, str):
         return None
@@ -193,7 +193,7 @@ def transcript_of(value: Any, report: ReadReport) -> str | None:
     return str(plain(value.replace(APOSTROPHE, "'").strip()))
 
 
-def plain(value: Any, depth: int = MAX_DEPTH - 8) -> Any:
+def plain(value: object, depth: int = MAX_DEPTH - 8) -> Any:
     """Returns a JSON value that a session can hold: texts in UTF-8, finite numbers, bounded nesting."""
     if isinstance(value, str):
         return value.encode("utf-8", "replace").decode("utf-8")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bisect
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -64,13 +64,13 @@ class MoveReader:
             self._by_speaker[stretch.speaker].append(stretch)
         self._first = first_frame
         self._report = report
-        self._last: tuple[Any, ...] | None = None
+        self._last: tuple[object, ...] | None = None
         self._number = -1
         self._exchange = -1
         self._transaction = -1
         self._open = {"exchange": False, "transaction": False}
 
-    def release(self, row: JsonObject, frame: int, speaker: Role) -> dict[str, Any]:
+    def release(self, row: JsonObject, frame: int, speaker: Role) -> dict[str, object]:
         """Returns the data of a row of the release layout; raises `OntologyError` for an unknown move."""
         given = row.get("act")
         act: JsonObject = given if isinstance(given, Mapping) else {"move": given}
@@ -93,14 +93,14 @@ class MoveReader:
             data["sdn_act"] = plain(rest)
         return data
 
-    def sample(self, row: JsonObject, val: JsonObject, frame: int, speaker: Role) -> dict[str, Any]:
+    def sample(self, row: JsonObject, val: JsonObject, frame: int, speaker: Role) -> dict[str, object]:
         """Returns the data of a row of the sample layout, which marks the ends of exchanges and transactions."""
         for name, mark in (("exchange", "g"), ("transaction", "t")):
             if val.get(f"is_so{mark}") is True:
                 self._open[name] = True
                 setattr(self, f"_{name}", getattr(self, f"_{name}") + 1)
         text = transcript_of(val.get("utterance"), self._report) or ""
-        act: dict[str, Any] = {"move": val.get("act"), "slots": slots_of(val.get("slot_type"), val.get("slot_val"))}
+        act: dict[str, object] = {"move": val.get("act"), "slots": slots_of(val.get("slot_type"), val.get("slot_val"))}
         data = self._said(row, act, frame, speaker, text)
         data["exchange"] = self._exchange if self._open["exchange"] else None
         if self._open["transaction"]:
@@ -110,7 +110,7 @@ class MoveReader:
                 self._open[name] = False
         return data
 
-    def _said(self, row: JsonObject, act: JsonObject, frame: int, speaker: Role, text: str) -> dict[str, Any]:
+    def _said(self, row: JsonObject, act: JsonObject, frame: int, speaker: Role, text: str) -> dict[str, object]:
         parsed = self._parse(act)
         stretch = self._stretch(row, frame, speaker)
         file = stretch.file if stretch is not None else None
@@ -175,7 +175,9 @@ class MoveReader:
         return round(over - max(len(text.split()), 1) / WORDS_A_SECOND, 3), over
 
 
-def read_speech(rows: Iterable[JsonObject], report: ReadReport, speaker_of: Any) -> tuple[Speech, ...]:
+def read_speech(
+    rows: Iterable[JsonObject], report: ReadReport, speaker_of: Callable[[JsonObject], Role | None]
+) -> tuple[Speech, ...]:
     """Returns the stretches of speech; the log has a row for every frame of each."""
     found: dict[str, Speech] = {}
     for row in rows:
@@ -195,11 +197,11 @@ def read_speech(rows: Iterable[JsonObject], report: ReadReport, speaker_of: Any)
     return tuple(sorted(found.values(), key=lambda stretch: (stretch.start, stretch.file)))
 
 
-def slots_of(types: Any, values: Any) -> dict[str, list[Any]]:
+def slots_of(types: object, values: object) -> dict[str, list[object]]:
     """Returns slots of the sample layout: one type and value, or lists of both."""
     names = types if isinstance(types, list) else [types]
     given = values if isinstance(values, list) and len(names) > 1 else [values]
-    slots: dict[str, list[Any]] = {}
+    slots: dict[str, list[object]] = {}
     for k, name in enumerate(names):
         if not isinstance(name, str) or not name.strip():
             continue

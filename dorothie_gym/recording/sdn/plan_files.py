@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology import (
@@ -26,6 +26,7 @@ from dorothie_gym.recording.sdn.files import (
     AD_WIZARD_FILE,
     DETAILED_PLAN_FILE,
     PLAN_FILE,
+    JsonObject,
     frame_of,
     number_of,
     plain,
@@ -133,7 +134,7 @@ class ViewReader:
             events.append(self._deed({"frame": frame}, line[2], line[3:]))
         return events
 
-    def _deed(self, row: dict[str, Any], name: str, values: list[str]) -> Event:
+    def _deed(self, row: dict[str, object], name: str, values: list[str]) -> Event:
         if name.casefold() in MESSAGE_TYPES:
             return self._event(row, EventType.MESSAGE, Role.AD_WIZARD, {"text": plain(", ".join(values))})
         try:
@@ -147,7 +148,7 @@ class ViewReader:
             return self._event(row, EventType.OTHER, Role.AD_WIZARD, kept, {"type": f"sdn:{plain(name)[:80]}"})
         return self._event(row, EventType.EXCEPTION, Role.AD_WIZARD, {"kind": kind.name.lower(), **data})
 
-    def _rows(self, name: str) -> list[Any]:
+    def _rows(self, name: str) -> list[JsonObject]:
         if not (self._folder / name).is_file():
             self._report.miss(name)
             return []
@@ -157,13 +158,18 @@ class ViewReader:
         return sorted(usable, key=lambda row: frame_of(row) or 0)
 
     def _event(
-        self, row: Any, kind: EventType, source: Role, data: dict[str, Any], extra: dict[str, Any] | None = None
+        self,
+        row: JsonObject,
+        kind: EventType,
+        source: Role,
+        data: dict[str, object],
+        extra: dict[str, object] | None = None,
     ) -> Event:
         frame = FRAMES_PER_TENTH * max((frame_of(row) or 0) - self._first, 0)
         return Event(frame=frame, type=kind, source=source, data=data, extra=extra or {})
 
 
-def _arguments(kind: ExceptionKind, values: list[str]) -> dict[str, Any] | None:
+def _arguments(kind: ExceptionKind, values: list[str]) -> dict[str, object] | None:
     """Returns the data of an exception of the Ad-Wizard; None if the layout's description does not name it."""
     numbers = [number_of(value) for value in values]
     if kind is ExceptionKind.WEATHER and len(values) == 2 and numbers[1] is not None:
@@ -187,7 +193,7 @@ def _key(event: Event) -> str:
     return repr(_common(event))
 
 
-def _common(event: Event) -> tuple[Any, ...]:
+def _common(event: Event) -> tuple[object, ...]:
     data, tenth = event.data, event.frame // FRAMES_PER_TENTH
     if event.type is EventType.EXCEPTION:
         return tenth, event.type, data.get("kind"), data.get("parameter"), data.get("prop")

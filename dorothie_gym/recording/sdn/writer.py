@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -83,7 +83,7 @@ def plan_rows(session: Session, first: int) -> Iterator[dict[str, Any]]:
             since = frame
 
 
-def detailed_plan_rows(session: Session, first: int) -> Iterator[dict[str, Any]]:
+def detailed_plan_rows(session: Session, first: int) -> Iterator[dict[str, object]]:
     """Yields the rows of `detailed_plan.json`: plans and goals of the Co-Wizard's belief updates."""
     for event in session.of_type(EventType.BELIEF_UPDATE):
         junctions, landmarks = event.data.get("junctions"), event.data.get("landmarks")
@@ -96,7 +96,7 @@ def ad_wizard_lines(session: Session, first: int) -> Iterator[str]:
     props = 0
     for event in session.of_type(EventType.EXCEPTION, EventType.MESSAGE):
         data = event.data
-        values: list[Any] | None = None
+        values: list[object] | None = None
         if event.type is EventType.MESSAGE:
             values = ["message", " ".join(str(data.get("text")).split())]
         elif data.get("kind") == ExceptionKind.WEATHER.name.lower():
@@ -114,7 +114,11 @@ def ad_wizard_lines(session: Session, first: int) -> Iterator[str]:
 
 
 def _row(event: Event, first: int) -> dict[str, Any]:
-    row: dict[str, Any] = {"frame": _frame(event, first), "type": event.type.value, "from": event.source.sdn_names[0]}
+    row: dict[str, Any] = {
+        "frame": _frame(event, first),
+        "type": event.type.value,
+        "from": event.source.sdn_names[0],
+    }
     to = _TO.get(event.source) if event.type is EventType.DIALOGUE_MOVE else None
     row |= {"to": to.sdn_names[0] if to is not None else None, "flag": event.flagged}
     data = event.data
@@ -134,7 +138,7 @@ def _row(event: Event, first: int) -> dict[str, Any]:
     return {**row, MORE: dict(event.extra)} if event.extra else row
 
 
-def _said(data: Mapping[str, Any]) -> dict[str, Any]:
+def _said(data: Mapping[str, Any]) -> dict[str, object]:
     act = {name: data[name] for name in _ACT if name in data}
     if isinstance(data.get("sdn_act"), Mapping):
         act = {**data["sdn_act"], **act}
@@ -147,10 +151,10 @@ def _file(data: Mapping[str, Any]) -> str:
     return str(data.get("audio") or f"utterance_{data['utterance']}.flac")
 
 
-def _physical(data: Mapping[str, Any]) -> dict[str, Any]:
+def _physical(data: Mapping[str, Any]) -> dict[str, object]:
     action = parse_physical_action(data["action"])
     kind, angle, up = action.argument, data.get("angle"), data.get("up")
-    slot: tuple[str | None, Any] = (None, None)
+    slot: tuple[str | None, object] = (None, None)
     if kind is ArgumentKind.ANGLE:
         slot = ("Angle", angle) if angle is not None or "road" not in data else ("RoadID", data["road"])
     elif kind is ArgumentKind.SIDE and angle is not None:
@@ -174,12 +178,12 @@ def _is_belief(data: Mapping[str, Any]) -> bool:
     return all(name in data for name in action.arguments)
 
 
-def _belief(data: Mapping[str, Any]) -> dict[str, Any]:
+def _belief(data: Mapping[str, Any]) -> dict[str, object]:
     action = parse_mental_action(str(data["action"]))
     name, slot_type = _BELIEFS[action]
     known = ["action", "sdn", *action.arguments]
     values = [data[argument] for argument in action.arguments]
-    value: Any = values
+    value: object = values
     if action in (MentalAction.PLAN_UPDATE, MentalAction.GOAL_UPDATE):
         value = values[0]
     elif action is MentalAction.KNOWLEDGE_UPDATE and isinstance(data.get("landmark"), str):
@@ -190,7 +194,7 @@ def _belief(data: Mapping[str, Any]) -> dict[str, Any]:
     return {"act": name, "slot_type": slot_type, "slot_val": value, **_more(data, known)}
 
 
-def _more(data: Mapping[str, Any], known: Any) -> dict[str, Any]:
+def _more(data: Mapping[str, Any], known: Container[str]) -> dict[str, object]:
     rest = {name: value for name, value in data.items() if name not in known}
     return {MORE: rest} if rest else {}
 
@@ -210,7 +214,7 @@ def _speech(session: Session, first: int) -> Iterator[dict[str, Any]]:
             }
 
 
-def _blueprint(prop: Any) -> str:
+def _blueprint(prop: object) -> str:
     try:
         return parse_prop(str(prop)).blueprint
     except OntologyError:
@@ -278,7 +282,7 @@ def _lines(rows: Iterable[Mapping[str, Any]]) -> str:
 # --- config.json ----------------------------------------------------------------------------------------------------
 
 
-def _config(session: Session, town: Town | None, first: int) -> dict[str, Any]:
+def _config(session: Session, town: Town | None, first: int) -> dict[str, object]:
     header = session.header
     read = header.config.get("sdn")
     original = read.get("config") if isinstance(read, Mapping) else None
@@ -293,7 +297,7 @@ def _config(session: Session, town: Town | None, first: int) -> dict[str, Any]:
     }
 
 
-def _own_config(session: Session, town: Town | None) -> dict[str, Any]:
+def _own_config(session: Session, town: Town | None) -> dict[str, object]:
     header = session.header
     weather = session.scene.weather
     values = weather.rows[0].tolist() if len(weather) else ()
@@ -310,7 +314,7 @@ def _own_config(session: Session, town: Town | None) -> dict[str, Any]:
     }
 
 
-def _landmark(row: LandmarkRow, town: Town | None) -> dict[str, Any]:
+def _landmark(row: LandmarkRow, town: Town | None) -> dict[str, object]:
     return {
         "asset": row["name"],
         "name": row["name"],
@@ -319,7 +323,7 @@ def _landmark(row: LandmarkRow, town: Town | None) -> dict[str, Any]:
     }
 
 
-def _waypoint(lane: int, station: float, x: float, y: float, town: Town | None) -> dict[str, Any]:
+def _waypoint(lane: int, station: float, x: float, y: float, town: Town | None) -> dict[str, object]:
     """Returns a position on a lane, with OpenDRIVE numbers if the town is known; else (x, y) without numbers."""
     z = yaw = 0.0
     ids = {"lane_id": _NONE, "road_id": _NONE, "junction_id": _NONE}
