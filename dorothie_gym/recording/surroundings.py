@@ -202,7 +202,7 @@ def light_rows(lights: Mapping[int, LightColour | str]) -> Rows:
     return rows
 
 
-def weather_rows(weather: Mapping[WeatherParameter | str, float]) -> Rows:
+def weather_rows(weather: Mapping[WeatherParameter, float] | Mapping[str, float]) -> Rows:
     """Returns the ten parameters as one row of `WEATHER_DTYPE`.
 
     Raises:

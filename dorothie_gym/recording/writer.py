@@ -63,7 +63,7 @@ class SessionWriter:
         self._last_frame = -1
         self._frames: set[float] = set()
         self._lights: tuple[Mapping[int, LightColour | str], Rows] | None = None
-        self._weather: tuple[Mapping[WeatherParameter | str, float], Rows] | None = None
+        self._weather: tuple[Mapping[WeatherParameter, float] | Mapping[str, float], Rows] | None = None
         self._recorded = {ACTORS: -1, LIGHTS: -1, WEATHER: -1}
         self._last_decision = -1
 
@@ -126,7 +126,7 @@ class SessionWriter:
             self._lights = dict(lights), light_rows(lights)
         self._add(LIGHTS, frame, self._lights[1])
 
-    def add_weather(self, frame: int, weather: Mapping[WeatherParameter | str, float]) -> None:
+    def add_weather(self, frame: int, weather: Mapping[WeatherParameter, float] | Mapping[str, float]) -> None:
         """Appends the ten weather parameters at a frame; raises `SessionError` as `add_actors`."""
         if self._weather is None or self._weather[0] != weather:
             self._weather = dict(weather), weather_rows(weather)

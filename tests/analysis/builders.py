@@ -1,4 +1,4 @@
-"""Talk made by hand: who says what, and what happens between."""
+"""Hand-made dialogues with events between the utterances."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the paper reports of people and cars, in talk that is so and in talk that is not."""
+"""Claims of the paper about people and cars, on dialogues that fulfil them and on dialogues that do not."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_every_claim_holds_of_talk_as_the_paper_describes_it() -> None:
     assert list(found) == [claim.name for claim in CLAIMS]
 
 
-def test_no_claim_about_exceptions_holds_where_nobody_cares_about_them() -> None:
+def test_no_claim_about_exceptions_holds_without_exchanges_that_handle_them() -> None:
     talk = [ordinary(2.0 + 12.0 * k, 1) for k in range(4)]
     around = [
         human(54.0, "slower", M.INSTRUCT, A.SPEED_CHANGE),
@@ -59,7 +59,7 @@ def test_no_claim_about_exceptions_holds_where_nobody_cares_about_them() -> None
         human(127.0, "right", M.ACKNOWLEDGE),
     ]
     found = verdicts([drive(*talk, FOG, ADDED, *around, seconds=240.0)] * 4)
-    # what the car names is told by the rule itself, and what is said of speed is an action
+    # the rule itself finds the names of the car, and a mention of speed is an action
     assert [name for name, verdict in found.items() if verdict.holds] == [
         "human_mostly_instructs",
         "car_mostly_grounds",
@@ -90,7 +90,7 @@ def test_the_interval_is_that_of_sessions_drawn_with_replacement() -> None:
         assert verdict.low <= verdict.difference <= verdict.high
 
 
-def test_without_exceptions_there_is_nothing_to_compare() -> None:
+def test_comparison_without_exceptions_is_undefined() -> None:
     found = verdicts([drive(ordinary(2.0, 1))] * 3)
     assert {name for name, verdict in found.items() if verdict.difference is not None} == {
         "human_mostly_instructs",

@@ -10,7 +10,7 @@ from tests.analysis.builders import M, car, drive, human
 
 
 def annotated(numbers: Iterable[int | None], *events: list[Event], **changes: object) -> Session:
-    """A drive whose acts are stored in exchanges of the given numbers, all in one transaction."""
+    """Drive with acts in exchanges of the given numbers, all in one transaction."""
     flat = [event for part in events for event in part]
     stored = [
         replace(event, data={**event.data, "exchange": number, "transaction": 0})
@@ -27,27 +27,27 @@ TALK = (
 )
 
 
-def test_what_the_rules_say_is_consistent() -> None:
+def test_annotation_by_the_rules_is_consistent() -> None:
     assert inconsistencies(annotated((0, 0, 1, 1), *TALK)) == ()
 
 
-def test_a_response_without_an_exchange_is_told() -> None:
+def test_response_without_an_exchange_is_reported() -> None:
     faults = inconsistencies(annotated((0, None, 1, 1), *TALK))
     assert "events[1] (utterance 40, Acknowledge): responds in no exchange" in faults
 
 
-def test_an_exchange_that_starts_with_a_response_is_told() -> None:
+def test_exchange_that_starts_with_a_response_is_reported() -> None:
     faults = inconsistencies(annotated((0, 1, 2, 2), *TALK))
     assert faults[0] == "events[1] (utterance 40, Acknowledge): begins exchange 1, which is not for a Acknowledge"
     assert "exchanges: 3 are stored, 2 are found anew" in faults
 
 
-def test_exchanges_that_were_cut_otherwise_are_told_even_if_their_number_is_right() -> None:
+def test_other_bounds_of_exchanges_are_reported_even_if_their_number_is_right() -> None:
     faults = inconsistencies(annotated((0, 0, 1, 0), *TALK))
     assert faults == ("events[3] (utterance 110, ReplyW): is stored in exchange 0, found anew in 1",)
 
 
-def test_missing_transactions_are_told() -> None:
+def test_missing_transactions_are_reported() -> None:
     session = annotated((0, 0, 1, 1), *TALK)
     bare = [
         replace(event, data={k: v for k, v in event.data.items() if k != "transaction"})
@@ -58,12 +58,12 @@ def test_missing_transactions_are_told() -> None:
     assert inconsistencies(replace(session, events=tuple(bare))) == ("transactions: 0 are stored, 1 are found anew",)
 
 
-def test_an_outcome_that_counts_otherwise_is_told() -> None:
+def test_outcome_with_other_counts_is_reported() -> None:
     session = annotated((0, 0, 1, 1), *TALK, summary={"exchanges": 5, "utterances": 4})
     assert inconsistencies(session) == ("outcome: field 'exchanges' is 5, and 2 are found anew",)
 
 
-def test_people_who_annotate_are_asked_for_starts_and_responses_only() -> None:
+def test_annotations_by_people_are_checked_for_starts_and_responses_only() -> None:
     session = annotated((7, 7, 7, 7), *TALK)
     people = replace(session, header=replace(session.header, source="sdn-release"))
     assert inconsistencies(people) == ()

@@ -19,7 +19,7 @@ def counted(*parts: object, fold: Fold | None = None) -> Counts:
     return counts
 
 
-def test_words_are_told_apart_without_case_and_punctuation() -> None:
+def test_words_are_compared_without_case_and_punctuation() -> None:
     assert words_of("Don’t stop: 7-Eleven, LEFT!") == ("don't", "stop", "7-eleven", "left")
     assert plain("Okay.") == plain("okay") and plain("...") == ""
 
@@ -62,7 +62,7 @@ def test_speech_of_the_car_and_overlapping_speech_do_not_lengthen_the_audio() ->
     assert counts.audio_seconds == pytest.approx(3.0)
 
 
-def test_actions_that_change_nothing_and_the_cars_own_stops_are_not_counted() -> None:
+def test_ineffective_actions_and_stops_of_the_car_itself_are_not_counted() -> None:
     session = drive(
         did(1.0, P.START),
         did(2.0, P.LANE_FOLLOW),
@@ -80,7 +80,7 @@ def test_actions_that_change_nothing_and_the_cars_own_stops_are_not_counted() ->
     assert kept == [1, 2, 5, 7, 8, 9, 10]
 
 
-def test_nobody_speaks() -> None:
+def test_counts_of_a_session_without_speech() -> None:
     counts = counted().to_json()
     assert counts["utterances"] == counts["exchanges"] == counts["transactions"] == 0
     assert counts["distinct_utterance_ratio"] is None and counts["folds"] == {}

@@ -35,7 +35,7 @@ def test_talk_that_repeats_itself_surprises_less_than_new_words() -> None:
     assert same is not None and new is not None and 1.0 < same < new
 
 
-def test_nothing_to_learn_from_or_to_predict_is_undefined() -> None:
+def test_perplexity_without_training_or_test_words_is_undefined() -> None:
     pytest.importorskip("nltk")
     assert trigram_perplexity([], TEST) is None and trigram_perplexity(TRAIN, ["..."]) is None
 

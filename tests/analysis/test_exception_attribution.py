@@ -30,7 +30,7 @@ def test_slowing_down_after_fog_handles_it_and_before_does_not() -> None:
     ]
 
 
-def test_long_after_an_exception_nothing_handles_it_any_more() -> None:
+def test_exchange_long_after_an_exception_does_not_handle_it() -> None:
     fog = exception(1.0, "weather", parameter="fog_density", value=80.0)
     assert kinds(fog, human(90.0, "slower", M.INSTRUCT, ActionValue.SPEED_CHANGE)) == [Handled.NONE]
 
@@ -86,7 +86,7 @@ def test_an_action_belongs_to_the_exchange_that_was_heard_last_and_not_long_ago(
     assert [found[move.index] for move in session.moves()] == [Handled.ENVIRONMENTAL]
     assert [found[action.index] for action in session.physical_actions] == [
         Handled.NONE,
-        Handled.NONE,  # what is over at its own frame is not known yet
+        Handled.NONE,  # utterances that end in the frame of the action are not visible yet
         Handled.ENVIRONMENTAL,
         Handled.ENVIRONMENTAL,
         Handled.NONE,

@@ -251,14 +251,14 @@ def test_it_is_found_where_it_is(number: int) -> None:
 
 
 @pytest.mark.parametrize(("number", "form", "make"), OTHERS, ids=[f"{k} {form}" for k, form, _ in OTHERS])
-def test_its_other_forms_are_told_apart(number: int, form: str, make: Make) -> None:
+def test_forms_of_a_phenomenon_are_distinguished(number: int, form: str, make: Make) -> None:
     assert [finding.form for finding in phenomenon(number).find(make())] == [form]
 
 
 @pytest.mark.parametrize(
     ("number", "make"), [(k, make) for k, _, make in DECOYS], ids=[f"{k} {why}" for k, why, _ in DECOYS]
 )
-def test_what_only_looks_like_it_is_not_found(number: int, make: Make) -> None:
+def test_similar_dialogue_is_not_found(number: int, make: Make) -> None:
     assert list(phenomenon(number).find(make())) == []
 
 
@@ -269,7 +269,7 @@ def test_every_form_has_an_example() -> None:
 
 
 @pytest.mark.parametrize("number", ABSENT)
-def test_it_is_not_found_where_something_is_missing(number: int) -> None:
+def test_phenomenon_with_a_missing_part_is_not_found(number: int) -> None:
     assert list(phenomenon(number).find(ABSENT[number]())) == []
 
 
@@ -280,11 +280,11 @@ def test_a_cause_in_the_world_is_seen(number: int) -> None:
     assert not phenomenon(number).has_cause(quiet)
 
 
-def test_a_roadblock_that_is_never_met_causes_nothing() -> None:
+def test_roadblock_that_is_never_met_is_no_cause() -> None:
     assert not phenomenon(9).has_cause(talk(exception(1.0, "place_prop", x=-900.0, y=0.0)))
 
 
-def test_fog_that_lifts_causes_nothing() -> None:
+def test_fog_that_lifts_is_no_cause() -> None:
     assert not phenomenon(10).has_cause(talk(exception(1.0, "weather", parameter="fog_density", value=2.0)))
     assert not phenomenon(10).has_cause(talk(exception(1.0, "weather", parameter="cloudiness", value=90.0)))
     assert not phenomenon(10).has_cause(talk(exception(55.0, "weather", parameter="fog_density", value=90.0)))
@@ -294,7 +294,7 @@ def test_an_errand_that_is_dropped_at_the_very_end_leaves_no_time_to_tell() -> N
     assert not phenomenon(13).has_cause(talk(exception(55.0, "task_delete", landmark="KFC")))
 
 
-def test_tags_that_the_generator_left_change_nothing() -> None:
+def test_stored_tags_do_not_change_the_findings() -> None:
     asked = car(1.0, "which way", M.QUERY_W, A.QUERIED, exchange=99, transaction=7, phenomenon=4)
     answered = human(3.0, "left", M.REPLY_W, A.J_TURN, exchange=12, transaction=8)
     assert [finding.turn.text for finding in phenomenon(4).find(talk(asked, answered))] == ["which way"]

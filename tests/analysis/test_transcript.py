@@ -18,7 +18,7 @@ from tests.analysis.builders import (
 from tests.recording.builders import session
 
 
-def test_words_stand_with_their_acts_units_and_what_they_handle() -> None:
+def test_lines_show_words_acts_units_and_handled_exceptions() -> None:
     played = drive(
         exception(1.0, "task_delete", subgoal=0, landmark="KFC", status="Abandoned"),
         said(2.0, Role.PARTICIPANT, ("No KFC,", act(M.INSTRUCT, LandmarkName.KFC, GoalStatus.ABANDONED)),
@@ -32,7 +32,7 @@ def test_words_stand_with_their_acts_units_and_what_they_handle() -> None:
     assert (answer.time, answer.text, answer.exchanges) == (5.0, "left it is [Confirm(Action=JTurn)]", "0 (task)")
 
 
-def test_what_the_car_does_between_two_utterances_is_one_line() -> None:
+def test_actions_between_two_utterances_share_a_line() -> None:
     played = drive(
         human(1.0, "go", M.INSTRUCT, ActionValue.START),
         did(3.0, PhysicalAction.START),
@@ -51,7 +51,7 @@ def test_what_the_car_does_between_two_utterances_is_one_line() -> None:
     ]
 
 
-def test_what_a_recogniser_made_of_it_is_told() -> None:
+def test_recognised_words_are_shown() -> None:
     (line,) = transcript_lines(drive(human(1.0, "to Ikea", M.INSTRUCT, LandmarkName.IKEA, recognised="to a key")))
     assert line.text.endswith('(heard: "to a key")')
 

@@ -1,4 +1,4 @@
-"""What is around the car, made in code."""
+"""Surroundings of the car, built in code."""
 
 from __future__ import annotations
 

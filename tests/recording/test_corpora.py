@@ -70,7 +70,7 @@ def test_corpus_is_filtered_by_town_and_kind_of_exception(corpus: Corpus) -> Non
     assert len(corpus.filter(town="nowhere")) == 0
 
 
-def test_unknown_filters_are_told(corpus: Corpus) -> None:
+def test_unknown_filters_are_reported(corpus: Corpus) -> None:
     with pytest.raises(SessionError, match="fold: 'dev' is unknown; choose from seen, test"):
         corpus.filter(fold="dev")
     with pytest.raises(SessionError, match="earthquake"):
@@ -86,7 +86,7 @@ def test_sessions_of_sdn_are_in_a_corpus_like_ours(tmp_path: Path) -> None:
     assert names(corpus.filter(town="Town97", fold="val")) == "log_2"
 
 
-def test_manifest_tells_what_was_changed(corpus: Corpus) -> None:
+def test_manifest_reports_changed_sessions(corpus: Corpus) -> None:
     path = corpus.write_manifest()
     before = path.read_bytes()
     assert corpus.verify() == ()

@@ -28,7 +28,7 @@ def test_folder_without_sessions_is_an_error(tmp_path: Path) -> None:
         session_folders(tmp_path / "missing")
 
 
-def test_unreadable_session_is_told_by_name(tmp_path: Path) -> None:
+def test_unreadable_session_is_reported_by_name(tmp_path: Path) -> None:
     write(tmp_path / "a", frames=2)
     write(tmp_path / "b", frames=2)
     (tmp_path / "b/session.json").write_text("{}\n")

@@ -1,4 +1,4 @@
-"""Whenever the process dies, the folder is a finished session, or one that loads up to what was complete."""
+"""After the death of the process, the folder holds a finished session or one that loads up to its last record."""
 
 from __future__ import annotations
 
@@ -34,7 +34,9 @@ def cut_off(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("name", ["events.jsonl", "frames.journal"])
-def test_session_cut_off_at_any_byte_loads_up_to_what_was_complete(cut_off: Path, tmp_path: Path, name: str) -> None:
+def test_session_cut_off_at_any_byte_loads_up_to_the_last_complete_record(
+    cut_off: Path, tmp_path: Path, name: str
+) -> None:
     whole = Session.load(cut_off)
     copy = shutil.copytree(cut_off, tmp_path / "copy")
     content = (copy / name).read_bytes()
@@ -60,7 +62,7 @@ def test_damaged_block_of_the_journal_ends_it(cut_off: Path, tmp_path: Path) -> 
 
 
 class Died(BaseException):
-    """Stands for the death of the process."""
+    """Simulated death of the process."""
 
 
 def die_after(calls: int, monkeypatch: pytest.MonkeyPatch) -> None:

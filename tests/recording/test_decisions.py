@@ -30,7 +30,7 @@ def test_decisions_are_read_as_they_were_written_without_the_idle_ones(tmp_path:
     assert found.decisions == (Decision(frame=0, actions=SAID), Decision(frame=30, actions=DONE))
 
 
-def test_session_in_which_nobody_did_anything_is_not_one_whose_decisions_are_unknown(tmp_path: Path) -> None:
+def test_session_without_actions_differs_from_one_with_unknown_decisions(tmp_path: Path) -> None:
     with SessionWriter(tmp_path / "idle", header()) as writer:
         writer.add_decision(0, {})
         writer.finish({})

@@ -31,7 +31,7 @@ def add_column(folder: Path, name: str, values: pa.Array) -> None:
     pq.write_table(table.append_column(name, values), folder / "frames.parquet")
 
 
-def test_what_a_newer_minor_version_added_is_kept_and_reported(tmp_path: Path) -> None:
+def test_additions_of_a_newer_minor_version_are_kept_and_reported(tmp_path: Path) -> None:
     folder = write(tmp_path / "one", talk()[:2], frames=30)
     edit(folder, format_version="2.7", mood={"happy": True}, counts={"events": 3, "frames": 30})
     line = {"frame": 40, "type": "Yawn", "source": "participant", "flagged": False, "data": {"width": 2}, "loud": 1}
@@ -72,7 +72,7 @@ def test_another_major_version_is_rejected(tmp_path: Path, version: str) -> None
         Session.load(folder)
 
 
-def test_saved_session_is_the_same_and_replaces_nothing(tmp_path: Path) -> None:
+def test_saved_session_is_equal_and_overwrites_no_folder(tmp_path: Path) -> None:
     loaded = Session.load(write(tmp_path / "one", talk()))
     again = Session.load(loaded.save(tmp_path / "far/copy"))
     assert (again.digest, again.events, again.complete) == (loaded.digest, loaded.events, True)
@@ -81,7 +81,7 @@ def test_saved_session_is_the_same_and_replaces_nothing(tmp_path: Path) -> None:
     assert [path.name for path in (tmp_path / "far").iterdir()] == ["copy"]
 
 
-def test_what_is_not_known_of_the_car_stays_unknown(tmp_path: Path) -> None:
+def test_unknown_values_of_the_car_stay_unknown(tmp_path: Path) -> None:
     unknown = rows(0, 4)
     unknown[1:, 5:8] = np.nan
     with SessionWriter(tmp_path, header()) as writer:
@@ -129,14 +129,14 @@ def damaged(table: pa.Table, fault: str) -> pa.Table:
     ],
 )
 @pytest.mark.filterwarnings("ignore:invalid value")
-def test_damaged_frames_are_told_by_column(tmp_path: Path, fault: str, message: str) -> None:
+def test_damaged_frames_are_reported_by_column(tmp_path: Path, fault: str, message: str) -> None:
     folder = write(tmp_path / "one", frames=10)
     pq.write_table(damaged(pq.read_table(folder / "frames.parquet"), fault), folder / "frames.parquet")
     with pytest.raises(SessionError, match=f"frames.parquet: {message}"):
         Session.load(folder)
 
 
-def test_a_million_events_are_refused_before_they_are_read(tmp_path: Path) -> None:
+def test_too_many_events_are_rejected_before_they_are_decoded(tmp_path: Path) -> None:
     folder = write(tmp_path / "one", frames=2)
     line = (folder / "events.jsonl").read_bytes() or b'{"frame":1}\n'
     (folder / "events.jsonl").write_bytes(line * 1_000_000)
@@ -144,7 +144,7 @@ def test_a_million_events_are_refused_before_they_are_read(tmp_path: Path) -> No
         Session.load(folder)
 
 
-def test_a_pipe_in_the_place_of_a_file_does_not_block(tmp_path: Path) -> None:
+def test_named_pipe_instead_of_a_file_does_not_block(tmp_path: Path) -> None:
     folder = write(tmp_path / "one", frames=2)
     (folder / "events.jsonl").unlink()
     os.mkfifo(folder / "events.jsonl")
@@ -174,7 +174,7 @@ def test_names_of_folders_stay_in_their_folder(text: str) -> None:
     assert "/" not in session(town=text, name="").name
 
 
-def test_faults_that_reading_does_not_refuse_are_told() -> None:
+def test_faults_that_the_reader_accepts_are_reported_by_check() -> None:
     first = utterance(30, Role.PARTICIPANT, 0, ("Go on.", OKAY))
     other = utterance(60, Role.CO_WIZARD, 0, ("Fine.", OKAY), seconds=-1.0)
     events = [

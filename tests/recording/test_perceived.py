@@ -33,7 +33,7 @@ def one_look(rows: object, frame: int = 30) -> SceneTable:
 
 
 def standing(x: float, y: float, heading: float) -> Session:
-    """A car that stands, and starts at frame 60."""
+    """Car that stands still and starts at frame 60."""
     frames = np.arange(90.0)
     rows = np.stack([frames, frames * 0 + x, frames * 0 + y, frames * 0 + heading, *[frames * 0] * 5], axis=1)
     return replace(session([physical(60, PhysicalAction.START)]), trajectory=trajectory_of(rows))
@@ -51,7 +51,7 @@ def now(recorded: Session) -> tuple[list[int], np.ndarray]:  # type: ignore[type
 
 
 def test_objects_are_relative_to_the_car() -> None:
-    """The car looks south, y grows southwards: what is east of it is to its left."""
+    """The car faces south and y grows southwards, so objects in the east are to its left."""
     scene = Surroundings(actors=one_look(np.concatenate([
         actor(ActorKind.PEDESTRIAN, 40.0, 10.0, 0.0), actor(ActorKind.VEHICLE, 10.0, 22.0, math.pi / 2),
     ])))  # fmt: skip
@@ -61,7 +61,7 @@ def test_objects_are_relative_to_the_car() -> None:
     np.testing.assert_allclose(values[1, :5], [30.0, 90.0, 0.0, 30.0, 90.0], atol=1e-5)
 
 
-def test_only_what_is_within_sight_is_perceived() -> None:
+def test_only_objects_within_sight_are_perceived() -> None:
     near, far = (
         replace(standing(0.0, 0.0, 0.0), scene=Surroundings(actors=one_look(actor(ActorKind.VEHICLE, x, 0.0))))
         for x in (CLEAR_SIGHT - 0.1, CLEAR_SIGHT + 0.1)
@@ -83,7 +83,7 @@ def test_fog_hides_and_lamps_help_in_the_dark() -> None:
     assert now(replace(recorded, events=(switched, *recorded.events)))[0] == [ObjectKind.PROP]
 
 
-def test_lights_are_read_by_whoever_comes_towards_them() -> None:
+def test_lights_are_perceived_when_the_car_drives_towards_them() -> None:
     town = load_town("brookside")
     signal, (x, y, heading) = next(iter(sorted(stop_lines(town).items())))
     ahead = math.radians(heading)

@@ -53,7 +53,7 @@ def test_rfn_sees_no_words_and_no_act_of_its_own_utterance() -> None:
     assert [move.act for move in points[1].view.moves] == [TO_KFC]
 
 
-def test_who_turns_round_at_once_has_heard_what_was_said() -> None:
+def test_nfd_point_sees_utterances_of_its_own_frame_that_precede_it() -> None:
     before = utterance(60, Role.PARTICIPANT, 0, ("Turn around,", STREET), ("please.", OKAY))
     after = utterance(60, Role.CO_WIZARD, 1, ("Okay.", OKAY))
     (point,) = nfd_points(session([*before, physical(60, PhysicalAction.U_TURN), *after]))
@@ -61,7 +61,7 @@ def test_who_turns_round_at_once_has_heard_what_was_said() -> None:
 
 
 @pytest.mark.parametrize("task", list(Task))
-def test_nothing_of_the_point_or_after_is_visible(task: Task) -> None:
+def test_neither_the_point_nor_later_events_are_visible(task: Task) -> None:
     for point in task_points(session(talk()), task):
         view = point.view
         same_frame = [move for move in view.moves if move.frame == view.frame]
@@ -72,7 +72,7 @@ def test_nothing_of_the_point_or_after_is_visible(task: Task) -> None:
 
 
 @pytest.mark.parametrize("task", list(Task))
-def test_what_comes_later_changes_no_view(task: Task) -> None:
+def test_later_events_change_no_view(task: Task) -> None:
     """The future is rewritten after each point: its view stays as it was."""
     events = talk()
     for point in task_points(session(events), task):
@@ -125,7 +125,7 @@ def test_the_way_goes_back_from_the_last_state_of_the_car() -> None:
     assert next(nfd_points(session([physical(0, PhysicalAction.STOP)]))).view.way == ()
 
 
-def test_flagged_events_that_are_no_point_are_told_with_the_reason() -> None:
+def test_flagged_events_that_are_no_point_are_reported_with_the_reason() -> None:
     odd = [
         physical(10, PhysicalAction.SPEED_CHANGE, up=True),
         replace(physical(20, PhysicalAction.STOP), source=Role.AGENT),

@@ -58,7 +58,7 @@ def test_an_empty_road_is_not_a_road_that_was_not_recorded(tmp_path: Path) -> No
     assert scene.actors.at(13) is None
 
 
-def test_a_whole_session_and_one_that_was_cut_off_hold_the_same_scene(tmp_path: Path) -> None:
+def test_finished_and_interrupted_sessions_hold_the_same_scene(tmp_path: Path) -> None:
     whole, cut = record(tmp_path / "one", finish=True), record(tmp_path / "other", finish=False)
     assert whole.scene.equals(cut.scene)
     assert np.array_equal(whole.trajectory, cut.trajectory)
@@ -109,7 +109,7 @@ def test_lights_and_weather_of_another_form_are_refused(tmp_path: Path) -> None:
             writer.add_weather(0, {**weather(0), "wetness": math.inf})
 
 
-def test_what_is_around_the_car_belongs_to_a_frame_of_the_car(tmp_path: Path) -> None:
+def test_surroundings_belong_to_a_frame_of_the_car(tmp_path: Path) -> None:
     with SessionWriter(tmp_path, header()) as writer:
         writer.add_frames(rows(0, 10))
         with pytest.raises(SessionError, match="frame 10 was not appended"):

@@ -28,7 +28,7 @@ def copy(recorded: Path, tmp_path: Path) -> Iterator[Path]:
     yield folder
 
 
-def test_round_trip_keeps_everything(recorded: Path) -> None:
+def test_round_trip_preserves_the_session(recorded: Path) -> None:
     loaded = Session.load(recorded)
     assert loaded.header == header()
     assert list(loaded.events) == talk()
@@ -106,7 +106,9 @@ def test_folder_without_a_session_is_an_error(tmp_path: Path) -> None:
         ("session.json", b'"events": 16', b'"event": 16', r"session.json, counts: field 'events' is missing"),
     ],
 )
-def test_damage_is_told_by_file_line_and_field(copy: Path, name: str, old: bytes, new: bytes, message: str) -> None:
+def test_damage_is_reported_with_file_line_and_field(
+    copy: Path, name: str, old: bytes, new: bytes, message: str
+) -> None:
     content = (copy / name).read_bytes()
     assert old in content
     (copy / name).write_bytes(content.replace(old, new, 1))

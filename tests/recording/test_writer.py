@@ -36,7 +36,7 @@ def test_numpy_numbers_are_written_as_plain_ones(tmp_path: Path) -> None:
     assert loaded.physical_actions[0].angle == 12.5
 
 
-def test_what_is_appended_is_there_before_the_session_ends(tmp_path: Path) -> None:
+def test_appended_data_is_readable_before_the_session_ends(tmp_path: Path) -> None:
     writer = SessionWriter(tmp_path, header())
     assert Session.load(tmp_path).events == ()
     writer.append(talk()[:2], rows(0, 40))
@@ -57,7 +57,7 @@ def test_folder_with_a_session_is_refused_unless_it_may_be_overwritten(tmp_path:
     assert (fresh.header.seed, fresh.events, fresh.complete) == (8, (), False)
 
 
-def test_bad_batch_is_refused_whole(tmp_path: Path) -> None:
+def test_malformed_batch_is_rejected_as_a_whole(tmp_path: Path) -> None:
     with SessionWriter(tmp_path, header()) as writer:
         bad = Event(frame=1, type=EventType.MESSAGE, source=Role.AD_WIZARD, data={"distance": math.inf})
         with pytest.raises(SessionError, match=r"data.distance is inf"):
@@ -91,7 +91,7 @@ def test_event_that_could_not_be_read_back_is_not_written(tmp_path: Path, data: 
         writer.append([event])
 
 
-def test_closed_session_takes_nothing_more(tmp_path: Path) -> None:
+def test_closed_session_rejects_further_data(tmp_path: Path) -> None:
     writer = SessionWriter(tmp_path, header())
     writer.finish({})
     with pytest.raises(SessionError, match="closed"):

@@ -1,4 +1,4 @@
-"""Files that are damaged or made to do harm: one clear error, or a repair that is told."""
+"""Damaged and malicious files give one clear error, or a reported repair."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ TEXT = json.dumps(log())
         ({"trajectory__csv": b"frame, x, y, yaw\n\xff"}, "trajectory.csv: not UTF-8"),
     ],
 )
-def test_files_that_cannot_be_read_are_told_by_name_and_place(tmp_path: Path, files: Any, message: str) -> None:
+def test_unreadable_files_are_reported_with_name_and_place(tmp_path: Path, files: Any, message: str) -> None:
     with pytest.raises(SessionError, match=message):
         read_sdn(release(tmp_path / "log_1", **files))
 
@@ -91,7 +91,7 @@ def test_trajectory_ends_at_its_second_header(tmp_path: Path) -> None:
     assert session.report.repaired[told] == 1
 
 
-def test_faults_of_the_trajectory_are_put_right_and_told(tmp_path: Path) -> None:
+def test_faults_of_the_trajectory_are_repaired_and_reported(tmp_path: Path) -> None:
     rows = [",".join(map(str, row)) for row in drive()]
     rows[10], rows[20] = rows[20], rows[10]
     rows[30] = rows[29]
@@ -131,7 +131,7 @@ def test_a_million_events_are_refused_in_bounded_time_and_memory(tmp_path: Path,
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 1_500_000  # kB
 
 
-def test_a_pipe_in_the_place_of_a_file_does_not_block(tmp_path: Path) -> None:
+def test_named_pipe_instead_of_a_file_does_not_block(tmp_path: Path) -> None:
     folder = release(tmp_path / "log_1", trajectory__csv=None)
     os.mkfifo(folder / "trajectory.csv")
     assert read_sdn(folder).report.missing["trajectory.csv"] == 1
@@ -172,7 +172,7 @@ def nested(depth: int) -> Any:
     return value
 
 
-def test_deep_fields_are_cut_where_nobody_looks(tmp_path: Path) -> None:
+def test_deeply_nested_extra_fields_are_cut(tmp_path: Path) -> None:
     rows = [*log(), {**deed(3, "Stop"), "note": nested(300)}]
     session = read_sdn(release(tmp_path / "log_1", annotated_log__json=rows, config__json=config(note=nested(300))))
     assert Session.load(session.save(tmp_path / "native")).events == session.events

@@ -26,7 +26,7 @@ ODD: tuple[Any, ...] = (
     "Instruct", "NaN",
     float("nan"), float("-inf"), [1, 2, 3], {"Landmark": ["KFC"]}, "\u202e", "x" * 70_000,
 )  # fmt: skip
-"""What a field may be that ought to be something else."""
+"""Wrong values of a field."""
 
 PIECES = (b'"', b"[", b"]", b"{", b"}", b",", b"\n", b"\0", b"1e999", b"NaN", b"\\ud800", b"\xff")
 
@@ -97,7 +97,7 @@ def originals(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     database=None,
 )
 @given(random=st.randoms(use_true_random=False))
-def test_what_is_damaged_is_read_or_refused_in_one_sentence(
+def test_damaged_file_is_read_or_rejected_with_one_sentence(
     layout: str, random: Random, originals: dict[str, Path], tmp_path: Path
 ) -> None:
     folder = tmp_path / "damaged"

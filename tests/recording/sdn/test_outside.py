@@ -1,4 +1,4 @@
-"""Sessions as somebody else's tools write them: each layout by hand, with every trap that its description names."""
+"""Hand-written sessions of each layout, with every irregularity that its description names."""
 
 from __future__ import annotations
 
@@ -202,7 +202,7 @@ def test_the_release_layout_is_read_with_all_its_traps(release: Path, tmp_path: 
     assert not (tmp_path / "exploded").exists()
 
 
-def test_what_it_does_not_understand_is_kept_and_told_by_name(release: Path) -> None:
+def test_unknown_fields_are_kept_and_reported_by_name(release: Path) -> None:
     session = read_session(release)
     told = "\n".join(session.report.lines())
     for part in (
@@ -237,7 +237,7 @@ def test_the_sample_layout_is_read_with_all_its_traps(sample: Path) -> None:
 
 @pytest.mark.parametrize("wrap", [lambda rows: rows, lambda rows: {"log": rows, "version": 3},
                                   lambda rows: {str(k): row for k, row in enumerate(rows)}])  # fmt: skip
-def test_the_hub_layout_is_read_whatever_is_around_its_rows(hub: Path, wrap: Any) -> None:
+def test_hub_layout_is_read_with_any_fields_around_its_rows(hub: Path, wrap: Any) -> None:
     (hub / "dialog_log.json").write_text(json.dumps(wrap(json.loads(RELEASE_LOG))), encoding="utf-8")
     session = read_session(hub)
     assert [m.act.move for m in session.moves()] == [
@@ -309,7 +309,7 @@ def test_it_plays_over_an_imported_town(layout: str, request: pytest.FixtureRequ
 
 
 @pytest.mark.parametrize("layout", ["release", "sample", "hub"])
-def test_statistics_keep_what_people_annotated(layout: str, request: pytest.FixtureRequest) -> None:
+def test_statistics_keep_annotations_by_people(layout: str, request: pytest.FixtureRequest) -> None:
     session = read_session(request.getfixturevalue(layout))
     units = Units(session)
     assert len(units.exchanges) == 2

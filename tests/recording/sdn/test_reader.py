@@ -37,14 +37,14 @@ def angles(session: Session) -> list[float | None]:
     return [a.angle for a in session.physical_actions if a.action is PhysicalAction.J_TURN]
 
 
-def test_layouts_are_told_apart_by_their_files(tmp_path: Path) -> None:
+def test_layouts_are_detected_by_their_files(tmp_path: Path) -> None:
     assert detect_layout(release(tmp_path / "r")) is SdnLayout.RELEASE
     assert detect_layout(sample(tmp_path / "s")) is SdnLayout.SAMPLE
     assert detect_layout(hub(tmp_path / "h")) is SdnLayout.HUB
     assert detect_layout(tmp_path) is None
 
 
-# --- the release layout ---------------------------------------------------------------------------------------------
+# --- Release layout -------------------------------------------------------------------------------------------------
 
 
 def test_moves_come_in_order_with_their_acts_and_both_transcripts(tmp_path: Path) -> None:
@@ -161,7 +161,7 @@ def test_yaw_in_radians_is_recognised(tmp_path: Path) -> None:
     assert session.trajectory["heading"][-1] == pytest.approx(-math.pi / 2)
 
 
-# --- the sign of angles ---------------------------------------------------------------------------------------------
+# --- Sign of angles -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("turn", "angle", "positive"), [(-90.0, 90.0, "left"), (90.0, -90.0, "right")])
@@ -171,7 +171,7 @@ def test_the_sign_is_settled_by_where_the_car_went(tmp_path: Path, turn: float, 
     assert session.report.facts["turn_angles"] == {"positive": positive, "agreement": 1.0, "turns": 1}
 
 
-def test_the_whole_corpus_settles_the_sign(tmp_path: Path) -> None:
+def test_the_whole_corpus_determines_the_sign(tmp_path: Path) -> None:
     folders = [release(tmp_path / f"log_{k}", trajectory__csv=csv(drive(90.0))) for k in range(3)]
     folders.append(release(tmp_path / "log_9"))
     (tmp_path / "log_8").mkdir()
@@ -188,7 +188,7 @@ def test_without_a_junction_positive_is_left(tmp_path: Path) -> None:
     assert session.report.facts["turn_angles"]["agreement"] is None
 
 
-def test_lane_switches_of_other_values_have_no_angle_and_are_told(tmp_path: Path) -> None:
+def test_lane_switches_of_other_values_have_no_angle_and_are_reported(tmp_path: Path) -> None:
     rows = [deed(5 * k, "LaneSwitch", "Direction", value) for k, value in enumerate([1, "2", 0, None])]
     session = read_sdn(release(tmp_path / "log_1", annotated_log__json=rows))
     assert [a.angle for a in session.physical_actions] == [90.0, -90.0, None, None]
@@ -196,7 +196,7 @@ def test_lane_switches_of_other_values_have_no_angle_and_are_told(tmp_path: Path
     assert session.report.missing["argument of LaneSwitch"] == 2
 
 
-# --- the other layouts ----------------------------------------------------------------------------------------------
+# --- Other layouts --------------------------------------------------------------------------------------------------
 
 
 def test_sample_layout_is_read(tmp_path: Path) -> None:
@@ -263,10 +263,10 @@ def test_hub_layout_is_read_as_far_as_it_is_understood(tmp_path: Path, wrapped: 
     assert Session.load(session.save(tmp_path / "native")).digest == session.digest
 
 
-# --- what is not understood -----------------------------------------------------------------------------------------
+# --- Unknown values -------------------------------------------------------------------------------------------------
 
 
-def test_what_is_not_understood_is_kept_and_named(tmp_path: Path) -> None:
+def test_unknown_values_are_kept_and_named(tmp_path: Path) -> None:
     def change(rows: list[dict[str, Any]]) -> None:
         rows.append(move(50, "dorothy", "Hm.", "Hum"))
         rows.append(move(51, "dorothy", "To Mars.", "Instruct", {"Landmark": ["Mars", "KFC"]}, mood="odd"))
@@ -299,7 +299,7 @@ def test_what_is_not_understood_is_kept_and_named(tmp_path: Path) -> None:
     assert again.events == session.events
 
 
-def test_what_is_missing_is_named(tmp_path: Path) -> None:
+def test_missing_files_and_fields_are_named(tmp_path: Path) -> None:
     rows = [{name: value for name, value in row.items() if name not in ("utterance", "flag")} for row in log()]
     nothing = {"plan__json": None, "detailed_plan__json": None, "ad_wizardlog__csv": None, "trajectory__csv": None}
     session = read_sdn(release(tmp_path / "log_1", annotated_log__json=rows, config__json={"npc_count": 1}, **nothing))
@@ -322,7 +322,7 @@ def test_unflagged_events_are_no_points(tmp_path: Path) -> None:
 
 def test_pickles_are_never_opened(tmp_path: Path) -> None:
     folder = release(tmp_path / "log_1")
-    (folder / "features.pkl").symlink_to("/dev/zero")  # whoever reads it never comes back
+    (folder / "features.pkl").symlink_to("/dev/zero")  # a reader of the pipe never returns
     session = read_sdn(folder)
     assert session.report.facts["files_not_read"] == "carlalog.log, features.pkl"
 
@@ -334,7 +334,7 @@ def test_report_is_json_and_words(tmp_path: Path) -> None:
     assert all("\n" not in line for line in report.lines())
 
 
-def test_speech_of_somebody_else_times_nothing(tmp_path: Path) -> None:
+def test_speech_of_another_speaker_gives_no_times(tmp_path: Path) -> None:
     rows = [*speech(10, 22, "wizard", 0), move(22, "dorothy", "Go on then.", "Instruct")]
     session = read_sdn(
         release(tmp_path / "log_1", annotated_log__json=rows, plan__json=PLAN, detailed_plan__json=DETAILED_PLAN)

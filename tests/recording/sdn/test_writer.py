@@ -71,7 +71,7 @@ def original() -> Session:
     return replace(whole, summary={"success": True})
 
 
-def test_everything_that_the_layout_carries_comes_back(original: Session, tmp_path: Path) -> None:
+def test_round_trip_preserves_everything_that_the_layout_can_hold(original: Session, tmp_path: Path) -> None:
     again = read_sdn(write_sdn(original, tmp_path / "log_1"))
     assert again.header == original.header
     assert list(again.events) == in_tenths(original.events)
@@ -159,7 +159,7 @@ def test_a_known_town_gives_opendrive_numbers(tmp_path: Path) -> None:
 
 
 def test_without_our_own_fields_the_layout_still_reads(original: Session, tmp_path: Path) -> None:
-    """What any other program would write in this layout from the same session."""
+    """The same session as another program writes it in this layout."""
     folder = write_sdn(original, tmp_path / "log_1")
     config = written(folder, "config.json")
     del config["dorothie_gym"]
@@ -206,7 +206,7 @@ def test_our_sessions_have_no_voice_in_the_sign_of_others(tmp_path: Path) -> Non
     assert [a.angle for a in read_sdn(ours[0], sign=sign).physical_actions][1] == 90.0
 
 
-def test_nothing_is_replaced_and_nothing_is_left_behind(original: Session, tmp_path: Path) -> None:
+def test_existing_folder_is_kept_and_no_temporary_folder_remains(original: Session, tmp_path: Path) -> None:
     write_sdn(original, tmp_path / "log_1")
     with pytest.raises(SessionError, match="log_1: exists already"):
         write_sdn(session(), tmp_path / "log_1")
@@ -216,7 +216,7 @@ def test_nothing_is_replaced_and_nothing_is_left_behind(original: Session, tmp_p
     assert [path.name for path in tmp_path.iterdir()] == ["log_1"]
 
 
-def test_what_was_around_the_car_comes_back(tmp_path: Path) -> None:
+def test_surroundings_survive_the_round_trip(tmp_path: Path) -> None:
     frames = np.arange(0, 300, 15)
     around = np.concatenate([actors(k % 3, seed=k) for k in range(len(frames))])
     offsets = np.concatenate(([0], np.cumsum([k % 3 for k in range(len(frames))])))
