@@ -83,7 +83,7 @@ def _aligned(first: Session, second: Session) -> list[tuple[UtteranceRecord, Utt
                 f"{utterance.text!r} in the one, {other[key].text!r} in the other"
             )
     if not one:
-        raise SessionError(f"{first.name} and {second.name}: nobody says anything, so there is nothing to compare")
+        raise SessionError(f"{first.name} and {second.name}: no utterances, so there is nothing to compare")
     return [(one[key], other[key]) for key in one]
 
 
@@ -165,12 +165,12 @@ def _differences(
 ) -> Iterator[str]:
     counts = tuple(len({number for number in each.values() if number is not None}) for each in (stored, found))
     if counts[0] != counts[1]:
-        yield f"{name}s: {counts[0]} are stored, {counts[1]} are found anew"
+        yield f"{name}s: {counts[0]} are stored, {counts[1]} are derived by the rules"
     if not counts[0]:
         return
     for move in moves:
         if stored[move.index] != found[move.index]:
-            yield f"{_place(move)}: is stored in {name} {stored[move.index]}, found anew in {found[move.index]}"
+            yield f"{_place(move)}: is stored in {name} {stored[move.index]}, by the rules in {found[move.index]}"
             return  # later numbers are mostly shifted by the same amount
 
 
@@ -185,4 +185,4 @@ def _outcome(session: Session, units: Units) -> Iterator[str]:
     }
     for name, count in found.items():
         if name in session.summary and session.summary[name] != count:
-            yield f"outcome: field {name!r} is {session.summary[name]}, and {count} are found anew"
+            yield f"outcome: field {name!r} is {session.summary[name]}, and {count} are derived by the rules"

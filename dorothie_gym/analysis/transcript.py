@@ -117,16 +117,16 @@ def _said(utterance: UtteranceRecord, units: Units, kinds: Mapping[int, Handled]
 
 
 def _happened(event: Event, session: Session) -> Iterator[TranscriptLine]:
-    text = _told(event, session)
+    text = _description(event, session)
     if text:
         yield TranscriptLine(time=event.time, speaker=event.source, text=text, said=False)
 
 
-def _told(event: Event, session: Session) -> str:
+def _description(event: Event, session: Session) -> str:
     """Returns the description of an event; empty for events that are left out."""
     data = event.data
     if event.type is EventType.PHYSICAL_ACTION:
-        return _deed(event)
+        return _action_text(event)
     if event.type is EventType.BELIEF_UPDATE and data.get("action") in _MENTAL:
         about = data.get("landmarks", data.get("landmark"))
         names = about if isinstance(about, Sequence) and not isinstance(about, str) else [about]
@@ -146,13 +146,15 @@ def _told(event: Event, session: Session) -> str:
     return f"the session is over: {data.get('reason')}" if event.type is EventType.END else ""
 
 
-def _deed(event: Event) -> str:
-    deed = action_record(event, 0, "event")
-    text = deed.action.label
-    if deed.angle is not None:
-        text += f" {abs(deed.angle):.0f}° {'left' if deed.angle > 0 else 'right'}" if deed.angle else " straight on"
-    elif deed.up is not None:
-        text += " up" if deed.up else " down"
+def _action_text(event: Event) -> str:
+    action = action_record(event, 0, "event")
+    text = action.action.label
+    if action.angle is not None:
+        text += (
+            f" {abs(action.angle):.0f}° {'left' if action.angle > 0 else 'right'}" if action.angle else " straight on"
+        )
+    elif action.up is not None:
+        text += " up" if action.up else " down"
     return text
 
 

@@ -39,12 +39,12 @@ def test_response_without_an_exchange_is_reported() -> None:
 def test_exchange_that_starts_with_a_response_is_reported() -> None:
     faults = inconsistencies(annotated((0, 1, 2, 2), *TALK))
     assert faults[0] == "events[1] (utterance 40, Acknowledge): begins exchange 1, which is not for a Acknowledge"
-    assert "exchanges: 3 are stored, 2 are found anew" in faults
+    assert "exchanges: 3 are stored, 2 are derived by the rules" in faults
 
 
 def test_other_bounds_of_exchanges_are_reported_even_if_their_number_is_right() -> None:
     faults = inconsistencies(annotated((0, 0, 1, 0), *TALK))
-    assert faults == ("events[3] (utterance 110, ReplyW): is stored in exchange 0, found anew in 1",)
+    assert faults == ("events[3] (utterance 110, ReplyW): is stored in exchange 0, by the rules in 1",)
 
 
 def test_missing_transactions_are_reported() -> None:
@@ -55,12 +55,14 @@ def test_missing_transactions_are_reported() -> None:
         else event
         for event in session.events
     ]
-    assert inconsistencies(replace(session, events=tuple(bare))) == ("transactions: 0 are stored, 1 are found anew",)
+    assert inconsistencies(replace(session, events=tuple(bare))) == (
+        "transactions: 0 are stored, 1 are derived by the rules",
+    )
 
 
 def test_outcome_with_other_counts_is_reported() -> None:
     session = annotated((0, 0, 1, 1), *TALK, summary={"exchanges": 5, "utterances": 4})
-    assert inconsistencies(session) == ("outcome: field 'exchanges' is 5, and 2 are found anew",)
+    assert inconsistencies(session) == ("outcome: field 'exchanges' is 5, and 2 are derived by the rules",)
 
 
 def test_annotations_by_people_are_checked_for_starts_and_responses_only() -> None:

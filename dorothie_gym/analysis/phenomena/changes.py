@@ -62,8 +62,8 @@ def hidden_place(talk: DialogueView) -> Iterator[Occurrence]:
 
 def _describes(turn: Turn, places: Collection[str]) -> bool:
     """Returns whether a turn describes a position: by a street, or by a place other than the given ones."""
-    tells = turn.does(M.REPLY_W, M.EXPLAIN, M.CLARIFY, M.INSTRUCT)
-    return tells and bool(turn.names(Slot.STREET) or labels(turn.names(Slot.LANDMARK)) - frozenset(places))
+    describes = turn.does(M.REPLY_W, M.EXPLAIN, M.CLARIFY, M.INSTRUCT)
+    return describes and bool(turn.names(Slot.STREET) or labels(turn.names(Slot.LANDMARK)) - frozenset(places))
 
 
 def has_hidden_goal(talk: DialogueView) -> bool:
@@ -80,16 +80,16 @@ def roadblock(talk: DialogueView) -> Iterator[Occurrence]:
             continue
         following = [turn, *talk.later(turn, within=SOON)]
         proposal = next((t for t in following if t.speaker is CAR and t.does(M.QUERY_YN, M.QUERY_W, M.CHECK)), None)
-        told = next((t for t in following if t.speaker is HUMAN and t.does(M.INSTRUCT, M.REPLY_W)), None)
-        first = proposal or told
+        instruction = next((t for t in following if t.speaker is HUMAN and t.does(M.INSTRUCT, M.REPLY_W)), None)
+        first = proposal or instruction
         if first is not None and _goes_another_way(talk, since=turn.start, until=first.end + SOON):
             yield Occurrence(turn, "proposed" if proposal is not None else "told")
 
 
 def _goes_another_way(talk: DialogueView, *, since: float, until: float) -> bool:
     around = (PhysicalAction.U_TURN, PhysicalAction.J_TURN, PhysicalAction.LANE_SWITCH)
-    anew = talk.believed(MentalAction.PLAN_UPDATE, since=since, until=until)
-    return anew or talk.did(*around, since=since, until=until)
+    replanned = talk.believed(MentalAction.PLAN_UPDATE, since=since, until=until)
+    return replanned or talk.did(*around, since=since, until=until)
 
 
 def meets_roadblock(talk: DialogueView) -> bool:
@@ -136,7 +136,7 @@ def _dim(talk: DialogueView) -> Iterator[tuple[float, float]]:
 
 def task_added(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 11: the participant names a new task; the car takes it up, or asks when."""
-    for _, turn in _told(talk, ExceptionKind.TASK_TRIGGER, M.INSTRUCT, M.EXPLAIN):
+    for _, turn in _turns_after_exception(talk, ExceptionKind.TASK_TRIGGER, M.INSTRUCT, M.EXPLAIN):
         question = next(talk.answers(turn, M.QUERY_W, M.QUERY_YN, M.CHECK), None)
         if question is not None and talk.answered(question):
             yield Occurrence(turn, "negotiated")
@@ -167,7 +167,7 @@ def _gave_up(talk: DialogueView, turn: Turn) -> bool:
 
 def task_deleted(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 13: the participant gives up a task, and may resume it later."""
-    for _, turn in _told(talk, ExceptionKind.TASK_DELETE):
+    for _, turn in _turns_after_exception(talk, ExceptionKind.TASK_DELETE):
         if not turn.mentions(GoalStatus.ABANDONED):
             continue
         given_up = turn.names(Slot.LANDMARK)
@@ -177,7 +177,9 @@ def task_deleted(talk: DialogueView) -> Iterator[Occurrence]:
         yield Occurrence(turn, "resumed" if resumed else "given up")
 
 
-def _told(talk: DialogueView, kind: ExceptionKind, *moves: DialogueMove) -> Iterator[tuple[Event, Turn]]:
+def _turns_after_exception(
+    talk: DialogueView, kind: ExceptionKind, *moves: DialogueMove
+) -> Iterator[tuple[Event, Turn]]:
     """Yields the participant's turns with one of the moves that name the landmark of an earlier task exception."""
     for event in talk.exceptions(kind):
         for turn in talk.by(HUMAN, *moves):

@@ -138,7 +138,7 @@ def _asked_again(talk: DialogueView, turn: Turn) -> bool:
     return False
 
 
-def somebody_asks(talk: DialogueView) -> bool:
+def has_question(talk: DialogueView) -> bool:
     """Returns whether there is a question."""
     return any(turn.does(*QUESTIONS) for turn in talk.turns)
 
@@ -182,6 +182,6 @@ def misheard(turn: Turn) -> bool:
     return turn.recognised is not None and words_of(turn.recognised) != words_of(turn.text)
 
 
-def somebody_misheard(talk: DialogueView) -> bool:
+def has_mishearing(talk: DialogueView) -> bool:
     """Returns whether the participant was misheard."""
     return any(misheard(turn) for turn in talk.by(HUMAN))

@@ -84,8 +84,8 @@ def plan_on_request(talk: DialogueView) -> Iterator[Occurrence]:
         if turn.says(_WHY, M.QUERY_W) or not (asks or turn.says(_WAY, M.QUERY_W)):
             continue
         for answer in talk.replies(turn, M.REPLY_W):
-            told = {value for act in answer.doing(M.REPLY_W, M.EXPLAIN) for value in act.slots}
-            if answer.names(Slot.STREET) or told & set(STEPS):
+            mentioned = {value for act in answer.doing(M.REPLY_W, M.EXPLAIN) for value in act.slots}
+            if answer.names(Slot.STREET) or mentioned & set(STEPS):
                 yield Occurrence(turn, "described")
                 break
 

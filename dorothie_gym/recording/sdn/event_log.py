@@ -38,7 +38,7 @@ _ON: Final = {"on": True, "off": False, "true": True, "false": False, "1": True,
 
 
 @dataclass
-class DeedReader:
+class ActionReader:
     """Turns the values of rows into the data of actions and beliefs.
 
     Attributes:
@@ -220,7 +220,7 @@ class LogReader:
         self._first = first_frame
         self._name = name
         self._report = report
-        self.deeds = DeedReader(report)
+        self.actions = ActionReader(report)
         speech = read_speech((row for row in rows if _type(row) == SPEECH), report, role_of)
         self._moves = MoveReader(speech, first_frame, report, audio=audio)
         if speech:
@@ -257,10 +257,10 @@ class LogReader:
             data = self._moves.sample(row, val, frame, source) if is_sample else self._moves.release(row, frame, source)
             return data, self._flag(row, source in (Role.PARTICIPANT, Role.CO_WIZARD))
         if kind is EventType.PHYSICAL_ACTION:
-            data = {**self.deeds.physical(val), **more_of(val)}
+            data = {**self.actions.physical(val), **more_of(val)}
             navigates = parse_physical_action(str(data["action"])) in NAVIGATION_ACTIONS
             return data, self._flag(row, source is Role.CO_WIZARD and navigates)
-        return {**self.deeds.belief(val), **more_of(val)}, self._flag(row, False)
+        return {**self.actions.belief(val), **more_of(val)}, self._flag(row, False)
 
     def _flag(self, row: JsonObject, otherwise: bool) -> bool:
         if "flag" not in row:

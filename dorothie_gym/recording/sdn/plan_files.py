@@ -131,10 +131,10 @@ class ViewReader:
                 if line and number:  # the first line may be a header
                     self._report.repair(f"{AD_WIZARD_FILE}: lines without a frame were left out")
                 continue
-            events.append(self._deed({"frame": frame}, line[2], line[3:]))
+            events.append(self._exception({"frame": frame}, line[2], line[3:]))
         return events
 
-    def _deed(self, row: dict[str, object], name: str, values: list[str]) -> Event:
+    def _exception(self, row: dict[str, object], name: str, values: list[str]) -> Event:
         if name.casefold() in MESSAGE_TYPES:
             return self._event(row, EventType.MESSAGE, Role.AD_WIZARD, {"text": plain(", ".join(values))})
         try:

@@ -128,11 +128,11 @@ def raw_session(folder: Path, maps: Path | None) -> RawSession:
     header = header_of(config, task, layout, place, first, report)
     ours = isinstance(config.get(OURS), Mapping)
     log = LogReader(rows, first, name, report, audio=not ours)
-    events, unknown = with_roads(log.events(), log.deeds.roads, places, first, place)
-    if log.deeds.roads:
-        report.facts["turns_into_a_road"] = {"found": len(log.deeds.roads) - unknown, "unknown": unknown}
-    if log.deeds.lane_switches:
-        report.facts["lane_switch_values"] = dict(sorted(log.deeds.lane_switches.items()))
+    events, unknown = with_roads(log.events(), log.actions.roads, places, first, place)
+    if log.actions.roads:
+        report.facts["turns_into_a_road"] = {"found": len(log.actions.roads) - unknown, "unknown": unknown}
+    if log.actions.lane_switches:
+        report.facts["lane_switch_values"] = dict(sorted(log.actions.lane_switches.items()))
     if layout is SdnLayout.RELEASE and not ours:  # the log of this package is complete
         more, header = ViewReader(folder, first, report).events(events, header)
         events = sorted([*events, *more], key=lambda event: event.frame)
