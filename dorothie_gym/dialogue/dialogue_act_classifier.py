@@ -6,11 +6,10 @@ import functools
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from dorothie_gym.dialogue.conversation import Span
 from dorothie_gym.dialogue.directions import word_lists
-from dorothie_gym.dialogue.lexicon import read_data, strings
+from dorothie_gym.dialogue.lexicon import YamlMapping, read_data, strings
 from dorothie_gym.dialogue.nlu import ParsedText, understand
 from dorothie_gym.errors import OntologyError, PhraseFileError
 from dorothie_gym.ontology import (
@@ -321,7 +320,7 @@ def _cues() -> MoveCues:
     return MoveCues(rules, answers, **words)
 
 
-def _rule(where: str, rule: Mapping[str, Any], terms: Mapping[str, str]) -> MoveRule:
+def _rule(where: str, rule: YamlMapping, terms: Mapping[str, str]) -> MoveRule:
     texts = list(strings(f"{where}.cues", rule.get("cues")))
     for name, expression in terms.items():
         texts = [text.replace(name, expression) for text in texts]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -144,7 +145,7 @@ def find_ordinal(words: Sequence[str], lists: WordLists) -> int | None:
     """Returns the ordinal in the words ("the second light"), 1 for the next opportunity, or None."""
     if _AFTER_NEXT.search(" ".join(words)):
         return 2
-    for word, noun in zip(words, words[1:], strict=False):
+    for word, noun in itertools.pairwise(words):
         number = read_ordinal(word)
         if number is not None and noun in lists.ordinal_nouns:
             return number

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
-from typing import Any
+from typing import Any, TypeAlias
 
 import yaml
 
@@ -69,6 +69,10 @@ _STOP = re.compile(r"[.;:!\u2014\u2026]+(?=\s|$)")
 _WORD = re.compile(r"[a-z0-9']+|\?|,")
 
 
+YamlMapping: TypeAlias = Mapping[str, Any]
+"""Mapping read from a data file, before its values are checked."""
+
+
 def split_words(text: str) -> list[str]:
     """Returns lower-case tokens: "?" and "," are tokens, other stops become ",", hyphens and contractions are split."""
     words = _WORD.findall(_STOP.sub(" , ", text.lower().translate(_TYPOGRAPHY)))
@@ -77,7 +81,7 @@ def split_words(text: str) -> list[str]:
     return [part for word in words for part in _CONTRACTED.get(word, (word,))]
 
 
-def read_data(name: str) -> dict[str, Any]:
+def read_data(name: str) -> YamlMapping:
     """Returns the mapping of a data file of this package.
 
     Raises:
@@ -115,7 +119,7 @@ def load_lexicon() -> Lexicon:
     return parse_lexicon(read_data("lexicon.yaml"))
 
 
-def parse_lexicon(data: Mapping[str, Any]) -> Lexicon:
+def parse_lexicon(data: YamlMapping) -> Lexicon:
     """Builds the lexicon from the data of a lexicon file.
 
     Raises:
@@ -148,21 +152,21 @@ def bare_name(words: Sequence[str]) -> tuple[str, ...]:
     return tuple(words[1:] if len(words) > 1 and words[0] in _ARTICLES else words)
 
 
-def _entry(data: Mapping[str, Any], slot: str, label: str) -> dict[str, Any]:
+def _entry(data: YamlMapping, slot: str, label: str) -> Mapping[str, object]:
     entry = data.get(slot, {}).get(label)
     if not isinstance(entry, dict):
         raise PhraseFileError(f"lexicon.yaml: {slot}.{label} is missing")
     return entry
 
 
-def _forms(value: SlotValue, entry: Mapping[str, Any]) -> Mapping[str, tuple[str, ...]]:
+def _forms(value: SlotValue, entry: Mapping[str, object]) -> Mapping[str, tuple[str, ...]]:
     where = f"lexicon.yaml: {value.slot.label}.{value.label}"
     if not set(entry) <= _FORMS or not entry.get("say"):
         raise PhraseFileError(f"{where}: needs `say` and may have {sorted(_FORMS)}, got {sorted(entry)}")
     return {form: strings(f"{where}.{form}", listed) for form, listed in entry.items()}
 
 
-def _action_cues(label: str, entry: Mapping[str, Any]) -> ActionCues:
+def _action_cues(label: str, entry: Mapping[str, object]) -> ActionCues:
     where = f"lexicon.yaml: Action.{label}"
     if set(entry) != {"stems", "hear"}:
         raise PhraseFileError(f"{where}: needs `stems` and `hear`, has {sorted(entry)}")

@@ -6,7 +6,7 @@ import enum
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ExceptionKind, LandmarkName, PropKind, Role, Sensor, WeatherParameter
 from dorothie_gym.policies.observation_parser import place_on_path, read_landmarks, read_subgoals, scalar
 from dorothie_gym.policies.policy import Policy
-from dorothie_gym.spaces import ActionDict, AdWizardAction, LanePosition, PropColumn, SpaceLimits
+from dorothie_gym.spaces import ActionDict, AdWizardAction, LanePosition, ObservationMapping, PropColumn, SpaceLimits
 
 
 class Trick(enum.StrEnum):
@@ -66,7 +66,7 @@ class AdWizardConfig:
             Trick.TASK: 1.6,
             Trick.SENSOR: 0.5,
             Trick.CROWD: 0.5,
-        }  # fmt: skip
+        }
     )
     roadblock_ahead: tuple[float, float] = (55.0, 115.0)
     roadblock_margins: tuple[float, float] = (12.0, 8.0)
@@ -211,7 +211,7 @@ class ScriptedAdWizard(Policy[AdWizardState]):
                 planned.append(PlannedTrick(trick=self._kinds[int(order[k % len(order)])], at=float(at)))
         return AdWizardState(seed=seed, town=town, config=config, planned=tuple(planned))
 
-    def step(self, observation: Mapping[str, Any], state: AdWizardState) -> tuple[ActionDict, AdWizardState]:
+    def step(self, observation: ObservationMapping, state: AdWizardState) -> tuple[ActionDict, AdWizardState]:
         """Plays a trick, undoes one, or does nothing."""
         state = state.advanced()
         rng = np.random.default_rng((state.seed, state.count))
@@ -222,7 +222,7 @@ class ScriptedAdWizard(Policy[AdWizardState]):
         return (action or AdWizardAction()).encode(self.limits), state
 
 
-def _play(state: AdWizardState, observation: Mapping[str, Any], now: float, rng: np.random.Generator) -> Outcome:
+def _play(state: AdWizardState, observation: ObservationMapping, now: float, rng: np.random.Generator) -> Outcome:
     """Plays the first trick that is due and possible."""
     if not state.is_due(now):
         return None, state
@@ -235,7 +235,7 @@ def _play(state: AdWizardState, observation: Mapping[str, Any], now: float, rng:
     return None, state
 
 
-def _restore(state: AdWizardState, observation: Mapping[str, Any], now: float) -> Outcome:
+def _restore(state: AdWizardState, observation: ObservationMapping, now: float) -> Outcome:
     """Undoes a change that is due."""
     due = next((item for item in state.restorations if item.at <= now), None)
     if due is None:
@@ -253,7 +253,7 @@ def _restore(state: AdWizardState, observation: Mapping[str, Any], now: float) -
     return None, state
 
 
-def _roadblock(state: AdWizardState, observation: Mapping[str, Any], now: float, rng: np.random.Generator) -> Outcome:
+def _roadblock(state: AdWizardState, observation: ObservationMapping, now: float, rng: np.random.Generator) -> Outcome:
     """Places a barrier across the lane ahead, not too near to a place where the car may have to stop."""
     config = state.config
     if state.roadblocks >= config.most_roadblocks or scalar(observation, "speed") < config.roadblock_speed:
@@ -280,7 +280,7 @@ def _roadblock(state: AdWizardState, observation: Mapping[str, Any], now: float,
     return action, state.after_roadblock().with_restoration(removal)
 
 
-def _weather(state: AdWizardState, observation: Mapping[str, Any], now: float, rng: np.random.Generator) -> Outcome:
+def _weather(state: AdWizardState, observation: ObservationMapping, now: float, rng: np.random.Generator) -> Outcome:
     """Brings fog, heavy rain or night, for a while."""
     parameter, share = (
         (WeatherParameter.FOG_DENSITY, float(rng.uniform(0.5, 0.85))),
@@ -292,7 +292,7 @@ def _weather(state: AdWizardState, observation: Mapping[str, Any], now: float, r
     return action, state.with_restoration(clearing)
 
 
-def _task(state: AdWizardState, observation: Mapping[str, Any], now: float, rng: np.random.Generator) -> Outcome:
+def _task(state: AdWizardState, observation: ObservationMapping, now: float, rng: np.random.Generator) -> Outcome:
     """Adds, drops or changes a task, with a message for the participant."""
     subgoals = read_subgoals(observation)
     marks = {mark.row: mark for mark in read_landmarks(observation, state.town)}
@@ -309,13 +309,13 @@ def _task(state: AdWizardState, observation: Mapping[str, Any], now: float, rng:
     return AdWizardAction(exception=kind, item=subgoal.index, message=message), state
 
 
-def _sensor(state: AdWizardState, observation: Mapping[str, Any], now: float, rng: np.random.Generator) -> Outcome:
+def _sensor(state: AdWizardState, observation: ObservationMapping, now: float, rng: np.random.Generator) -> Outcome:
     """Lets a sensor fail; it recovers by itself."""
     sensor = tuple(Sensor)[int(rng.integers(len(Sensor)))]
     return AdWizardAction(exception=ExceptionKind.SENSOR_FAULT, sensor=sensor, on=True), state
 
 
-def _crowd(state: AdWizardState, observation: Mapping[str, Any], now: float, rng: np.random.Generator) -> Outcome:
+def _crowd(state: AdWizardState, observation: ObservationMapping, now: float, rng: np.random.Generator) -> Outcome:
     """Spawns people or vehicles on the road ahead."""
     config = state.config
     place = place_on_path(state.town, observation, float(rng.uniform(*config.crowd_ahead)))
@@ -331,7 +331,7 @@ def _crowd(state: AdWizardState, observation: Mapping[str, Any], now: float, rng
     return action, state
 
 
-_TRICKS: dict[Trick, Callable[[AdWizardState, Mapping[str, Any], float, np.random.Generator], Outcome]] = {
+_TRICKS: dict[Trick, Callable[[AdWizardState, ObservationMapping, float, np.random.Generator], Outcome]] = {
     Trick.ROADBLOCK: _roadblock,
     Trick.WEATHER: _weather,
     Trick.TASK: _task,

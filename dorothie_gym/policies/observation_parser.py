@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import GoalStatus, LandmarkName, ObjectClass, StreetName, WeatherParameter
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
-from dorothie_gym.spaces import LandmarkColumn, ObjectColumn, SubgoalColumn
+from dorothie_gym.spaces import LandmarkColumn, ObjectColumn, ObservationMapping, SubgoalColumn
 
 PARAMETERS = tuple(WeatherParameter)
 
@@ -86,14 +86,14 @@ class SeenObject:
     distance: float
 
 
-def street_of(observation: Mapping[str, Any], town: Town, lane: int) -> StreetName:
+def street_of(observation: ObservationMapping, town: Town, lane: int) -> StreetName:
     """Returns the name of the street that a lane belongs to; UNKNOWN where it has none."""
     street = town.lanes[lane].street
     names = observation["street_names"]
     return StreetName(int(names[street])) if 0 <= street < len(names) else StreetName.UNKNOWN
 
 
-def read_landmarks(observation: Mapping[str, Any], town: Town) -> tuple[SeenLandmark, ...]:
+def read_landmarks(observation: ObservationMapping, town: Town) -> tuple[SeenLandmark, ...]:
     """Returns the rows of `landmarks` in use."""
     return _landmarks(_bytes(observation["landmarks"]), tuple(observation["street_names"].tolist()), town)
 
@@ -116,7 +116,7 @@ def _landmarks(table: bytes, street_names: tuple[int, ...], town: Town) -> tuple
     )
 
 
-def read_subgoals(observation: Mapping[str, Any]) -> tuple[SeenSubgoal, ...]:
+def read_subgoals(observation: ObservationMapping) -> tuple[SeenSubgoal, ...]:
     """Returns all rows of `subgoals`; rows that are not in use are not live."""
     return _subgoals(_bytes(observation["subgoals"]))
 
@@ -140,7 +140,7 @@ def _subgoals(table: bytes) -> tuple[SeenSubgoal, ...]:
     )
 
 
-def _bytes(table: Any) -> bytes:
+def _bytes(table: ArrayLike) -> bytes:
     """Returns a table as a cache key; most tables are the same at successive decisions."""
     return np.asarray(table, dtype=np.float64).tobytes()
 
@@ -150,7 +150,7 @@ def _rows(table: bytes, columns: int) -> list[list[float]]:
     return rows
 
 
-def read_objects(observation: Mapping[str, Any]) -> tuple[SeenObject, ...]:
+def read_objects(observation: ObservationMapping) -> tuple[SeenObject, ...]:
     """Returns the rows of `objects` in use, nearest first."""
     column = ObjectColumn
     return tuple(
@@ -165,27 +165,27 @@ def read_objects(observation: Mapping[str, Any]) -> tuple[SeenObject, ...]:
     )
 
 
-def weather(observation: Mapping[str, Any], parameter: WeatherParameter) -> float:
+def weather(observation: ObservationMapping, parameter: WeatherParameter) -> float:
     """Returns a parameter of the weather, in its own unit."""
     return float(observation["weather"][PARAMETERS.index(parameter)])
 
 
-def is_foggy(observation: Mapping[str, Any]) -> bool:
+def is_foggy(observation: ObservationMapping) -> bool:
     """Returns whether fog limits the view."""
     return weather(observation, WeatherParameter.FOG_DENSITY) > FOG_LIMIT
 
 
-def is_rainy(observation: Mapping[str, Any]) -> bool:
+def is_rainy(observation: ObservationMapping) -> bool:
     """Returns whether it rains heavily."""
     return weather(observation, WeatherParameter.PRECIPITATION) > RAIN_LIMIT
 
 
-def is_dark(observation: Mapping[str, Any]) -> bool:
+def is_dark(observation: ObservationMapping) -> bool:
     """Returns whether the sun is below the horizon."""
     return weather(observation, WeatherParameter.SUN_ALTITUDE_ANGLE) < 0.0
 
 
-def scalar(observation: Mapping[str, Any], name: str) -> float:
+def scalar(observation: ObservationMapping, name: str) -> float:
     """Returns the value of a field of one number."""
     return float(np.asarray(observation[name]).reshape(-1)[0])
 
@@ -211,7 +211,7 @@ def place_on_lanes(
     return None
 
 
-def place_on_path(town: Town, observation: Mapping[str, Any], ahead: float) -> tuple[int, float] | None:
+def place_on_path(town: Town, observation: ObservationMapping, ahead: float) -> tuple[int, float] | None:
     """Returns lane and station of a point ahead on the path that the Ad-Wizard sees; None beyond the path's end.
 
     Args:

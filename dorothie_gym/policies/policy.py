@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final, Generic, TypeVar
+from typing import Any, ClassVar, Final, Generic, TypeAlias, TypeVar
 
 import numpy as np
 
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.spaces import ActionDict, SpaceLimits
+from dorothie_gym.spaces import ActionDict, ObservationMapping, SpaceLimits
 
 State = TypeVar("State")
 
@@ -48,7 +47,7 @@ class Policy(ABC, Generic[State]):
         """
 
     @abstractmethod
-    def step(self, observation: Mapping[str, Any], state: State) -> tuple[ActionDict, State]:
+    def step(self, observation: ObservationMapping, state: State) -> tuple[ActionDict, State]:
         """Chooses an action.
 
         Args:
@@ -58,6 +57,10 @@ class Policy(ABC, Generic[State]):
         Returns:
             An action of the role's action space, and the state for the next decision.
         """
+
+
+AnyPolicy: TypeAlias = Policy[Any]
+"""Policy whose state type is not known statically."""
 
 
 @dataclass(frozen=True, kw_only=True)

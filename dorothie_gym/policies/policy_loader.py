@@ -8,14 +8,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, TypeAlias
+from typing import Final, TypeAlias
 
 from dorothie_gym.errors import PolicyLoadError
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
 from dorothie_gym.policies.co_wizard import ScriptedCoWizard
 from dorothie_gym.policies.participant import ScriptedParticipant
-from dorothie_gym.policies.policy import Policy
+from dorothie_gym.policies.policy import AnyPolicy
 from dorothie_gym.policies.trivial import LaneFollowPolicy, RandomPolicy, SilentPolicy
 from dorothie_gym.spaces import SpaceLimits
 
@@ -31,7 +31,7 @@ def policy_names(role: Role) -> tuple[str, ...]:
     return (*POLICY_NAMES, LANE_FOLLOW) if role is Role.CO_WIZARD else POLICY_NAMES
 
 
-def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Policy[Any]:
+def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> AnyPolicy:
     """Returns a policy by name.
 
     Args:
@@ -58,7 +58,7 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Pol
     return ScriptedCoWizard(limits) if role is Role.CO_WIZARD else ScriptedAdWizard(limits)
 
 
-Loader: TypeAlias = Callable[[Path, Role, SpaceLimits], Policy[Any]]
+Loader: TypeAlias = Callable[[Path, Role, SpaceLimits], AnyPolicy]
 """Function that reads a policy from a file or folder; defined in a module, so that it can be pickled."""
 
 DESCRIPTION: Final = "model.json"
@@ -106,7 +106,7 @@ class Player:
     sha256: str | None = None
     training: Mapping[str, float] = field(default_factory=dict)
 
-    def make(self, role: Role, limits: SpaceLimits) -> Policy[Any]:
+    def make(self, role: Role, limits: SpaceLimits) -> AnyPolicy:
         """Returns the policy.
 
         Raises:
@@ -154,7 +154,7 @@ def find_player(given: str, role: Role) -> Player:
     return Player(name=given, path=path, loader=loader, sha256=_sha256(path), training=training)
 
 
-def _description(path: Path) -> Mapping[str, Any]:
+def _description(path: Path) -> Mapping[str, object]:
     """Returns the JSON of a file, or of a folder's description; empty where there is none."""
     file = path / DESCRIPTION if path.is_dir() else path
     if file.suffix != ".json" or not file.is_file():
@@ -166,7 +166,7 @@ def _description(path: Path) -> Mapping[str, Any]:
     return page if isinstance(page, dict) else {}
 
 
-def _kinds_of(path: Path, description: Mapping[str, Any]) -> tuple[str, ...]:
+def _kinds_of(path: Path, description: Mapping[str, object]) -> tuple[str, ...]:
     """Returns the possible kinds of a file: the one named in its JSON, and its suffix."""
     named = (str(description["kind"]),) if "kind" in description else ()
     if not path.is_dir():

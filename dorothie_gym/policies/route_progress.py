@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.dialogue import Direction
@@ -17,6 +16,7 @@ from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import StreetName
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.sim.ego.limits import PLANNED_BRAKING
+from dorothie_gym.spaces import ObservationMapping
 
 PASSED = 3.0
 """Distance behind the car from which on a goal has been passed [m]."""
@@ -417,7 +417,7 @@ class RouteState:
 
 
 def first_new_street(
-    observation: Mapping[str, Any], town: Town, lane: int, progress: RouteProgress | None
+    observation: ObservationMapping, town: Town, lane: int, progress: RouteProgress | None
 ) -> StreetName | None:
     """Returns the first named street of a route other than that of the present lane; None if there is none.
 

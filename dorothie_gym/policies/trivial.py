@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +15,7 @@ from dorothie_gym.spaces import (
     CoWizardAction,
     ExitColumn,
     Motion,
+    ObservationMapping,
     Physical,
     SpaceLimits,
     action_space,
@@ -44,7 +43,7 @@ class SilentPolicy(Policy[None]):
     def initial_state(self, seed: int, town: Town) -> None:
         """Returns None: the policy has no state."""
 
-    def step(self, observation: Mapping[str, Any], state: None) -> tuple[ActionDict, None]:
+    def step(self, observation: ObservationMapping, state: None) -> tuple[ActionDict, None]:
         """Returns the action that does nothing."""
         return noop(self.role, self.limits), None
 
@@ -63,7 +62,7 @@ class RandomPolicy(Policy[DrawCount]):
         """Returns the beginning of the stream of draws."""
         return DrawCount(seed=seed)
 
-    def step(self, observation: Mapping[str, Any], state: DrawCount) -> tuple[ActionDict, DrawCount]:
+    def step(self, observation: ObservationMapping, state: DrawCount) -> tuple[ActionDict, DrawCount]:
         """Returns a sample that depends only on the seed and the number of the decision."""
         self._space.seed(state.seed * 1_000_003 + state.count & 0x7FFFFFFF)
         action: ActionDict = self._space.sample()
@@ -87,12 +86,12 @@ class LaneFollowPolicy(Policy[None]):
     def initial_state(self, seed: int, town: Town) -> None:
         """Returns None: the policy has no state."""
 
-    def step(self, observation: Mapping[str, Any], state: None) -> tuple[ActionDict, None]:
+    def step(self, observation: ObservationMapping, state: None) -> tuple[ActionDict, None]:
         """Returns the action that keeps the car going."""
         return CoWizardAction(physical=_drive_on(observation)).encode(self.limits), None
 
 
-def _drive_on(observation: Mapping[str, Any]) -> Physical | None:
+def _drive_on(observation: ObservationMapping) -> Physical | None:
     motion = Motion(int(observation["motion"]))
     if motion is Motion.STOPPED:
         return Physical(action=PhysicalAction.START)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from dorothie_gym.dialogue import ParsedText, guess_spans, understand
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role
-from dorothie_gym.spaces import heard_acts
+from dorothie_gym.spaces import ObservationMapping, heard_acts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,7 +18,7 @@ class HeardUtterance:
 
 
 def heard_utterance(
-    observation: Mapping[str, Any], speaker: Role, after: DialogueMove | None = None
+    observation: ObservationMapping, speaker: Role, after: DialogueMove | None = None
 ) -> HeardUtterance | None:
     """Returns the utterance completed since the last decision, or None; acts that are not observed are classified.
 

@@ -35,6 +35,9 @@ from dorothie_gym.spaces.limits import MESSAGE_LENGTH, STORY_LENGTH, UTTERANCE_L
 Observation: TypeAlias = dict[str, Any]
 """Observation dict of one role: values by field name, as specified by `observation_fields`."""
 
+ObservationMapping: TypeAlias = Mapping[str, Any]
+"""Read-only observation dict, as accepted by policies."""
+
 MAX_UTTERANCE = 4 * (UTTERANCE_LENGTH + 1)
 """Greatest length of an utterance of several spans [characters]."""
 
@@ -279,7 +282,7 @@ def _utterance(speaker: Role, limits: SpaceLimits, observe_acts: bool) -> tuple[
     )
 
 
-def heard_acts(observation: Mapping[str, Any], speaker: Role) -> tuple[DialogueAct, ...] | None:
+def heard_acts(observation: ObservationMapping, speaker: Role) -> tuple[DialogueAct, ...] | None:
     """Returns the acts of the utterance that ended since the last decision; None if acts are not observed."""
     moves: NDArray[np.int64] | None = observation.get(f"{speaker}_moves")
     if moves is None:

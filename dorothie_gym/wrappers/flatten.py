@@ -65,12 +65,12 @@ class FlatActions:
 
     def action(self, values: Flat) -> Any:
         """Returns the action of the space for a flat vector (n,)."""
-        fields: dict[str, Any] = dict(self._rest)
+        fields: dict[str, object] = dict(self._rest)
         begin = 0
         for name, sizes in self.sizes.items():
             fields[name] = _value(self._parts[name], values[begin : begin + len(sizes)])
             begin += len(sizes)
-        return fields[_WHOLE] if _WHOLE in fields else fields
+        return fields.get(_WHOLE, fields)
 
     def mask(self, mask: object) -> FlatMask:
         """Returns the permitted values of all entries, one bool per value (sum(nvec),), from `info["action_mask"]`."""
@@ -116,7 +116,7 @@ def _sizes(name: str, part: AnySpace) -> Flat:
     raise ValueError(f"the action space's field {name!r} is {part}; only discrete fields and texts can be flattened")
 
 
-def _rest(part: AnySpace) -> Any:
+def _rest(part: AnySpace) -> object:
     if isinstance(part, spaces.Text):
         return ""
     if isinstance(part, spaces.Discrete):
@@ -124,7 +124,7 @@ def _rest(part: AnySpace) -> Any:
     return np.zeros(part.shape or (), dtype=part.dtype)
 
 
-def _value(part: AnySpace, entries: Flat) -> Any:
+def _value(part: AnySpace, entries: Flat) -> object:
     if isinstance(part, spaces.Discrete):
         return np.int64(entries[0] + part.start)
     assert part.shape is not None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, TypeAlias
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +16,11 @@ from dorothie_gym.envs.point_env import PointEnv
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.policies import Policy, make_policy
-from dorothie_gym.policies.policy import policy_seed
+from dorothie_gym.policies import make_policy
+from dorothie_gym.policies.policy import AnyPolicy, policy_seed
 from dorothie_gym.recording import Event, Point, SceneTable, Session, Surroundings, Task, task_points, trajectory_of
 from dorothie_gym.recording.surroundings import Rows, light_rows, weather_rows
 from dorothie_gym.spaces import SpaceLimits, StepInfo
-
-AnyPolicy: TypeAlias = Policy[Any]
-"""Policy whose state type is not known statically."""
 
 MAX_SILENT_SESSIONS = 20
 """Largest number of consecutive sessions without a point of the task before an error is raised."""

@@ -57,7 +57,7 @@ def test_groups_of_a_move_go_from_wide_to_narrow() -> None:
 
 
 def test_an_answer_that_is_not_offered_is_refused_by_name() -> None:
-    with pytest.raises(OntologyError, match="'it opens nothing'.*'it opens something'"):
+    with pytest.raises(OntologyError, match=r"'it opens nothing'.*'it opens something'"):
         walk(["it opens nothing"])
 
 

@@ -131,12 +131,12 @@ def test_values_of_all_slots_together_are_the_slots(act: DialogueAct) -> None:
 
 
 def test_a_move_given_as_number_is_refused() -> None:
-    with pytest.raises(OntologyError, match="DialogueAct.move"):
+    with pytest.raises(OntologyError, match=r"DialogueAct.move"):
         DialogueAct(1)  # type: ignore[arg-type]
 
 
 def test_slots_that_are_no_frozenset_are_refused() -> None:
-    with pytest.raises(OntologyError, match="DialogueAct.of"):
+    with pytest.raises(OntologyError, match=r"DialogueAct.of"):
         DialogueAct(DialogueMove.EXPLAIN, [LandmarkName.KFC])  # type: ignore[arg-type]
 
 

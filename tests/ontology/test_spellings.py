@@ -128,12 +128,12 @@ def test_parsers_refuse_non_text(parser: Parser, text: object) -> None:
 
 
 def test_error_names_vocabulary_and_nearest_spelling() -> None:
-    with pytest.raises(OntologyError, match="value of slot Street.*'Bonistel'.*'Bonisteel'"):
+    with pytest.raises(OntologyError, match=r"value of slot Street.*'Bonistel'.*'Bonisteel'"):
         parse_slot_value(Slot.STREET, "Bonistel")
 
 
 def test_null_slot_has_no_values() -> None:
-    with pytest.raises(OntologyError, match="slot Null.*no values"):
+    with pytest.raises(OntologyError, match=r"slot Null.*no values"):
         parse_slot_value(Slot.NULL, "Unknown")
 
 

@@ -32,9 +32,9 @@ def another_task(human: Human):
     view = human.view
     for task in view.subgoals:
         place = view.landmark(task.landmark)
-        if task.open and task.index != human.state.task.target and place is not None:
-            if place.name is not human.state.task.goal.name:
-                return task, place
+        other = place is not None and place.name is not human.state.task.goal.name
+        if task.open and task.index != human.state.task.target and other:
+            return task, place
     raise AssertionError("there is no other task")
 
 

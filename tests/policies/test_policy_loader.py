@@ -37,7 +37,7 @@ def test_player_by_name_makes_its_policy() -> None:
 
 def test_policy_of_another_role_raises_error_with_known_names() -> None:
     with pytest.raises(
-        PolicyLoadError, match="participant: there is no policy 'lane-follow'.*scripted, silent, random$"
+        PolicyLoadError, match=r"participant: there is no policy 'lane-follow'.*scripted, silent, random$"
     ):
         find_player("lane-follow", Role.PARTICIPANT)
 
@@ -69,10 +69,10 @@ def test_kind_without_loader_raises_error(tmp_path: Path) -> None:
 
 
 def test_folder_without_description_and_damaged_json_raise_error(tmp_path: Path) -> None:
-    with pytest.raises(PolicyLoadError, match="folder without model.json"):
+    with pytest.raises(PolicyLoadError, match=r"folder without model.json"):
         find_player(str(tmp_path), Role.CO_WIZARD)
     (tmp_path / "model.json").write_text('{"kind": ')
-    with pytest.raises(PolicyLoadError, match="model.json: cannot be read"):
+    with pytest.raises(PolicyLoadError, match=r"model.json: cannot be read"):
         find_player(str(tmp_path), Role.CO_WIZARD)
 
 

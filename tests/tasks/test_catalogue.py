@@ -51,7 +51,7 @@ def test_unknown_landmarks_are_not_found(text):
 
 
 def test_a_value_given_twice_is_refused():
-    with pytest.raises(ValueError, match="KFC.menuitems"):
+    with pytest.raises(ValueError, match=r"KFC.menuitems"):
         LandmarkKind(
             name=LandmarkName.KFC, category="c", label="KFC", noun="KFC", repeatable=False,
             attributes={"menuitems": ("a", "a")},

@@ -118,7 +118,7 @@ def test_a_file_is_read_and_named_for_its_stem(tmp_path):
 
 
 def test_an_unknown_name_lists_those_known():
-    with pytest.raises(StoryboardError, match="storyboard nonesuch: name: .*school_run"):
+    with pytest.raises(StoryboardError, match=r"storyboard nonesuch: name: .*school_run"):
         load_template("nonesuch")
 
 
@@ -136,7 +136,7 @@ def test_a_folder_is_no_template(tmp_path):
 def test_a_file_that_is_no_text_is_refused(tmp_path):
     path = tmp_path / "bytes.json"
     path.write_bytes(b"{\xff}")
-    with pytest.raises(StoryboardError, match="not UTF-8 text .byte 1"):
+    with pytest.raises(StoryboardError, match=r"not UTF-8 text .byte 1"):
         load_template(path)
 
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import warnings
 
 import numpy as np
@@ -69,10 +70,7 @@ def test_masked_actions_of_all_roles_are_carried_out() -> None:
     while env.agents:
         actions = {
             agent: np.array(
-                [
-                    rng.choice(np.flatnonzero(infos[agent]["action_mask"][a:b]))
-                    for a, b in zip(start[:-1], start[1:], strict=True)
-                ]
+                [rng.choice(np.flatnonzero(infos[agent]["action_mask"][a:b])) for a, b in itertools.pairwise(start)]
             )
             for agent in env.agents
         }

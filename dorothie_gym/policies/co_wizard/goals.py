@@ -109,7 +109,7 @@ def set_goal(
             state.say(remark(DialogueMove.EXPLAIN, ActionValue.U_TURN, joined=True))
     elif corrected:
         state.say(remark(DialogueMove.CONFIRM, name, wording=Wording(topic="sorry")))
-    elif not sure or not streets and rng.random() < state.style.checks * (2.0 if name in _COMMON else 0.6):
+    elif not sure or (not streets and rng.random() < state.style.checks * (2.0 if name in _COMMON else 0.6)):
         state.say(remark(DialogueMove.CHECK, name, mark.street))
     else:
         values: list[SlotValue] = [name]

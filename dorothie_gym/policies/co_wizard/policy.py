@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from copy import copy
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from dorothie_gym.policies.co_wizard.understanding_update import listen
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import Policy
 from dorothie_gym.policies.speech import SpeechState
-from dorothie_gym.spaces import ActionDict, CoWizardAction, Mental, Motion, Physical, SpaceLimits
+from dorothie_gym.spaces import ActionDict, CoWizardAction, Mental, Motion, ObservationMapping, Physical, SpaceLimits
 
 
 class ScriptedCoWizard(Policy[CoWizardState]):
@@ -62,7 +61,7 @@ class ScriptedCoWizard(Policy[CoWizardState]):
             intentions=Intentions(speed=style.pace, usual=style.pace),
         )
 
-    def step(self, observation: Mapping[str, Any], state: CoWizardState) -> tuple[ActionDict, CoWizardState]:
+    def step(self, observation: ObservationMapping, state: CoWizardState) -> tuple[ActionDict, CoWizardState]:
         """Listens, looks, drives, and says something or nothing."""
         decision = attend(observation, state)
         updated, view = decision.state, decision.view
@@ -79,7 +78,7 @@ class PendingDecision(NamedTuple):
     rng: np.random.Generator
 
 
-def attend(observation: Mapping[str, Any], state: CoWizardState) -> PendingDecision:
+def attend(observation: ObservationMapping, state: CoWizardState) -> PendingDecision:
     """Updates the state from an observation: the first part of a decision, before acting and speaking.
 
     Args:

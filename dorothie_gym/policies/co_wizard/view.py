@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from dorothie_gym.ontology import (
 from dorothie_gym.policies.guidance_config import STANDING_SPEED
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenObject, read_landmarks, read_objects, scalar
 from dorothie_gym.policies.route_progress import Choice, is_choice, next_choice
-from dorothie_gym.spaces import ExitColumn, Motion
+from dorothie_gym.spaces import ExitColumn, Motion, ObservationMapping
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +43,7 @@ class CoWizardView:
         waypoints: points of the planned path (n, 2) [m].
     """
 
-    raw: Mapping[str, Any]
+    raw: ObservationMapping
     time: float
     speed: float
     lane: int
@@ -62,7 +61,7 @@ class CoWizardView:
     waypoints: np.ndarray
 
     @classmethod
-    def read(cls, observation: Mapping[str, Any], town: Town) -> CoWizardView:
+    def read(cls, observation: ObservationMapping, town: Town) -> CoWizardView:
         """Reads an observation."""
         manoeuvre = int(observation["manoeuvre"])
         waypoints = observation["waypoints"]

@@ -5,4 +5,4 @@ from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.navigation_policy import NavigationPolicy
 from dorothie_gym.policies.navigation.observation_vector import FIELD_SPECS, FIELDS, layout
 
-__all__ = ["FIELD_SPECS", "FIELDS", "Guidance", "NavigationAction", "NavigationPolicy", "layout"]
+__all__ = ["FIELDS", "FIELD_SPECS", "Guidance", "NavigationAction", "NavigationPolicy", "layout"]

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,7 +12,7 @@ from dorothie_gym.policies.navigation.actions import ACTIONS, FIRST_TURN, UNDER_
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits
 from dorothie_gym.sim.ego.feasibility import is_past_stopping
 from dorothie_gym.sim.ego.limits import HALF_LENGTH, LEAD, MAX_CRUISE, MIN_CRUISE, MIN_SWITCH, U_TURN_SPEED
-from dorothie_gym.spaces import ExitColumn, Motion
+from dorothie_gym.spaces import ExitColumn, Motion, ObservationMapping
 
 END_TOLERANCE = 0.5
 """Distance by which a U-turn may begin behind the end of its lane [m]."""
@@ -37,7 +34,7 @@ class EstimatedActionMask:
     def __init__(self, town: Town, exits: JunctionExits) -> None:
         self._town, self._exits = town, exits
 
-    def mask(self, observation: Mapping[str, Any]) -> NDArray[np.bool_]:
+    def mask(self, observation: ObservationMapping) -> NDArray[np.bool_]:
         """Returns which actions would be carried out now (18,)."""
         town, held = self._town, int(observation["motion"]) == Motion.STOPPED
         lane, station = town.lanes[int(observation["lane"])], float(observation["station"][0])
@@ -63,7 +60,7 @@ class EstimatedActionMask:
             mask[FIRST_TURN:] = [way is not None for way in self._exits.by_sector(choice)]
         return mask
 
-    def _is_committed(self, observation: Mapping[str, Any], speed: float) -> bool:
+    def _is_committed(self, observation: ObservationMapping, speed: float) -> bool:
         """Returns whether the car can no longer stop before the junction at which it is about to turn."""
         first = observation["exits"][0]
         if int(observation["manoeuvre"]) != PhysicalAction.J_TURN or not first[ExitColumn.PRESENT]:

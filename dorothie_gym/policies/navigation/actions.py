@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.policies.navigation.junction_exits import SECTORS, JunctionExits
-from dorothie_gym.spaces import Motion, Physical
+from dorothie_gym.spaces import Motion, ObservationMapping, Physical
 
 LEFT, RIGHT = 90, -90
 """Angles of a lane switch [degrees]."""
@@ -73,7 +73,7 @@ UNDER_WAY = {
 """Manoeuvres, and the value of `LocalPlanner.manoeuvre` while they are prepared or driven."""
 
 
-def physical_of(action: NavigationAction, observation: Mapping[str, Any], exits: JunctionExits) -> Physical | None:
+def physical_of(action: NavigationAction, observation: ObservationMapping, exits: JunctionExits) -> Physical | None:
     """Maps an action to a physical action; None for no action.
 
     A manoeuvre that is being prepared continues when it is chosen again, so a driver may repeat an action until it
@@ -96,7 +96,7 @@ def physical_of(action: NavigationAction, observation: Mapping[str, Any], exits:
     return Physical(action=PhysicalAction.J_TURN, angle=SECTORS[sector] if angle is None else angle)
 
 
-def prepares(action: NavigationAction, observation: Mapping[str, Any], exits: JunctionExits) -> bool:
+def prepares(action: NavigationAction, observation: ObservationMapping, exits: JunctionExits) -> bool:
     """Returns whether the car prepares or carries out an action already."""
     if int(observation["motion"]) == Motion.STOPPED:
         return False
@@ -107,7 +107,7 @@ def prepares(action: NavigationAction, observation: Mapping[str, Any], exits: Ju
     return manoeuvre == (int(observation["manoeuvre"]), int(observation["manoeuvre_angle"][0]))
 
 
-def _angle_of(sector: int, observation: Mapping[str, Any], exits: JunctionExits) -> int | None:
+def _angle_of(sector: int, observation: ObservationMapping, exits: JunctionExits) -> int | None:
     """Returns the angle of the exit in a sector of the next junction [degrees]; None where the sector has none."""
     choice = exits.choice_ahead(observation)
     way = exits.by_sector(choice)[sector] if choice is not None else None

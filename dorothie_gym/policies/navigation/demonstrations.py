@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +24,7 @@ from dorothie_gym.policies.navigation.navigation_policy import (
 )
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vector
 from dorothie_gym.policies.route_progress import lanes_beside
-from dorothie_gym.spaces import CoWizardAction, Motion, Physical
+from dorothie_gym.spaces import CoWizardAction, Motion, ObservationMapping, Physical
 
 STOP_FOR_GOAL = 30.0
 """Distance to the destination within which a stop is attributed to it [m]."""
@@ -60,7 +59,7 @@ class DemonstrationRecorder:
         self._state = NavigationPolicyState(co_wizard=co_wizard, speed=co_wizard.intentions.speed)
         self._stopped_by_itself = False
 
-    def record(self, observation: Mapping[str, Any], done: CoWizardAction) -> Demonstration | None:
+    def record(self, observation: ObservationMapping, done: CoWizardAction) -> Demonstration | None:
         """Converts a decision.
 
         Args:
@@ -93,7 +92,7 @@ def _has_to_stop(state: CoWizardState, view: CoWizardView) -> bool:
     return state.intentions.halted or (left is not None and left < STOP_FOR_GOAL)
 
 
-def action_of(physical: Physical | None, observation: Mapping[str, Any], exits: JunctionExits) -> NavigationAction:
+def action_of(physical: Physical | None, observation: ObservationMapping, exits: JunctionExits) -> NavigationAction:
     """Maps a physical action to the equivalent `NavigationAction`; speed and light changes map to `NOTHING`.
 
     Args:
@@ -113,7 +112,7 @@ def action_of(physical: Physical | None, observation: Mapping[str, Any], exits: 
     return NavigationAction.NOTHING if prepares(action, observation, exits) else action
 
 
-def _turn_of(angle: int, observation: Mapping[str, Any], exits: JunctionExits) -> NavigationAction:
+def _turn_of(angle: int, observation: ObservationMapping, exits: JunctionExits) -> NavigationAction:
     """Returns the turn into the sector of the exit whose angle is closest [degrees]."""
     choice = exits.choice_ahead(observation)
     if choice is None:

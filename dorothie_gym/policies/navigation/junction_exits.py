@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.maps import Exit, Town
 from dorothie_gym.policies.route_progress import is_choice, lanes_beside, next_choice
-from dorothie_gym.spaces import ExitColumn
+from dorothie_gym.spaces import ExitColumn, ObservationMapping
 
 SECTORS = tuple(range(-180, 180, 45))
 """Middles of the sectors [degrees, positive left]: back, sharp right, right, half right, straight, ..."""
@@ -57,7 +55,7 @@ class JunctionExits:
             found = self._found[lane] = self._find(lane)
         return found
 
-    def choice_ahead(self, observation: Mapping[str, Any]) -> int | None:
+    def choice_ahead(self, observation: ObservationMapping) -> int | None:
         """Returns the lane before the next junction with a choice; None where the car comes to none.
 
         The turn options of the Co-Wizard's observation identify the lane, even where the position has drifted. The

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from dorothie_gym.policies.navigation.observation_vector import (
     Vector,
 )
 from dorothie_gym.policies.policy import Policy
-from dorothie_gym.spaces import ActionDict, Motion, Physical, SpaceLimits
+from dorothie_gym.spaces import ActionDict, Motion, ObservationMapping, Physical, SpaceLimits
 
 Choose: TypeAlias = Callable[[Vector, NDArray[np.bool_]], int]
 """Driver: chooses one of the 18 actions from an observation of `Navigation-v0` (161,) and a mask (18,)."""
@@ -50,7 +50,7 @@ class NavigationPolicyState:
 
     co_wizard: CoWizardState
     instructions: InstructionState = field(default_factory=InstructionState)
-    observation: Mapping[str, Any] | None = None
+    observation: ObservationMapping | None = None
     decided_at: float = -1.0
     speed: int
 
@@ -72,7 +72,7 @@ class DriverInputs:
         state: NavigationPolicyState,
         co_wizard: CoWizardState,
         view: CoWizardView,
-        observation: Mapping[str, Any],
+        observation: ObservationMapping,
     ) -> NavigationPolicyState:
         """Returns the state after another observation; `co_wizard` has listened to it already and is updated."""
         instructions = state.instructions
@@ -135,7 +135,7 @@ class NavigationPolicy(Policy[NavigationPolicyState]):
         return NavigationPolicyState(co_wizard=co_wizard, speed=co_wizard.intentions.speed)
 
     def step(
-        self, observation: Mapping[str, Any], state: NavigationPolicyState
+        self, observation: ObservationMapping, state: NavigationPolicyState
     ) -> tuple[ActionDict, NavigationPolicyState]:
         """Listens and looks, drives, and says something or nothing."""
         decision = attend(observation, state.co_wizard)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from gymnasium import spaces
@@ -29,7 +29,7 @@ from dorothie_gym.policies.navigation.instructor import NavigationInstruction
 from dorothie_gym.policies.navigation.junction_exits import SECTORS, JunctionExits, SectorExit
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.sim.ego.limits import MAX_CRUISE
-from dorothie_gym.spaces import ExitColumn, Motion, ObjectColumn
+from dorothie_gym.spaces import ExitColumn, Motion, ObjectColumn, ObservationMapping
 from dorothie_gym.spaces.fields import share, signal, sizes
 
 Vector: TypeAlias = NDArray[np.float32]
@@ -163,7 +163,7 @@ class HeardInstruction:
     driven: float = 0.0
     goal: Place | None = None
 
-    def driven_on(self, before: Mapping[str, Any], now: Mapping[str, Any]) -> HeardInstruction:
+    def driven_on(self, before: ObservationMapping, now: ObservationMapping) -> HeardInstruction:
         """Adds the distance driven between two observations, computed from the speeds in both."""
         seconds = float(now["time"][0] - before["time"][0])
         return replace(self, driven=self.driven + seconds * float(before["speed"][0] + now["speed"][0]) / 2.0)
@@ -181,7 +181,7 @@ class NavigationEncoder:
         self._oncoming = oncoming_lanes(town)
         self._cost_to_go = CostToGo(town)
 
-    def observe(self, seen: Mapping[str, Any], heard: HeardInstruction, blocked: tuple[Place, ...]) -> Vector:
+    def observe(self, seen: ObservationMapping, heard: HeardInstruction, blocked: tuple[Place, ...]) -> Vector:
         """Encodes an observation.
 
         Args:
@@ -210,7 +210,7 @@ class NavigationEncoder:
         observation = np.array(values, dtype=np.float32)
         return np.minimum(np.maximum(observation, -1.0, out=observation), 1.0, out=observation)
 
-    def _car(self, seen: Mapping[str, Any], lane: int) -> list[float]:
+    def _car(self, seen: ObservationMapping, lane: int) -> list[float]:
         town = self._town
         manoeuvre, covariance = int(seen["manoeuvre"]), seen["pose_covariance"]
         hazard = bool(seen["hazard"])
@@ -231,7 +231,7 @@ class NavigationEncoder:
         ]
 
     def _junction(
-        self, seen: Mapping[str, Any], heard: HeardInstruction, ways: tuple[SectorExit | None, ...], choice: int | None
+        self, seen: ObservationMapping, heard: HeardInstruction, ways: tuple[SectorExit | None, ...], choice: int | None
     ) -> list[float]:  # fmt: skip
         if choice is None:
             return [0.0] * (2 + 3 * len(SECTORS))
@@ -255,7 +255,7 @@ class NavigationEncoder:
         left = self._town.lanes[lane].length - station
         return [left / FAR, *_one_hot(_COLOURS.index(colour), len(_COLOURS))]
 
-    def _goal(self, seen: Mapping[str, Any], heard: HeardInstruction, lane: int, station: float) -> list[float]:
+    def _goal(self, seen: ObservationMapping, heard: HeardInstruction, lane: int, station: float) -> list[float]:
         if heard.goal is None:
             return [0.0] * 6
         x, y = self._town.lanes[heard.goal[0]].position(heard.goal[1])
@@ -317,7 +317,7 @@ def _instruction(heard: HeardInstruction, time: float) -> list[float]:
     ]
 
 
-def _objects(seen: Mapping[str, Any]) -> list[float]:
+def _objects(seen: ObservationMapping) -> list[float]:
     values: list[float] = []
     for row in seen["objects"][:OBJECTS].tolist():
         kind = int(row[ObjectColumn.KIND])

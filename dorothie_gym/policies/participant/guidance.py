@@ -267,9 +267,9 @@ def next_step(
         return None
     crossing = progress.next_crossing(state.town, view.station)
     manoeuvre = progress.next_manoeuvre(view.station)
-    if manoeuvre is not None and manoeuvre[0] is LaneEntry.U_TURN:
-        if crossing is None or manoeuvre[1] < crossing.distance:
-            return ("round", 0, 0), manoeuvre[1], remark(move, ActionValue.U_TURN)
+    u_turn = manoeuvre is not None and manoeuvre[0] is LaneEntry.U_TURN
+    if manoeuvre is not None and u_turn and (crossing is None or manoeuvre[1] < crossing.distance):
+        return ("round", 0, 0), manoeuvre[1], remark(move, ActionValue.U_TURN)
     switch = manoeuvre is not None and (
         crossing is None
         or (manoeuvre[1] < crossing.distance and progress.needs_switch(state.town, view.lane, view.station, crossing))

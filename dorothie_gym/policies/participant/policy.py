@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from copy import copy
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +21,7 @@ from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import Policy
 from dorothie_gym.policies.route_progress import light_ahead
 from dorothie_gym.policies.speech import SpeechState
-from dorothie_gym.spaces import ActionDict, ParticipantAction, SpaceLimits
+from dorothie_gym.spaces import ActionDict, ObservationMapping, ParticipantAction, SpaceLimits
 
 TURN_TIME = 4.0
 """Standstill across the lane after which a car is no longer regarded as turning [s]."""
@@ -61,7 +59,7 @@ class ScriptedParticipant(Policy[ParticipantState]):
         conversation = ConversationState(speech=speech, chat_at=chat_at)
         return ParticipantState(seed=seed, town=town, style=style, config=self._config, conversation=conversation)
 
-    def step(self, observation: Mapping[str, Any], state: ParticipantState) -> tuple[ActionDict, ParticipantState]:
+    def step(self, observation: ObservationMapping, state: ParticipantState) -> tuple[ActionDict, ParticipantState]:
         """Processes utterances, observes the car, and chooses a remark or silence."""
         updated = copy(state)
         updated.count += 1

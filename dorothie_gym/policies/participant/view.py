@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
@@ -20,6 +18,7 @@ from dorothie_gym.policies.observation_parser import (
     read_subgoals,
     scalar,
 )
+from dorothie_gym.spaces import ObservationMapping
 
 TURNED = 0.8
 """Cosine of the angle between car and lane below which the car is in the middle of a U-turn."""
@@ -42,7 +41,7 @@ class ParticipantView:
         turning: whether the car stands across its lane.
     """
 
-    raw: Mapping[str, Any]
+    raw: ObservationMapping
     time: float
     speed: float
     lane: int
@@ -54,7 +53,7 @@ class ParticipantView:
     turning: bool
 
     @classmethod
-    def read(cls, observation: Mapping[str, Any], town: Town) -> ParticipantView:
+    def read(cls, observation: ObservationMapping, town: Town) -> ParticipantView:
         """Reads an observation."""
         lane, station = int(observation["lane"]), scalar(observation, "station")
         across = float(observation["pose"][2]) - town.lanes[lane].heading_at(station)
