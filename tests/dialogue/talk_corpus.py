@@ -1,4 +1,4 @@
-"""A corpus of talk from acts as a session might have them, and how it compares with talk of people.
+"""Corpus of utterances generated from sampled acts, with the figures that compare it with human dialogue.
 
 Run `python -m tests.dialogue.talk_corpus` for the figures (needs nltk for the perplexity).
 """
@@ -53,7 +53,7 @@ TOPICS = ["fog", "rain", "night", "blocked", "wrong_way", "arrived", "plan", "re
 
 
 class Sampler:
-    """Draws acts with their particulars."""
+    """Sampler of dialogue acts with the details of their wording."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.rng = rng
@@ -163,7 +163,7 @@ def tokens(text: str) -> list[str]:
 
 
 def figures(said: Sequence[Said]) -> Figures:
-    """Texts are compared in lower case and without punctuation: "Okay." is "okay"."""
+    """Returns the figures of a corpus; texts are compared in lower case and without punctuation."""
     texts = [plain(item.text) for item in said]
     words = [word for text in texts for word in text.split()]
     (text, times), *_ = Counter(texts).most_common(1)
@@ -178,7 +178,7 @@ def figures(said: Sequence[Said]) -> Figures:
 
 
 def perplexity(train: Sequence[Said], test: Sequence[Said]) -> float:
-    """Interpolated Kneser-Ney trigrams of nltk, words in lower case, those seen once as unknown."""
+    """Returns the perplexity of Kneser-Ney trigrams (nltk): lower case, words that occur once as unknown."""
     from nltk.lm import KneserNeyInterpolated, Vocabulary
     from nltk.lm.preprocessing import padded_everygram_pipeline
     from nltk.util import ngrams, pad_sequence

@@ -1,4 +1,4 @@
-"""Understanding of words that no grammar has made; the figures stand in docs/talk.md."""
+"""Understanding of hand-written utterances; docs/talk.md has the figures."""
 
 import time
 
@@ -28,7 +28,7 @@ def test_utterances_that_no_rule_was_written_for_are_understood(name):
 
 
 @pytest.mark.parametrize("name", ["dev", "test", "voices", "more", "cabin", "fresh", "unseen", "held"])
-def test_hand_written_utterances_are_parted_into_their_acts(name):
+def test_hand_written_utterances_are_segmented_into_acts(name):
     annotated = read_annotated(name)
     right = sum(len(guess_spans(item.text, item.after)) == len(item.acts) for item in annotated)
     assert right / len(annotated) >= 0.85

@@ -16,7 +16,7 @@ SAID = [item.text for seed in range(300, 325) for item in session(seed)][:1000]
 
 
 @pytest.mark.parametrize("rate", [0.05, 0.12, 0.25])
-def test_the_error_rate_is_the_one_that_is_set(rate):
+def test_error_rate_equals_setting(rate):
     rng = np.random.default_rng(8)
     heard = [AsrChannel(rate=rate).transcribe(text, rng) for text in SAID]
     assert word_error_rate(SAID, heard) == pytest.approx(rate, rel=0.1)
@@ -27,7 +27,7 @@ def test_error_free_channel_returns_the_spoken_text():
     assert [AsrChannel(rate=0).transcribe(text, rng) for text in SAID] == SAID
 
 
-def test_a_transcript_is_a_function_of_text_and_seed():
+def test_transcript_depends_on_text_and_seed_only():
     hear = [[AsrChannel(rate=0.3).transcribe(text, np.random.default_rng(3)) for text in SAID[:50]] for _ in range(2)]
     assert hear[0] == hear[1]
 
@@ -39,18 +39,18 @@ def test_names_are_confused_with_similar_sounding_words():
 
 
 @given(st.text(max_size=160), st.integers(0, 2**32))
-def test_any_text_has_a_transcript(text, seed):
+def test_every_text_has_a_transcript(text, seed):
     heard = AsrChannel(rate=0.5).transcribe(text, np.random.default_rng(seed))
     assert bool(heard.split()) >= bool(text.split())
 
 
 @pytest.mark.parametrize("fields", [{"rate": 1.0}, {"rate": -0.1}, {"substitutions": 0.9, "deletions": 0.3}])
-def test_settings_out_of_range_are_named(fields):
+def test_error_names_setting_out_of_range(fields):
     with pytest.raises(ValueError, match=next(iter(fields))):
         AsrChannel(**fields)
 
 
-def test_texts_and_transcripts_come_in_pairs():
+def test_word_error_rate_needs_equal_numbers_of_texts():
     with pytest.raises(ValueError, match="2 texts and 1 transcripts"):
         word_error_rate(["a", "b"], ["a"])
 
@@ -75,7 +75,7 @@ def test_error_free_recogniser_returns_the_utterance() -> None:
     assert all(perfect.hear(utterance) is utterance for utterance in TALK)
 
 
-def test_words_that_are_heard_right_keep_their_act_and_others_never_do() -> None:
+def test_correctly_recognised_words_keep_act_and_others_never_do() -> None:
     ears = recogniser(0.12)
     kept = lost = 0
     for utterance in TALK:
@@ -86,7 +86,7 @@ def test_words_that_are_heard_right_keep_their_act_and_others_never_do() -> None
                 assert span.act == truth.act
             else:
                 lost += 1
-                assert span.act == guess_act(span.text), "nobody could have said this act by these words alone"
+                assert span.act == guess_act(span.text), "the words alone determine another act"
         assert (heard.speaker, heard.start, heard.end) == (utterance.speaker, utterance.start, utterance.end)
     assert kept > 30 and lost > 30
 
@@ -106,7 +106,7 @@ def test_transcript_does_not_depend_on_the_intended_act() -> None:
 
 
 def heard_after_a_question(pause: float, between: Utterance | None = None) -> set[DialogueMove]:
-    """Moves of "go left at the Ikea" where it was misheard, said so long after a question."""
+    """Returns the moves of misheard "go left at the Ikea" after a question and a pause [s]."""
     found = set()
     for seed in range(60):
         ears = recogniser(0.3, seed)
@@ -122,13 +122,13 @@ def heard_after_a_question(pause: float, between: Utterance | None = None) -> se
     return found
 
 
-def test_misheard_words_are_read_in_the_light_of_an_open_question() -> None:
+def test_misheard_words_are_classified_by_open_question() -> None:
     assert DialogueMove.REPLY_W in heard_after_a_question(1.0)
-    assert DialogueMove.REPLY_W not in heard_after_a_question(PATIENCE + 1.0), "nobody waits for it any more"
+    assert DialogueMove.REPLY_W not in heard_after_a_question(PATIENCE + 1.0), "the exchange is abandoned"
     other = said(Role.PARTICIPANT, 2.0, ("well", DialogueAct(DialogueMove.IRRELEVANT)))
     assert DialogueMove.REPLY_W not in heard_after_a_question(1.0, other), "it has been answered"
 
 
-def test_the_same_seed_hears_the_same() -> None:
+def test_equal_seeds_give_equal_transcripts() -> None:
     once, again = recogniser(0.2), recogniser(0.2)
     assert [once.hear(utterance) for utterance in TALK] == [again.hear(utterance) for utterance in TALK]

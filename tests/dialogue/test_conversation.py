@@ -7,13 +7,13 @@ STOP = Span("Stop.", DialogueAct.of(DialogueMove.INSTRUCT))
 OKAY = Span("Okay.", DialogueAct.of(DialogueMove.ACKNOWLEDGE))
 
 
-def test_speech_takes_its_words_at_the_rate():
+def test_speech_duration_follows_speaking_rate():
     assert speech_seconds("turn left at the next") == pytest.approx(5 / WORDS_PER_SECOND)
     assert speech_seconds("turn left at the next", words_per_second=5.0) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("text", ["", "yes"])
-def test_shortest_speech_outlasts_a_decision(text):
+def test_shortest_speech_is_longer_than_decision_interval(text):
     assert speech_seconds(text) == pytest.approx(0.6)
 
 
@@ -28,7 +28,7 @@ def test_utterance_joins_its_spans():
     assert [act.move for act in utterance.acts] == [DialogueMove.ACKNOWLEDGE, DialogueMove.INSTRUCT]
 
 
-def test_blank_spans_and_impossible_utterances_are_refused():
+def test_blank_spans_and_invalid_utterances_raise_error():
     with pytest.raises(ValueError, match="blank"):
         Span("  ", STOP.act)
     with pytest.raises(ValueError, match="spans"):
@@ -46,7 +46,7 @@ def span(text: str, move: DialogueMove = DialogueMove.INSTRUCT) -> Span:
     return Span(text, DialogueAct.of(move))
 
 
-def test_an_utterance_is_delivered_when_its_words_are_over():
+def test_utterance_is_delivered_at_its_end():
     talk = Conversation(words_per_second=2.5)
     assert talk.say(PARTICIPANT, span("turn left at the next"), 10.0) is None  # 5 words: 2 s
     assert talk.speaking(PARTICIPANT, 10.5) == pytest.approx(1.5)
@@ -57,7 +57,7 @@ def test_an_utterance_is_delivered_when_its_words_are_over():
     assert talk.speaking(PARTICIPANT, 12.0) == 0.0
 
 
-def test_one_word_in_each_of_two_decisions_is_one_utterance():
+def test_one_word_per_decision_makes_one_utterance():
     talk = Conversation()
     talk.say(PARTICIPANT, span("yes", DialogueMove.REPLY_Y), 0.0)  # until 0.6 s
     assert talk.deliver(0.5) == []
@@ -68,7 +68,7 @@ def test_one_word_in_each_of_two_decisions_is_one_utterance():
     assert [act.move for act in heard.acts] == [DialogueMove.REPLY_Y, DialogueMove.INSTRUCT]
 
 
-def test_a_pause_begins_a_new_utterance():
+def test_pause_begins_new_utterance():
     talk = Conversation()
     talk.say(PARTICIPANT, span("yes"), 0.0)
     assert len(talk.deliver(1.0)) == 1
@@ -76,7 +76,7 @@ def test_a_pause_begins_a_new_utterance():
     assert talk.in_air(PARTICIPANT).start == 1.0
 
 
-def test_an_undelivered_utterance_is_continued_from_now():
+def test_undelivered_utterance_is_continued():
     talk = Conversation()
     talk.say(PARTICIPANT, span("yes"), 0.0)
     talk.say(PARTICIPANT, span("stop"), 2.0)
@@ -84,7 +84,7 @@ def test_an_undelivered_utterance_is_continued_from_now():
     assert (heard.start, heard.end) == (0.0, pytest.approx(2.6))
 
 
-def test_speakers_overlap_and_are_delivered_by_their_start_participant_first():
+def test_overlapping_utterances_are_delivered_by_start_then_role():
     talk = Conversation()
     talk.say(CO_WIZARD, span("which way"), 0.0)
     talk.say(PARTICIPANT, span("left now"), 0.0)
@@ -95,14 +95,14 @@ def test_speakers_overlap_and_are_delivered_by_their_start_participant_first():
     assert [heard.speaker for heard in talk.deliver(3.5)] == [CO_WIZARD]
 
 
-def test_late_delivery_keeps_the_order_of_starts():
+def test_late_delivery_keeps_order_of_starts():
     talk = Conversation()
     talk.say(CO_WIZARD, span("okay"), 0.0)
     talk.say(PARTICIPANT, span("stop"), 0.5)
     assert [heard.speaker for heard in talk.deliver(5.0)] == [CO_WIZARD, PARTICIPANT]
 
 
-def test_too_many_acts_in_an_utterance_are_refused_with_a_reason():
+def test_too_many_acts_in_utterance_raise_error_with_reason():
     talk = Conversation(max_spans=2)
     assert talk.say(PARTICIPANT, span("left"), 0.0) is None
     assert talk.say(PARTICIPANT, span("left"), 0.5) is None
@@ -113,6 +113,6 @@ def test_too_many_acts_in_an_utterance_are_refused_with_a_reason():
 
 
 @pytest.mark.parametrize("arguments", [{"words_per_second": 0.0}, {"max_spans": 0}])
-def test_arguments_out_of_range_are_named(arguments):
+def test_error_names_argument_out_of_range(arguments):
     with pytest.raises(ValueError, match=next(iter(arguments))):
         Conversation(**arguments)

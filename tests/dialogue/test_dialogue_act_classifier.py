@@ -12,7 +12,7 @@ SHARES = {Slot.ACTION: 0.4, Slot.LANDMARK: 0.4, Slot.STREET: 0.25, Slot.OBJECT: 
 
 
 def random_act(rng: np.random.Generator) -> DialogueAct:
-    """Any move; up to two values in any of the slots. Irrelevant talk carries none."""
+    """Draws a move with up to two values in each slot; Irrelevant has none."""
     move = DialogueMove(int(rng.integers(len(DialogueMove))))
     values = []
     for slot, share in SHARES.items():
@@ -125,7 +125,7 @@ def test_previous_move_determines_the_move_of_an_answer(text, after, move):
         ("  ", []),
     ],
 )
-def test_one_breath_may_hold_several_acts(text, moves):
+def test_one_utterance_may_contain_several_acts(text, moves):
     spans = guess_spans(text)
     assert [span.act.move.label for span in spans] == moves
     assert " ".join(span.text for span in spans) == text.strip()

@@ -20,7 +20,7 @@ def said(speaker: Role, start: float, *moves: DialogueMove, seconds: float = 1.0
     return Utterance(speaker, tuple(Span("words", DialogueAct.of(move)) for move in moves), start, start + seconds)
 
 
-def test_a_command_and_its_acknowledgement_are_one_exchange():
+def test_command_and_acknowledgement_are_one_exchange():
     tracker = ExchangeTracker()
     assert tracker.update(said(P, 0.0, M.INSTRUCT)) == (0,)
     assert tracker.exchanges[0].state is ExchangeState.OPEN
@@ -32,7 +32,7 @@ def test_a_command_and_its_acknowledgement_are_one_exchange():
 
 
 @pytest.mark.parametrize("question", EXPECTATIONS, ids=lambda move: move.label)
-def test_every_expected_answer_fulfils(question):
+def test_every_expected_answer_fulfils_exchange(question):
     for answer in EXPECTATIONS[question]:
         tracker = ExchangeTracker()
         tracker.update(said(C, 0.0, question))
@@ -40,27 +40,27 @@ def test_every_expected_answer_fulfils(question):
         assert tracker.exchanges[0].state is ExchangeState.FULFILLED
 
 
-def test_an_answer_and_a_command_in_one_utterance_close_and_open():
+def test_answer_and_command_in_one_utterance_close_and_open_exchanges():
     tracker = ExchangeTracker()
     tracker.update(said(C, 0.0, M.QUERY_YN))
     assert tracker.update(said(P, 2.0, M.REPLY_Y, M.INSTRUCT)) == (0, 1)
     assert [exchange.state for exchange in tracker.exchanges] == [ExchangeState.FULFILLED, ExchangeState.OPEN]
 
 
-def test_a_reason_and_the_following_question_share_an_exchange():
+def test_reason_and_following_question_share_exchange():
     tracker = ExchangeTracker()
     assert tracker.update(said(C, 0.0, M.EXPLAIN, M.QUERY_YN)) == (0, 0)
     assert tracker.update(said(P, 2.0, M.REPLY_N)) == (0,)
 
 
-def test_an_explanation_behind_an_answer_belongs_to_it():
+def test_explanation_after_answer_belongs_to_its_exchange():
     tracker = ExchangeTracker()
     tracker.update(said(P, 0.0, M.INSTRUCT))
     assert tracker.update(said(C, 2.0, M.ACKNOWLEDGE, M.EXPLAIN)) == (0, 0)
     assert tracker.exchanges[0].state is ExchangeState.FULFILLED
 
 
-def test_two_overlapping_exchanges_both_get_closed():
+def test_two_overlapping_exchanges_are_both_closed():
     tracker = ExchangeTracker()
     assert tracker.update(said(P, 0.0, M.INSTRUCT)) == (0,)
     assert tracker.update(said(C, 0.2, M.QUERY_W)) == (1,)
@@ -69,14 +69,14 @@ def test_two_overlapping_exchanges_both_get_closed():
     assert tracker.open() == []
 
 
-def test_a_speaker_cannot_answer_its_own_question():
+def test_speaker_cannot_answer_own_question():
     tracker = ExchangeTracker()
     tracker.update(said(C, 0.0, M.QUERY_YN))
     tracker.update(said(C, 2.0, M.REPLY_Y))
     assert tracker.exchanges[0].state is ExchangeState.OPEN
 
 
-def test_an_exchange_with_a_misunderstanding_stays_open_until_the_repair():
+def test_misunderstood_exchange_stays_open_until_repair():
     tracker = ExchangeTracker()
     tracker.update(said(P, 0.0, M.INSTRUCT))
     assert tracker.update(said(C, 2.0, M.CONFUSE)) == (0,)
@@ -95,14 +95,14 @@ def test_ten_seconds_of_silence_abandon_a_question():
     assert tracker.exchanges[0].state is ExchangeState.ABANDONED
 
 
-def test_an_unanswered_statement_is_fulfilled():
+def test_unanswered_statement_is_fulfilled():
     tracker = ExchangeTracker()
     tracker.update(said(C, 0.0, M.EXPLAIN))
     tracker.tick(20.0)
     assert tracker.exchanges[0].state is ExchangeState.FULFILLED
 
 
-def test_an_answer_that_started_in_time_counts():
+def test_answer_that_started_in_time_counts():
     tracker = ExchangeTracker()
     tracker.update(said(C, 0.0, M.QUERY_W))
     tracker.tick(12.0)
@@ -110,7 +110,7 @@ def test_an_answer_that_started_in_time_counts():
     assert tracker.exchanges[0].state is ExchangeState.FULFILLED
 
 
-def test_a_response_to_nothing_joins_the_last_exchange_or_stands_unprompted():
+def test_unprompted_response_joins_last_exchange_or_none():
     tracker = ExchangeTracker()
     assert tracker.update(said(P, 0.0, M.ACKNOWLEDGE)) == (0,)
     assert tracker.exchanges[0].unprompted
@@ -119,14 +119,14 @@ def test_a_response_to_nothing_joins_the_last_exchange_or_stands_unprompted():
     assert tracker.update(said(C, 30.0, M.REPLY_Y)) == (0,)
 
 
-def test_irrelevant_talk_disturbs_no_exchange():
+def test_irrelevant_act_leaves_exchanges_unchanged():
     tracker = ExchangeTracker()
     tracker.update(said(C, 0.0, M.QUERY_W))
     assert tracker.update(said(P, 2.0, M.IRRELEVANT)) == (0,)
     assert tracker.exchanges[0].state is ExchangeState.OPEN
 
 
-def test_irrelevant_talk_after_a_silence_is_in_no_exchange():
+def test_irrelevant_act_after_silence_is_in_no_exchange():
     tracker = ExchangeTracker()
     assert tracker.update(said(P, 0.0, M.IRRELEVANT)) == (None,)
     tracker.update(said(C, 5.0, M.QUERY_W))
@@ -139,7 +139,7 @@ def test_patience_must_be_positive():
         ExchangeTracker(0.0)
 
 
-def test_a_question_about_a_command_stays_in_the_exchange_of_the_command():
+def test_question_about_command_stays_in_its_exchange():
     tracker = ExchangeTracker()
     tracker.update(said(P, 0.0, M.INSTRUCT))
     assert tracker.update(said(C, 2.0, M.CHECK)) == (0,)
@@ -148,7 +148,7 @@ def test_a_question_about_a_command_stays_in_the_exchange_of_the_command():
     assert tracker.exchanges[0].state is ExchangeState.FULFILLED
 
 
-def test_an_explanation_of_missing_knowledge_stays_in_the_exchange():
+def test_explanation_of_missing_knowledge_stays_in_exchange():
     tracker = ExchangeTracker()
     tracker.update(said(P, 0.0, M.INSTRUCT))
     assert tracker.update(said(C, 2.0, M.EXPLAIN)) == (0,)
@@ -157,14 +157,14 @@ def test_an_explanation_of_missing_knowledge_stays_in_the_exchange():
     assert tracker.exchanges[0].state is ExchangeState.FULFILLED
 
 
-def test_a_question_may_be_answered_by_a_command():
+def test_question_may_be_answered_by_command():
     tracker = ExchangeTracker()
     tracker.update(said(C, 0.0, M.QUERY_W))
     assert tracker.update(said(P, 2.0, M.INSTRUCT)) == (0,)
     assert tracker.exchanges[0].state is ExchangeState.FULFILLED
 
 
-def test_a_command_given_while_the_other_still_asks_begins_an_exchange_of_its_own():
+def test_command_during_question_begins_new_exchange():
     tracker = ExchangeTracker()
     tracker.update(said(C, 0.0, M.QUERY_W, seconds=2.0))
     assert tracker.update(said(P, 1.0, M.INSTRUCT, seconds=2.0)) == (1,)
@@ -174,9 +174,9 @@ def naming(speaker: Role, start: float, move: DialogueMove, *values: SlotValue) 
     return Utterance(speaker, (Span("words", DialogueAct.of(move, *values)),), start, start + 1.0)
 
 
-def test_a_grounding_act_with_a_name_refers_to_the_exchange_of_that_name():
+def test_grounding_act_with_name_refers_to_exchange_of_that_name():
     tracker = ExchangeTracker()
-    tracker.update(naming(C, 0.0, M.EXPLAIN, LandmarkName.PANERA))  # 0: nobody has taken it up yet
+    tracker.update(naming(C, 0.0, M.EXPLAIN, LandmarkName.PANERA))  # 0: without a response so far
     assert tracker.update(naming(P, 1.5, M.INSTRUCT, LandmarkName.HOUSE)) == (1,)
     assert tracker.update(said(C, 3.0, M.ACKNOWLEDGE)) == (1,)
     assert tracker.update(naming(C, 5.0, M.CONFIRM, LandmarkName.HOUSE)) == (1,)
@@ -192,7 +192,7 @@ def test_queried_and_unknown_values_are_not_names(value):
     assert tracker.update(naming(C, 4.5, M.ACKNOWLEDGE, value)) == (1,)
 
 
-def test_a_repetition_before_an_answer_continues_the_exchange():
+def test_repetition_before_answer_continues_exchange():
     tracker = ExchangeTracker()
     tracker.update(naming(P, 0.0, M.INSTRUCT, ActionValue.STOP))
     assert tracker.update(naming(P, 4.0, M.INSTRUCT, ActionValue.STOP)) == (0,)
@@ -202,7 +202,7 @@ def test_a_repetition_before_an_answer_continues_the_exchange():
 
 
 @pytest.mark.parametrize("puzzled", [M.CONFUSE, M.CHECK, M.EXPLAIN])
-def test_a_repetition_after_a_misunderstanding_continues_the_exchange(puzzled):
+def test_repetition_after_misunderstanding_continues_exchange(puzzled):
     tracker = ExchangeTracker()
     tracker.update(naming(P, 0.0, M.INSTRUCT, LandmarkName.COCO, ActionValue.U_TURN))
     tracker.update(said(C, 2.0, puzzled))
@@ -212,21 +212,21 @@ def test_a_repetition_after_a_misunderstanding_continues_the_exchange(puzzled):
     assert tracker.exchanges[0].state is ExchangeState.FULFILLED
 
 
-def test_something_else_is_no_answer_to_a_check():
+def test_unrelated_act_does_not_answer_check():
     tracker = ExchangeTracker()
     tracker.update(naming(P, 0.0, M.INSTRUCT, LandmarkName.COCO))
     tracker.update(said(C, 2.0, M.CHECK))
     assert tracker.update(naming(P, 4.0, M.INSTRUCT, ActionValue.STOP)) == (1,)
 
 
-def test_a_repetition_after_ten_seconds_starts_a_new_exchange():
+def test_repetition_after_ten_seconds_starts_new_exchange():
     tracker = ExchangeTracker()
     tracker.update(naming(P, 0.0, M.INSTRUCT, ActionValue.STOP))
     tracker.tick(12.0)
     assert tracker.update(naming(P, 12.0, M.INSTRUCT, ActionValue.STOP)) == (1,)
 
 
-def test_an_explanation_answers_a_statement_of_missing_knowledge():
+def test_explanation_answers_statement_of_missing_knowledge():
     tracker = ExchangeTracker()
     tracker.update(naming(C, 0.0, M.EXPLAIN, LandmarkName.HOUSE, GoalStatus.UNKNOWN))
     assert tracker.update(naming(P, 2.0, M.EXPLAIN, StreetName.FULLER)) == (0,)

@@ -9,7 +9,7 @@ from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology import LABELS, ActionValue, LandmarkName, StreetName
 
 
-def test_every_value_that_is_said_is_understood_as_itself():
+def test_every_spoken_value_is_recognised():
     lexicon = load_lexicon()
     for value in LABELS:
         if isinstance(value, ActionValue):
@@ -34,27 +34,27 @@ def test_every_value_that_is_said_is_understood_as_itself():
         ("Panara", LandmarkName.PANERA),
     ],
 )
-def test_spellings_and_slips_are_understood(text, value):
+def test_misspellings_are_understood(text, value):
     mentions, words = find_names(split_words(text))
     assert [mention.value for mention in mentions] == [value]
     assert words[-1].startswith("#")
 
 
-def test_a_missing_value_is_named():
+def test_error_names_missing_value():
     data = copy.deepcopy(read_data("lexicon.yaml"))
     del data["Street"]["Baits"]
     with pytest.raises(PhraseFileError, match=r"Street\.Baits"):
         parse_lexicon(data)
 
 
-def test_an_ambiguous_phrase_is_named():
+def test_error_names_ambiguous_phrase():
     data = copy.deepcopy(read_data("lexicon.yaml"))
     data["Street"]["Baits"]["hear"] = ["Beal"]
     with pytest.raises(PhraseFileError, match="Beal"):
         parse_lexicon(data)
 
 
-def test_an_unquoted_boolean_is_named():
+def test_error_names_unquoted_boolean():
     data = copy.deepcopy(read_data("lexicon.yaml"))
     data["Object"]["Pole"]["hear"] = [True]
     with pytest.raises(PhraseFileError, match=r"Object\.Pole\.hear"):
@@ -62,15 +62,15 @@ def test_an_unquoted_boolean_is_named():
 
 
 @pytest.mark.parametrize("text", ["the car is fully loaded", "sure thing", "step on it", "a plenty hearty mouthful"])
-def test_ordinary_words_are_no_names(text):
+def test_ordinary_words_are_not_names(text):
     assert find_names(split_words(text))[0] == []
 
 
-def test_a_word_unlike_every_name_is_none():
+def test_word_unlike_all_names_is_not_matched():
     assert nearest_name("zyzzyva") is None
 
 
-def test_cues_that_are_no_expression_are_named():
+def test_error_names_invalid_cue_expression():
     data = copy.deepcopy(read_data("lexicon.yaml"))
     data["Action"]["Stop"]["hear"] = ["stop("]
     with pytest.raises(PhraseFileError, match=r"Action\.Stop\.hear"):

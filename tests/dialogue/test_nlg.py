@@ -66,13 +66,13 @@ def test_every_act_of_every_speaker_has_words(act, speaker, wording, seed):
     assert not re.search(r"  |,,|\?\.|\.\.|,\?", text), text
 
 
-def test_all_labels_at_once_are_said_in_part():
+def test_act_with_all_labels_is_worded_in_part():
     for move in DialogueMove:
         for speaker in Role:
             assert len(words(DialogueAct(move, frozenset(LABELS)), speaker)) <= MAX_CHARACTERS
 
 
-def test_wording_is_a_function_of_act_and_seed():
+def test_wording_depends_on_act_and_seed_only():
     act = DialogueAct.of(DialogueMove.INSTRUCT, LandmarkName.KFC, StreetName.BAITS)
     assert [words(act, seed=seed) for seed in range(20)] == [words(act, seed=seed) for seed in range(20)]
     assert len({words(act, seed=seed) for seed in range(20)}) > 3
@@ -80,7 +80,7 @@ def test_wording_is_a_function_of_act_and_seed():
 
 @pytest.mark.parametrize("move", [DialogueMove.INSTRUCT, DialogueMove.REPLY_W])
 @pytest.mark.parametrize("direction", ["left", "right", "straight", "back"])
-def test_a_turn_says_its_direction(move, direction):
+def test_turn_names_direction(move, direction):
     for seed in range(20):
         for speaker in (Role.PARTICIPANT, Role.CO_WIZARD):
             assert (
@@ -88,7 +88,7 @@ def test_a_turn_says_its_direction(move, direction):
             )
 
 
-def test_particulars_are_said():
+def test_wording_details_are_realised():
     act = DialogueAct.of
     turn = act(DialogueMove.INSTRUCT, ActionValue.J_TURN)
     speed = act(DialogueMove.EXPLAIN, ActionValue.SPEED_CHANGE)
@@ -102,20 +102,20 @@ def test_particulars_are_said():
         assert heard.dropped == (LandmarkName.IKEA,) and LandmarkName.COCO in heard.landmarks, heard.text
 
 
-def test_a_topic_picks_its_templates():
+def test_topic_selects_templates():
     for seed in range(10):
         text = words(DialogueAct.of(DialogueMove.EXPLAIN), seed=seed, topic="wrong_way")
         assert "wrong" in text
     assert words(DialogueAct.of(DialogueMove.EXPLAIN), topic="nothing we know of")
 
 
-def test_the_car_speaks_in_whole_sentences():
+def test_co_wizard_speaks_in_whole_sentences():
     for seed in range(20):
         text = words(DialogueAct.of(DialogueMove.ACKNOWLEDGE, LandmarkName.KFC), Role.CO_WIZARD, seed)
         assert text[0].isupper() and text.endswith(".")
 
 
-def test_talk_is_brief():
+def test_utterances_are_brief():
     rng = np.random.default_rng(0)
     act = DialogueAct.of
     common = [
@@ -137,26 +137,26 @@ def test_talk_is_brief():
 @pytest.mark.parametrize(
     "fields", [{"direction": "up"}, {"ordinal": 0}, {"ordinal": 10}, {"speed": -1.0}, {"distance": 1e9}]
 )
-def test_wording_names_the_field_that_is_out_of_range(fields):
+def test_error_names_wording_field_out_of_range(fields):
     with pytest.raises(ValueError, match=next(iter(fields))):
         Wording(**fields)
 
 
 def without_section(name: str, head: str) -> dict[str, str]:
-    """The talk files without the sections that begin with a head."""
+    """Returns the talk files without the sections of a head."""
     texts = read_talk_files()
     sections = re.split(r"(?m)^(?===)", texts[name])
     texts[name] = "".join(section for section in sections if not section.startswith(head))
     return texts
 
 
-def test_a_grammar_that_leaves_a_speaker_without_words_is_refused():
+def test_grammar_without_words_for_a_speaker_raises_error():
     texts = without_section("20_initiating.talk", "== Align co_wizard")
     with pytest.raises(PhraseFileError, match="Align has no template without slots for co_wizard"):
         parse_grammar(texts)
 
 
-def test_a_grammar_that_leaves_an_action_without_words_is_refused():
+def test_grammar_without_words_for_an_action_raises_error():
     with pytest.raises(PhraseFileError, match="doing UTurn"):
         parse_grammar(without_section("00_actions.talk", "== doing UTurn"))
 
@@ -166,7 +166,7 @@ def test_a_grammar_that_leaves_an_action_without_words_is_refused():
     [
         ("== Explain\nthe {weather} is fine", "weather"),
         ("== Explain Street=Elm\non Elm", "Elm"),
-        ("== Explain\n<nobody> knows", "nobody"),
+        ("== Explain\n<nothing> knows", "nothing"),
         ("== Explain\n(left|right", "missing"),
         ("== Explain\ngo ({street}|left)", "lines of their own"),
         ("== Shout\nhey", "Shout"),
@@ -174,12 +174,12 @@ def test_a_grammar_that_leaves_an_action_without_words_is_refused():
         ("hello", "precedes the first section"),
     ],
 )
-def test_a_faulty_line_is_named_with_its_file(line, reason):
+def test_error_names_faulty_line_and_file(line, reason):
     with pytest.raises(PhraseFileError, match=rf"new\.talk.*{reason}"):
         parse_grammar({**read_talk_files(), "new.talk": line})
 
 
-def test_acts_of_one_breath_are_joined():
+def test_acts_of_one_utterance_are_joined():
     acts = [
         DialogueAct.of(DialogueMove.REPLY_Y),
         DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.J_TURN),
@@ -205,7 +205,7 @@ def test_any_acts_fit_into_an_utterance(said, speaker, seed):
     assert len(" ".join(span.text for span in spans)) <= MAX_CHARACTERS
 
 
-def test_as_many_contexts_as_acts_are_wanted():
+def test_number_of_contexts_must_equal_number_of_acts():
     with pytest.raises(ValueError, match="2 for 1 acts"):
         word_acts([DialogueAct.of(DialogueMove.CONFIRM)], Role.PARTICIPANT, np.random.default_rng(0), [None, None])
 

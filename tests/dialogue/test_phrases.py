@@ -40,12 +40,12 @@ def test_alternatives_weights_and_gaps():
     assert 0.65 < counts["go WAY"] / 400 < 0.85
 
 
-def test_options_are_for_the_chatty():
+def test_options_are_limited_to_chatty_speakers():
     assert set(said("go [now|please]", chattiness=0.0)) == {"go"}
     assert set(said("go [now|please]", chattiness=1.0)) == {"go now", "go please"}
 
 
-def test_marks_are_for_their_registers():
+def test_marks_apply_to_their_registers_only():
     text = "go | ~bounce | ^kindly go | !move | %could you go"
     assert set(said(text)) == {"go"}
     assert set(said(text, register=Register.SLANGY)) == {"go", "bounce"}
@@ -53,7 +53,7 @@ def test_marks_are_for_their_registers():
     assert set(said("~bounce | ^kindly go")) == {"bounce", "kindly go"}
 
 
-def test_habits_favour_one_alternative_of_a_speaker():
+def test_habits_favour_one_alternative_per_speaker():
     text = " | ".join(f"word{number}" for number in range(10))
     habitual = said(text, habit=0.6, idiolect=12345)
     assert habitual.most_common(1)[0][1] > 0.55 * 400
@@ -62,6 +62,6 @@ def test_habits_favour_one_alternative_of_a_speaker():
 
 
 @pytest.mark.parametrize("text", ["(left", "left)", "[now", "<unknown>", "<", "go }"])
-def test_faulty_phrases_name_their_line(text):
+def test_error_names_line_of_faulty_phrase(text):
     with pytest.raises(PhraseFileError, match="here:1"):
         parse_alternatives("here:1", text, {})

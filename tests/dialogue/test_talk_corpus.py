@@ -1,4 +1,4 @@
-"""Talk of many sessions, made from acts drawn at random, is as varied as people's; docs/talk.md has the figures."""
+"""Variety of generated utterances in many sessions, compared with human dialogue; docs/talk.md has the figures."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ def sessions() -> list[list[Said]]:
     return [session(seed) for seed in range(1000, 1183)]
 
 
-def test_a_corpus_has_the_size_of_talk_of_people(sessions):
+def test_corpus_figures_are_in_range_of_human_dialogue(sessions):
     found = figures([item for one in sessions for item in one])
     assert 5.1 <= found.words <= 6.9
     assert 1.25 <= found.acts <= 1.5
@@ -22,7 +22,7 @@ def test_a_corpus_has_the_size_of_talk_of_people(sessions):
     assert found.commonest[1] <= 0.08, found.commonest
 
 
-def test_sessions_sound_different(sessions):
+def test_sessions_differ_in_wording(sessions):
     words = [np.mean([len(tokens(item.text)) for item in one if item.speaker is Role.PARTICIPANT]) for one in sessions]
     assert np.percentile(words, 90) > 1.25 * np.percentile(words, 10)
 
@@ -33,12 +33,12 @@ def test_most_acts_are_recovered_from_their_words(sessions):
     assert right / len(spans) >= 0.85
 
 
-def test_the_same_seed_says_the_same(sessions):
+def test_equal_seeds_give_equal_words(sessions):
     assert session(1000) == sessions[0]
 
 
 @pytest.mark.slow
-def test_language_is_neither_verbatim_nor_noise(sessions):
+def test_perplexity_is_between_verbatim_and_noise(sessions):
     pytest.importorskip("nltk")
     train, test = sessions[:122], sessions[122:]
     found = perplexity([item for one in train for item in one], [item for one in test for item in one][::4])

@@ -13,14 +13,14 @@ def test_ids_and_labels_are_those_of_sdn() -> None:
     assert [(int(action), action.label) for action in PhysicalAction] == list(enumerate(names.split(), start=1))
 
 
-def test_groups_share_out_all_actions() -> None:
+def test_groups_partition_all_actions() -> None:
     assert [int(action) for action in NAVIGATION_ACTIONS] == [1, 2, 3, 4, 5, 6]
     assert ADAPTIVE_ACTIONS == (PhysicalAction.SPEED_CHANGE,)
     assert EPISTEMIC_ACTIONS == (PhysicalAction.LIGHT_CHANGE,)
 
 
 @pytest.mark.parametrize("action", NAVIGATION_ACTIONS)
-def test_nfd_class_is_the_id_less_one_and_leads_back(action: PhysicalAction) -> None:
+def test_nfd_class_is_id_minus_one_and_invertible(action: PhysicalAction) -> None:
     assert action.nfd_class == action - 1
     assert PhysicalAction.from_nfd_class(action.nfd_class) is action
 
@@ -32,7 +32,7 @@ def test_other_actions_have_no_nfd_class(action: PhysicalAction) -> None:
 
 
 @pytest.mark.parametrize("index", [-1, 6])
-def test_nfd_class_out_of_range_is_refused(index: int) -> None:
+def test_nfd_class_out_of_range_raises_error(index: int) -> None:
     with pytest.raises(OntologyError, match=str(index)):
         PhysicalAction.from_nfd_class(index)
 
@@ -54,7 +54,7 @@ def test_slot_value_has_the_same_label(action: PhysicalAction) -> None:
         (PhysicalAction.J_TURN, -180.0),
     ],
 )
-def test_arguments_of_the_specification_are_taken(action: PhysicalAction, argument: float | None) -> None:
+def test_specified_arguments_are_accepted(action: PhysicalAction, argument: float | None) -> None:
     action.check_argument(argument)
 
 
@@ -72,14 +72,14 @@ def test_arguments_of_the_specification_are_taken(action: PhysicalAction, argume
         (PhysicalAction.LIGHT_CHANGE, 2),
     ],
 )
-def test_other_arguments_are_refused_with_the_domain(action: PhysicalAction, argument: float | None) -> None:
+def test_other_arguments_raise_error_with_domain(action: PhysicalAction, argument: float | None) -> None:
     with pytest.raises(OntologyError) as error:
         action.check_argument(argument)
     assert action.label in str(error.value) and action.argument.domain in str(error.value)
 
 
 @given(st.floats(-180, 180, exclude_max=True))
-def test_turn_takes_every_angle_of_the_circle(angle: float) -> None:
+def test_turn_accepts_every_angle(angle: float) -> None:
     PhysicalAction.J_TURN.check_argument(angle)
 
 

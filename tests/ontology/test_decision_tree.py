@@ -17,16 +17,16 @@ from dorothie_gym.ontology import (
 
 
 @pytest.mark.parametrize("move", DialogueMove, ids=lambda move: move.label)
-def test_walking_the_path_to_a_move_finds_it(move: DialogueMove) -> None:
+def test_path_to_move_leads_to_it(move: DialogueMove) -> None:
     assert walk(answer.label for _, answer in path_to(move)) is move
 
 
-def test_every_path_ends_in_another_move_and_all_moves_are_reached() -> None:
+def test_paths_lead_to_distinct_moves_and_reach_all() -> None:
     assert sorted(move for _, move in paths()) == list(DialogueMove)
 
 
 @given(st.data())
-def test_any_choice_of_answers_ends_in_a_move(data: st.DataObject) -> None:
+def test_every_choice_of_answers_ends_in_move(data: st.DataObject) -> None:
     node: Question | DialogueMove = DECISION_TREE
     labels: list[str] = []
     while isinstance(node, Question):
@@ -47,30 +47,30 @@ def test_any_choice_of_answers_ends_in_a_move(data: st.DataObject) -> None:
         (MoveGroup.REPLY, "ReplyY ReplyN ReplyU ReplyW"),
     ],
 )
-def test_groups_hold_the_moves_of_the_specification(group: MoveGroup, names: str) -> None:
+def test_groups_contain_moves_of_specification(group: MoveGroup, names: str) -> None:
     assert [move.label for move in group.moves] == names.split()
 
 
-def test_groups_of_a_move_go_from_wide_to_narrow() -> None:
+def test_groups_of_move_are_ordered_from_wide_to_narrow() -> None:
     assert groups_of(DialogueMove.QUERY_W) == (MoveGroup.INITIATE, MoveGroup.ASK, MoveGroup.QUERY)
     assert groups_of(DialogueMove.IRRELEVANT) == ()
 
 
-def test_an_answer_that_is_not_offered_is_refused_by_name() -> None:
+def test_error_names_answer_that_is_not_offered() -> None:
     with pytest.raises(OntologyError, match=r"'it opens nothing'.*'it opens something'"):
         walk(["it opens nothing"])
 
 
-def test_too_few_answers_are_refused_with_the_open_question() -> None:
+def test_too_few_answers_raise_error_with_open_question() -> None:
     with pytest.raises(OntologyError, match="before the question"):
         walk([DECISION_TREE.answers[1].label])
 
 
-def test_an_answer_too_many_is_refused_with_the_move_found() -> None:
+def test_surplus_answer_raises_error_with_move_found() -> None:
     with pytest.raises(OntologyError, match="after the move Irrelevant"):
         walk([DECISION_TREE.answers[0].label, "yes"])
 
 
-def test_a_question_with_one_answer_is_refused() -> None:
+def test_question_with_one_answer_raises_error() -> None:
     with pytest.raises(OntologyError, match="two or more"):
         Question("Why?", (Answer("so", DialogueMove.EXPLAIN),))

@@ -71,24 +71,24 @@ def test_encoding_undoes_decoding(vector: list[int]) -> None:
 
 
 @given(st.permutations(LABELS))
-def test_label_order_does_not_depend_on_the_order_given(values: list[SlotValue]) -> None:
+def test_label_order_is_independent_of_argument_order(values: list[SlotValue]) -> None:
     assert in_label_order(values) == LABELS
 
 
 @given(st.lists(st.just(0), max_size=200).filter(lambda vector: len(vector) != 69))
-def test_a_vector_of_another_length_is_refused(vector: list[int]) -> None:
+def test_vector_of_wrong_length_raises_error(vector: list[int]) -> None:
     with pytest.raises(OntologyError, match=f"has {len(vector)} entries, expected 69"):
         decode_slots(vector)
 
 
-def test_an_entry_that_is_no_bit_is_refused_by_place_and_name() -> None:
+def test_error_names_index_and_label_of_invalid_entry() -> None:
     vector = [0] * 69
     vector[37] = 2
     with pytest.raises(OntologyError, match=r"37 \(Landmark=KFC\) is 2"):
         decode_slots(vector)
 
 
-def test_encoding_of_other_objects_is_refused() -> None:
+def test_encoding_other_objects_raises_error() -> None:
     with pytest.raises(OntologyError, match="EXPLAIN"):
         encode_slots([LandmarkName.KFC, DialogueMove.EXPLAIN])  # type: ignore[list-item]
 
@@ -96,7 +96,7 @@ def test_encoding_of_other_objects_is_refused() -> None:
 acts = st.builds(DialogueAct, st.sampled_from(DialogueMove), st.frozensets(st.sampled_from(LABELS)))
 
 
-def test_values_of_a_slot_come_by_id() -> None:
+def test_values_of_slot_are_ordered_by_id() -> None:
     act = DialogueAct.of(DialogueMove.INSTRUCT, LandmarkName.KFC, LandmarkName.COCO, StreetName.FULLER)
     assert act.values(Slot.LANDMARK) == (LandmarkName.COCO, LandmarkName.KFC)
     assert act.values(Slot.OBJECT) == ()
@@ -130,22 +130,22 @@ def test_values_of_all_slots_together_are_the_slots(act: DialogueAct) -> None:
     assert frozenset(values) == act.slots and len(values) == len(act.slots)
 
 
-def test_a_move_given_as_number_is_refused() -> None:
+def test_move_given_as_number_raises_error() -> None:
     with pytest.raises(OntologyError, match=r"DialogueAct.move"):
         DialogueAct(1)  # type: ignore[arg-type]
 
 
-def test_slots_that_are_no_frozenset_are_refused() -> None:
+def test_slots_other_than_frozenset_raise_error() -> None:
     with pytest.raises(OntologyError, match=r"DialogueAct.of"):
         DialogueAct(DialogueMove.EXPLAIN, [LandmarkName.KFC])  # type: ignore[arg-type]
 
 
-def test_a_stranger_among_the_slots_is_refused() -> None:
+def test_slot_of_other_type_raises_error() -> None:
     with pytest.raises(OntologyError, match="'KFC'"):
         DialogueAct.of(DialogueMove.EXPLAIN, "KFC")  # type: ignore[arg-type]
 
 
-def test_only_a_transaction_can_be_interrupted() -> None:
+def test_only_transactions_can_be_interrupted() -> None:
     assert [unit for unit in DialogueUnit if UnitEnd.INTERRUPTED in unit.ends] == [DialogueUnit.TRANSACTION]
 
 

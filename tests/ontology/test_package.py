@@ -1,4 +1,4 @@
-"""The package as its importers see it."""
+"""Public names and imports of the package."""
 
 import subprocess
 import sys
@@ -10,7 +10,7 @@ def test_every_exported_name_exists() -> None:
     assert [name for name in ontology.__all__ if not hasattr(ontology, name)] == []
 
 
-def test_import_pulls_in_the_standard_library_only() -> None:
+def test_import_loads_standard_library_only() -> None:
     code = (
         "import dorothie_gym, sys; before = set(sys.modules); import dorothie_gym.ontology\n"
         "roots = {name.split('.')[0] for name in set(sys.modules) - before}\n"

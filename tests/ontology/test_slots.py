@@ -32,6 +32,6 @@ def test_all_values_hash_differently_and_by_number() -> None:
 
 
 @pytest.mark.parametrize("value", [ActionValue.J_TURN, LandmarkName.KFC])
-def test_value_keeps_its_identity_through_pickle_and_copy(value: SlotValue) -> None:
+def test_value_is_identical_after_pickle_and_copy(value: SlotValue) -> None:
     assert pickle.loads(pickle.dumps(value)) is value
     assert copy.deepcopy(value) is value

@@ -65,14 +65,14 @@ PARSERS: list[Parser] = list(dict.fromkeys(parser for parser, _, _ in OWN_SPELLI
 
 @st.composite
 def careless(draw: st.DrawFn, text: str) -> str:
-    """The text with other case and with stray spaces, underscores and hyphens."""
+    """Draws variants of a text in case, spaces, underscores and hyphens."""
     chars = [draw(st.sampled_from([char, char.upper(), char.lower()])) for char in text]
     strays = [draw(st.sampled_from(["", "", "", " ", "_", "-", "\t"])) for _ in range(len(chars) + 1)]
     return strays[0] + "".join(char + stray for char, stray in zip(chars, strays[1:], strict=True))
 
 
 @given(st.sampled_from(OWN_SPELLINGS), st.data())
-def test_own_spelling_is_read_however_carelessly_written(
+def test_own_spelling_is_read_in_any_case_and_punctuation(
     entry: tuple[Parser, str, object], data: st.DataObject
 ) -> None:
     parser, text, member = entry
@@ -114,7 +114,7 @@ def test_slot_value_is_read_within_its_slot(value: LandmarkName) -> None:
 
 @pytest.mark.parametrize("parser", PARSERS)
 @given(text=st.text(alphabet="qxzжλ '.", max_size=12))
-def test_unknown_text_is_refused_by_name(parser: Parser, text: str) -> None:
+def test_error_names_unknown_text(parser: Parser, text: str) -> None:
     with pytest.raises(OntologyError, match="nearest known spelling") as error:
         parser(text)
     assert repr(text) in str(error.value)
@@ -122,7 +122,7 @@ def test_unknown_text_is_refused_by_name(parser: Parser, text: str) -> None:
 
 @pytest.mark.parametrize("parser", PARSERS)
 @pytest.mark.parametrize("text", [None, 3])
-def test_parsers_refuse_non_text(parser: Parser, text: object) -> None:
+def test_parsers_raise_error_for_non_text(parser: Parser, text: object) -> None:
     with pytest.raises(OntologyError, match="expected a text"):
         parser(text)  # type: ignore[arg-type]
 
@@ -161,6 +161,6 @@ def test_act_without_values_is_read(slots: dict[str, list[str] | str | None] | N
         ("Instruct", {"Street": ["KFC"]}, "slot Street"),
     ],
 )
-def test_act_with_an_unknown_part_is_refused(move: str, slots: dict[str, list[str]], named: str) -> None:
+def test_act_with_unknown_part_raises_error(move: str, slots: dict[str, list[str]], named: str) -> None:
     with pytest.raises(OntologyError, match=named):
         parse_act(move, slots)

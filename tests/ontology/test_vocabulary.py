@@ -6,16 +6,16 @@ from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology.vocabulary import Vocabulary, normalise, unknown_spelling
 
 
-def test_case_space_and_punctuation_do_not_count() -> None:
+def test_look_up_ignores_case_space_and_punctuation() -> None:
     assert normalise(" Seven_Eleven ") == normalise("SevenEleven") == normalise("seven-eleven")
 
 
-def test_one_spelling_for_two_members_is_refused() -> None:
+def test_one_spelling_for_two_members_raises_error() -> None:
     with pytest.raises(OntologyError, match="belongs to 1 and to 2"):
         Vocabulary("number", [("one", 1), ("ONE", 2)])
 
 
-def test_a_spelling_of_punctuation_only_is_refused() -> None:
+def test_spelling_of_punctuation_only_raises_error() -> None:
     with pytest.raises(OntologyError, match="neither letters"):
         Vocabulary("number", [("--", 1)])
 
@@ -29,7 +29,7 @@ def test_error_names_text_vocabulary_and_nearest_spelling() -> None:
     assert "'instrukt'" in message and "dialogue move" in message and "'Instruct'" in message
 
 
-def test_error_shows_a_spelling_even_when_none_is_near() -> None:
+def test_error_shows_spelling_even_if_none_is_similar() -> None:
     assert "'Explain'" in str(unknown_spelling("%%%", "dialogue move", ["Explain"]))
 
 
@@ -42,6 +42,6 @@ def test_error_is_a_value_error_and_survives_pickling() -> None:
     assert isinstance(error, ValueError) and str(error) == "message"
 
 
-def test_a_huge_text_is_neither_compared_nor_shown_as_a_whole() -> None:
+def test_long_text_is_truncated_in_comparison_and_error() -> None:
     for text in ("a" * 100_000, ["a"] * 100_000):
         assert len(str(unknown_spelling(text, "slots", ["Action", "Street"]))) < 250

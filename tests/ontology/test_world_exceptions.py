@@ -13,7 +13,7 @@ def test_ids_are_those_of_the_contract() -> None:
     assert int(ExceptionKind.MESSAGE) == 11
 
 
-def test_environmental_and_task_share_out_all_but_none_and_message() -> None:
+def test_environmental_and_task_kinds_cover_all_but_none_and_message() -> None:
     neither = [kind for kind in ExceptionKind if not kind.is_environmental and not kind.is_task]
     assert neither == [ExceptionKind.NONE, ExceptionKind.MESSAGE]
     assert not any(kind.is_environmental and kind.is_task for kind in ExceptionKind)
@@ -60,7 +60,7 @@ def test_names_are_those_of_carla() -> None:
 
 
 @pytest.mark.parametrize("parameter", WeatherParameter)
-def test_clear_noon_lies_in_the_range(parameter: WeatherParameter) -> None:
+def test_clear_noon_is_in_range(parameter: WeatherParameter) -> None:
     assert parameter.low < parameter.high
     parameter.check(parameter.clear_noon)
 
@@ -71,12 +71,12 @@ def test_clear_noon_is_dry_and_has_the_sun_up() -> None:
 
 
 @given(parameters, st.floats(0, 1))
-def test_every_value_in_the_range_is_taken(parameter: WeatherParameter, share: float) -> None:
+def test_values_in_range_are_accepted(parameter: WeatherParameter, share: float) -> None:
     parameter.check(parameter.low + share * (parameter.high - parameter.low))
 
 
 @given(parameters, st.floats(min_value=1e-6) | st.just(math.nan), st.booleans())
-def test_every_value_beyond_the_range_is_refused(parameter: WeatherParameter, excess: float, above: bool) -> None:
+def test_values_out_of_range_raise_error(parameter: WeatherParameter, excess: float, above: bool) -> None:
     value = parameter.high + excess if above else parameter.low - excess
     with pytest.raises(OntologyError, match=f"{parameter}.*{parameter.low:g} to {parameter.high:g}"):
         parameter.check(value)

@@ -33,8 +33,8 @@ def test_silent_style_does_not_acknowledge():
 def test_echo_names_direction():
     state = state_of(echoes=1.0)
     acknowledge(state, ActionValue.J_TURN, understand("left at the next one"), np.random.default_rng(5))
-    told = [item for item in state.speech.queue if item.act.slots]
-    assert told and told[0].wording.direction is Direction.LEFT
+    named = [item for item in state.speech.queue if item.act.slots]
+    assert named and named[0].wording.direction is Direction.LEFT
 
 
 def test_stop_is_never_checked():

@@ -50,12 +50,12 @@ def test_nudge_is_shorter_than_arrival_zone() -> None:
     assert within - NUDGE_DISTANCE - rolls_on > -within
 
 
-@pytest.mark.parametrize(("before", "told"), [(4.0, "bit"), (14.0, "10"), (26.0, "10"), (30.0, "20")])
-def test_standing_car_is_told_distance_that_does_not_pass_goal(before, told) -> None:
+@pytest.mark.parametrize(("before", "expected"), [(4.0, "bit"), (14.0, "10"), (26.0, "10"), (30.0, "20")])
+def test_distance_given_to_standing_car_does_not_pass_goal(before, expected) -> None:
     human = Guide(before)
     assert human.says() == [ActionValue.LANE_FOLLOW]
     distance = human.state.speech.queue[0].wording.distance
-    assert (distance is None) is (told == "bit")
+    assert (distance is None) is (expected == "bit")
     if distance is not None:
         assert 10 * round(distance / 10) <= before
 
@@ -91,7 +91,7 @@ def test_u_turn_leaves_enough_road_to_stop() -> None:
     goal = replace(human.state.task.goal, lane=longest.id, station=longest.length / 2)
     human.state.task = replace(human.state.task, goal=goal)
     run_up = human.state.config.run_up
-    told: dict[bool, list[bool]] = {True: [], False: []}
+    announced: dict[bool, list[bool]] = {True: [], False: []}
     for lane in human.env.town.lanes:
         for station in np.arange(2.0, lane.length - run_up - 15.0, 4.0):
             human.put(lane.id, float(station), 8.0)
@@ -105,9 +105,9 @@ def test_u_turn_leaves_enough_road_to_stop() -> None:
                 continue
             human.state.speech = human.state.speech.cleared()
             human.state.guidance = replace(human.state.guidance, step=None)
-            told[rest[0] > run_up].append(ActionValue.U_TURN in human.says())
-    assert told[True] and all(told[True])
-    assert told[False] and not any(told[False])
+            announced[rest[0] > run_up].append(ActionValue.U_TURN in human.says())
+    assert announced[True] and all(announced[True])
+    assert announced[False] and not any(announced[False])
 
 
 def test_route_without_u_turn_has_no_run_up() -> None:

@@ -98,10 +98,10 @@ class Far:
 
 def test_new_task_on_the_way_interrupts_target_that_is_resumed_later():
     human, place = next(found for seed in range(20) if (found := interrupted(seed))[0].state.task.put_off)
-    told = planned(human)
+    remarks = planned(human)
     assert human.state.task.goal == place
-    assert GoalStatus.ONGOING in told[0][1] and place.name in told[0][1]
-    assert GoalStatus.PENDING in told[1][1]
+    assert GoalStatus.ONGOING in remarks[0][1] and place.name in remarks[0][1]
+    assert GoalStatus.PENDING in remarks[1][1]
     former = next(iter(human.state.task.put_off))
     view = human.view
     done = tuple(replace(task, reached=task.index == human.state.task.target) for task in view.subgoals)
@@ -117,12 +117,12 @@ def test_changed_later_task_is_reported_with_both_names():
     names = {place.name, human.state.task.goal.name}
     other = next(mark for mark in human.view.landmarks if mark.name not in names)
     view = with_tasks(human, index=task.index, landmark=other.row)
-    told = []
+    remarks = []
     for seed in range(10):
         human.state.speech = human.state.speech.cleared()
         human.state.task = human.state.task.with_subgoals(human.view.subgoals)
         keep_live_subgoals(human)
         note_tasks(human.state, view, np.random.default_rng(seed))
-        told += planned(human)
-    assert told
-    assert all({place.name, other.name, GoalStatus.ABANDONED, GoalStatus.PENDING} == slots for _, slots in told)
+        remarks += planned(human)
+    assert remarks
+    assert all({place.name, other.name, GoalStatus.ABANDONED, GoalStatus.PENDING} == slots for _, slots in remarks)

@@ -129,7 +129,7 @@ def test_red_light_is_explained_without_u_turn_or_question():
     talk = Talk()
     talk.say(DialogueMove.INSTRUCT, talk.landmarks(hidden=False)[0].name)
     assert talk.state.route.progress is not None
-    way, told = talk.state.route.progress.route, 0
+    way, mentions = talk.state.route.progress.route, 0
     for seed in range(6):
         observation, state = dict(talk.observations["co_wizard"]), talk.state
         state = replace(state, seed=seed, dialogue=replace(state.dialogue, hazard_explained_at=-100.0))
@@ -145,11 +145,11 @@ def test_red_light_is_explained_without_u_turn_or_question():
             done = CoWizardAction.decode(action, talk.env.limits)
             allowed = (PhysicalAction.J_TURN, PhysicalAction.STOP)  # the turn is planned for afterwards
             assert done.physical is None or done.physical.action in allowed
-            told += done.speech is not None and ObjectClass.TRAFFIC_LIGHT in done.speech.act.values(Slot.OBJECT)
+            mentions += done.speech is not None and ObjectClass.TRAFFIC_LIGHT in done.speech.act.values(Slot.OBJECT)
         assert state.route.progress is not None
         assert state.route.progress.route == way
         assert not state.intentions.halted
-    assert told > 0
+    assert mentions > 0
 
 
 def test_wish_is_kept_at_red_light():

@@ -50,7 +50,7 @@ def test_number_of_utterances_is_limited():
     assert len(played.moves(Role.PARTICIPANT)) < 25
 
 
-def test_same_seed_same_session():
+def test_equal_seeds_give_equal_sessions():
     first, second = play(5, decisions=160), play(5, decisions=160)
     for a, b in zip(first.actions, second.actions, strict=True):
         for role in a:

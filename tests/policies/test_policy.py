@@ -36,7 +36,7 @@ def test_random_policy_samples_the_action_space_from_its_seed(role):
 
 @pytest.mark.parametrize("role", ROLES)
 @pytest.mark.parametrize("name", POLICY_NAMES)
-def test_every_policy_is_made_for_every_role(name, role):
+def test_every_named_policy_exists_for_every_role(name, role):
     assert make_policy(name, role, LIMITS).role is role
 
 

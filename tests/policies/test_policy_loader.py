@@ -31,7 +31,7 @@ def no_other_loaders(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(policy_loader, "_LOADERS", {})
 
 
-def test_player_by_name_makes_its_policy() -> None:
+def test_named_player_makes_its_policy() -> None:
     assert isinstance(find_player("lane-follow", Role.CO_WIZARD).make(Role.CO_WIZARD, LIMITS), LaneFollowPolicy)
 
 
@@ -76,7 +76,7 @@ def test_folder_without_description_and_damaged_json_raise_error(tmp_path: Path)
         find_player(str(tmp_path), Role.CO_WIZARD)
 
 
-def test_second_loader_of_a_kind_is_refused() -> None:
+def test_second_loader_of_kind_raises_error() -> None:
     register_loader("quiet", load_silent)
     register_loader("quiet", load_silent)
     with pytest.raises(ValueError, match="have a loader already"):

@@ -57,16 +57,16 @@ def test_u_turn_is_explained_by_goal():
 def test_question_about_objects_names_objects_in_sight():
     talk = on_the_way()
     view = view_of(talk)
-    told = answer(talk, view, ObjectClass.QUERIED)
+    reply = answer(talk, view, ObjectClass.QUERIED)
     seen = {thing.kind for thing in view.objects} or {ObjectClass.ROAD}
-    assert told.move is M.REPLY_W and set(told.values(Slot.OBJECT)) <= seen
+    assert reply.move is M.REPLY_W and set(reply.values(Slot.OBJECT)) <= seen
 
 
 def test_question_about_plan_names_turns_or_streets():
     talk = on_the_way()
-    told = answer(talk, view_of(talk), ActionValue.QUERIED)
-    assert told.move is M.REPLY_W
-    assert told.values(Slot.ACTION) or told.values(Slot.STREET)
+    reply = answer(talk, view_of(talk), ActionValue.QUERIED)
+    assert reply.move is M.REPLY_W
+    assert reply.values(Slot.ACTION) or reply.values(Slot.STREET)
 
 
 @pytest.mark.parametrize("colour", [LightColour.RED, LightColour.GREEN])

@@ -14,7 +14,7 @@ TOWN = load_town("brookside")
 CHOICES = [lane.id for lane in TOWN.lanes if is_choice(TOWN, lane.id)]
 
 
-def test_next_choice_of_a_lane_that_ends_at_one_is_at_its_end():
+def test_next_choice_is_at_end_of_lane_before_it():
     lane = TOWN.lanes[CHOICES[0]]
     choice = next_choice(TOWN, lane.id, 5.0)
     assert choice is not None and choice.lane == lane.id

@@ -11,7 +11,7 @@ def voice() -> SpeechState:
     return SpeechState(role=Role.PARTICIPANT)
 
 
-def test_a_question_is_followed_by_silence_for_an_answer():
+def test_question_is_followed_by_silence_for_answer():
     speaker = voice().plan(remark(DialogueMove.QUERY_W), remark(DialogueMove.EXPLAIN))
     first, speaker = speaker.speak(0.0, 0.0, RNG)
     assert first is not None and first.act.move is DialogueMove.QUERY_W

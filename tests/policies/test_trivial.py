@@ -40,7 +40,7 @@ def test_stopped_car_starts_and_dead_end_leads_to_u_turn() -> None:
     assert decide(Motion.WAITING).physical.action is PhysicalAction.U_TURN
 
 
-def test_lane_follow_drives_through_town_without_talking() -> None:
+def test_lane_follow_drives_through_town_silently() -> None:
     env = DuoWizardEnv("brookside", config=EnvConfig(max_seconds=60.0))
     policies = {role: make_policy("silent", role, env.limits) for role in AGENT_ROLES}
     lanes: set[int] = set()

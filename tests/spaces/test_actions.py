@@ -66,7 +66,7 @@ def test_decoding_inverts_encoding(action: RoleAction) -> None:
 
 
 @pytest.mark.parametrize("role", AGENT_ROLES)
-def test_samples_of_the_space_are_read(role: Role) -> None:
+def test_samples_of_space_are_decoded(role: Role) -> None:
     space, decode = action_space(role, LIMITS), ActionDecoder(role, LIMITS)
     space.seed(3)
     for _ in range(40):
@@ -100,12 +100,12 @@ WRONG: list[tuple[Role, str, Any]] = [
 
 
 @pytest.mark.parametrize(("role", "field", "value"), WRONG)
-def test_the_field_that_is_wrong_is_named(role: Role, field: str, value: Any) -> None:
+def test_error_names_wrong_field(role: Role, field: str, value: Any) -> None:
     with pytest.raises(ValueError, match=f"action of {role}: field '{field}'"):
         decode_action(role, {**noop(role, LIMITS), field: value}, LIMITS)
 
 
-def test_flags_may_be_of_any_whole_type() -> None:
+def test_flags_may_be_of_any_integer_type() -> None:
     for kind in (np.int8, np.uint8, np.bool_, np.int64):
         slots = np.zeros(69, dtype=kind)
         slots[12] = 1
@@ -115,7 +115,7 @@ def test_flags_may_be_of_any_whole_type() -> None:
         assert len(action.speech.act.slots) == 1
 
 
-def test_a_field_that_is_missing_or_unknown_is_named() -> None:
+def test_error_names_missing_or_unknown_field() -> None:
     action = noop(Role.PARTICIPANT, LIMITS)
     del action["slots"]
     with pytest.raises(ValueError, match="field 'slots' is missing"):

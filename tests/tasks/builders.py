@@ -21,7 +21,7 @@ class FakePlace:
 
 
 def grid_places(count: int, *, spacing: float = 40.0, lanes: int = 8) -> list[FakePlace]:
-    """Places along parallel streets, `spacing` metres apart, three metres beside their waypoints."""
+    """Returns places along parallel streets, `spacing` metres apart, three metres beside their waypoints."""
     places = []
     for k in range(count):
         row, column = k % lanes, k // lanes
@@ -35,7 +35,7 @@ def parse(fields: dict[str, Any], name: str = "test") -> StoryboardTemplate:
 
 
 def plain(*subgoals: dict[str, Any], **fields: Any) -> dict[str, Any]:
-    """A template whose subgoals lie at landmarks named outright, so that only what is tested has to be given."""
+    """Returns a template with default landmarks and descriptions; arguments replace or add fields."""
     names = ["KFC", "Shell", "Ikea", "Coco", "Qdoba", "Panera", "SevenEleven"]
     rows = [
         {"destination": name, "description": f"Stop at {name}"} | subgoal
@@ -64,7 +64,7 @@ POOL = (
 
 @st.composite
 def templates(draw: st.DrawFn) -> dict[str, Any]:
-    """Valid templates: 2 to 6 subgoals live at the start, up to two triggered ones, every field used."""
+    """Draws valid templates: 2 to 6 subgoals live at the start, up to two triggered ones, every field used."""
     live = draw(st.integers(2, 6))
     triggers = draw(st.integers(0, 2))
     count = live + triggers

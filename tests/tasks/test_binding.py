@@ -25,7 +25,7 @@ def cast_of(*categories, seed=0, dependents=(), subgoals=({}, {})):
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_a_wide_category_does_not_use_up_the_kinds_of_a_narrow_one(seed):
+def test_wide_category_leaves_kinds_for_narrow_one(seed):
     parts = cast_of("places", "places.cafe", "places.stores", seed=seed, subgoals=({"destination": "House"}, {}))
     assert parts["$V1"] is LandmarkName.COCO
     assert len(set(parts.values())) == len(parts)
@@ -45,13 +45,13 @@ def test_houses_and_people_are_repeated():
     assert Counter(parts.values())[LandmarkName.PERSON] == 2
 
 
-def test_a_landmark_named_outright_is_not_given_to_a_variable():
+def test_explicitly_named_landmark_is_not_bound_to_variable():
     for seed in range(20):
         parts = cast_of("places.stores", subgoals=({"destination": "Ikea"}, {}), seed=seed)
         assert parts["$V0"] is LandmarkName.SEVEN_ELEVEN
 
 
-def test_a_dependent_restricts_a_wide_category_to_kinds_with_the_attribute():
+def test_dependent_restricts_category_to_kinds_with_attribute():
     for seed in range(20):
         parts = cast_of("places", seed=seed, dependents=[["A", "V0.actions"]], subgoals=({"destination": "KFC"}, {}))
         assert parts["$V0"].label in ("Ikea", "SevenEleven")  # Shell is named outright
@@ -79,7 +79,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_infeasible_templates_are_refused(case):
+def test_infeasible_templates_raise_error(case):
     fields, message = REFUSED[case]
     with pytest.raises(StoryboardError, match="^storyboard test: " + message):
         parse(plain({}, {}, **fields))
@@ -93,26 +93,26 @@ def closest_pair(places):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_places_lie_apart_though_many_are_close(seed):
+def test_sites_are_spaced_although_many_are_close(seed):
     chosen = spread_places(grid_places(400, spacing=6.0, lanes=20), 12, np.random.default_rng(seed))
     assert len({place.id for place in chosen}) == 12
     assert closest_pair(chosen) >= SPACING
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_lanes_of_their_own_come_first(seed):
+def test_unused_lanes_are_preferred(seed):
     chosen = spread_places(grid_places(64, lanes=8), 12, np.random.default_rng(seed))
     assert len({place.lane for place in chosen[:8]}) == 8
 
 
-def test_a_crowded_town_still_gives_distinct_places_the_farthest_first():
+def test_crowded_town_gives_distinct_sites_farthest_first():
     row = [FakePlace(k, 0, float(k), (float(k), 2.0), (float(k), 0.0), 0) for k in range(10)]
     chosen = spread_places(row, 2, np.random.default_rng(0))
     assert closest_pair(chosen) >= 4.0
     assert {place.id for place in spread_places(row, 10, np.random.default_rng(0))} == set(range(10))
 
 
-def test_two_sides_of_one_stop_are_not_both_taken_while_others_are_free():
+def test_opposite_sites_are_not_both_chosen_while_others_are_free():
     pairs = [
         FakePlace(2 * k + side, 2 * k + side, 0.0, (30.0 * k, 20.0 * side), (30.0 * k, 9.0 + 2.0 * side), k)
         for k in range(6)
@@ -127,7 +127,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 @given(templates(), SEEDS)
 @settings(max_examples=150, deadline=None)
-def test_any_template_binds_to_a_town_of_24_places(fields, seed):
+def test_every_template_binds_to_town_of_24_sites(fields, seed):
     template, places = parse(fields), grid_places(24)
     storyboard = bind(template, places, np.random.default_rng(seed))
     landmarks = storyboard.landmarks
@@ -155,13 +155,13 @@ def test_any_template_binds_to_a_town_of_24_places(fields, seed):
 
 @given(SEEDS)
 @settings(max_examples=20, deadline=None)
-def test_the_same_seed_gives_the_same_storyboard(seed):
+def test_equal_seeds_give_equal_storyboards(seed):
     template = load_template("low_battery")
     first, second = (bind(template, grid_places(24), np.random.default_rng(seed)) for _ in range(2))
     assert first == second
 
 
-def test_other_seeds_give_other_places_and_things():
+def test_other_seeds_give_other_sites_and_values():
     template = load_template("community_picnic")
     boards = [bind(template, grid_places(24), np.random.default_rng(seed)) for seed in range(20)]
     assert len({board.story for board in boards}) > 15
@@ -169,7 +169,7 @@ def test_other_seeds_give_other_places_and_things():
 
 
 @pytest.mark.parametrize("name", template_names())
-def test_every_template_of_the_package_binds_to_a_small_town(name):
+def test_every_package_template_binds_to_small_town(name):
     for seed in range(10):
         storyboard = bind(load_template(name), grid_places(14), np.random.default_rng(seed))
         assert storyboard.name == name
@@ -184,7 +184,7 @@ def test_dependents_of_one_attribute_differ():
         assert len(set(board.story.split("; "))) == 5
 
 
-def test_the_landmarks_of_the_story_get_the_best_spread_places():
+def test_story_landmarks_get_best_spaced_sites():
     fields = plain({}, {}, variables=[["A", "people"], ["B", "people"]])
     fields["subgoals"] = [{"destination": "$A", "description": "a"}, {"destination": "$B", "description": "b"}]
     for seed in range(20):
@@ -198,19 +198,19 @@ def test_repeated_landmarks_are_numbered_on_the_map():
     assert [landmark.label for landmark in board.landmarks[8:]] == ["House", "Person 1", "Person 2"]
 
 
-def test_a_changed_subgoal_knows_its_other_landmark():
+def test_changed_subgoal_has_its_other_landmark():
     board = bound({"change": "Go to Coco", "change_destination": "Coco"}, {"change": "Only look"})
     assert board.landmarks[board.subgoals[0].change_landmark or 0].name.label == "Coco"
     assert board.subgoals[1].change == "Only look" and board.subgoals[1].change_landmark is None
 
 
-def test_a_town_with_too_few_places_is_refused():
+def test_town_with_too_few_sites_raises_error():
     template = parse(plain({}, {}, variables=[["A", "people"], ["B", "people"]]))
     with pytest.raises(StoryboardError, match="11 landmarks need as many places, but the town has 10; use a larger"):
         bind(template, grid_places(10), np.random.default_rng(0))
     assert len(bind(template, grid_places(11), np.random.default_rng(0)).landmarks) == 11
 
 
-def test_a_storyboard_may_be_given_another_name():
+def test_storyboard_name_is_configurable():
     template = load_template("school_run")
     assert bind(template, grid_places(24), np.random.default_rng(0), name="monday").name == "monday"

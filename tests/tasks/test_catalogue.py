@@ -34,7 +34,7 @@ def test_only_houses_and_people_may_be_repeated():
     assert {kind.name.label for kind in catalogue().values() if kind.repeatable} == {"House", "Person"}
 
 
-def test_no_value_is_to_be_had_at_two_landmarks():
+def test_no_value_belongs_to_two_landmarks():
     values = [value for kind in catalogue().values() for row in kind.attributes.values() for value in row]
     assert len(values) == len(set(values))
 
@@ -50,7 +50,7 @@ def test_unknown_landmarks_are_not_found(text):
     assert find_kind(text) is None
 
 
-def test_a_value_given_twice_is_refused():
+def test_duplicate_value_raises_error():
     with pytest.raises(ValueError, match=r"KFC.menuitems"):
         LandmarkKind(
             name=LandmarkName.KFC, category="c", label="KFC", noun="KFC", repeatable=False,

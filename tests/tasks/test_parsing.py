@@ -27,7 +27,7 @@ def test_raw_line_breaks_in_strings_are_kept():
     assert read_json('{"a": "one\n two"}', "t") == {"a": "one\n two"}
 
 
-def test_commas_inside_strings_are_left_alone():
+def test_commas_inside_strings_are_kept():
     assert read_json(r'{"a": "x,]", "b": "\",}"}', "t") == {"a": "x,]", "b": '",}'}
 
 
@@ -38,7 +38,7 @@ def test_strict_json_is_parsed_unchanged(value):
 
 
 @pytest.mark.parametrize("text", ["[,]", "{,}", "[1,,]", '{"a":,}', "", "{", '{"a": "'])
-def test_malformed_json_is_refused(text):
+def test_malformed_json_raises_error(text):
     with pytest.raises(StoryboardError, match="line 1, column"):
         read_json(text, "t")
 
@@ -48,12 +48,12 @@ def test_json_error_contains_line_and_column_of_the_file():
         read_json('{\n "a": [1,],\n "b" : : 2\n}', "picnic")
 
 
-def test_a_field_given_twice_is_refused():
+def test_duplicate_field_raises_error():
     with pytest.raises(StoryboardError, match="story: this field is given twice"):
         read_json('{"story": "a", "story": "b"}', "t")
 
 
-def test_deep_nesting_is_refused():
+def test_deep_nesting_raises_error():
     with pytest.raises(StoryboardError, match="nested too deeply"):
         read_json("[" * 200_000, "t")
 
@@ -63,7 +63,7 @@ VERBATIM = re.compile(r"\\begin\{verbatim\}(.*?)\\end\{verbatim\}", re.DOTALL)
 
 
 def printed_template() -> str:
-    """The two parts of the template that the paper prints, put together as they stand."""
+    """Returns the template printed in the paper, joined from its two parts."""
     if not PAPER.exists():
         pytest.skip("the paper's text is not beside the repository")
     text = PAPER.read_text(encoding="utf-8")
@@ -73,7 +73,7 @@ def printed_template() -> str:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_the_template_that_the_paper_prints_loads_and_binds(seed):
+def test_template_printed_in_paper_loads_and_binds(seed):
     template = parse_template(printed_template(), "paper")
     assert len(template.subgoals) == 3 and len(template.dependents) == 3
     storyboard = bind(template, grid_places(24), np.random.default_rng(seed))
@@ -84,7 +84,7 @@ def test_the_template_that_the_paper_prints_loads_and_binds(seed):
     assert "$" not in storyboard.story and "\n" not in storyboard.story
 
 
-def test_ten_templates_or_more_come_with_the_package():
+def test_package_has_at_least_ten_templates():
     assert len(template_names()) >= 10
 
 
@@ -95,7 +95,7 @@ def test_every_template_of_the_package_starts_with_two_to_six_subgoals(name):
     assert 2 <= sum(not subgoal.trigger for subgoal in template.subgoals) <= 6
 
 
-def test_the_templates_of_the_package_use_every_feature():
+def test_package_templates_use_every_feature():
     subgoals = [subgoal for name in template_names() for subgoal in load_template(name).subgoals]
     for feature in ("after", "trigger", "delete", "change", "change_destination", "delete_after_subgoal", "leaves"):
         assert len({getattr(subgoal, feature) for subgoal in subgoals}) > 1, feature
@@ -104,43 +104,43 @@ def test_the_templates_of_the_package_use_every_feature():
 
 @given(templates())
 @settings(max_examples=60, deadline=None)
-def test_any_template_that_follows_the_rules_is_read(fields):
+def test_valid_templates_are_parsed(fields):
     template = parse(fields)
     assert [subgoal.destination for subgoal in template.subgoals] == [row["destination"] for row in fields["subgoals"]]
     assert set(template.hidden) == set(fields["hidden_from_wizard"])
 
 
-def test_a_file_is_read_and_named_for_its_stem(tmp_path):
+def test_template_is_named_for_file_stem(tmp_path):
     path = tmp_path / "mine.json"
     path.write_text(json.dumps(plain({}, {})), encoding="utf-8-sig")
     assert load_template(path) == load_template(str(path))
     assert load_template(path).name == "mine"
 
 
-def test_an_unknown_name_lists_those_known():
+def test_error_for_unknown_name_lists_known_names():
     with pytest.raises(StoryboardError, match=r"storyboard nonesuch: name: .*school_run"):
         load_template("nonesuch")
 
 
-def test_a_missing_file_is_named(tmp_path):
+def test_error_names_missing_file(tmp_path):
     path = tmp_path / "none.json"
     with pytest.raises(StoryboardError, match=f"{re.escape(str(path))}: file: cannot be read .No such file"):
         load_template(path)
 
 
-def test_a_folder_is_no_template(tmp_path):
+def test_folder_as_template_raises_error(tmp_path):
     with pytest.raises(StoryboardError, match="file: cannot be read"):
         load_template(tmp_path)
 
 
-def test_a_file_that_is_no_text_is_refused(tmp_path):
+def test_file_of_other_encoding_raises_error(tmp_path):
     path = tmp_path / "bytes.json"
     path.write_bytes(b"{\xff}")
     with pytest.raises(StoryboardError, match=r"not UTF-8 text .byte 1"):
         load_template(path)
 
 
-def test_errors_in_a_file_name_its_path(tmp_path):
+def test_error_in_file_names_path(tmp_path):
     path = tmp_path / "bad.json"
     path.write_text('{"story": 5}', encoding="utf-8")
     with pytest.raises(StoryboardError) as caught:
@@ -149,23 +149,23 @@ def test_errors_in_a_file_name_its_path(tmp_path):
     assert caught.value.field == "story"
 
 
-def test_names_in_any_spelling_are_kept_as_the_ontology_spells_them():
+def test_names_are_normalised_to_ontology_spelling():
     template = parse(plain({"destination": "Seven Eleven"}, {"destination": "burger king"}))
     assert [subgoal.destination for subgoal in template.subgoals] == ["SevenEleven", "BurgerKing"]
 
 
-def test_both_hidden_fields_count_and_a_dollar_sign_does_not():
+def test_both_hidden_fields_are_read_with_and_without_dollar_sign():
     fields = plain({}, {}, variables=[["A", "people"], ["B", "places.residential"]])
     template = parse(fields | {"hidden_from_wizard": ["$A"], "hidden_from_co_wizard": ["B", "A"]})
     assert template.hidden == ("A", "B")
 
 
-def test_delete_after_a_subgoal_permits_the_deletion():
+def test_delete_after_subgoal_permits_deletion():
     template = parse(plain({}, {"delete_after_subgoal": 0}, {}))
     assert template.subgoals[1].delete and template.subgoals[1].delete_after_subgoal == 0
 
 
-def test_delete_after_as_a_flag_means_that_the_landmark_leaves():
+def test_delete_after_as_flag_removes_landmark():
     subgoal = parse(plain({"delete_after_subgoal": True}, {})).subgoals[0]
     assert (subgoal.leaves, subgoal.delete, subgoal.delete_after_subgoal) == (True, False, None)
 
@@ -202,7 +202,7 @@ MALFORMED = {
 
 
 @pytest.mark.parametrize("case", MALFORMED)
-def test_a_malformed_template_is_refused_with_field_and_reason(case):
+def test_malformed_template_raises_error_with_field_and_reason(case):
     fields, message = MALFORMED[case]
     with pytest.raises(StoryboardError, match="^storyboard test: " + message):
         parse_template(json.dumps(fields), "test")

@@ -22,7 +22,7 @@ def statuses(state):
     return [state.status(i).label for i in range(len(state.storyboard.subgoals))]
 
 
-def test_stops_in_between_come_in_any_order_and_the_destination_last():
+def test_intermediate_stops_come_in_any_order_before_destination():
     state = state_of({}, {}, {})
     assert statuses(state) == ["Ongoing", "Ongoing", "Pending"]
     assert reach(state, 2) == []
@@ -32,30 +32,30 @@ def test_stops_in_between_come_in_any_order_and_the_destination_last():
     assert state.success and state.done
 
 
-def test_a_subgoal_waits_for_its_predecessors():
+def test_subgoal_waits_for_predecessors():
     state = state_of({"after": [1]}, {}, {})
     assert reach(state, 0) == []
     assert reach(state, 1, 0) == [1, 0]
 
 
-def test_a_stop_elsewhere_completes_nothing():
+def test_stop_elsewhere_completes_no_subgoal():
     state = state_of({}, {})
     elsewhere = {state.landmark_of(i) for i in range(2)}
     assert all(state.arrive(k) == [] for k in range(10) if k not in elsewhere)
 
 
-def test_arriving_again_completes_nothing_twice():
+def test_second_arrival_completes_no_subgoal_again():
     state = state_of({}, {})
     assert reach(state, 0, 0) == [0]
 
 
-def test_one_stop_may_complete_two_subgoals_in_order():
+def test_one_stop_completes_two_subgoals_in_order():
     state = state_of({"destination": "Coco", "after": [1]}, {"destination": "Coco"}, {"destination": "Coco"})
     assert reach(state, 0) == [1, 0, 2]
     assert state.success
 
 
-def test_a_subgoal_to_be_triggered_is_no_part_of_the_task_before():
+def test_untriggered_subgoal_is_not_part_of_task():
     state = state_of({}, {"trigger": True}, {"after": [1]})
     assert state.live == (0, 2) and state.possible_triggers() == (1,)
     assert state.status(1) is GoalStatus.PENDING
@@ -73,7 +73,7 @@ def test_no_subgoal_waits_for_an_untriggered_subgoal():
     assert not state.allowed(1)
 
 
-def test_a_trigger_behind_the_destination_takes_its_part():
+def test_subgoal_triggered_behind_destination_becomes_destination():
     state = state_of({}, {}, {"trigger": True})
     assert state.destination == 1
     state.trigger(2)
@@ -83,14 +83,14 @@ def test_a_trigger_behind_the_destination_takes_its_part():
     assert reach(state, 2) == [2]
 
 
-def test_nothing_is_triggered_when_the_task_is_done():
+def test_completed_task_accepts_no_trigger():
     state = state_of({}, {}, {"trigger": True})
     reach(state, 0, 1)
     with pytest.raises(StoryboardError, match=r"subgoals\[2\]: cannot be triggered, as the task is done"):
         state.trigger(2)
 
 
-def test_a_deleted_subgoal_is_abandoned_and_awaited_by_none():
+def test_deleted_subgoal_is_abandoned_and_blocks_no_other():
     state = state_of({"delete": True}, {"after": [0]}, {})
     state.delete(0)
     assert state.status(0) is GoalStatus.ABANDONED and state.live == (1, 2)
@@ -98,7 +98,7 @@ def test_a_deleted_subgoal_is_abandoned_and_awaited_by_none():
     assert state.success
 
 
-def test_a_deletion_may_have_to_wait_for_another_subgoal():
+def test_deletion_may_require_another_subgoal():
     state = state_of({}, {"delete_after_subgoal": 0}, {})
     with pytest.raises(StoryboardError, match="cannot be deleted before subgoal 0 is reached"):
         state.delete(1)
@@ -107,7 +107,7 @@ def test_a_deletion_may_have_to_wait_for_another_subgoal():
     state.delete(1)
 
 
-def test_a_change_replaces_place_and_description_of_a_subgoal():
+def test_change_replaces_place_and_description_of_subgoal():
     state = state_of({"change": "Drink something", "change_destination": "Coco"}, {})
     before = state.landmark_of(0)
     assert state.description(0) == "Stop at KFC" and state.possible_changes() == (0,)
@@ -118,13 +118,13 @@ def test_a_change_replaces_place_and_description_of_a_subgoal():
     assert reach(state, 0) == [0]
 
 
-def test_the_destination_may_change_its_place():
+def test_final_destination_may_change_place():
     state = state_of({}, {"change": "Drink something", "change_destination": "Coco"})
     state.change(1)
     assert reach(state, 0, 1) == [0, 1] and state.success
 
 
-def test_a_change_without_a_destination_keeps_the_place():
+def test_change_without_destination_keeps_place():
     state = state_of({"change": "Ask for the bill"}, {})
     before = state.landmark_of(0)
     state.change(0)
@@ -156,7 +156,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_changes_that_the_template_forbids_are_refused_without_effect(case):
+def test_forbidden_changes_raise_error_without_effect(case):
     subgoals, steps, action, i, reason = REFUSED[case]
     state = state_of(*subgoals)
     for step, k in steps:
@@ -172,7 +172,7 @@ def test_changes_that_the_template_forbids_are_refused_without_effect(case):
 
 @given(templates(), st.integers(0, 999), st.data())
 @settings(max_examples=150, deadline=None)
-def test_whatever_happens_the_destination_comes_last_and_the_task_stays_possible(fields, seed, data):
+def test_destination_stays_last_and_task_feasible_under_any_events(fields, seed, data):
     state = TaskState(bind(parse(fields), grid_places(24), np.random.default_rng(seed)))
     count = len(state.storyboard.subgoals)
     for _ in range(data.draw(st.integers(0, 25))):

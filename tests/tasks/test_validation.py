@@ -58,15 +58,15 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_an_inconsistent_template_is_refused(case):
+def test_inconsistent_template_raises_error(case):
     fields, message = REFUSED[case]
     with pytest.raises(StoryboardError, match="^storyboard test: " + message):
         parse(fields)
 
 
-def test_after_may_refer_to_a_later_subgoal_that_is_never_final():
+def test_after_may_refer_to_later_subgoal_that_is_never_final():
     assert parse(plain({"after": [1]}, {}, {})).subgoals[0].after == (1,)
 
 
-def test_a_price_in_dollars_is_no_reference():
+def test_price_in_dollars_is_no_reference():
     assert parse(plain({}, {}, story="It costs $5.")).story == "It costs $5."

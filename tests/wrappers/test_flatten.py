@@ -22,7 +22,7 @@ def single(role: str, **arguments: Any) -> SingleRole:
 
 
 class Echo(gym.Env[Any, Any]):
-    """Shows what it was given to do."""
+    """Environment that stores the action taken."""
 
     def __init__(self, action_space: spaces.Space[Any], observation_space: spaces.Space[Any], mask: Any = None) -> None:
         self.action_space, self.observation_space, self.mask = action_space, observation_space, mask
@@ -57,7 +57,7 @@ NUMBERS = spaces.Dict(
 )
 
 
-def test_actions_are_a_row_of_choices() -> None:
+def test_actions_are_a_vector_of_choices() -> None:
     env = FlattenAction(Echo(MIXED, NUMBERS))
     assert env.action_space == spaces.MultiDiscrete([4, 3, 2, 2, 2, 2])
     env.reset(seed=0)
@@ -70,7 +70,7 @@ def test_actions_are_a_row_of_choices() -> None:
     assert taken["words"] == ""
 
 
-def test_fields_that_are_left_out_rest() -> None:
+def test_omitted_fields_have_neutral_values() -> None:
     env = FlattenAction(Echo(MIXED, NUMBERS), fields=("plan",))
     assert env.action_space == spaces.MultiDiscrete([3, 2])
     taken = env.unflatten(np.array([1, 1]))
@@ -78,7 +78,7 @@ def test_fields_that_are_left_out_rest() -> None:
     assert (taken["angle"], taken["slots"].tolist(), taken["words"]) == (0, [0, 0, 0], "")
 
 
-def test_roles_rest_by_saying_and_doing_nothing() -> None:
+def test_neutral_action_of_each_role_does_nothing() -> None:
     env = FlattenAction(gym.wrappers.TimeLimit(single("co_wizard"), 5), fields=["physical", "angle"])
     assert env.action_space == spaces.MultiDiscrete([360, 9])
     action = env.unflatten(np.array([270, 3]))
@@ -95,7 +95,7 @@ def test_every_flat_action_of_a_role_is_well_formed(role: Role, data: st.DataObj
     decode_action(role, env.unflatten(env.action_space.sample()), limits)
 
 
-def test_masks_are_one_row() -> None:
+def test_masks_are_one_vector() -> None:
     mask = {
         "angle": np.array([1, 0, 0, 1], dtype=np.int8),
         "plan": (np.array([0, 1, 0], dtype=np.int8), np.array([1, 0], dtype=np.int8)),
@@ -111,14 +111,14 @@ def test_masks_are_one_row() -> None:
     assert kept.action_masks().astype(int).tolist() == [1, 0, 0, 1]
 
 
-def test_without_a_mask_everything_may_be_done() -> None:
+def test_missing_mask_permits_all_actions() -> None:
     env = FlattenAction(Echo(MIXED, NUMBERS))
     env.reset(seed=0)
     assert env.action_masks().tolist() == [True] * 15
 
 
 @pytest.mark.parametrize("role", AGENT_ROLES)
-def test_masks_of_roles_leave_a_choice_everywhere(role: Role) -> None:
+def test_masks_of_roles_permit_a_value_of_every_field(role: Role) -> None:
     env = flatten(single(role, max_cycles=6))
     assert isinstance(env.action_space, spaces.MultiDiscrete)
     observation, _ = env.reset(seed=2)
@@ -142,7 +142,7 @@ def test_masked_physical_actions_follow_the_car() -> None:
     assert not env.action_masks()[stop]
 
 
-def test_observations_are_a_row_of_finite_numbers() -> None:
+def test_observations_are_a_vector_of_finite_numbers() -> None:
     env = FlattenObservation(Echo(MIXED, NUMBERS))
     box = env.observation_space["observation"]
     assert isinstance(box, spaces.Box)
@@ -154,7 +154,7 @@ def test_observations_are_a_row_of_finite_numbers() -> None:
     assert set(flat) == {"observation"}
 
 
-def test_plain_spaces_are_flattened_too() -> None:
+def test_plain_spaces_are_flattened() -> None:
     env = flatten(Echo(spaces.Discrete(3, start=1), spaces.Box(0.0, 1.0, (2, 3), dtype=np.float64)))
     observation, _ = env.reset(seed=0)
     assert env.observation_space.contains(observation)
@@ -178,12 +178,12 @@ def test_error_names_the_field_that_cannot_be_flattened(space: Any, fields: Any,
         FlattenAction(Echo(space, NUMBERS), fields)
 
 
-def test_an_action_of_the_wrong_shape_is_refused() -> None:
+def test_action_of_wrong_shape_raises_error() -> None:
     with pytest.raises(ValueError, match=r"shape \(2,\); it must be \(6,\)"):
         FlattenAction(Echo(MIXED, NUMBERS)).unflatten(np.array([0, 0]))
 
 
-def test_a_flat_environment_can_be_made_again_from_its_spec() -> None:
+def test_flat_environment_is_recreated_from_spec() -> None:
     env = flatten(gym.make("dorothie_gym/CoWizard-v0", max_cycles=3), fields=("physical",))
     assert env.spec is not None
     again = gym.make(env.spec)

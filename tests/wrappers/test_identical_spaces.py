@@ -22,7 +22,7 @@ def make(max_cycles: int = 30) -> DuoWizardEnv:
     return DuoWizardEnv(max_cycles=max_cycles)
 
 
-def test_pettingzoo_accepts_it() -> None:
+def test_environment_passes_pettingzoo_checks() -> None:
     parallel_api_test(IdenticalSpaces(make(12)), num_cycles=30)
 
 
@@ -50,7 +50,7 @@ def test_flat_actions_decode_to_the_actions_of_the_role() -> None:
     assert ActionValue.STOP.value == PhysicalAction.STOP
 
 
-def test_masks_have_a_place_for_every_value_of_every_entry() -> None:
+def test_masks_have_one_entry_per_value() -> None:
     env = IdenticalSpaces(make(), FEW)
     _, infos = env.reset(seed=0)
     start = np.concatenate(([0], np.cumsum(env.nvec)))
@@ -78,7 +78,7 @@ def test_masked_actions_of_all_roles_are_carried_out() -> None:
     assert all(truncations.values())
 
 
-def test_invalid_arguments_are_refused() -> None:
+def test_invalid_arguments_raise_error() -> None:
     with pytest.raises(ValueError, match="fields: 'driver'"):
         IdenticalSpaces(make(), {"driver": ["move"]})
     env = IdenticalSpaces(make(), FEW)

@@ -1,4 +1,4 @@
-"""The reinforcement learners that the wrappers are for do learn on them."""
+"""Reinforcement learning on wrapped environments."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ QUIET = {"participant": "silent", "ad_wizard": "silent"}
 
 @pytest.fixture(autouse=True)
 def one_thread() -> Iterator[None]:
-    """Small networks on cores that are shared with other tests."""
+    """Limits torch to one thread, because tests share the cores."""
     torch = pytest.importorskip("torch", reason="needs the extra 'baselines'")
     before = torch.get_num_threads()
     torch.set_num_threads(1)
@@ -31,7 +31,7 @@ def driving() -> Any:
 
 
 @pytest.mark.parametrize(("package", "name"), [("stable_baselines3", "PPO"), ("sb3_contrib", "MaskablePPO")])
-def test_a_learner_learns(package: str, name: str) -> None:
+def test_learner_improves(package: str, name: str) -> None:
     learner = getattr(pytest.importorskip(package, reason="needs the extra 'baselines'"), name)
     model = learner("MultiInputPolicy", driving(), n_steps=32, batch_size=32, n_epochs=1, device="cpu", seed=0)
     model.learn(64)
@@ -39,7 +39,7 @@ def test_a_learner_learns(package: str, name: str) -> None:
     assert model.predict(model.env.reset())[0].shape == (1, 2)
 
 
-def test_a_masked_learner_takes_feasible_actions_only() -> None:
+def test_masked_learner_takes_feasible_actions_only() -> None:
     contrib = pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
     env = dorothie_gym.flatten(
         gym.make("dorothie_gym/CoWizard-v0", partners=QUIET, max_cycles=20), fields=("physical",)
@@ -56,18 +56,18 @@ def points_of(task: str, fields: tuple[str, ...] | None = None) -> Any:
     return dorothie_gym.flatten(gym.make(f"dorothie_gym/{task}-v0", corpus=[session(talk())]), fields)
 
 
-def test_a_learner_learns_on_recorded_points() -> None:
-    """One session, again and again: what it earns there rises."""
+def test_learner_improves_on_recorded_points() -> None:
+    """The reward rises in training on one session."""
     learner = pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'").PPO
     env = points_of("NfD", ("action",))
     settings = {"n_steps": 64, "batch_size": 64, "n_epochs": 8, "gamma": 0.0, "learning_rate": 3e-3}
     model = learner("MultiInputPolicy", env, device="cpu", seed=0, **settings)
-    before = earned(model, env)
+    before = mean_reward(model, env)
     model.learn(512)
-    assert earned(model, env) > before
+    assert mean_reward(model, env) > before
 
 
-def test_a_learner_takes_moves_and_slots() -> None:
+def test_learner_accepts_moves_and_slots() -> None:
     learner = pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'").PPO
     model = learner("MultiInputPolicy", points_of("UfN"), n_steps=8, batch_size=8, n_epochs=1, device="cpu", seed=0)
     model.learn(16)
@@ -75,8 +75,8 @@ def test_a_learner_takes_moves_and_slots() -> None:
     assert model.predict(model.env.reset())[0].shape == (1, 70)
 
 
-def earned(model: Any, env: Any) -> float:
-    """Mean reward of an episode."""
+def mean_reward(model: Any, env: Any) -> float:
+    """Returns the mean reward of an episode."""
     observation, _ = env.reset(seed=0)
     rewards, done = [], False
     while not done:
@@ -86,6 +86,6 @@ def earned(model: Any, env: Any) -> float:
 
 
 @pytest.mark.parametrize("task", ["UfN", "RfN", "NfD"])
-def test_stable_baselines_accepts_the_tasks(task: str) -> None:
+def test_tasks_pass_stable_baselines_checks(task: str) -> None:
     checker = pytest.importorskip("stable_baselines3.common.env_checker", reason="needs the extra 'baselines'")
     checker.check_env(points_of(task))

@@ -24,7 +24,7 @@ PERIOD = 15  # frames a decision
 
 
 class TalkingEnv(ParallelEnv[str, int, int]):
-    """Plays the talk of the tests, 15 frames a step; it knows nothing of a recorder."""
+    """Environment that replays the test dialogue, 15 frames per step, without access to the recorder."""
 
     metadata: dict[str, Any] = {"name": "talking_v0", "render_modes": []}
     possible_agents = ["participant", "co_wizard"]
@@ -104,14 +104,14 @@ def test_session_left_early_is_incomplete(tmp_path: Path) -> None:
     assert not Session.load(tmp_path / "seed_4").complete
 
 
-def test_two_recordings_are_the_same_bytes(tmp_path: Path) -> None:
+def test_two_recordings_are_equal_byte_for_byte(tmp_path: Path) -> None:
     for name in ("one", "other"):
         play(RecordSession(TalkingEnv(), tmp_path / name))
     for file in (tmp_path / "one/seed_3").iterdir():
         assert file.read_bytes() == (tmp_path / "other/seed_3" / file.name).read_bytes()
 
 
-def test_name_may_be_given_and_the_same_one_needs_leave(tmp_path: Path) -> None:
+def test_folder_name_is_configurable_and_existing_one_needs_overwrite(tmp_path: Path) -> None:
     play(RecordSession(TalkingEnv(), tmp_path, name=lambda _: "."))
     assert Session.load(tmp_path).complete
     with pytest.raises(SessionError, match="holds a session already"):
@@ -122,7 +122,7 @@ def test_name_may_be_given_and_the_same_one_needs_leave(tmp_path: Path) -> None:
     assert Session.load(tmp_path).header.seed == 5
 
 
-def test_session_survives_the_death_of_the_process(tmp_path: Path) -> None:
+def test_recording_survives_killed_process(tmp_path: Path) -> None:
     code = f"""
         import os
         from tests.wrappers.test_record_session import RecordSession, TalkingEnv

@@ -16,7 +16,7 @@ from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.spaces import SpaceLimits, noop, observation_space
 
 
-class Note(SilentPolicy):
+class RecordingPolicy(SilentPolicy):
     """Silent policy that records its seeds and observations."""
 
     observes = True
@@ -35,7 +35,7 @@ class Note(SilentPolicy):
 
 
 @pytest.mark.parametrize("role", AGENT_ROLES)
-def test_a_role_plays_in_its_own_spaces(role: Role) -> None:
+def test_role_acts_in_its_own_spaces(role: Role) -> None:
     env = SingleRole(role, partners={other: "random" for other in AGENT_ROLES if other is not role}, max_cycles=5)
     observation, info = env.reset(seed=3)
     env.action_space.seed(3)
@@ -67,8 +67,8 @@ def test_session_equals_one_played_by_three_policies() -> None:
     np.testing.assert_equal(mine, observations["co_wizard"])
 
 
-def test_partners_see_their_own_observations_and_get_seeds_of_the_session() -> None:
-    partners = {"participant": Note(Role.PARTICIPANT), "ad_wizard": Note(Role.AD_WIZARD)}
+def test_partners_get_their_own_observations_and_session_seeds() -> None:
+    partners = {"participant": RecordingPolicy(Role.PARTICIPANT), "ad_wizard": RecordingPolicy(Role.AD_WIZARD)}
     env = SingleRole("co_wizard", partners=partners)
     for seed in (1, 2, 1):
         env.reset(seed=seed)
@@ -80,7 +80,7 @@ def test_partners_see_their_own_observations_and_get_seeds_of_the_session() -> N
     assert partners["participant"].seeds[0] != partners["ad_wizard"].seeds[0]
 
 
-def test_seeds_are_gymnasiums() -> None:
+def test_seeds_follow_gymnasium_convention() -> None:
     env = SingleRole("co_wizard", partners={"participant": "silent", "ad_wizard": "silent"})
     env.reset(seed=5)
     assert env.np_random_seed == 5
@@ -92,14 +92,14 @@ def test_seeds_are_gymnasiums() -> None:
     assert env.engine.scenario.seed == drawn != 5
 
 
-def test_a_given_scenario_is_played() -> None:
+def test_given_scenario_is_played() -> None:
     env = SingleRole("participant", partners={"co_wizard": "silent", "ad_wizard": "silent"})
     scenario = dorothie_gym.draw_scenario(env.engine.town, None, 77)
     env.reset(seed=1, options={"scenario": scenario})
     assert env.engine.scenario is scenario
 
 
-def test_arguments_come_through_gymnasium() -> None:
+def test_arguments_are_passed_by_gymnasium_make() -> None:
     policy = RandomPolicy(Role.AD_WIZARD)
     env = gym.make(
         "dorothie_gym/CoWizard-v0",
@@ -127,7 +127,7 @@ def test_arguments_come_through_gymnasium() -> None:
         ({"role": "agent"}, "role is 'agent'; it must be one of participant, co_wizard, ad_wizard"),
         ({"role": "driver"}, "role is 'driver'"),
         ({"role": "co_wizard", "partners": {"co_wizard": "silent"}}, "partners has 'co_wizard'; the others are"),
-        ({"role": "co_wizard", "partners": {"nobody": "silent"}}, "partners has 'nobody'"),
+        ({"role": "co_wizard", "partners": {"stranger": "silent"}}, "partners has 'stranger'"),
         ({"role": "co_wizard", "partners": {"ad_wizard": "clever"}}, "no policy 'clever'"),
         ({"role": "co_wizard", "partners": {"ad_wizard": SilentPolicy(Role.PARTICIPANT)}}, "a policy of participant"),
         (
@@ -137,12 +137,12 @@ def test_arguments_come_through_gymnasium() -> None:
         ({"role": "co_wizard", "render_mode": "ascii"}, "render_mode is 'ascii'"),
     ],
 )
-def test_wrong_arguments_are_named(arguments: dict[str, Any], message: str) -> None:
+def test_error_names_invalid_argument(arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         SingleRole(**arguments)
 
 
-def test_a_malformed_action_names_its_field() -> None:
+def test_error_names_field_of_malformed_action() -> None:
     env = SingleRole("co_wizard", partners={"participant": "silent", "ad_wizard": "silent"})
     with pytest.raises(ResetNeeded):
         env.step(env.noop_action)
@@ -151,7 +151,7 @@ def test_a_malformed_action_names_its_field() -> None:
         env.step({**env.noop_action, "angle": 180})
 
 
-def test_policies_are_generic() -> None:
+def test_partner_policy_is_used_as_given() -> None:
     partner: Policy[Any] = SilentPolicy(Role.PARTICIPANT)
     env = SingleRole("ad_wizard", partners={Role.PARTICIPANT: partner})
     assert env.partners[Role.PARTICIPANT] is partner

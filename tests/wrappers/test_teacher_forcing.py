@@ -28,15 +28,15 @@ def duo(seconds: float = 45.0) -> DuoWizardEnv:
     return DuoWizardEnv("brookside", config=EnvConfig(max_seconds=seconds))
 
 
-def play(env: TeacherForcing, *, right: bool = True) -> tuple[list[PointView], list[Any], list[float]]:
-    """Plays an episode with the truth, or with random answers."""
+def play(env: TeacherForcing, *, truth: bool = True) -> tuple[list[PointView], list[Any], list[float]]:
+    """Plays an episode with the true labels, or with random actions."""
     observation, _ = env.reset(seed=SEED)
     env.action_space.seed(0)
     views, observations, rewards, done = [], [observation], [], False
     while not done:
         assert env._point is not None
         views.append(env._point.view)
-        action = env.rules.label(env._point) if right else env.action_space.sample()
+        action = env.rules.label(env._point) if truth else env.action_space.sample()
         observation, reward, done, _, _ = env.step(action)
         observations.append(observation)
         rewards.append(reward)
@@ -45,7 +45,7 @@ def play(env: TeacherForcing, *, right: bool = True) -> tuple[list[PointView], l
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Session:
-    """The session that is played live below, recorded."""
+    """Returns the recording of the session that the tests play live."""
     env = duo()
     folder: Path = tmp_path_factory.mktemp("recorded") / "session"
     play_session(
@@ -55,14 +55,14 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Session:
 
 
 @pytest.mark.parametrize("task", list(Task))
-def test_live_points_are_those_of_the_recorded_session(task: Task, recorded: Session) -> None:
+def test_live_points_equal_recorded_ones(task: Task, recorded: Session) -> None:
     views, _, rewards = play(TeacherForcing(duo(), task))
     assert views == [replace(point.view, session=views[0].session) for point in task_points(recorded, task)]
     assert set(rewards) == {1.0}, "the truth earns everything"
 
 
 @pytest.mark.parametrize(("task", "env_class"), [(Task.UFN, UfNEnv), (Task.RFN, RfNEnv), (Task.NFD, NfDEnv)])
-def test_live_observations_are_those_of_the_recorded_session(
+def test_live_observations_equal_recorded_ones(
     task: Task, env_class: type[TeacherForcedEnv], recorded: Session
 ) -> None:
     _, live, _ = play(TeacherForcing(duo(), task))
@@ -79,16 +79,16 @@ def test_live_observations_are_those_of_the_recorded_session(
 @pytest.mark.parametrize("task", list(Task))
 def test_predictions_do_not_change_the_session(task: Task) -> None:
     _, one, _ = play(TeacherForcing(duo(), task))
-    _, other, rewards = play(TeacherForcing(duo(), task), right=False)
+    _, other, rewards = play(TeacherForcing(duo(), task), truth=False)
     np.testing.assert_equal(one, other)
     assert np.mean(rewards) < 1.0
 
 
-def test_gymnasium_accepts_the_environment() -> None:
+def test_environment_passes_gymnasium_checks() -> None:
     check_env(TeacherForcing(duo(10.0), "nfd"), skip_render_check=True)  # its warnings are errors here
 
 
-def test_learners_that_take_vectors_can_play() -> None:
+def test_live_environment_can_be_flattened() -> None:
     env = flatten(TeacherForcing(duo(20.0), "nfd"))
     observation, _ = env.reset(seed=SEED)
     assert env.observation_space.contains(observation)
@@ -96,7 +96,7 @@ def test_learners_that_take_vectors_can_play() -> None:
     assert env.observation_space.contains(observation) and 0.0 <= reward <= 1.0
 
 
-def test_an_episode_is_a_session_and_the_next_is_another() -> None:
+def test_each_episode_is_a_new_session() -> None:
     env = TeacherForcing(duo(20.0), Task.NFD)
     with pytest.raises(ResetNeeded):
         env.step(env.action_space.sample())
@@ -105,13 +105,13 @@ def test_an_episode_is_a_session_and_the_next_is_another() -> None:
     assert env.reset(seed=7)[1]["session"].startswith("brookside-")
 
 
-def test_policies_that_say_nothing_are_one_clear_error() -> None:
+def test_silent_policies_raise_one_error() -> None:
     silent = dict.fromkeys(AGENT_ROLES, "silent")
     with pytest.raises(SessionError, match="task ufn: 20 sessions had no point; give policies that talk"):
         TeacherForcing(duo(1.0), "ufn", policies=silent).reset(seed=0)
 
 
-def test_wrong_arguments_are_named() -> None:
+def test_error_names_invalid_argument() -> None:
     env = duo(1.0)
     with pytest.raises(ValueError, match="task is 'xyz'; it must be one of ufn, rfn, nfd"):
         TeacherForcing(env, "xyz")

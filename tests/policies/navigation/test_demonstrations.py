@@ -55,7 +55,7 @@ def test_recorded_observations_equal_those_of_the_driver() -> None:
 
 def test_action_of_inverts_physical_of(env: NavigationEnv) -> None:
     rng = np.random.default_rng(0)
-    told = 0
+    count = 0
     for seed in range(4):
         _, info = env.reset(seed=seed)
         for _ in range(60):
@@ -65,11 +65,11 @@ def test_action_of_inverts_physical_of(env: NavigationEnv) -> None:
             set_as_asked = action in (NavigationAction.FASTER, NavigationAction.SLOWER, NavigationAction.LIGHTS)
             expected = NavigationAction.NOTHING if set_as_asked or physical is None else action
             assert action_of(physical, seen, env.drive.exits) is expected
-            told += expected is not NavigationAction.NOTHING
+            count += expected is not NavigationAction.NOTHING
             _, _, over, cut, info = env.step(action)
             if over or cut:
                 break
-    assert told > 50
+    assert count > 50
 
 
 def test_unrequested_stop_is_left_out() -> None:

@@ -89,7 +89,7 @@ def instruct(*values: Any) -> DialogueAct:
     return DialogueAct.of(DialogueMove.INSTRUCT, *values)
 
 
-def test_driver_is_not_asked_before_first_instruction() -> None:
+def test_driver_is_not_queried_before_first_instruction() -> None:
     ride = Ride()
     ride.go(4)
     assert ride.seen is None
