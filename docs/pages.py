@@ -1,5 +1,7 @@
-"""Generates `transcripts.md`, the figures of `data-sheet.md` and the learning curves of `navigation.md`.
+"""Generates pages, figures and pictures of the documentation.
 
+python docs/pages.py environments         # `environments/*.md`, from the spaces and docstrings of the environments
+python docs/pages.py frames               # their pictures
 python docs/pages.py transcripts          # simulates sessions until three fit; a few seconds each
 python docs/pages.py figures CORPUS       # statistics of a corpus made by `dorothie-gym generate`
 python docs/pages.py curves ppo=DIR,DIR maskable_ppo=DIR,DIR   # one run of `dorothie-gym train-rl` per seed
@@ -16,6 +18,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import environment_pages
 
 from dorothie_gym.analysis import (
     PAPER,
@@ -222,10 +226,19 @@ def main(arguments: list[str]) -> None:
     """Runs one of the commands."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", required=True)
+    commands.add_parser("environments")
+    commands.add_parser("frames")
     commands.add_parser("transcripts").add_argument("--first-seed", type=int, default=1)
     commands.add_parser("figures").add_argument("corpus", type=Path)
     commands.add_parser("curves").add_argument("runs", nargs="+", metavar="NAME=DIR,DIR,...")
     given = parser.parse_args(arguments)
+    if given.command == "environments":
+        for name, text in environment_pages.pages().items():
+            (environment_pages.FOLDER / name).write_text(text, encoding="utf-8", newline="\n")
+        return
+    if given.command == "frames":
+        environment_pages.draw_pictures()
+        return
     if given.command == "curves":
         named = dict(run.split("=", 1) for run in given.runs)
         print(curves({name: [Path(each) for each in folders.split(",")] for name, folders in named.items()}))

@@ -32,7 +32,13 @@ CONTINUOUS_FIELD_SPECS = (
     signal("controls", 3, meaning="throttle, steering angle (positive right) and brake in force"),
     signal("offset", 1, unit="4 m", meaning="lateral distance from the path, positive right"),
     signal("course", 2, meaning="sine and cosine of the angle from the path to the heading, positive right"),
-    signal("path", 2 * len(AHEAD), unit="50 m", meaning="points of the path at the distances `AHEAD`: ahead and right"),
+    signal(
+        "path",
+        2 * len(AHEAD),
+        unit="50 m",
+        meaning=f"points of the path {', '.join(f'{ahead:g}' for ahead in AHEAD)} m ahead: "
+        "longitudinal and lateral position relative to the car, positive right",
+    ),
     share("allowed", 1 + len(AHEAD), unit="25 m/s", meaning="permitted speed here and at each point of the path"),
     signal("room", 1, unit="100 m", meaning="remaining path before a junction without instruction; 1 for no such end"),
     signal(

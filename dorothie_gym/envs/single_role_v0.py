@@ -43,7 +43,8 @@ class SingleRole(gym.Env[Observation, ActionDict]):
     `dorothie_gym.flatten` makes both spaces flat.
 
     ## Rewards
-    The weighted sum of the role's terms in `info["reward_terms"]` (see `RewardWeights`).
+    The weighted sum of the role's terms in `info["reward_terms"]` (see `RewardWeights`). The Ad-Wizard gets the shared
+    terms with the opposite sign.
 
     ## Episode End
     Terminates when the destination is reached; truncates after `config.max_seconds` or `max_cycles` decisions. The last

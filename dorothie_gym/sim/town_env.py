@@ -232,7 +232,8 @@ class TownEnv(AbstractEnv):
     seconds.
 
     ## Arguments
-    `config`: settings of highway-env, and
+    `config`: settings of highway-env, and:
+
     - `town`: name of a town, or path of an `.xodr` or `.yaml` file.
     - `vehicles`: number of other vehicles, at most as many as fit; none starts within 25 m of the ego.
     - `pedestrians`: number of pedestrians; 0 in a town without pavements. The default is 0, because `Kinematics` does

@@ -150,7 +150,7 @@ def observation_fields(role: Role, limits: SpaceLimits, observe_acts: bool = Tru
     common = (
         real("time", 1, low=0.0, unit="s", meaning="time since the start of the session"),
         real("speed", 1, unit="m/s", meaning="speed of the car"),
-        real("weather", len(WeatherParameter), unit="mixed", meaning="weather parameters in the order of the ontology"),
+        real("weather", len(WeatherParameter), unit="mixed", meaning="values in the order of `WeatherParameter`"),
         choices("street_names", len(StreetName), limits.streets, meaning="id of the `StreetName` of each street"),
         real(
             "pose",
@@ -262,7 +262,7 @@ def _speaking() -> FieldSpec:
 
 
 def _utterance(speaker: Role, limits: SpaceLimits, observe_acts: bool) -> tuple[FieldSpec, ...]:
-    name = {Role.PARTICIPANT: "Participant", Role.CO_WIZARD: "Co-Wizard"}[speaker]
+    name = {Role.PARTICIPANT: "participant", Role.CO_WIZARD: "Co-Wizard"}[speaker]
     words = text(
         f"{speaker}_text", MAX_UTTERANCE, meaning=f"utterance of the {name} that ended since the last decision"
     )

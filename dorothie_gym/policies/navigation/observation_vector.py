@@ -84,7 +84,9 @@ FIELD_SPECS = (
     share("uncertainty", 2, unit="10 m, 0.1 rad", meaning="standard deviations of the estimated position and heading"),
     share("junction", 2, unit="1, 100 m", meaning="1 if a junction with a choice is ahead; distance to the junction"),
     share(
-        "exits", 3 * len(SECTORS), meaning="for each sector: 1 if an exit exists, is planned, leads to the named street"
+        "exits",
+        3 * len(SECTORS),
+        meaning="three flags for each sector of `SECTORS`: exit present, exit planned, exit leads to the named street",
     ),
     signal(
         "traffic_light",
@@ -94,7 +96,7 @@ FIELD_SPECS = (
     ),
     share("said", 1 + len(DialogueMove), meaning="1 if an instruction was heard; its one-hot `DialogueMove`"),
     share("said_action", len(ActionValue), meaning="one-hot `ActionValue` of the instruction"),
-    share("said_sector", len(SECTORS), meaning="one-hot sector of the instruction"),
+    share("said_sector", len(SECTORS), meaning="one-hot sector of the instruction, in the order of `SECTORS`"),
     share("said_landmark", len(LandmarkName), meaning="one-hot `LandmarkName` of the instruction"),
     signal(
         "said_distance",
@@ -116,7 +118,7 @@ FIELD_SPECS = (
         "detours",
         3 + len(SECTORS),
         unit="200 m",
-        meaning="added route cost of a U-turn, of a switch to the left and right, and of the exit in each sector",
+        meaning="added route cost of a U-turn, of a switch to the left and right, and of the exit in each of `SECTORS`",
     ),
     signal(
         "objects",
