@@ -12,15 +12,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+import dorothie_gym.testing
+from dorothie_gym import DuoWizardEnv
 from dorothie_gym.benchmark import metrics_of, read_predictions
 from dorothie_gym.benchmark.features import Batch
 from dorothie_gym.benchmark.predictions import file_schema
 from dorothie_gym.dialogue.grammar import parse_grammar
 from dorothie_gym.dialogue.talk_files import read_talk_files
 from dorothie_gym.maps import describe, load_town
-from dorothie_gym.ontology import WeatherParameter
-from dorothie_gym.policies import policy_loader
+from dorothie_gym.ontology import AGENT_ROLES, WeatherParameter
+from dorothie_gym.policies import make_policy, policy_loader
 from dorothie_gym.recording import Task
+from dorothie_gym.rollout import play_session
 from dorothie_gym.rollout.closed_loop import METRICS, RecoverySeconds
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.tasks import bind, load_template
@@ -192,3 +195,21 @@ def test_the_examples_of_the_closed_loop_page_run(
     assert printed.startswith("0.0 0.0 0.0 0\n[0.")
     for metric in (*METRICS, RecoverySeconds()):
         assert f"| {metric.title} | `{metric.key}` |" in text
+
+
+def test_the_checks_of_the_testing_page_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    env = DuoWizardEnv("brookside", max_cycles=20)
+    policies = {role: make_policy("silent", role, env.limits) for role in AGENT_ROLES}
+    play_session(env, policies, seed=7, folder=tmp_path / "sessions" / "seed_7")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    exec(compile(example("testing.md", "python"), "testing.md", "exec"), names)
+    checks = [name for name in names if name.startswith("test_")]
+    assert len(checks) == len(dorothie_gym.testing.__all__)
+    for name in checks:
+        names[name]()
+
+
+def test_the_testing_page_names_every_check() -> None:
+    text = (DOCS / "testing.md").read_text(encoding="utf-8")
+    assert [name for name in dorothie_gym.testing.__all__ if f"| `{name}(" not in text] == []
