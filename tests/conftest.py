@@ -18,8 +18,11 @@ from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.spaces import noop
 from dorothie_gym.user_cache import CACHE_VARIABLE
 
-SIMULATED = frozenset("baselines bench benchmark engine envs policies recording rollout sim testing wrappers".split())
-"""Folders whose tests step the simulation."""
+SIMULATED = frozenset(
+    "baselines bench benchmark engine envs policies recording rollout sim testing wrappers"
+    " test_docs.py test_environment_pages.py test_readme.py".split()
+)
+"""Folders and files whose tests step the simulation."""
 
 _FOLDER = pytest.StashKey[tempfile.TemporaryDirectory[str]]()
 
