@@ -122,7 +122,7 @@ class TestRun:
         assert seconds == pytest.approx(2.1, abs=0.05)
 
     def test_a_film_without_its_extra_says_what_to_install(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr("dorothie_gym.cli.video.find_spec", lambda name: None)
+        monkeypatch.setattr("dorothie_gym.cli.output.find_spec", lambda name: None)
         result = call("run", "--video", "v.mp4")
         assert result.exit_code == 2 and "pip install 'dorothie-gym[video]'" in result.stderr
 

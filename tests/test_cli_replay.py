@@ -53,7 +53,7 @@ def test_what_cannot_be_replayed_says_what_to_do(recorded: Path, tmp_path: Path)
         ((sdn,), "give --town FILE, or --maps DIR"),
         ((sdn, "--check", "--town", "brookside"), "was not recorded"),
         ((recorded, "--check", "--video", "v.mp4"), "exclude each other"),
-        ((recorded, "--video", "v.gif"), "no format of a film"),
+        ((recorded, "--video", "v.gif"), "not a video format"),
         ((tmp_path / "nowhere",), "no session"),
     ):
         result = call("replay", *arguments)

@@ -6,8 +6,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from dorothie_gym.cli.live import LiveShow, clock
-from dorothie_gym.cli.script import script_lines
+from dorothie_gym.cli.live import LiveShow, clock, script_lines
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import AGENT_ROLES, Role

@@ -17,15 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.analysis.exception_attribution import Handled, handling
+from dorothie_gym.analysis.intervals import RESAMPLES, bootstrap_weights, percentile_interval
 from dorothie_gym.analysis.units import Units
 from dorothie_gym.ontology import DialogueMove, MoveGroup, Role, Slot
 from dorothie_gym.recording.session import Session
-
-RESAMPLES: Final = 2000
-"""Bootstrap samples of the sessions."""
-
-LEVEL: Final = 0.95
-"""Confidence level of the interval (percentile bootstrap; Efron 1979)."""
 
 MOST: Final = 0.5
 """Share of undefined bootstrap samples from which on the interval is undefined."""
@@ -164,8 +159,7 @@ def verdicts_of(
         return tuple(BehaviourVerdict(claim=claim, difference=None, low=None, high=None) for claim in CLAIMS)
     count = tally.sessions
     whole = tally.totals(np.ones((1, count)))
-    drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=resamples)
-    totals = tally.totals(drawn.astype(np.float64))
+    totals = tally.totals(bootstrap_weights(count, resamples=resamples, seed=seed))
     return tuple(_verdict(claim, whole, totals if count > 1 else None) for claim in CLAIMS)
 
 
@@ -176,8 +170,8 @@ def _verdict(claim: BehaviourClaim, whole: Totals, drawn: Totals | None) -> Beha
     figures = np.full(1, np.nan) if drawn is None else claim.figure(drawn)
     if np.isnan(figures).mean() >= MOST:
         return BehaviourVerdict(claim=claim, difference=difference, low=None, high=None)
-    low, high = np.nanquantile(figures, ((1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0))
-    return BehaviourVerdict(claim=claim, difference=difference, low=float(low), high=float(high))
+    low, high = percentile_interval(figures)
+    return BehaviourVerdict(claim=claim, difference=difference, low=low, high=high)
 
 
 # --- Claims ----------------------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from dorothie_gym.sim.config import FRAME_RATE
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row:
+class Measurement:
     """One speed or time that was measured.
 
     Attributes:
@@ -56,7 +56,7 @@ class Report:
     setting: str
     headline: str
     unit: str
-    rows: tuple[Row, ...]
+    rows: tuple[Measurement, ...]
     mark: Mark | None = None
     notes: tuple[str, ...] = ()
     machine: str
@@ -75,11 +75,11 @@ def world_report(figures: Mapping[str, Any]) -> Report:
         f"{number(figures['substeps_per_second'] / FRAME_RATE)} times real time",
         unit="substeps a second",
         rows=(
-            Row(
+            Measurement(
                 label=f"highway-env's road\n{_count(figures['vehicles'], 'IDM vehicle')}, nothing else",
                 value=stock, spread=figures["stock_spread"], best=figures["stock_best"], reference=True,
             ),
-            Row(
+            Measurement(
                 label="dorothie_gym's world\ntraffic, people, lights, yielding, props",
                 value=figures["substeps_per_second"], spread=figures["spread"], best=figures["best"],
             ),
@@ -94,7 +94,7 @@ def env_report(figures: Mapping[str, Any]) -> Report:
     """Words for `env.measure`."""
     simulated = figures["simulated_seconds_per_second"]
     rows = [
-        Row(
+        Measurement(
             label="highway-env\nintersection-v0", value=figures["stock_simulated_seconds_per_second"],
             spread=figures["stock_spread"], reference=True,
         )
@@ -102,10 +102,10 @@ def env_report(figures: Mapping[str, Any]) -> Report:
     sumo = figures["sumo_substeps_per_second"]
     if sumo is not None:
         label = "SUMO\nvehicles on a grid as large"
-        rows.append(Row(label=label, value=sumo / FRAME_RATE, spread=figures["sumo_spread"], reference=True))
+        rows.append(Measurement(label=label, value=sumo / FRAME_RATE, spread=figures["sumo_spread"], reference=True))
     step_share = simulated / figures["steps_per_second"]
     rows.append(
-        Row(
+        Measurement(
             label="DuoWizardEnv\nthree agents observed in full", value=simulated, spread=figures["spread"],
             best=figures["best"] * step_share,
         )
@@ -150,8 +150,8 @@ def vector_report(figures: Mapping[str, Any]) -> Report:
         headline=f"{threads} do {figures['scaling']:.2f} times as much as one",
         unit="substeps a second, all worlds together",
         rows=(
-            Row(label="one thread", value=figures["substeps_per_second_one_thread"], reference=True),
-            Row(label=threads, value=figures["substeps_per_second"]),
+            Measurement(label="one thread", value=figures["substeps_per_second_one_thread"], reference=True),
+            Measurement(label=threads, value=figures["substeps_per_second"]),
         ),
         notes=tuple(notes),
         machine=machine_line(figures["machine"]),
@@ -168,11 +168,11 @@ def import_report(figures: Mapping[str, Any]) -> Report:
         headline=f"a first environment takes {figures['ratio']:.2f} times as long as importing highway-env",
         unit="seconds",
         rows=(
-            Row(label="import highway_env", value=stock, spread=figures["highway_env_spread"], reference=True),
-            Row(label="import dorothie_gym", value=seconds["package"], spread=figures["package_spread"]),
-            Row(label="... and make and reset\na first environment", value=seconds["first_environment"],
+            Measurement(label="import highway_env", value=stock, spread=figures["highway_env_spread"], reference=True),
+            Measurement(label="import dorothie_gym", value=seconds["package"], spread=figures["package_spread"]),
+            Measurement(label="... and make and reset\na first environment", value=seconds["first_environment"],
                 spread=figures["spread"]),
-            Row(label="... and its first step", value=seconds["first_step"]),
+            Measurement(label="... and its first step", value=seconds["first_step"]),
         ),
         machine=machine_line(figures["machine"]),
         logarithmic=False,
@@ -186,10 +186,12 @@ def rl_report(figures: Mapping[str, Any]) -> Report:
         "policy": "choosing actions", "learner": "learning",
     }  # fmt: skip
     shares = ", ".join(f"{names[name]} {100 * share:.0f} %" for name, share in figures["shares"].items())
-    rows = [Row(label="one process\nfor environments and learner", value=figures["one_process_steps_per_second"])]
+    rows = [
+        Measurement(label="one process\nfor environments and learner", value=figures["one_process_steps_per_second"])
+    ]
     if figures["workers_steps_per_second"] is not None:
         label = f"{_count(figures['workers'], 'worker')} beside the learner\nfor the environments"
-        rows.append(Row(label=label, value=figures["workers_steps_per_second"]))
+        rows.append(Measurement(label=label, value=figures["workers_steps_per_second"]))
     return Report(
         title=f"Training {figures['algorithm']} on {figures['env']}",
         setting=f"{_count(figures['environments'], 'environment')}, network {figures['network']}, "
@@ -216,19 +218,19 @@ def train_report(figures: Mapping[str, Any]) -> Report:
         f"{figures['matrix_share']:.0%} of the machine's matrix rate",
         unit="points a second",
         rows=(
-            Row(
+            Measurement(
                 label="published loop, training\none point at a time", value=figures["published_points_per_second"],
                 spread=figures["published_spread"], best=figures["published_best"], reference=True,
             ),
-            Row(
+            Measurement(
                 label="TOTO, training", value=figures["points_per_second"], spread=figures["spread"],
                 best=figures["best"],
             ),
-            Row(
+            Measurement(
                 label="published loop, answering", value=figures["published_inference_points_per_second"],
                 reference=True,
             ),
-            Row(label="TOTO, answering", value=figures["inference_points_per_second"]),
+            Measurement(label="TOTO, answering", value=figures["inference_points_per_second"]),
         ),
         notes=(
             f"answering: {number(figures['inference_ratio'])} times the published loop",

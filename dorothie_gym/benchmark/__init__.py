@@ -1,7 +1,7 @@
 """The three tasks on recordings: metrics, prediction files, trivial baselines and the results table."""
 
-from dorothie_gym.benchmark.claims import Claim, Finding, Verdict, above, findings
-from dorothie_gym.benchmark.intervals import Estimate
+from dorothie_gym.analysis.intervals import Estimate
+from dorothie_gym.benchmark.claims import ModelClaim, ModelFinding, ModelVerdict, above, findings
 from dorothie_gym.benchmark.labels import SPLITS, CorpusLabels, Split, TaskLabels, Unscored, labels_of
 from dorothie_gym.benchmark.metrics import (
     COLUMNS,
@@ -47,11 +47,11 @@ __all__ = [
     "ArgumentAccuracy",
     "ArgumentAccuracyPaper",
     "COLUMNS",
-    "Claim",
+    "ModelClaim",
     "CorpusLabels",
     "Estimate",
     "FLOORS",
-    "Finding",
+    "ModelFinding",
     "FloorModel",
     "JointAccuracy",
     "JointAccuracyPaper",
@@ -71,7 +71,7 @@ __all__ = [
     "Split",
     "TaskLabels",
     "TaskPredictions",
-    "Verdict",
+    "ModelVerdict",
     "above",
     "act_labels",
     "action_labels",

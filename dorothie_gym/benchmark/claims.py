@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Final, Literal, TypeAlias
 
-from dorothie_gym.benchmark.intervals import Estimate
+from dorothie_gym.analysis.intervals import Estimate
 from dorothie_gym.benchmark.metrics import COLUMNS
 
 FULL: Final = "TOTO"
@@ -30,7 +30,7 @@ Estimates: TypeAlias = Callable[[str, str, str], Estimate]
 """Figure of a model, a part of the corpus and a metric."""
 
 
-class Verdict(StrEnum):
+class ModelVerdict(StrEnum):
     """How a claim comes out."""
 
     HOLDS = "holds"
@@ -40,7 +40,7 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Claim:
+class ModelClaim:
     """A difference between two models in one figure, and what the paper has it be.
 
     Attributes:
@@ -57,7 +57,7 @@ class Claim:
     expected: Literal["positive", "hardly any"]
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> ModelVerdict:
         """Whether the 95 % interval of the difference lies where it is expected.
 
         "positive" holds if all of it is above 0, and fails if all is below. "hardly any" holds if all of it is below
@@ -65,15 +65,15 @@ class Claim:
         """
         mean, half = self.difference.mean, self.difference.half_width
         if mean is None:
-            return Verdict.UNTESTED
+            return ModelVerdict.UNTESTED
         if half is None:
-            return Verdict.UNDECIDED
+            return ModelVerdict.UNDECIDED
         low, high = mean - half, mean + half
         if self.expected == "positive":
             holds, fails = low > 0.0, high < 0.0
         else:
             holds, fails = high < MARGIN, low > 0.0
-        return Verdict.HOLDS if holds else Verdict.FAILS if fails else Verdict.UNDECIDED
+        return ModelVerdict.HOLDS if holds else ModelVerdict.FAILS if fails else ModelVerdict.UNDECIDED
 
     def to_json(self) -> dict[str, Any]:
         """Returns the fields and the verdict."""
@@ -88,7 +88,7 @@ class Claim:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finding:
+class ModelFinding:
     """A finding on one part of the corpus: the paper's, or that one model is above another.
 
     Attributes:
@@ -100,15 +100,15 @@ class Finding:
 
     statement: str
     part: str
-    claims: tuple[Claim, ...]
+    claims: tuple[ModelClaim, ...]
     note: str = ""
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> ModelVerdict:
         """The worst of its claims: it fails where one fails, and holds where all hold."""
         found = {claim.verdict for claim in self.claims}
-        order = (Verdict.UNTESTED, Verdict.FAILS, Verdict.UNDECIDED)
-        return next((verdict for verdict in order if verdict in found), Verdict.HOLDS)
+        order = (ModelVerdict.UNTESTED, ModelVerdict.FAILS, ModelVerdict.UNDECIDED)
+        return next((verdict for verdict in order if verdict in found), ModelVerdict.HOLDS)
 
     def to_json(self) -> dict[str, Any]:
         """Returns the fields and the verdict."""
@@ -121,7 +121,7 @@ class Finding:
         }
 
 
-def findings(estimate: Estimates, part: str) -> tuple[Finding, ...]:
+def findings(estimate: Estimates, part: str) -> tuple[ModelFinding, ...]:
     """Returns the paper's findings on one part of the corpus (section 6, ablation on input modalities).
 
     Args:
@@ -129,15 +129,15 @@ def findings(estimate: Estimates, part: str) -> tuple[Finding, ...]:
         part: part of the corpus.
     """
 
-    def claim(metric: str, higher: str, lower: str, *, positive: bool = True) -> Claim:
+    def claim(metric: str, higher: str, lower: str, *, positive: bool = True) -> ModelClaim:
         return _claim(estimate, part, metric, (higher, lower), "positive" if positive else "hardly any")
 
-    def most(metric: str) -> tuple[Claim, ...]:
+    def most(metric: str) -> tuple[ModelClaim, ...]:
         rival = _lowest(estimate, part, metric, OTHER_ABLATIONS)
         return (claim(metric, FULL, NO_HISTORY), *([claim(metric, rival, NO_HISTORY)] if rival else []))
 
     return (
-        Finding(
+        ModelFinding(
             statement="Action history matters most: removing it lowers move and action accuracy more than removing "
             "any other input",
             part=part,
@@ -145,17 +145,17 @@ def findings(estimate: Estimates, part: str) -> tuple[Finding, ...]:
             note="In the published features, the history of a UfN point contains the point's own label, which is "
             "removed together with the history; here it is never included.",
         ),
-        Finding(
+        ModelFinding(
             statement="The current utterance matters for UfN",
             part=part,
             claims=(claim("ufn_move_accuracy", FULL, NO_SPEECH),),
         ),
-        Finding(
+        ModelFinding(
             statement="Fine-tuned BERT leads on moves and trails on NfD joint",
             part=part,
             claims=(*(claim(metric, TUNED, FULL) for metric in MOVES), claim("nfd_joint_accuracy", FULL, TUNED)),
         ),
-        Finding(
+        ModelFinding(
             statement="Map knowledge hardly helps",
             part=part,
             claims=tuple(claim(metric, FULL, NO_MAP, positive=False) for metric in COLUMNS),
@@ -163,7 +163,7 @@ def findings(estimate: Estimates, part: str) -> tuple[Finding, ...]:
     )
 
 
-def above(estimate: Estimates, part: str, higher: str, lower: str, metrics: Sequence[str] = COLUMNS) -> Finding:
+def above(estimate: Estimates, part: str, higher: str, lower: str, metrics: Sequence[str] = COLUMNS) -> ModelFinding:
     """Returns whether one model is above another in every one of some figures.
 
     Args:
@@ -174,15 +174,15 @@ def above(estimate: Estimates, part: str, higher: str, lower: str, metrics: Sequ
         metrics: keys of the figures.
     """
     claims = tuple(_claim(estimate, part, metric, (higher, lower), "positive") for metric in metrics)
-    return Finding(statement=f"{higher} is above {lower}", part=part, claims=claims)
+    return ModelFinding(statement=f"{higher} is above {lower}", part=part, claims=claims)
 
 
 def _claim(
     estimate: Estimates, part: str, metric: str, models: tuple[str, str], expected: Literal["positive", "hardly any"]
-) -> Claim:
+) -> ModelClaim:
     higher, lower = models
     difference = estimate(higher, part, metric).minus(estimate(lower, part, metric))
-    return Claim(metric=metric, higher=higher, lower=lower, difference=difference, expected=expected)
+    return ModelClaim(metric=metric, higher=higher, lower=lower, difference=difference, expected=expected)
 
 
 def _lowest(estimate: Estimates, part: str, metric: str, models: Sequence[str]) -> str | None:

@@ -11,8 +11,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.benchmark.claims import MARGIN, Claim, Finding
-from dorothie_gym.benchmark.intervals import Estimate
+from dorothie_gym.analysis.intervals import Estimate
+from dorothie_gym.benchmark.claims import MARGIN, ModelClaim, ModelFinding
 from dorothie_gym.benchmark.labels import ALL, UNSEEN
 from dorothie_gym.benchmark.metrics import (
     COLUMNS,
@@ -158,7 +158,7 @@ def _cells(table: ResultsTable, model: str, part: str, bold: Callable[[str], str
         yield text if paper is None else f"{text} / {percent(paper)}"
 
 
-def finding_lines(finding: Finding) -> Iterator[str]:
+def finding_lines(finding: ModelFinding) -> Iterator[str]:
     """Yields a finding and its claims, a line each."""
     yield f"**{finding.statement}** ({finding.part}): {finding.verdict}."
     yield from (f"- {claim_line(claim)}" for claim in finding.claims)
@@ -166,7 +166,7 @@ def finding_lines(finding: Finding) -> Iterator[str]:
         yield f"- {finding.note}"
 
 
-def claim_line(claim: Claim) -> str:
+def claim_line(claim: ModelClaim) -> str:
     """Returns a claim in a line: figure, models, difference in points, verdict."""
     mean, half = claim.difference.mean, claim.difference.half_width
     amount = NONE if mean is None else f"{100 * mean:+.1f}" + ("" if half is None else f" ± {100 * half:.1f}")

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.analysis import Handled
-from dorothie_gym.benchmark.claims import ACTIONS, FULL, MOVES, Finding, above, findings
-from dorothie_gym.benchmark.intervals import Estimate
+from dorothie_gym.analysis.intervals import Estimate
+from dorothie_gym.benchmark.claims import ACTIONS, FULL, MOVES, ModelFinding, above, findings
 from dorothie_gym.benchmark.labels import ALL, CorpusLabels, Split, labels_of
 from dorothie_gym.benchmark.metrics import COLUMNS, keys_of, per_class_accuracy
 from dorothie_gym.benchmark.paper_results import paper_figure, paper_figures, paper_name, paper_source
@@ -103,7 +103,7 @@ class ResultsTable:
         }
         return {name: estimate for name, estimate in found.items() if estimate.seeds}
 
-    def findings(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[ModelFinding, ...]:
         """Returns how the paper's findings come out here, and whether TOTO is above the floors and below others.
 
         Others are the models that are neither the paper's nor floors.
@@ -113,7 +113,7 @@ class ResultsTable:
         def estimate(model: str, part: str, key: str) -> Estimate:
             return self.estimate(names.get(model, model), part, key)
 
-        found: list[Finding] = []
+        found: list[ModelFinding] = []
         for part in self.parts:
             found += findings(estimate, part)
             found += [

@@ -10,8 +10,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from dorothie_gym.analysis import Handled
-from dorothie_gym.benchmark.claims import Finding, Verdict
-from dorothie_gym.benchmark.intervals import Estimate
+from dorothie_gym.analysis.intervals import Estimate
+from dorothie_gym.benchmark.claims import ModelFinding, ModelVerdict
 from dorothie_gym.benchmark.labels import ALL
 from dorothie_gym.benchmark.metrics import (
     COLUMNS,
@@ -47,8 +47,11 @@ NOTES: Final = 8
 """So many notes are shown; the JSON has all."""
 
 _VERDICTS: Final = {
-    Verdict.HOLDS: "green", Verdict.FAILS: "red", Verdict.UNDECIDED: "yellow", Verdict.UNTESTED: "dim",
-}  # fmt: skip
+    ModelVerdict.HOLDS: "green",
+    ModelVerdict.FAILS: "red",
+    ModelVerdict.UNDECIDED: "yellow",
+    ModelVerdict.UNTESTED: "dim",
+}
 
 
 def print_table(table: ResultsTable, console: Console) -> None:
@@ -121,7 +124,7 @@ def _percent(figure: Estimate | PaperFigure) -> str:
     return percent(figure).replace(" ± ", " ±")
 
 
-def _print_finding(finding: Finding, console: Console) -> None:
+def _print_finding(finding: ModelFinding, console: Console) -> None:
     colour = _VERDICTS[finding.verdict]
     console.print(f"[bold]{escape(finding.statement)}[/] ({finding.part}): [{colour}]{finding.verdict}[/]")
     for claim in finding.claims:

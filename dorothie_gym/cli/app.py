@@ -1,4 +1,4 @@
-"""The application and its commands. What a command needs is imported when it runs, so that `--help` is quick."""
+"""Application `dorothie-gym` and its commands, which import their modules when they run to keep `--help` fast."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dorothie_gym.cli.evaluate import evaluate
 from dorothie_gym.cli.generate import generate
 from dorothie_gym.cli.leaderboard import leaderboard
 from dorothie_gym.cli.listings import storyboards, towns
-from dorothie_gym.cli.optional import PictureCommand
+from dorothie_gym.cli.options import PictureCommand
 from dorothie_gym.cli.replay import replay
 from dorothie_gym.cli.rollout import rollout
 from dorothie_gym.cli.run import run
@@ -26,7 +26,7 @@ from dorothie_gym.cli.train import table, train
 from dorothie_gym.cli.train_rl import train_rl
 
 app = typer.Typer(
-    help="Talk between a passenger and a car that drives through a town, with an adversary in between.",
+    help="Simulation of situated dialogue between a passenger and a car that drives through a town, with an adversary.",
     no_args_is_help=True,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -50,7 +50,7 @@ app.command()(train)
 app.command()(table)
 
 
-def _tell_version(wanted: bool) -> None:
+def _print_version(wanted: bool) -> None:
     if wanted:
         typer.echo(f"dorothie-gym {__version__}")
         raise typer.Exit
@@ -59,7 +59,7 @@ def _tell_version(wanted: bool) -> None:
 @app.callback()
 def _options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Show the version and exit.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
     pass
@@ -67,8 +67,8 @@ def _options(
 
 def main() -> None:
     """Runs the command line."""
-    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # its greeting on standard output would spoil --json
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # keep its greeting out of the output of --json
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")  # a terminal without a letter shows "?" instead of failing
+            stream.reconfigure(errors="replace")  # terminals print "?" for letters that they cannot encode
     app(prog_name="dorothie-gym")

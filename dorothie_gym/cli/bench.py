@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
-from dorothie_gym.cli.optional import OWN_NAME, PictureCommand
-from dorothie_gym.cli.options import AsJson
-from dorothie_gym.cli.output import INTERRUPTED, check_picture, fail, print_json, stderr, stdout, told_plainly
+from dorothie_gym.cli.options import OWN_NAME, AsJson, PictureCommand
+from dorothie_gym.cli.output import INTERRUPTED, check_picture, fail, print_json, reporting_errors, stderr, stdout
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -202,7 +201,7 @@ def _bench(name: str, measure: Measure, picture: Path | None, as_json: bool) -> 
     if picture is not None:
         check_picture(picture)
     try:
-        with told_plainly(), _progress() as progress:
+        with reporting_errors(), _progress() as progress:
             figures = measure(progress)
     except KeyboardInterrupt:
         stderr().print("Interrupted; a benchmark that is cut short says nothing.", soft_wrap=True)

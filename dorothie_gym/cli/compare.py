@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dorothie_gym.cli.options import AsJson
-from dorothie_gym.cli.output import print_json, stdout, told_plainly
+from dorothie_gym.cli.output import print_json, reporting_errors, stdout
 
 if TYPE_CHECKING:
     from dorothie_gym.recording import Difference
@@ -29,7 +29,7 @@ def compare(
     from dorothie_gym.recording import compare_folders
 
     rows: list[tuple[str, Difference | None]] = []
-    with told_plainly():
+    with reporting_errors():
         for name, difference in compare_folders(first, second):
             rows.append((name, difference))
             if not as_json:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dorothie_gym.cli.options import AsJson, Maps
-from dorothie_gym.cli.output import fail, print_json, stderr, stdout, told_plainly
+from dorothie_gym.cli.output import fail, print_json, reporting_errors, stderr, stdout
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dorothie_gym.recording import Corpus, CorpusEntry, Session
 
 
-class Layout(enum.StrEnum):
+class TargetLayout(enum.StrEnum):
     """What sessions are written as."""
 
     SDN = "sdn"
@@ -30,7 +30,9 @@ class Layout(enum.StrEnum):
 def convert(
     source: Annotated[Path, typer.Argument(metavar="IN", help="A session, or a folder of sessions or of folds.")],
     out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder to write, which must hold no such session yet.")],
-    to: Annotated[Layout, typer.Option("--to", help="Write the SDN release layout, our own, or two Parquet tables.")],
+    to: Annotated[
+        TargetLayout, typer.Option("--to", help="Write the SDN release layout, our own, or two Parquet tables.")
+    ],
     maps: Maps = None,
     as_json: AsJson = False,
 ) -> None:
@@ -42,12 +44,12 @@ def convert(
     """
     if maps is not None and not maps.is_dir():
         fail(f"{maps}: there is no such folder; give one with maps (.xodr)")
-    with told_plainly():
+    with reporting_errors():
         from dorothie_gym.recording import Corpus
 
         corpus = Corpus.load(source, maps=maps)
         _check_out(source, out)
-        if to is Layout.TABLES:
+        if to is TargetLayout.TABLES:
             _write_tables(corpus, out, as_json=as_json)
             return
         is_one = [entry.path for entry in corpus.entries] == [source]
@@ -76,13 +78,13 @@ def _write_tables(corpus: Corpus, out: Path, *, as_json: bool) -> None:
     """The tables of acts and of decision points, of all sessions: one that cannot be read fails the command."""
     paths = [str(path) for path in corpus.export(out)]
     if as_json:
-        print_json({"to": Layout.TABLES.value, "in": str(corpus.root), "out": str(out), "tables": paths})
+        print_json({"to": TargetLayout.TABLES.value, "in": str(corpus.root), "out": str(out), "tables": paths})
     else:
         stdout().print(f"{len(corpus)} sessions: {', '.join(paths)}", markup=False, soft_wrap=True)
 
 
 def _convert(
-    corpus: Corpus, out: Path, to: Layout, maps: Path | None, *, is_one: bool, quiet: bool
+    corpus: Corpus, out: Path, to: TargetLayout, maps: Path | None, *, is_one: bool, quiet: bool
 ) -> list[dict[str, Any]]:
     rows = []
     taken: set[Path] = set()
@@ -98,7 +100,7 @@ def _convert_one(
     entry: CorpusEntry,
     number: int,
     out: Path,
-    to: Layout,
+    to: TargetLayout,
     maps: Path | None,
     taken: set[Path],
     *,
@@ -114,7 +116,7 @@ def _convert_one(
         session = entry.load()
         target = out if is_one else out / path.with_name(_name(session, number, to, out / path.parent, taken))
         taken.add(target)
-        written = write_sdn(session, target, maps=maps) if to is Layout.SDN else session.save(target)
+        written = write_sdn(session, target, maps=maps) if to is TargetLayout.SDN else session.save(target)
     except (SessionError, TownError) as error:
         return {**row, "error": str(error)}
     return {
@@ -128,9 +130,9 @@ def _convert_one(
     }
 
 
-def _name(session: Session, number: int, to: Layout, folder: Path, taken: set[Path]) -> str:
+def _name(session: Session, number: int, to: TargetLayout, folder: Path, taken: set[Path]) -> str:
     """Name of the folder of a session: the original scripts look for `log_<number>`."""
-    if to is Layout.NATIVE or session.name.startswith("log_"):
+    if to is TargetLayout.NATIVE or session.name.startswith("log_"):
         return session.name
     seed = session.header.seed
     name = f"log_{number if seed is None else seed}"

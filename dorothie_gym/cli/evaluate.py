@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dorothie_gym.cli.options import Maps
-from dorothie_gym.cli.output import check_file, fail, print_json, told_plainly, wide_stdout
+from dorothie_gym.cli.output import check_file, fail, print_json, reporting_errors, wide_stdout
 
 if TYPE_CHECKING:
     from dorothie_gym.benchmark import CorpusLabels, ResultsTable, Split, TaskPredictions
@@ -53,7 +53,7 @@ def evaluate(
         if floor is None:
             fail("--save writes the predictions of a floor; give --model majority or --model random with it")
         check_file(save)
-    with told_plainly():
+    with reporting_errors():
         from dorothie_gym.benchmark import evaluate_predictions, labels_of, read_about
         from dorothie_gym.errors import PredictionError
         from dorothie_gym.recording import Corpus

@@ -10,7 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from dorothie_gym.cli.video import video_writer
+from dorothie_gym.cli.output import video_writer
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.engine.session_scene import scene_of
 from dorothie_gym.recording import FRAME_RATE

@@ -1,4 +1,4 @@
-"""`dorothie-gym generate`: a corpus of sessions."""
+"""`dorothie-gym generate`: generation of a corpus."""
 
 from __future__ import annotations
 
@@ -9,28 +9,37 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dorothie_gym.cli.options import AsJson, MaxSeconds, Players, Ray, WordErrors, env_config
-from dorothie_gym.cli.output import FAILED, INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
-from dorothie_gym.cli.progress import processors, session_progress
+from dorothie_gym.cli.output import (
+    FAILED,
+    INTERRUPTED,
+    fail,
+    print_json,
+    processors,
+    reporting_errors,
+    session_progress,
+    stderr,
+    stdout,
+)
 
 if TYPE_CHECKING:
     from dorothie_gym.rollout import Generated
 
 
 def generate(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the corpus; one that was begun is gone on with.")],
-    sessions: Annotated[int, typer.Option(min=1, help="How many, in folds as the paper's 183.")] = 183,
-    seed: Annotated[int, typer.Option(min=0, help="Equal seeds make equal corpora.")] = 0,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the corpus; a started corpus is resumed.")],
+    sessions: Annotated[int, typer.Option(min=1, help="Number of sessions, divided into folds as in the paper.")] = 183,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the corpus; equal seeds give equal corpora.")] = 0,
     workers: Players = None,
     max_seconds: MaxSeconds = None,
     word_errors: WordErrors = 0.0,
     ray: Ray = None,
     as_json: AsJson = False,
 ) -> None:
-    """Make a corpus: the scripted three play many sessions, divided into train, val and test, seen and unseen towns.
+    """Generate a corpus: the scripted roles play sessions, divided into train, val and test, seen and unseen towns.
 
-    The same bytes come out whatever the number of workers. When it is stopped, the same command goes on.
+    The bytes do not depend on the number of workers. After an interruption the same command resumes.
     """
-    with told_plainly():
+    with reporting_errors():
         from dorothie_gym.errors import ProcessError
         from dorothie_gym.rollout import generate_corpus
 
@@ -48,7 +57,7 @@ def generate(
                     on_session=on_session,
                 )
         except KeyboardInterrupt:
-            _tell_interruption(out, sessions, seed, max_seconds, word_errors)
+            _exit_interrupted(out, sessions, seed, max_seconds, word_errors)
         except ProcessError as error:
             fail(str(error), FAILED)
     facts = _facts(made, seed, time.perf_counter() - begun)
@@ -64,7 +73,7 @@ def generate(
         )
 
 
-def _tell_interruption(out: Path, sessions: int, seed: int, max_seconds: float | None, word_errors: float) -> None:
+def _exit_interrupted(out: Path, sessions: int, seed: int, max_seconds: float | None, word_errors: float) -> None:
     from dorothie_gym.rollout import finished_sessions
 
     done = finished_sessions(out, sessions=sessions, seed=seed)
@@ -74,7 +83,7 @@ def _tell_interruption(out: Path, sessions: int, seed: int, max_seconds: float |
     if word_errors:
         command += f" --word-errors {word_errors:g}"
     stderr().print(
-        f"Interrupted with {done} of {sessions} sessions finished; go on with: {command}", markup=False, soft_wrap=True
+        f"Interrupted with {done} of {sessions} sessions finished; resume with: {command}", markup=False, soft_wrap=True
     )
     raise typer.Exit(INTERRUPTED)
 

@@ -1,4 +1,4 @@
-"""`dorothie-gym leaderboard`: the page that ranks policies."""
+"""`dorothie-gym leaderboard`: ranking of policies as a Markdown page."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from typing import Annotated
 import typer
 
 from dorothie_gym.cli.options import AsJson
-from dorothie_gym.cli.output import check_file, fail, print_json, stdout, told_plainly
+from dorothie_gym.cli.output import check_file, fail, print_json, reporting_errors, stdout
 
 PAGE = Path("docs/leaderboard.md")
 
 
 def leaderboard(
     folders: Annotated[
-        list[Path], typer.Argument(metavar="DIR...", help="Folders of rollouts, or folders that hold some.")
+        list[Path], typer.Argument(metavar="DIR...", help="Folders of rollouts, or folders that contain them.")
     ],
     out: Annotated[
-        Path, typer.Option(metavar="FILE.md", help="Page to write; its picture lies beside it, with the ending .png.")
+        Path, typer.Option(metavar="FILE.md", help="Page to write; its picture is written beside it as .png.")
     ] = PAGE,
     as_json: AsJson = False,
 ) -> None:
-    """Rank policies by the results of their rollouts: a page with intervals, cost and commands, and a picture."""
-    with told_plainly():
+    """Rank policies by their rollouts, on a page with intervals, cost and commands, and in a picture."""
+    with reporting_errors():
         from dorothie_gym.errors import RolloutError
         from dorothie_gym.rollout.closed_loop.leaderboard import draw_leaderboard, leaderboard_page, read_entries
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from dorothie_gym.cli.optional import OWN_NAME
-from dorothie_gym.cli.output import check_picture, fail, print_json, stderr, stdout, told_plainly
+from dorothie_gym.cli.options import OWN_NAME
+from dorothie_gym.cli.output import check_picture, fail, print_json, reporting_errors, stderr, stdout
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.lint import Fault
@@ -41,7 +41,7 @@ def towns(
         picture = Path(f"{Path(town).stem}.png")
     if picture is not None:
         check_picture(picture)
-    with told_plainly():
+    with reporting_errors():
         from dorothie_gym.maps import describe, fold_of, load_town
         from dorothie_gym.maps.lint import check_town
 
@@ -69,7 +69,7 @@ def _list_towns(check: bool, picture: Path | None, as_json: bool) -> None:
         fail("--check looks at one town; name it: dorothie-gym towns --check NAME (or a file, .xodr or .yaml)")
     if picture is not None:
         fail("--picture draws one town; name it: dorothie-gym towns NAME --picture")
-    with told_plainly():
+    with reporting_errors():
         from dorothie_gym.maps import describe, fold_of, load_town, town_names
 
         rows = [{**describe(load_town(name)), "fold": fold_of(name)} for name in town_names()]
@@ -80,7 +80,7 @@ def storyboards(
     as_json: Annotated[bool, typer.Option("--json", help="Write JSON, and nothing else.")] = False,
 ) -> None:
     """List the storyboards that are shipped, with their stories as templates."""
-    with told_plainly():
+    with reporting_errors():
         from dorothie_gym.tasks import load_template, template_names
 
         templates = [load_template(name) for name in template_names()]

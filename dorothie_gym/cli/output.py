@@ -1,11 +1,13 @@
-"""What commands write, and how they fail."""
+"""Output of the commands: consoles, JSON, errors, progress, and checks of output files."""
 
 from __future__ import annotations
 
 import json
+import os
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -13,25 +15,25 @@ import typer
 from rich.console import Console
 
 FAILED = 1
-"""Exit code where what was asked for could not be done."""
+"""Exit code where a command could not do its work."""
 
 BAD_INPUT = 2
-"""Exit code for a user's mistake."""
+"""Exit code for invalid input."""
 
 INTERRUPTED = 130
-"""Exit code after Ctrl-C, as shells have it (128 + SIGINT)."""
+"""Exit code after Ctrl-C, by the convention of shells (128 + SIGINT)."""
 
 WIDTH = 130
-"""Columns of what is written into a file or a pipe, which have no width of their own."""
+"""Width of the output into a file or a pipe [columns]."""
 
 
 def stdout() -> Console:
-    """A console on standard output, as it is now."""
+    """Returns a console on the present standard output."""
     return Console(highlight=False)
 
 
 def wide_stdout() -> Console:
-    """A console on standard output for tables: `WIDTH` columns where it is no terminal."""
+    """Returns a console on standard output for tables; `WIDTH` columns wide if it is no terminal."""
     console = stdout()
     if not console.is_terminal:
         console.width = WIDTH
@@ -39,26 +41,26 @@ def wide_stdout() -> Console:
 
 
 def stderr() -> Console:
-    """A console on standard error, as it is now."""
+    """Returns a console on the present standard error."""
     return Console(stderr=True, highlight=False)
 
 
 def fail(message: str, code: int = BAD_INPUT) -> NoReturn:
-    """Writes one message on standard error and exits."""
+    """Prints a message on standard error and exits."""
     console = stderr()
     console.print("Error: ", style="bold red", end="")
     console.print(message, markup=False, soft_wrap=True)
     raise typer.Exit(code)
 
 
-def print_json(value: Mapping[str, Any] | list[Any]) -> None:
-    """Writes one JSON value, and nothing else, on standard output."""
+def print_json(value: Mapping[str, object] | Sequence[object]) -> None:
+    """Prints one JSON value on standard output."""
     typer.echo(json.dumps(value, allow_nan=False))
 
 
 @contextmanager
-def told_plainly() -> Iterator[None]:
-    """Turns the mistakes that a user can make into one message and exit code 2."""
+def reporting_errors() -> Iterator[None]:
+    """Turns errors of the input into one message and exit code 2."""
     from dorothie_gym.errors import SessionError, StoryboardError, TownError
 
     try:
@@ -71,13 +73,13 @@ def told_plainly() -> Iterator[None]:
 
 @contextmanager
 def compiling(after: float = 2.0) -> Iterator[None]:
-    """Tells on a terminal what takes so long, where the world's loops have to be compiled first.
+    """Prints a message on a terminal if the simulation has to be compiled first.
 
     Args:
-        after: seconds until it is told.
+        after: delay of the message [s].
     """
     console = stderr()
-    message = "compiling the world's loops for this machine: once after an installation, about a minute ..."
+    message = "compiling the simulation for this machine: once after an installation, about a minute ..."
     timer = threading.Timer(after, lambda: console.print(message, style="dim"))
     timer.daemon = True
     if console.is_terminal:
@@ -89,16 +91,16 @@ def compiling(after: float = 2.0) -> Iterator[None]:
 
 
 def check_picture(path: Path) -> None:
-    """Fails where a PNG file cannot be written at `path`, before anything takes time."""
+    """Fails if no PNG file can be written at `path`."""
     if path.suffix.lower() != ".png":
         fail(f"{path}: a picture is written as PNG; give a name that ends in .png")
     check_file(path)
 
 
 def check_file(path: Path) -> None:
-    """Fails where a file cannot be written at `path`; leaves nothing behind."""
+    """Fails if no file can be written at `path`; creates nothing."""
     if not path.parent.is_dir():
-        fail(f"{path}: the folder {path.parent} does not exist; make it first")
+        fail(f"{path}: the folder {path.parent} does not exist; create it first")
     there = path.exists()
     try:
         with path.open("ab"):
@@ -107,3 +109,45 @@ def check_file(path: Path) -> None:
         fail(f"{path}: cannot be written ({error.strerror}); choose another place")
     if not there:
         path.unlink()
+
+
+# --- Films as files: whether one can be written, and what writes it --------------------------------------------------
+
+_SUFFIXES = (".mp4", ".mkv", ".mov")
+
+
+def check_video(path: Path) -> None:
+    """Fails if no video can be written at `path`."""
+    if path.suffix.lower() not in _SUFFIXES:
+        fail(f"{path}: not a video format; give a name that ends in {', '.join(_SUFFIXES)}")
+    check_file(path)
+    if find_spec("imageio") is None or find_spec("imageio_ffmpeg") is None:
+        fail("--video needs imageio, which is not installed; run: pip install 'dorothie-gym[video]'")
+
+
+def video_writer(path: Path, frames_per_second: float) -> Any:  # imageio.v2 has no types
+    """Returns a video writer of imageio; raises `ImportError` if the extra `video` is not installed."""
+    import imageio.v2 as imageio
+
+    return imageio.get_writer(path, fps=frames_per_second, macro_block_size=16, ffmpeg_params=["-preset", "veryfast"])
+
+
+# --- How far a command that plays many sessions has come, and how many processes play --------------------------------
+
+
+def processors() -> int:
+    """Returns the number of processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def session_progress(*, quiet: bool) -> Iterator[Callable[[int, int], None]]:
+    """Shows a progress bar on a terminal; yields its update function (finished sessions, planned sessions)."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = stderr()
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    hidden = quiet or not console.is_terminal
+    with Progress(*columns, console=console, disable=hidden, transient=True) as progress:
+        bar = progress.add_task("Sessions", total=None)
+        yield lambda done, total: progress.update(bar, completed=done, total=total)

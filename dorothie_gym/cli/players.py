@@ -1,4 +1,4 @@
-"""Who plays, from a command line."""
+"""Players of the three roles from the options of a command line."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ if TYPE_CHECKING:
 
 
 def find_cast(participant: str, co_wizard: str, ad_wizard: str) -> dict[Role, Player]:
-    """Returns who plays each role; fails where a name or file is none.
+    """Returns the player of each role; exits if a name or file is unknown.
 
     Args:
-        participant: name of a policy, or file of a learned one.
-        co_wizard: likewise.
-        ad_wizard: likewise.
+        participant: name of a policy, or file of a learned policy.
+        co_wizard: as for the participant.
+        ad_wizard: as for the participant.
     """
     from dorothie_gym.errors import PolicyLoadError
     from dorothie_gym.ontology import AGENT_ROLES
@@ -25,24 +25,24 @@ def find_cast(participant: str, co_wizard: str, ad_wizard: str) -> dict[Role, Pl
 
     given = dict(zip(AGENT_ROLES, (participant, co_wizard, ad_wizard), strict=True))
     if any(name not in policy_names(role) for role, name in given.items()):
-        import dorothie_gym.baselines  # noqa: F401  # what is learned there makes itself known
+        import dorothie_gym.baselines  # noqa: F401  # registers the loaders of learned policies
     try:
         cast = {role: find_player(name, role) for role, name in given.items()}
     except PolicyLoadError as error:
         fail(str(error))
     for role, player in cast.items():
         if player.path is not None:
-            _try(player, role)
+            _check_loads(player, role)
     return cast
 
 
-def _try(player: Player, role: Role) -> None:
-    """Reads a learned player once, so that a damaged or unfit file is told before the first session, not in each."""
+def _check_loads(player: Player, role: Role) -> None:
+    """Loads a learned policy once, so that a damaged file is reported before the first session."""
     from dorothie_gym.spaces import SpaceLimits
 
     try:
         player.make(role, SpaceLimits())
     except ImportError as error:
-        fail(f"{role}: {player.name} needs {error.name}; pip install 'dorothie-gym[baselines]' brings it")
+        fail(f"{role}: {player.name} needs {error.name}; run: pip install 'dorothie-gym[baselines]'")
     except ValueError as error:
         fail(f"{role}: {error}")

@@ -9,9 +9,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dorothie_gym.cli.options import AsJson, Maps, Players
-from dorothie_gym.cli.output import INTERRUPTED, fail, print_json, stderr, stdout, told_plainly
-from dorothie_gym.cli.progress import processors
-from dorothie_gym.cli.video import check_video, video_writer
+from dorothie_gym.cli.output import (
+    INTERRUPTED,
+    check_video,
+    fail,
+    print_json,
+    processors,
+    reporting_errors,
+    stderr,
+    stdout,
+    video_writer,
+)
 
 if TYPE_CHECKING:
     from dorothie_gym.rendering.playback import Playback
@@ -56,7 +64,7 @@ def replay(
 
     sources = ReplaySources(town=town, maps=maps, storyboard=storyboard)
     try:
-        with told_plainly():
+        with reporting_errors():
             if check:
                 _check(path, sources, workers, as_json=as_json)
             else:

@@ -15,15 +15,15 @@ from dorothie_gym.cli.options import AdWizard, AsJson, CoWizard, Participant, Wo
 from dorothie_gym.cli.output import (
     INTERRUPTED,
     check_picture,
+    check_video,
     compiling,
     fail,
     print_json,
+    reporting_errors,
     stderr,
     stdout,
-    told_plainly,
 )
 from dorothie_gym.cli.players import find_cast
-from dorothie_gym.cli.video import check_video
 
 if TYPE_CHECKING:
     from dorothie_gym.engine.live_session import SessionSummary
@@ -91,7 +91,7 @@ def run(
         word_errors=word_errors,
     )
     _check_outputs(plan)
-    with told_plainly():
+    with reporting_errors():
         facts = _play(plan, quiet=as_json)
     if as_json:
         print_json(facts)

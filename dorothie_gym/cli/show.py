@@ -1,4 +1,4 @@
-"""`dorothie-gym show`: sessions as pages that people read."""
+"""`dorothie-gym show`: annotated transcripts of sessions."""
 
 from __future__ import annotations
 
@@ -7,20 +7,18 @@ from typing import Annotated
 
 import typer
 
-from dorothie_gym.cli.output import told_plainly
+from dorothie_gym.cli.output import reporting_errors
 
 
 def show(
     session: Annotated[list[Path], typer.Argument(metavar="SESSION...", help="Sessions of any layout.")],
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE.md", help="Write the page there; else to standard output.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE.md", help="File to write; default standard output.")] = None,
     maps: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder with maps of towns that are not shipped (Town01.xodr).")
     ] = None,
 ) -> None:
-    """Write annotated transcripts as Markdown: words, acts, exchanges, transactions, and what happens in between."""
-    with told_plainly():
+    """Write annotated transcripts as Markdown: utterances, dialogue acts, exchanges, transactions and other events."""
+    with reporting_errors():
         from dorothie_gym.analysis.transcript import markdown
         from dorothie_gym.recording import read_session
 

@@ -1,4 +1,4 @@
-"""`dorothie-gym stats`: what a corpus is like, beside the paper's."""
+"""`dorothie-gym stats`: statistics of a corpus, beside those of the paper."""
 
 from __future__ import annotations
 
@@ -9,18 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from dorothie_gym.cli.optional import OWN_NAME
-from dorothie_gym.cli.options import AsJson, Maps
-from dorothie_gym.cli.output import check_picture, fail, print_json, stdout, told_plainly
+from dorothie_gym.cli.options import OWN_NAME, AsJson, Maps
+from dorothie_gym.cli.output import check_picture, fail, print_json, reporting_errors, stdout
 
 if TYPE_CHECKING:
     from dorothie_gym.recording import Corpus
 
 PICTURE = Path("statistics.png")
-"""Picture that is written where `--picture` has no name."""
+"""Default file of `--picture`."""
 
 FAULTS_SHOWN = 5
-"""So many faults of a session are shown; --json has all."""
+"""Number of faults that are printed for a session; --json has all."""
 
 _ROWS = (
     ("sessions", "sessions"),
@@ -55,13 +54,13 @@ def stats(
         typer.Option(metavar="[FILE.png]", help=f"Draw moves and slots by speaker and exception; else {PICTURE}."),
     ] = None,
     phenomena: Annotated[
-        bool, typer.Option("--phenomena", help="In how many sessions each of the 24 phenomena of talk occurs.")
+        bool, typer.Option("--phenomena", help="Number of sessions with each of the 24 dialogue phenomena.")
     ] = False,
     behaviour: Annotated[
-        bool, typer.Option("--behaviour", help="What the paper reports of people and cars: does it hold here?")
+        bool, typer.Option("--behaviour", help="Test the claims of the paper about the behaviour of speakers.")
     ] = False,
     check: Annotated[
-        bool, typer.Option("--check", help="Check that the annotation holds together; exit code 1 if not.")
+        bool, typer.Option("--check", help="Check the consistency of the annotation; exit code 1 if it has faults.")
     ] = False,
     kappa: Annotated[
         tuple[Path, Path] | None,
@@ -69,12 +68,12 @@ def stats(
     ] = None,
     maps: Maps = None,
 ) -> None:
-    """Count a corpus: table 2 of the paper and what makes its tasks easy or hard, found anew from the events."""
+    """Print statistics of a corpus: table 2 of the paper, majority baselines and diversity, from the events."""
     _check_choice(folder, kappa, picture=picture is not None, phenomena=phenomena, behaviour=behaviour, check=check)
     if picture is not None:
         picture = PICTURE if picture == Path(OWN_NAME) else picture
         check_picture(picture)
-    with told_plainly():
+    with reporting_errors():
         from dorothie_gym.recording import Corpus
 
         if kappa is not None:
@@ -98,7 +97,7 @@ def _check_choice(folder: Path | None, kappa: object, **chosen: bool) -> None:
     if len(given) > 1:
         fail(f"{' and '.join(given)} exclude each other; give one of them")
     if kappa is not None and folder is not None:
-        fail(f"{folder}: --kappa compares the two sessions that follow it; leave the folder out")
+        fail(f"{folder}: --kappa compares the two sessions that follow it; omit the folder")
     if kappa is None and folder is None:
         fail("give a corpus, a folder of sessions, or one session: dorothie-gym stats DIR")
 
@@ -233,7 +232,7 @@ def _phenomena(corpus: Corpus, *, as_json: bool) -> None:
 
 def _behaviour(corpus: Corpus, *, as_json: bool) -> None:
     from dorothie_gym.analysis import verdicts_of
-    from dorothie_gym.analysis.behaviour import RESAMPLES
+    from dorothie_gym.analysis.intervals import RESAMPLES
 
     verdicts = verdicts_of(corpus)
     if as_json:
@@ -251,7 +250,7 @@ def _behaviour(corpus: Corpus, *, as_json: bool) -> None:
     console = stdout()
     console.print(shown)
     console.print(
-        f"{len(corpus)} sessions, drawn {RESAMPLES:,} times; docs/statistics.md tells what is compared.", style="dim"
+        f"{len(corpus)} sessions, drawn {RESAMPLES:,} times; docs/statistics.md defines the comparisons.", style="dim"
     )
 
 

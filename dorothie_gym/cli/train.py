@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dorothie_gym.cli.options import AsJson
-from dorothie_gym.cli.output import FAILED, INTERRUPTED, fail, print_json, stderr, stdout, told_plainly, wide_stdout
+from dorothie_gym.cli.output import FAILED, INTERRUPTED, fail, print_json, reporting_errors, stderr, stdout, wide_stdout
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.runs import Job
@@ -47,7 +47,7 @@ def train(
     as_json: AsJson = False,
 ) -> None:
     """Train a model with some seeds, test it, and tell its figures. When it is stopped, the same command goes on."""
-    with _told_plainly():
+    with _reporting_errors():
         from dorothie_gym.baselines.rows import find_row
         from dorothie_gym.baselines.table import gather_table, table_jobs
 
@@ -88,7 +88,7 @@ def table(
     the same command goes on.
     """
     begun = time.perf_counter()
-    with _told_plainly():
+    with _reporting_errors():
         from dorothie_gym.baselines.rows import ROWS, find_row
         from dorothie_gym.baselines.table import PREDICTIONS, gather_table, table_jobs
         from dorothie_gym.benchmark import write_predictions
@@ -173,7 +173,7 @@ def _show(table: ResultsTable) -> None:
 
 
 @contextmanager
-def _told_plainly() -> Iterator[None]:
+def _reporting_errors() -> Iterator[None]:
     """Turns a user's mistakes into one message, those of training among them."""
     try:
         import torch  # noqa: F401
@@ -181,7 +181,7 @@ def _told_plainly() -> Iterator[None]:
         fail("training needs torch; run: pip install 'dorothie-gym[baselines]'")
     from dorothie_gym.errors import CheckpointError, EncoderError, PredictionError, ProcessError
 
-    with told_plainly():
+    with reporting_errors():
         try:
             yield
         except (EncoderError, CheckpointError, PredictionError, ValueError) as error:

@@ -1,4 +1,4 @@
-"""A small corpus that is played once and kept: what there is to read when nobody has given a folder of sessions."""
+"""Default corpus: a small corpus that is generated once and kept in the user's cache."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from dorothie_gym.rollout.corpus_generation import generate_corpus
 from dorothie_gym.user_cache import CACHE_VARIABLE, cache_folder
 
 SESSIONS = 20
-"""Sessions of the corpus: the fewest of which each fold has one, as many as a leak test wants, some minutes to play."""
+"""Number of sessions: each fold has at least one, and the generation takes some minutes."""
 
 SEED = 0
 
@@ -33,16 +33,16 @@ _LOG = logging.getLogger(__name__)
 
 
 def default_corpus(*, sessions: int | None = None, seed: int = SEED, config: EnvConfig | None = None) -> Path:
-    """Returns a folder with a corpus of the scripted roles; plays it the first time, with a progress bar on stderr.
+    """Returns the folder of a corpus of the scripted roles; generates it at the first call, with a progress bar.
 
     Its folds and towns are shared out as the paper's. It is kept in the user's cache under the version of the package
     and what it was made from, so that another version plays its own. The folder appears when all sessions are played:
     nobody ever reads a part of it.
 
     Args:
-        sessions: how many; `SESSIONS` where None.
-        seed: of the corpus.
-        config: of the environment; `CONFIG` where None.
+        sessions: number of sessions; `SESSIONS` if None.
+        seed: seed of the corpus.
+        config: settings of the engine; `CONFIG` if None.
 
     Raises:
         CacheError: the cache cannot be written.
@@ -58,7 +58,7 @@ def default_corpus(*, sessions: int | None = None, seed: int = SEED, config: Env
     folder = cache / f"corpus-{__version__}-{digest}"
     if folder.is_dir():
         return folder
-    with _told_what_to_set(folder.parent):
+    with _naming_the_variable(folder.parent):
         folder.parent.mkdir(parents=True, exist_ok=True)
         part = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", suffix=".part", dir=folder.parent))
         try:
@@ -74,12 +74,12 @@ def _play(folder: Path, sessions: int, seed: int, config: EnvConfig) -> None:
     _LOG.info("playing %d sessions, which are kept in %s", sessions, folder.parent)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as progress:
-        bar = progress.add_task("Playing a small corpus, once", total=sessions)
+        bar = progress.add_task("Generating the default corpus", total=sessions)
 
         def advance(done: int, _: int) -> None:
             progress.update(bar, completed=done)
 
-        # One process: several need a main module that can be imported, which not every caller has.
+        # one process, because several need an importable main module
         generate_corpus(folder, sessions=sessions, seed=seed, config=config, on_session=advance)
 
 
@@ -94,11 +94,11 @@ def _publish(part: Path, folder: Path) -> None:
 
 
 @contextmanager
-def _told_what_to_set(folder: Path) -> Iterator[None]:
+def _naming_the_variable(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
         raise CacheError(
-            f"{folder}: sessions cannot be kept here ({error.strerror or error}); "
+            f"{folder}: no corpus can be stored here ({error.strerror or error}); "
             f"set {CACHE_VARIABLE} to a folder that can be written, or give a folder of sessions"
         ) from error

@@ -112,7 +112,7 @@ class PlayedSession:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome(Generic[Plan, Result]):
+class SessionOutcome(Generic[Plan, Result]):
     """Outcome of one planned session.
 
     Attributes:
@@ -162,7 +162,7 @@ def run_sessions(
     workers: int = 1,
     ray: str | None = None,
     on_session: Callable[[int, int], None] | None = None,
-) -> Iterator[Iterator[Outcome[Plan, Result]]]:
+) -> Iterator[Iterator[SessionOutcome[Plan, Result]]]:
     """Yields an iterator over the outcomes of planned sessions, which plays them as it is read.
 
     The folder is locked as long as the block lasts. A session appears in the folder when it is finished; a finished
@@ -189,7 +189,7 @@ def run_sessions(
     begun, spent = time.perf_counter(), 0.0
     prepare = partial(_SessionTask, job=replace(job, cast=dict(job.cast)))  # constants are proxies: not picklable
 
-    def outcomes() -> Generator[Outcome[Plan, Result], None, None]:
+    def outcomes() -> Generator[SessionOutcome[Plan, Result], None, None]:
         nonlocal spent
         report(0, len(plans))
         played = (
@@ -217,7 +217,7 @@ class _SessionTask(Generic[Result]):
         self._root, self._job = root, job
         self._maker = SessionMaker(root, job.config, job.cast)
 
-    def __call__(self, plan: Plan) -> Outcome[Plan, Result]:
+    def __call__(self, plan: Plan) -> SessionOutcome[Plan, Result]:
         begun = time.process_time()
         try:
             session, folder, played = self._maker(plan)
@@ -227,10 +227,10 @@ class _SessionTask(Generic[Result]):
             if not self._job.keep_errors:
                 raise
             text = f"{type(error).__name__}: {error}"
-            return Outcome(plan=plan, error=text, played=True, cpu_seconds=time.process_time() - begun)
+            return SessionOutcome(plan=plan, error=text, played=True, cpu_seconds=time.process_time() - begun)
         found = PlayedSession(session=session, folder=folder, root=self._root, maker=self._maker, town_name=plan.town)
         result = self._job.evaluate(found)
-        return Outcome(plan=plan, result=result, played=played, cpu_seconds=time.process_time() - begun)
+        return SessionOutcome(plan=plan, result=result, played=played, cpu_seconds=time.process_time() - begun)
 
 
 def _no_report(finished: int, planned: int) -> None:

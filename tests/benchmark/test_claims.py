@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from dorothie_gym.benchmark import COLUMNS, Estimate, Verdict, above, findings, paper_figures
+from dorothie_gym.benchmark import COLUMNS, Estimate, ModelVerdict, above, findings, paper_figures
 from dorothie_gym.benchmark.claims import FULL, NO_HISTORY, NO_MAP, OTHER_ABLATIONS, TUNED
 
 NOISE = (-0.01, 0.0, 0.01)
@@ -22,7 +22,7 @@ class Table:
         return Estimate.of({k: mean + NOISE[(k + turn) % 3] / 4 for k in range(self.seeds)})
 
 
-def verdicts(table: Table) -> list[Verdict]:
+def verdicts(table: Table) -> list[ModelVerdict]:
     return [finding.verdict for finding in findings(table, "seen")]
 
 
@@ -35,33 +35,38 @@ def test_findings_that_appear_hold() -> None:
             ("TOTO (- Current Speech)", "ufn_move_accuracy"): 0.5,
         }
     )
-    assert verdicts(table) == [Verdict.HOLDS] * 4
+    assert verdicts(table) == [ModelVerdict.HOLDS] * 4
 
 
 def test_differences_the_other_way_do_not_hold() -> None:
     table = Table({(NO_HISTORY, ""): 0.9, (TUNED, ""): 0.3, (NO_MAP, ""): 0.2, (OTHER_ABLATIONS[3], ""): 0.9})
-    assert verdicts(table) == [Verdict.FAILS] * 4
+    assert verdicts(table) == [ModelVerdict.FAILS] * 4
 
 
 def test_without_a_difference_it_is_undecided_but_for_what_should_not_help() -> None:
-    assert verdicts(Table({})) == [Verdict.UNDECIDED, Verdict.UNDECIDED, Verdict.UNDECIDED, Verdict.HOLDS]
+    assert verdicts(Table({})) == [
+        ModelVerdict.UNDECIDED,
+        ModelVerdict.UNDECIDED,
+        ModelVerdict.UNDECIDED,
+        ModelVerdict.HOLDS,
+    ]
 
 
 def test_one_seed_decides_nothing() -> None:
-    assert verdicts(Table({(NO_HISTORY, ""): 0.1}, seeds=1)) == [Verdict.UNDECIDED] * 4
+    assert verdicts(Table({(NO_HISTORY, ""): 0.1}, seeds=1)) == [ModelVerdict.UNDECIDED] * 4
 
 
 def test_without_the_models_nothing_is_tested() -> None:
     found = findings(lambda model, part, metric: Estimate.of({}), "seen")
-    assert [finding.verdict for finding in found] == [Verdict.UNTESTED] * 4
+    assert [finding.verdict for finding in found] == [ModelVerdict.UNTESTED] * 4
 
 
 def test_history_is_compared_with_whatever_else_costs_most() -> None:
     rival = "TOTO (- GT Transcript)"
     (history, *_) = findings(Table({(NO_HISTORY, ""): 0.3, (rival, ""): 0.2}), "seen")
-    assert history.verdict is Verdict.FAILS
+    assert history.verdict is ModelVerdict.FAILS
     claim = history.claims[1]
-    assert (claim.higher, claim.lower, claim.verdict) == (rival, NO_HISTORY, Verdict.FAILS)
+    assert (claim.higher, claim.lower, claim.verdict) == (rival, NO_HISTORY, ModelVerdict.FAILS)
 
 
 def test_claims_name_models_of_the_paper_and_columns_of_its_table() -> None:
@@ -79,7 +84,7 @@ def test_the_papers_figures_are_shares() -> None:
 
 def test_a_model_is_above_another_if_it_is_in_every_figure() -> None:
     table = Table({("mine", ""): 0.8, ("other", ""): 0.8, ("other", "rfn_slot_f1"): 0.6})
-    assert above(table, "seen", "mine", FULL).verdict is Verdict.HOLDS
-    assert above(table, "seen", "other", FULL).verdict is Verdict.UNDECIDED
-    assert above(table, "seen", "other", FULL, ("ufn_move_accuracy",)).verdict is Verdict.HOLDS
-    assert above(table, "seen", FULL, "mine").verdict is Verdict.FAILS
+    assert above(table, "seen", "mine", FULL).verdict is ModelVerdict.HOLDS
+    assert above(table, "seen", "other", FULL).verdict is ModelVerdict.UNDECIDED
+    assert above(table, "seen", "other", FULL, ("ufn_move_accuracy",)).verdict is ModelVerdict.HOLDS
+    assert above(table, "seen", FULL, "mine").verdict is ModelVerdict.FAILS

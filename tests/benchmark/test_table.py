@@ -8,8 +8,8 @@ import pytest
 from dorothie_gym.benchmark import (
     COLUMNS,
     CorpusLabels,
+    ModelVerdict,
     ResultsTable,
-    Verdict,
     evaluate_files,
     evaluate_predictions,
     labels_of,
@@ -129,5 +129,5 @@ def test_toto_is_held_against_the_floors_and_others_against_toto(labels: CorpusL
     runs = [run for seed in (0, 1) for name in ("TOTO", "mine") for run in oracle(labels, name, seed)]
     runs += [run for seed in (0, 1) for run in predict_floor("majority", labels, labels, seed)]
     verdicts = {(found.statement, found.part): found.verdict for found in evaluate_predictions(runs, labels).findings()}
-    assert verdicts["TOTO is above majority", "seen"] is Verdict.HOLDS
-    assert verdicts["mine is above TOTO", "unseen"] is Verdict.UNDECIDED
+    assert verdicts["TOTO is above majority", "seen"] is ModelVerdict.HOLDS
+    assert verdicts["mine is above TOTO", "unseen"] is ModelVerdict.UNDECIDED

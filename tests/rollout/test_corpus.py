@@ -61,7 +61,7 @@ def test_a_cache_that_cannot_be_written_is_told_with_what_to_set(
 ) -> None:
     (tmp_path / "file").touch()
     monkeypatch.setenv("DOROTHIE_GYM_CACHE", str(tmp_path / "file" / "below"))
-    with pytest.raises(CacheError, match=r"below: sessions cannot be kept here \(.*set DOROTHIE_GYM_CACHE to a folder"):
+    with pytest.raises(CacheError, match=r"below: no corpus can be stored here \(.*set DOROTHIE_GYM_CACHE to a folder"):
         default_corpus(sessions=1, seed=3, config=SHORT)
 
 

@@ -105,7 +105,8 @@ def test_two_workers_make_the_same_bytes_and_ctrl_c_tells_how_to_go_on(corpus: P
     if process.returncode:  # it may have been faster
         assert process.returncode == 130
         assert (
-            errors.count("\n") == 1 and f"go on with: dorothie-gym generate --sessions 6 --seed 5 --out {out}" in errors
+            errors.count("\n") == 1
+            and f"resume with: dorothie-gym generate --sessions 6 --seed 5 --out {out}" in errors
         )
     made = generate_corpus(out, sessions=6, seed=5, config=SHORT)
     assert made.played < 6 and contents(out) == contents(corpus)

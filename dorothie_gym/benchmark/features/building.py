@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.benchmark.features.columns import GROUPS, NO_TEXT, Columns, Sessions, TownGraph
+from dorothie_gym.benchmark.features.columns import GROUPS, NO_TEXT, Columns, SessionRows, TownGraph
 from dorothie_gym.benchmark.features.extraction import SessionColumns, extract, town_graph
 from dorothie_gym.benchmark.features.store import keep, recall
 from dorothie_gym.errors import SessionError, TownError
@@ -54,7 +54,7 @@ def join(
             wanted = [field.name for field in dataclasses.fields(kind)]
             groups[group] = kind(**{name: _column(rows, group, name) for name in wanted})
     number = {town.name: index for index, town in enumerate(towns)}
-    groups["sessions"] = Sessions(
+    groups["sessions"] = SessionRows(
         names=tuple(names),
         folds=tuple(folds),
         town=np.array([number[part.town] for part in parts], dtype=np.int32),

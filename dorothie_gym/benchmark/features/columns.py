@@ -31,7 +31,7 @@ PARTICIPANT, CO_WIZARD = 0, 1
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Sessions:
+class SessionRows:
     """The sessions (S,), by fold, town and seed, and by content where that is equal: their names do not count.
 
     Attributes:
@@ -48,7 +48,7 @@ class Sessions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Moves:
+class MoveRows:
     """Dialogue moves of both speakers (n,), those of an utterance together, flagged or not.
 
     Attributes:
@@ -79,7 +79,7 @@ class Moves:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Utterances:
+class UtteranceRows:
     """What was said (n,).
 
     Attributes:
@@ -98,7 +98,7 @@ class Utterances:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Actions:
+class ActionRows:
     """Physical actions (n,), flagged or not.
 
     Attributes:
@@ -111,7 +111,7 @@ class Actions:
         up: 1 faster or on, -1 slower or off, 0 for other actions.
         label_angle: argument as NfD's label [degrees]: 0 for an action that takes none, NaN where it is not known.
         flagged: whether it is a point of NfD.
-        handling: as of `Moves`, by the rule of `handling_of_events`.
+        handling: as of `MoveRows`, by the rule of `handling_of_events`.
     """
 
     session: Ints
@@ -126,7 +126,7 @@ class Actions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Frames:
+class FrameRows:
     """Where the car was (n,), ten rows a second.
 
     Attributes:
@@ -147,7 +147,7 @@ class Frames:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Looks:
+class LookRows:
     """Moments (n,) at which it was recorded what is around the car, about twice a second.
 
     Attributes:
@@ -162,7 +162,7 @@ class Looks:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Objects:
+class ObjectRows:
     """What was perceived around the car (n,), the nearest of each look first.
 
     Attributes:
@@ -175,7 +175,7 @@ class Objects:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Landmarks:
+class LandmarkRows:
     """Landmarks that are not hidden from the Co-Wizard (n,).
 
     Attributes:
@@ -194,7 +194,7 @@ class Landmarks:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Streets:
+class StreetRows:
     """Streets of each session's town (n,), in the order of their numbers.
 
     Attributes:
@@ -207,7 +207,7 @@ class Streets:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Goals:
+class GoalRows:
     """Where the car was to go: a label of the belief head, never an input (hidden landmarks are among them).
 
     The goal at a point is the first of the session that is reached after it.
@@ -263,16 +263,16 @@ class Columns:
     """
 
     key: str
-    sessions: Sessions
-    moves: Moves
-    utterances: Utterances
-    actions: Actions
-    frames: Frames
-    looks: Looks
-    objects: Objects
-    landmarks: Landmarks
-    streets: Streets
-    goals: Goals
+    sessions: SessionRows
+    moves: MoveRows
+    utterances: UtteranceRows
+    actions: ActionRows
+    frames: FrameRows
+    looks: LookRows
+    objects: ObjectRows
+    landmarks: LandmarkRows
+    streets: StreetRows
+    goals: GoalRows
     texts: tuple[str, ...]
     towns: tuple[TownGraph, ...]
     unreadable: tuple[tuple[str, str], ...] = ()
@@ -306,7 +306,7 @@ class Columns:
 
 
 GROUPS: Final[dict[str, type[Any]]] = {
-    "sessions": Sessions, "moves": Moves, "utterances": Utterances, "actions": Actions, "frames": Frames,
-    "looks": Looks, "objects": Objects, "landmarks": Landmarks, "streets": Streets, "goals": Goals,
+    "sessions": SessionRows, "moves": MoveRows, "utterances": UtteranceRows, "actions": ActionRows, "frames": FrameRows,
+    "looks": LookRows, "objects": ObjectRows, "landmarks": LandmarkRows, "streets": StreetRows, "goals": GoalRows,
 }  # fmt: skip
 """The groups of `Columns` that hold arrays over the whole corpus."""

@@ -1,13 +1,13 @@
-"""Agents in the loop: what is measured of sessions that they drive and talk in, and tables over many."""
+"""Closed-loop evaluation: rollouts of policies, their metrics, and the leaderboard."""
 
 from dorothie_gym.errors import RolloutError
-from dorothie_gym.rollout.closed_loop.intervals import Interval, figures_of, interval_of
 from dorothie_gym.rollout.closed_loop.metrics import (
     METRICS,
     PENALTIES,
     SPL,
     AbandonedExchanges,
     ClarificationRate,
+    ClosedLoopMetric,
     DrivingScore,
     ExceptionsMet,
     ExceptionsRecovered,
@@ -15,12 +15,14 @@ from dorothie_gym.rollout.closed_loop.metrics import (
     GoalConditionSuccess,
     Infractions,
     InfractionScore,
-    Metric,
+    MetricInterval,
     RecoverySeconds,
     RouteCompletion,
     Seconds,
     Success,
     UtterancesPerSubgoal,
+    figures_of,
+    interval_of,
 )
 from dorothie_gym.rollout.closed_loop.results import RolloutResult, RolloutRow, read_result
 from dorothie_gym.rollout.closed_loop.running import RolloutPlan, RolloutSettings, parse_towns, roll_out
@@ -44,10 +46,10 @@ __all__ = [
     "GoalConditionSuccess",
     "InfractionScore",
     "Infractions",
-    "Interval",
+    "MetricInterval",
     "METRICS",
     "MetException",
-    "Metric",
+    "ClosedLoopMetric",
     "PENALTIES",
     "RecoverySeconds",
     "RolloutError",

@@ -1,4 +1,4 @@
-"""The leaderboard: a row a policy, from the results of rollouts, as a page and a picture."""
+"""Leaderboard of policies from the results of rollouts, as a Markdown page and a picture."""
 
 from __future__ import annotations
 
@@ -11,33 +11,33 @@ from typing import Any, Final
 from dorothie_gym.errors import RolloutError
 from dorothie_gym.ontology import Role
 from dorothie_gym.rendering.charts import INK, dress_percent_axes, empty_figure
-from dorothie_gym.rollout.closed_loop.metrics import Metric, RecoverySeconds
+from dorothie_gym.rollout.closed_loop.metrics import ClosedLoopMetric, RecoverySeconds
 from dorothie_gym.rollout.closed_loop.results import ALL_METRICS, RESULT_FILE, RolloutResult, figure_text, read_result
 from dorothie_gym.rollout.closed_loop.running import command_of, fold_of_towns
 from dorothie_gym.rollout.runner import COST_FILE
 
 OTHER: Final = "other"
-"""Part of the rollouts in towns of both folds, or of none."""
+"""Part of the leaderboard for rollouts in towns of both folds, or of neither."""
 
 PARTS: Final[Mapping[str, str]] = {"seen": "Seen towns", "unseen": "Unseen towns", OTHER: "Other towns"}
-"""Parts of the page, and their titles."""
+"""Parts of the page and their titles."""
 
 COLUMNS: Final = (
     "success", "goal_condition_success", "spl", "route_completion", "infraction_score", "driving_score", "seconds",
     "exchanges_per_subgoal", "clarification_rate", "exceptions_recovered", "recovery_seconds",
 )  # fmt: skip
-"""Metrics of the page, by key."""
+"""Keys of the metrics on the page."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Entry:
-    """A rollout on the leaderboard.
+class LeaderboardEntry:
+    """Rollout on the leaderboard.
 
     Attributes:
-        folder: where its result lies.
-        result: the result.
-        page: its table (`RolloutResult.table`).
-        cost: what it took where it was played: `wall_seconds`, `cpu_seconds`, `workers`; empty where not known.
+        folder: folder of the rollout.
+        result: result of the rollout.
+        page: table of the result (`RolloutResult.table`).
+        cost: `wall_seconds`, `cpu_seconds` and `workers` of the rollout; empty if unknown.
     """
 
     folder: Path
@@ -47,7 +47,7 @@ class Entry:
 
     @property
     def policy(self) -> str:
-        """How its row is called: the Co-Wizard, and who else is not scripted, and how badly they hear."""
+        """Name of the row: the Co-Wizard, other roles that are not scripted, and the word error rate."""
         settings = self.result.settings
         name = str(settings[str(Role.CO_WIZARD)])
         others = [
@@ -61,38 +61,38 @@ class Entry:
 
     @property
     def part(self) -> str:
-        """Part of the page: a key of `PARTS`."""
+        """Part of the page, a key of `PARTS`."""
         return fold_of_towns(self.result.settings["towns"]) or OTHER
 
     @property
     def rank(self) -> tuple[float, float, str]:
-        """What rows are sorted by: success, then driving score, best first; then the name."""
+        """Sort key: success, then driving score, best first; then the name."""
         success, score = (self.page[key]["mean"] for key in ("success", "driving_score"))
         return -(success or 0.0), -(score or 0.0), self.policy
 
 
-def read_entries(folders: Sequence[Path | str]) -> tuple[Entry, ...]:
+def read_entries(folders: Sequence[Path | str]) -> tuple[LeaderboardEntry, ...]:
     """Reads the results of rollouts, in order of parts and ranks.
 
     Args:
-        folders: of rollouts, or of folders with rollouts in them.
+        folders: folders of rollouts, or folders that contain them.
 
     Raises:
-        RolloutError: there is none, one is damaged, or two are of the same policy in the same part.
+        RolloutError: there is no result, one is damaged, or two are of the same policy and part.
     """
-    entries: dict[tuple[str, str], Entry] = {}
+    entries: dict[tuple[str, str], LeaderboardEntry] = {}
     for folder in _with_results(folders):
         entry = _read(folder)
         other = entries.setdefault((entry.part, entry.policy), entry)
         if other is not entry:
             raise RolloutError(
-                f"{folder}: {entry.policy} in {PARTS[entry.part].lower()} is in {other.folder}, too; give one of them"
+                f"{folder}: {entry.policy} in {PARTS[entry.part].lower()} is also in {other.folder}; give one"
             )
     order = list(PARTS)
     return tuple(sorted(entries.values(), key=lambda entry: (order.index(entry.part), entry.rank)))
 
 
-def leaderboard_page(entries: Sequence[Entry], picture: str | None = None) -> str:
+def leaderboard_page(entries: Sequence[LeaderboardEntry], picture: str | None = None) -> str:
     """Returns the leaderboard as Markdown.
 
     Args:
@@ -117,8 +117,8 @@ def leaderboard_page(entries: Sequence[Entry], picture: str | None = None) -> st
     return "\n".join(lines)
 
 
-def _figures(entries: Sequence[Entry]) -> list[str]:
-    columns: list[Metric | RecoverySeconds] = [
+def _figures(entries: Sequence[LeaderboardEntry]) -> list[str]:
+    columns: list[ClosedLoopMetric | RecoverySeconds] = [
         next(metric for metric in ALL_METRICS if metric.key == key) for key in COLUMNS
     ]
     rows = [["Co-Wizard", "sessions", "errored", *(metric.title for metric in columns)]]
@@ -129,7 +129,7 @@ def _figures(entries: Sequence[Entry]) -> list[str]:
     return _table(rows)
 
 
-def _costs(entries: Sequence[Entry]) -> list[str]:
+def _costs(entries: Sequence[LeaderboardEntry]) -> list[str]:
     rows = [["Co-Wizard", "towns", "training steps", "training time", "decisions", "wall time", "processor time"]]
     for entry in entries:
         training = entry.result.settings.get("training", {}).get(str(Role.CO_WIZARD), {})
@@ -164,31 +164,31 @@ def _with_results(folders: Sequence[Path | str]) -> list[Path]:
     for given in map(Path, folders):
         here = [given] if (given / RESULT_FILE).is_file() else sorted(p.parent for p in given.glob(f"*/{RESULT_FILE}"))
         if not here:
-            raise RolloutError(f"{given}: holds no {RESULT_FILE}; write one with `dorothie-gym rollout --out {given}`")
+            raise RolloutError(f"{given}: has no {RESULT_FILE}; write one with `dorothie-gym rollout --out {given}`")
         found += [folder for folder in here if folder not in found]
     return found
 
 
-def _read(folder: Path) -> Entry:
+def _read(folder: Path) -> LeaderboardEntry:
     result = read_result(folder)
     file = folder / COST_FILE
     try:
         cost = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
     except ValueError as error:
-        raise RolloutError(f"{file}: is no JSON ({error}); remove it, and play the rollout again") from None
-    return Entry(folder=folder, result=result, page=result.table(), cost=cost)
+        raise RolloutError(f"{file}: is not valid JSON ({error}); remove it, and run the rollout again") from None
+    return LeaderboardEntry(folder=folder, result=result, page=result.table(), cost=cost)
 
 
-# --- The leaderboard as a picture: a row a policy, a dot a part, with intervals --------------------------------------
+# --- picture ----------------------------------------------------------------------------------------------------------
 
 PANELS: Final = ("success", "goal_condition_success", "driving_score", "spl")
-"""Metrics that are drawn: shares, each with a panel of its own."""
+"""Metrics of the panels of the picture."""
 
 _ROW, _TOP, _BOTTOM = 0.5, 1.2, 0.6
 _COLOURS: Final = {"seen": "#2f62c4", "unseen": "#cf7f1d", OTHER: "#5f8a3a"}
 
 
-def draw_leaderboard(entries: Sequence[Entry], path: Path | str) -> Path:
+def draw_leaderboard(entries: Sequence[LeaderboardEntry], path: Path | str) -> Path:
     """Draws the leaderboard.
 
     Args:
@@ -216,7 +216,7 @@ def draw_leaderboard(entries: Sequence[Entry], path: Path | str) -> Path:
     return Path(path)
 
 
-def _panel(axes: Any, entries: Sequence[Entry], names: Sequence[str], key: str) -> None:
+def _panel(axes: Any, entries: Sequence[LeaderboardEntry], names: Sequence[str], key: str) -> None:
     parts = [part for part in PARTS if any(entry.part == part for entry in entries)]
     for entry in entries:
         figure = entry.page[key]
@@ -231,7 +231,7 @@ def _panel(axes: Any, entries: Sequence[Entry], names: Sequence[str], key: str) 
     dress_percent_axes(axes, title, len(names), margin=3)
 
 
-def _legend(figure: Any, entries: Sequence[Entry], height: float) -> None:
+def _legend(figure: Any, entries: Sequence[LeaderboardEntry], height: float) -> None:
     from matplotlib.lines import Line2D
 
     handles = [

@@ -1,36 +1,40 @@
-"""Closed-loop metrics (spec: metrics), each a class that reads a session's record.
+"""Closed-loop metrics (spec: metrics) and their figures over sessions, with bootstrap intervals.
 
-Over several sessions a metric is the ratio of the sums of its two parts: of those that a session has once (its success,
-its driving score) that is the mean over sessions; of those per subgoal, per exchange or per exception met it is over
-all subgoals, exchanges or exceptions, so that a session in which little was said counts little.
+Over several sessions a metric is the ratio of the sums of its two parts. For metrics that a session has once (success,
+driving score) the ratio is the mean over sessions; for metrics per subgoal, exchange or exception it is the mean over
+all subgoals, exchanges or exceptions, so that a session with few exchanges has a small weight.
 """
 
 from __future__ import annotations
 
 import statistics
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import ClassVar, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.analysis.intervals import bootstrap_weights, percentile_interval
 from dorothie_gym.rollout.closed_loop.session_record import TIMEOUT, SessionRecord
 
 PENALTIES: Final[Mapping[str, float]] = MappingProxyType(
     {"pedestrian": 0.50, "vehicle": 0.60, "static": 0.65, "red_light": 0.70, "stop_sign": 0.80, TIMEOUT: 0.70}
 )
-"""What one infraction leaves of the driving score, as in the CARLA leaderboard (leaderboard.carla.org, version 2)."""
+"""Factor of the driving score for each infraction, as in the CARLA leaderboard (leaderboard.carla.org, version 2)."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Metric(ABC):
-    """One number for one or more sessions.
+class ClosedLoopMetric(ABC):
+    """Metric over one or more sessions.
 
     Attributes:
-        key: its name in JSON.
-        title: how tables call it.
-        worst: what a session counts for that ended in an error; None where such a session counts in none.
-        is_share: whether it is a share, which tables show in per cent.
+        key: name of the metric in JSON.
+        title: name of the metric in tables.
+        worst: value of a session that ended in an error; None leaves such sessions out.
+        is_share: whether tables show the metric in per cent.
     """
 
     key: ClassVar[str]
@@ -40,18 +44,18 @@ class Metric(ABC):
 
     @abstractmethod
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns what the session adds to the upper and to the lower sum; (0, 0) where it counts in none."""
+        """Returns the contributions of a session to numerator and denominator; (0, 0) leaves the session out."""
 
     def of(self, records: Iterable[SessionRecord]) -> float | None:
-        """Returns the metric over some sessions; None where nothing counts."""
+        """Returns the metric over some sessions; None if all are left out."""
         sums = [self.parts(record) for record in records]
         lower = sum(part for _, part in sums)
         return sum(part for part, _ in sums) / lower if lower else None
 
 
 @dataclass(frozen=True, kw_only=True)
-class Success(Metric):
-    """Whether all live subgoals were reached in an order that is allowed, the destination last, and nothing was hit."""
+class Success(ClosedLoopMetric):
+    """Whether all live subgoals were reached in an allowed order, the destination last, without own collisions."""
 
     key: ClassVar[str] = "success"
     title: ClassVar[str] = "success"
@@ -63,7 +67,7 @@ class Success(Metric):
 
 
 @dataclass(frozen=True, kw_only=True)
-class GoalConditionSuccess(Metric):
+class GoalConditionSuccess(ClosedLoopMetric):
     """Share of the live subgoals that were reached (ALFRED; Shridhar et al., 2020)."""
 
     key: ClassVar[str] = "goal_condition_success"
@@ -76,7 +80,7 @@ class GoalConditionSuccess(Metric):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SPL(Metric):
+class SPL(ClosedLoopMetric):
     """Success weighted by path length: success x shortest / max(shortest, driven) (Anderson et al., 2018)."""
 
     key: ClassVar[str] = "spl"
@@ -94,8 +98,8 @@ class SPL(Metric):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RouteCompletion(Metric):
-    """Share of the way through the live subgoals that was done (`record.route_completion`)."""
+class RouteCompletion(ClosedLoopMetric):
+    """Share of the route through the live subgoals that was driven (`session_record.route_completion`)."""
 
     key: ClassVar[str] = "route_completion"
     title: ClassVar[str] = "completion"
@@ -107,11 +111,11 @@ class RouteCompletion(Metric):
 
 
 @dataclass(frozen=True, kw_only=True)
-class InfractionScore(Metric):
-    """Product of the penalties of all infractions; 1 without any.
+class InfractionScore(ClosedLoopMetric):
+    """Product of the penalties of all infractions; 1 without infractions.
 
     Attributes:
-        penalties: factor of each kind of infraction; others cost nothing.
+        penalties: factor of each kind of infraction; other kinds have the factor 1.
     """
 
     key: ClassVar[str] = "infraction_score"
@@ -128,8 +132,8 @@ class InfractionScore(Metric):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Infractions(Metric):
-    """Infractions of a session that cost something."""
+class Infractions(ClosedLoopMetric):
+    """Number of infractions of a session that have a penalty."""
 
     key: ClassVar[str] = "infractions"
     title: ClassVar[str] = "infractions"
@@ -141,7 +145,7 @@ class Infractions(Metric):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DrivingScore(Metric):
+class DrivingScore(ClosedLoopMetric):
     """Route completion x infraction score."""
 
     key: ClassVar[str] = "driving_score"
@@ -155,7 +159,7 @@ class DrivingScore(Metric):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Seconds(Metric):
+class Seconds(ClosedLoopMetric):
     """Simulated time of a session [s]."""
 
     key: ClassVar[str] = "seconds"
@@ -168,8 +172,8 @@ class Seconds(Metric):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExchangesPerSubgoal(Metric):
-    """Exchanges for each live subgoal, reached or not."""
+class ExchangesPerSubgoal(ClosedLoopMetric):
+    """Exchanges per live subgoal, reached or not."""
 
     key: ClassVar[str] = "exchanges_per_subgoal"
     title: ClassVar[str] = "exchanges / subgoal"
@@ -181,8 +185,8 @@ class ExchangesPerSubgoal(Metric):
 
 
 @dataclass(frozen=True, kw_only=True)
-class UtterancesPerSubgoal(Metric):
-    """Utterances of participant and Co-Wizard for each live subgoal, reached or not."""
+class UtterancesPerSubgoal(ClosedLoopMetric):
+    """Utterances of participant and Co-Wizard per live subgoal, reached or not."""
 
     key: ClassVar[str] = "utterances_per_subgoal"
     title: ClassVar[str] = "utterances / subgoal"
@@ -194,20 +198,20 @@ class UtterancesPerSubgoal(Metric):
 
 
 @dataclass(frozen=True, kw_only=True)
-class AbandonedExchanges(Metric):
-    """Share of the exchanges that were given up without an answer."""
+class AbandonedExchanges(ClosedLoopMetric):
+    """Share of the exchanges that were abandoned without an answer."""
 
     key: ClassVar[str] = "abandoned_exchanges"
     title: ClassVar[str] = "exchanges abandoned"
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Those that were abandoned, and all."""
+        """Abandoned exchanges, and all exchanges."""
         return record.talk.abandoned, record.talk.exchanges
 
 
 @dataclass(frozen=True, kw_only=True)
-class ClarificationRate(Metric):
-    """Moves that repair or make sure (Confuse, Clarify, Check) for each exchange."""
+class ClarificationRate(ClosedLoopMetric):
+    """Clarifying moves (Confuse, Clarify, Check) per exchange."""
 
     key: ClassVar[str] = "clarification_rate"
     title: ClassVar[str] = "clarifications / exchange"
@@ -219,8 +223,8 @@ class ClarificationRate(Metric):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExceptionsMet(Metric):
-    """Exceptions that a session met (`recovery`)."""
+class ExceptionsMet(ClosedLoopMetric):
+    """Number of exceptions that the car met (`met_exceptions`)."""
 
     key: ClassVar[str] = "exceptions_met"
     title: ClassVar[str] = "exceptions met"
@@ -232,19 +236,19 @@ class ExceptionsMet(Metric):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExceptionsRecovered(Metric):
-    """Share of the exceptions met that were recovered from (`recovery`)."""
+class ExceptionsRecovered(ClosedLoopMetric):
+    """Share of the met exceptions from which the car recovered (`met_exceptions`)."""
 
     key: ClassVar[str] = "exceptions_recovered"
     title: ClassVar[str] = "recovered"
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Those recovered from, and those met."""
+        """Exceptions recovered from, and exceptions met."""
         met = [each for each in record.exceptions if each.met is not None]
         return float(sum(each.seconds is not None for each in met)), float(len(met))
 
 
-METRICS: Final[tuple[Metric, ...]] = (
+METRICS: Final[tuple[ClosedLoopMetric, ...]] = (
     Success(),
     GoalConditionSuccess(),
     SPL(),
@@ -265,7 +269,7 @@ METRICS: Final[tuple[Metric, ...]] = (
 
 @dataclass(frozen=True, kw_only=True)
 class RecoverySeconds:
-    """Median time from meeting an exception to having recovered from it, over those recovered from [s]."""
+    """Median time from meeting an exception to recovery, over the exceptions recovered from [s]."""
 
     key: ClassVar[str] = "recovery_seconds"
     title: ClassVar[str] = "seconds to recovery"
@@ -276,6 +280,91 @@ class RecoverySeconds:
         return tuple(each.seconds for each in record.exceptions if each.seconds is not None)
 
     def of(self, records: Iterable[SessionRecord]) -> float | None:
-        """Returns the median over the exceptions of some sessions; None where none was recovered from."""
+        """Returns the median over the exceptions of some sessions; None without a recovery."""
         found = [seconds for record in records for seconds in self.values(record)]
         return statistics.median(found) if found else None
+
+
+# --- figures over sessions --------------------------------------------------------------------------------------------
+
+SEED: Final = 0
+"""Seed of the bootstrap samples: equal sessions give equal intervals."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MetricInterval:
+    """Metric over sessions with its 95 % bootstrap interval.
+
+    Attributes:
+        mean: value over all sessions; None if undefined.
+        low: lower end of the interval; None if undefined or for a single session.
+        high: upper end of the interval.
+    """
+
+    mean: float | None
+    low: float | None = None
+    high: float | None = None
+
+    def to_json(self) -> dict[str, float | None]:
+        """Returns `mean`, `low` and `high`, rounded to 6 decimals, which do not depend on the machine."""
+        return {name: None if value is None else round(value, 6) for name, value in vars(self).items()}
+
+
+def figures_of(records: Sequence[SessionRecord], errored: int = 0) -> dict[str, MetricInterval]:
+    """Returns every metric over sessions, by key.
+
+    Args:
+        records: records of the finished sessions.
+        errored: number of sessions that ended in an error; they count with the `worst` value of a metric.
+    """
+    found = {metric.key: interval_of(metric, records, errored) for metric in METRICS}
+    found[RecoverySeconds.key] = _median(records)
+    return found
+
+
+def interval_of(metric: ClosedLoopMetric, records: Sequence[SessionRecord], errored: int = 0) -> MetricInterval:
+    """Returns a metric over sessions with its interval; see `figures_of`."""
+    parts = [metric.parts(record) for record in records]
+    if metric.worst is not None:
+        parts += [(metric.worst, 1.0)] * errored
+    if not any(lower for _, lower in parts):
+        return MetricInterval(mean=None)
+    sums = np.array(parts, dtype=np.float64)  # (n, 2)
+    upper, lower = sums.sum(axis=0)
+    drawn = bootstrap_weights(len(parts), seed=SEED) @ sums  # (RESAMPLES, 2)
+    drawn = drawn[drawn[:, 1] > 0.0]
+    return _between(float(upper / lower), drawn[:, 0] / drawn[:, 1], len(parts))
+
+
+def _median(records: Sequence[SessionRecord]) -> MetricInterval:
+    """Returns the median time to recovery; sessions are resampled with all their exceptions."""
+    metric = RecoverySeconds()
+    mean = metric.of(records)
+    if mean is None:
+        return MetricInterval(mean=None)
+    owners = [k for k, record in enumerate(records) for _ in metric.values(record)]
+    values = np.array([seconds for record in records for seconds in metric.values(record)])
+    order = np.argsort(values, kind="stable")
+    counts = bootstrap_weights(len(records), seed=SEED)[
+        :, np.array(owners)[order]
+    ]  # occurrences of each value in each sample
+    counts = counts[counts.sum(axis=1) > 0.0]
+    medians = _weighted_medians(values[order], counts)
+    return _between(mean, medians, len(records))
+
+
+def _weighted_medians(values: NDArray[np.float64], counts: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns the medians (m,) of ascending values (n,) that occur as often as counts (m, n) state."""
+    reached = np.cumsum(counts, axis=1)
+    total = reached[:, -1]
+    low = (reached >= np.floor((total + 1.0) / 2.0)[:, None]).argmax(axis=1)
+    high = (reached >= np.floor(total / 2.0 + 1.0)[:, None]).argmax(axis=1)
+    medians: NDArray[np.float64] = (values[low] + values[high]) / 2.0
+    return medians
+
+
+def _between(mean: float, drawn: NDArray[np.float64], sessions: int) -> MetricInterval:
+    if sessions < 2 or not len(drawn):
+        return MetricInterval(mean=mean)
+    low, high = percentile_interval(drawn)
+    return MetricInterval(mean=mean, low=low, high=high)

@@ -1,4 +1,4 @@
-"""The outcome of a rollout: a row a session, the table over them, and its file."""
+"""Result of a rollout: one row per session, the table over all sessions, and its file."""
 
 from __future__ import annotations
 
@@ -11,31 +11,38 @@ from typing import Any, Final
 from rich.console import Console
 from rich.table import Table
 
+from dorothie_gym.analysis.intervals import CONFIDENCE, RESAMPLES
 from dorothie_gym.errors import RolloutError
 from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind
-from dorothie_gym.rollout.closed_loop.intervals import RESAMPLES, SEED, Interval, figures_of
-from dorothie_gym.rollout.closed_loop.metrics import METRICS, Metric, RecoverySeconds
+from dorothie_gym.rollout.closed_loop.metrics import (
+    METRICS,
+    SEED,
+    ClosedLoopMetric,
+    MetricInterval,
+    RecoverySeconds,
+    figures_of,
+)
 from dorothie_gym.rollout.closed_loop.session_record import SessionRecord
 
 RESULT_FILE: Final = "rollout.json"
-"""Within the folder of a rollout: its rows and its table."""
+"""File of rows and table in the folder of a rollout."""
 
 RESULT_VERSION: Final = "1.0"
 
 NO_EXCEPTION: Final = "none"
-"""Name of the row of sessions in which nothing unexpected happened."""
+"""Name of the group of sessions without exceptions."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RolloutRow:
-    """One session of a rollout.
+    """Result of one session of a rollout.
 
     Attributes:
-        number: in the rollout.
-        town: where it was played.
-        seed: what it was played from.
-        record: its measures; None where it ended in an error.
-        error: that error.
+        number: number of the session in the rollout.
+        town: name or file of the town.
+        seed: seed of the session.
+        record: measures of the session; None if it ended in an error.
+        error: the error, if any.
     """
 
     number: int
@@ -45,18 +52,18 @@ class RolloutRow:
     error: str | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """Returns number, town, seed, error, and the measures or null."""
+        """Returns the fields in JSON types."""
         record = None if self.record is None else self.record.to_json()
         return {"number": self.number, "town": self.town, "seed": self.seed, "error": self.error, "record": record}
 
 
 @dataclass(frozen=True, kw_only=True)
 class RolloutResult:
-    """What came of a rollout.
+    """Result of a rollout.
 
     Attributes:
-        settings: what it was made from (`RolloutSettings.to_json`).
-        rows: of the sessions that were played, by number.
+        settings: settings of the rollout (`RolloutSettings.to_json`).
+        rows: rows of the finished sessions, by number.
     """
 
     settings: Mapping[str, Any]
@@ -64,20 +71,20 @@ class RolloutResult:
 
     @property
     def complete(self) -> bool:
-        """Whether all sessions that were planned have been played."""
+        """Whether all planned sessions are finished."""
         return len(self.rows) == int(self.settings["sessions_planned"])
 
     @property
     def errored(self) -> int:
-        """How many sessions ended in an error."""
+        """Number of sessions that ended in an error."""
         return sum(row.record is None for row in self.rows)
 
-    def figures(self) -> dict[str, Interval]:
+    def figures(self) -> dict[str, MetricInterval]:
         """Returns every metric over all sessions, by key."""
         return _figures(self.rows)
 
     def to_json(self) -> dict[str, Any]:
-        """Returns the table and the rows in JSON types; the same whoever computes it, and with however many workers."""
+        """Returns the table and the rows in JSON types; they do not depend on the number of workers."""
         return {
             "version": RESULT_VERSION,
             "settings": dict(self.settings),
@@ -86,7 +93,7 @@ class RolloutResult:
             "per_town": self._parts(dict.fromkeys(row.town for row in self.rows), lambda row, town: row.town == town),
             "per_exception": self.per_exception(),
             "seeds": [row.seed for row in self.rows],
-            "interval": {"share": 0.95, "resamples": RESAMPLES, "seed": SEED},
+            "interval": {"share": CONFIDENCE, "resamples": RESAMPLES, "seed": SEED},
             "rows": [row.to_json() for row in self.rows],
         }
 
@@ -95,9 +102,9 @@ class RolloutResult:
         return _table(self.rows)
 
     def per_exception(self) -> dict[str, Any]:
-        """Returns the table of the sessions in which each kind of exception happened, and of those without any.
+        """Returns a table for the sessions with each kind of exception, and one for sessions without exceptions.
 
-        What is met and recovered from counts for the exceptions of that kind only.
+        Exceptions met and recovered from are those of that kind only.
         """
         found: dict[str, Any] = {}
         for kind in ExceptionKind:
@@ -112,7 +119,7 @@ class RolloutResult:
 
 
 def result_from_json(page: Any, where: str) -> RolloutResult:
-    """Reads what `RolloutResult.to_json` returned; raises `RolloutError`, naming `where`, if it is something else."""
+    """Parses the output of `RolloutResult.to_json`; raises `RolloutError`, naming `where`, if it is malformed."""
     try:
         if str(page["version"]).split(".")[0] != RESULT_VERSION.split(".")[0]:
             raise RolloutError(f"{where}: is of version {page['version']}; this package reads {RESULT_VERSION}")
@@ -130,8 +137,8 @@ def result_from_json(page: Any, where: str) -> RolloutResult:
         ]
     except (KeyError, TypeError, AttributeError) as error:
         raise RolloutError(
-            f"{where}: is no result of a rollout ({type(error).__name__}: {error}); "
-            f"give a {RESULT_FILE} that `dorothie-gym rollout --out` wrote"
+            f"{where}: is not the result of a rollout ({type(error).__name__}: {error}); "
+            f"give a {RESULT_FILE} from `dorothie-gym rollout --out`"
         ) from None
     return RolloutResult(settings=settings, rows=tuple(rows))
 
@@ -140,10 +147,10 @@ def read_result(path: Path | str) -> RolloutResult:
     """Reads the result of a rollout.
 
     Args:
-        path: of its folder, or of the file (also of what `rollout --json` wrote).
+        path: folder of the rollout, or its file (also the output of `rollout --json`).
 
     Raises:
-        RolloutError: there is none, or it is damaged.
+        RolloutError: the file is missing or damaged.
     """
     file = Path(path) / RESULT_FILE if Path(path).is_dir() else Path(path)
     if not file.is_file():
@@ -151,7 +158,7 @@ def read_result(path: Path | str) -> RolloutResult:
     try:
         page = json.loads(file.read_text(encoding="utf-8"))
     except ValueError as error:
-        raise RolloutError(f"{file}: is no JSON ({error}); write it anew with `dorothie-gym rollout`") from None
+        raise RolloutError(f"{file}: is not valid JSON ({error}); write it again with `dorothie-gym rollout`") from None
     return result_from_json(page, str(file))
 
 
@@ -166,7 +173,7 @@ def _table(rows: Iterable[RolloutRow]) -> dict[str, Any]:
     }
 
 
-def _figures(rows: Iterable[RolloutRow]) -> dict[str, Interval]:
+def _figures(rows: Iterable[RolloutRow]) -> dict[str, MetricInterval]:
     rows = list(rows)
     records = [row.record for row in rows if row.record is not None]
     return figures_of(records, len(rows) - len(records))
@@ -177,15 +184,15 @@ def _kinds(row: RolloutRow) -> frozenset[ExceptionKind]:
 
 
 def _only(row: RolloutRow, kind: ExceptionKind) -> RolloutRow:
-    """The same session with the exceptions of one kind."""
+    """Returns the row with the exceptions of one kind only."""
     assert row.record is not None
     kept = tuple(each for each in row.record.exceptions if each.kind is kind)
     return replace(row, record=replace(row.record, exceptions=kept))
 
 
-# --- The result of a rollout on a terminal ---------------------------------------------------------------------------
+# --- terminal ---------------------------------------------------------------------------------------------------------
 
-ALL_METRICS: Final[tuple[Metric | RecoverySeconds, ...]] = (*METRICS, RecoverySeconds())
+ALL_METRICS: Final[tuple[ClosedLoopMetric | RecoverySeconds, ...]] = (*METRICS, RecoverySeconds())
 
 MAIN: Final = (
     "success",
@@ -202,11 +209,11 @@ HANDLING: Final = ("success", "driving_score", "exceptions_met", "exceptions_rec
 """Metrics of the table of exceptions."""
 
 SEEDS: Final = 20
-"""So many seeds are printed; all are in the file and in --json."""
+"""Number of seeds that are printed; the file and --json have all."""
 
 
 def print_result(result: RolloutResult, console: Console) -> None:
-    """Prints the tables of a rollout, its seeds, and what went wrong."""
+    """Prints the tables of a rollout, its seeds, and its errors."""
     page = result.to_json()
     settings = page["settings"]
     cast = ", ".join(f"{role} {settings[str(role)]}" for role in AGENT_ROLES)
@@ -223,8 +230,8 @@ def print_result(result: RolloutResult, console: Console) -> None:
             console.print(f"Session {row.number} ({row.town}, seed {row.seed}): {row.error}", markup=False)
 
 
-def figure_text(metric: Metric | RecoverySeconds, figure: Mapping[str, float | None]) -> str:
-    """Returns a figure with its interval: "95.0 [92.1, 97.4] %" for a share, "-" where it is not defined."""
+def figure_text(metric: ClosedLoopMetric | RecoverySeconds, figure: Mapping[str, float | None]) -> str:
+    """Returns a figure with its interval: "95.0 [92.1, 97.4] %" for a share, "-" if it is undefined."""
     mean, low, high = figure["mean"], figure["low"], figure["high"]
     if mean is None:
         return "-"

@@ -7,15 +7,15 @@ from dorothie_gym.ontology import ExceptionKind
 from dorothie_gym.rollout.closed_loop import (
     METRICS,
     DrivingScore,
-    Interval,
     MetException,
+    MetricInterval,
     RecoverySeconds,
     Seconds,
     Success,
     figures_of,
     interval_of,
 )
-from dorothie_gym.rollout.closed_loop.intervals import _weighted_medians
+from dorothie_gym.rollout.closed_loop.metrics import _weighted_medians
 from tests.rollout.closed_loop.drives import record
 
 
@@ -41,11 +41,11 @@ def test_errored_sessions_count_as_the_worst_and_not_at_all_in_time() -> None:
 
 def test_all_errored_is_no_success() -> None:
     figures = figures_of([], errored=3)
-    assert figures["success"].mean == 0.0 and figures["seconds"] == Interval(mean=None)
+    assert figures["success"].mean == 0.0 and figures["seconds"] == MetricInterval(mean=None)
 
 
 def test_one_session_has_no_interval() -> None:
-    assert interval_of(Seconds(), [record(seconds=4.0)]) == Interval(mean=4.0)
+    assert interval_of(Seconds(), [record(seconds=4.0)]) == MetricInterval(mean=4.0)
 
 
 def test_every_metric_has_a_figure() -> None:
@@ -57,7 +57,7 @@ def test_median_is_over_exceptions_and_drawn_by_session() -> None:
         return tuple(MetException(kind=ExceptionKind.WEATHER, met=1.0, seconds=each) for each in seconds)
 
     found = figures_of([record(exceptions=recovered(1.0, 2.0, 9.0)), record(exceptions=recovered(4.0))])
-    assert found["recovery_seconds"] == Interval(mean=3.0, low=2.0, high=4.0)  # of the one, of both, of the other
+    assert found["recovery_seconds"] == MetricInterval(mean=3.0, low=2.0, high=4.0)  # of the one, of both, of the other
 
 
 def test_weighted_medians_are_those_of_the_values_written_out() -> None:

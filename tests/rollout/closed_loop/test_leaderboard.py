@@ -56,10 +56,10 @@ def test_who_hears_badly_has_a_row_of_its_own(tmp_path: Path) -> None:
 def test_two_results_of_one_row_and_none_at_all_are_told(tmp_path: Path) -> None:
     write(tmp_path / "a", "scripted", 4)
     write(tmp_path / "b", "scripted", 3)
-    with pytest.raises(RolloutError, match=r"b: scripted in unseen towns is in .*a, too"):
+    with pytest.raises(RolloutError, match=r"b: scripted in unseen towns is also in .*a; give one"):
         read_entries([tmp_path])
     (tmp_path / "empty").mkdir()
-    with pytest.raises(RolloutError, match=r"empty: holds no rollout.json"):
+    with pytest.raises(RolloutError, match=r"empty: has no rollout.json"):
         read_entries([tmp_path / "empty"])
 
 
@@ -71,4 +71,4 @@ def test_command_writes_page_and_picture(tmp_path: Path) -> None:
     assert page.read_text().startswith("# Leaderboard")
     assert (tmp_path / "leaderboard.png").read_bytes().startswith(b"\x89PNG")
     done = CliRunner().invoke(app, ["leaderboard", str(tmp_path), "--out", str(page)])
-    assert done.exit_code == 2 and "holds no rollout.json" in done.stderr
+    assert done.exit_code == 2 and "has no rollout.json" in done.stderr

@@ -55,7 +55,7 @@ def test_result_survives_its_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [('{"version": ', "is no JSON"), ("[]", "is no result"), ('{"version": "1.0"}', "KeyError: 'settings'"),
+    [('{"version": ', "is not valid JSON"), ("[]", "is not the result"), ('{"version": "1.0"}', "KeyError: 'settings'"),
      ('{"version": "2.0"}', "is of version 2.0")],
 )  # fmt: skip
 def test_other_files_are_told(tmp_path: Path, text: str, message: str) -> None:
