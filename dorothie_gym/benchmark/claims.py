@@ -1,4 +1,4 @@
-"""Which of the paper's findings appear in a table, and what beats what: claims about paired differences over seeds."""
+"""Findings of the paper and comparisons of models, tested by paired differences over seeds."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ TUNED: Final = "Fine-tuned BERT Only"
 OTHER_ABLATIONS: Final = (
     "TOTO (- GT Transcript)", "TOTO (- Object Detection)", "TOTO (- Vision History)", NO_SPEECH, NO_MAP,
 )  # fmt: skip
-"""What else is taken away from TOTO, one at a time."""
+"""The other ablations of TOTO."""
 
 MOVES: Final = ("ufn_move_accuracy", "rfn_move_accuracy")
 ACTIONS: Final = ("nfd_action_accuracy", "nfd_joint_accuracy")
 
 MARGIN: Final = 0.05
-"""Less than this is hardly anything: the paper's own intervals are up to about so wide (share)."""
+"""Smallest difference that matters; about the largest width of the intervals in the paper (share)."""
 
 Estimates: TypeAlias = Callable[[str, str, str], Estimate]
-"""Figure of a model, a part of the corpus and a metric."""
+"""Returns the estimate of a model, a part of the corpus and a metric."""
 
 
 class ModelVerdict(StrEnum):
-    """How a claim comes out."""
+    """Outcome of a claim."""
 
     HOLDS = "holds"
     UNDECIDED = "undecided"
@@ -41,13 +41,13 @@ class ModelVerdict(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class ModelClaim:
-    """A difference between two models in one figure, and what the paper has it be.
+    """Claim about the difference of two models in one metric.
 
     Attributes:
         metric: key of the metric.
-        higher, lower: the models; the difference is the first minus the second, seed by seed.
-        difference: the difference.
-        expected: "positive", or "hardly any" where next to nothing should be gained.
+        higher, lower: names of the models.
+        difference: first model minus second, paired over seeds.
+        expected: "positive", or "hardly any" for a difference below `MARGIN`.
     """
 
     metric: str
@@ -58,10 +58,10 @@ class ModelClaim:
 
     @property
     def verdict(self) -> ModelVerdict:
-        """Whether the 95 % interval of the difference lies where it is expected.
+        """Outcome by the 95 % interval of the difference.
 
-        "positive" holds if all of it is above 0, and fails if all is below. "hardly any" holds if all of it is below
-        `MARGIN`, and fails if all is above 0. Else it is undecided, as it is with less than two seeds.
+        "positive" holds if the interval lies above 0, and fails if it lies below. "hardly any" holds if the interval
+        lies below `MARGIN`, and fails if it lies above 0. Otherwise, or with fewer than two seeds, it is undecided.
         """
         mean, half = self.difference.mean, self.difference.half_width
         if mean is None:
@@ -89,13 +89,13 @@ class ModelClaim:
 
 @dataclass(frozen=True, kw_only=True)
 class ModelFinding:
-    """A finding on one part of the corpus: the paper's, or that one model is above another.
+    """Finding on one part of the corpus: one of the paper, or that one model is better than another.
 
     Attributes:
-        statement: the finding.
+        statement: the finding in words.
         part: part of the corpus.
-        claims: what it says of figures.
-        note: what has to be kept in mind with it.
+        claims: claims that it consists of.
+        note: remark on its interpretation.
     """
 
     statement: str
@@ -105,7 +105,7 @@ class ModelFinding:
 
     @property
     def verdict(self) -> ModelVerdict:
-        """The worst of its claims: it fails where one fails, and holds where all hold."""
+        """Worst outcome of the claims: the finding fails if one fails, and holds if all hold."""
         found = {claim.verdict for claim in self.claims}
         order = (ModelVerdict.UNTESTED, ModelVerdict.FAILS, ModelVerdict.UNDECIDED)
         return next((verdict for verdict in order if verdict in found), ModelVerdict.HOLDS)
@@ -125,7 +125,7 @@ def findings(estimate: Estimates, part: str) -> tuple[ModelFinding, ...]:
     """Returns the paper's findings on one part of the corpus (section 6, ablation on input modalities).
 
     Args:
-        estimate: figure of a model, a part and a metric over seeds; without any seed where there is none.
+        estimate: estimate of a model, a part and a metric over seeds; without seeds if the model was not run.
         part: part of the corpus.
     """
 
@@ -164,14 +164,14 @@ def findings(estimate: Estimates, part: str) -> tuple[ModelFinding, ...]:
 
 
 def above(estimate: Estimates, part: str, higher: str, lower: str, metrics: Sequence[str] = COLUMNS) -> ModelFinding:
-    """Returns whether one model is above another in every one of some figures.
+    """Returns the finding that one model is better than another in every given metric.
 
     Args:
         estimate: as in `findings`.
         part: part of the corpus.
-        higher: the one.
-        lower: the other; to be paired they need the same seeds, also where a seed changes nothing.
-        metrics: keys of the figures.
+        higher: name of the better model.
+        lower: name of the other; both need the same seeds to be paired, even if a seed changes nothing.
+        metrics: keys of the metrics.
     """
     claims = tuple(_claim(estimate, part, metric, (higher, lower), "positive") for metric in metrics)
     return ModelFinding(statement=f"{higher} is above {lower}", part=part, claims=claims)
@@ -186,7 +186,7 @@ def _claim(
 
 
 def _lowest(estimate: Estimates, part: str, metric: str, models: Sequence[str]) -> str | None:
-    """The model with the lowest mean of a figure, None where none has it."""
+    """Returns the model with the lowest mean of a metric; None if no model has the metric."""
     means = {model: estimate(model, part, metric).mean for model in models}
     known = {model: mean for model, mean in means.items() if mean is not None}
     return min(known, key=known.__getitem__) if known else None

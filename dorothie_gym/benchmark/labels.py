@@ -1,6 +1,6 @@
-"""The labels of a corpus: what is right at every point, which part of the corpus it lies in, what is no point and why.
+"""Labels of a corpus: the correct answer at every point, its part of the corpus, and unscored events with reasons.
 
-A *part* is what figures are given for: "seen" and "unseen" (towns), or "all" where the sessions are not told apart so.
+Scores are given for each *part*: "seen" and "unseen" (towns), or "all" where sessions are not divided by town.
 """
 
 from __future__ import annotations
@@ -44,24 +44,24 @@ SEEN: Final = "seen"
 UNSEEN: Final = "unseen"
 ALL: Final = "all"
 PARTS: Final = (SEEN, UNSEEN, ALL)
-"""In the order in which they are shown."""
+"""Parts in display order."""
 
 NO_ANGLE: Final = "the recording does not know its angle: only the action is scored"
-"""Why a point of NfD is not scored wholly."""
+"""Reason why a point of NfD is scored in part only."""
 
 HALVES: Final = "the first half of the sessions by name trains, the second half tests"
-"""How sessions are divided that lie in no folds."""
+"""Division of a corpus without folds, in words."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Unscored:
-    """A flagged event that is not scored, or not wholly.
+    """Flagged event that is not scored, or scored in part only.
 
     Attributes:
         session: name of the session.
-        event: number of its event.
-        task: the task that it would be a point of; None where it is a point of none.
-        reason: why.
+        event: number of the event.
+        task: task of the point; None if the event is a point of no task.
+        reason: reason in words.
     """
 
     session: str
@@ -77,14 +77,14 @@ class Unscored:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TaskLabels:
-    """The labels of n points of one task, by session and event.
+    """Labels of n points of one task, by session and event.
 
     Attributes:
         task: the task.
         sessions: (n,) names of the sessions.
         events: (n,) numbers of the events, counted from 0 within the session.
         parts: (n,) part of the corpus.
-        handled: (n,) what the exchange of the point handles, values of `Handled`.
+        handled: (n,) kind of exception that the exchange of the point handles, values of `Handled`.
         labels: the labels in the form of a prediction.
     """
 
@@ -106,13 +106,13 @@ class TaskLabels:
 
 @dataclass(kw_only=True)
 class FoldCount:
-    """The points of one fold.
+    """Counts of one fold.
 
     Attributes:
-        sessions: sessions that could be read.
-        flagged: flagged events.
-        points: points of each task.
-        skipped: flagged events that are a point of no task.
+        sessions: number of readable sessions.
+        flagged: number of flagged events.
+        points: number of points of each task.
+        skipped: number of flagged events that are points of no task.
     """
 
     sessions: int = 0
@@ -128,19 +128,19 @@ class FoldCount:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CorpusLabels:
-    """The labels of the sessions that were chosen, and how many points the whole corpus has.
+    """Labels of the chosen sessions, and counts of the whole corpus.
 
     Attributes:
         root: folder of the corpus.
-        split: what was chosen.
-        division: how it was chosen, in words.
-        tasks: the labels of each task.
-        part_of: part of each session chosen, by name.
-        others: names of the sessions that were not chosen.
-        incomplete: sessions chosen that were cut off; they are used as far as they go.
-        counts: points of each fold of the whole corpus, by name of the fold.
-        skipped: flagged events of the sessions chosen that are not scored, or not wholly.
-        unreadable: reason for each session of the whole corpus that cannot be read, by name.
+        split: chosen split.
+        division: rule of the division, in words.
+        tasks: labels of each task.
+        part_of: part of each chosen session, by name.
+        others: names of the sessions outside the split.
+        incomplete: chosen sessions that were interrupted; their recorded points are used.
+        counts: counts of each fold of the whole corpus, by name of the fold.
+        skipped: flagged events of the chosen sessions that are unscored or scored in part.
+        unreadable: reason for each unreadable session of the whole corpus, by name.
     """
 
     root: Path
@@ -156,7 +156,7 @@ class CorpusLabels:
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """The parts that there are, in the order in which they are shown."""
+        """Parts of the chosen sessions, in display order."""
         there = set(self.part_of.values())
         return tuple(part for part in PARTS if part in there)
 
@@ -165,13 +165,13 @@ def labels_of(corpus: Corpus | Path | str, split: Split = "test") -> CorpusLabel
     """Reads the labels of a corpus.
 
     Args:
-        corpus: the corpus or its folder, of any layout.
-        split: "train", "val", "test" or "all": the sessions in folds of that name; where no session lies in a fold,
-            the first half by name is "train" and the second "test".
+        corpus: corpus or its folder, of any layout.
+        split: "train", "val", "test" or "all": the sessions in folds of that name; without folds, the first half by
+            name is "train" and the second "test".
 
     Raises:
-        SessionError: there is no session to be read, two have one name, or there is none in the split; the message
-            says which splits there are.
+        SessionError: no session can be read, two sessions have the same name, or the split is empty; the message
+            names the splits of the corpus.
     """
     if not isinstance(corpus, Corpus):
         corpus = Corpus.load(corpus)
@@ -198,7 +198,7 @@ def labels_of(corpus: Corpus | Path | str, split: Split = "test") -> CorpusLabel
 
 
 class _Reader:
-    """Gathers the labels, one session at a time."""
+    """Collects the labels, session by session."""
 
     def __init__(self, part_of: Mapping[str, str]) -> None:
         self._part_of = part_of
@@ -280,7 +280,7 @@ def _check_names(corpus: Corpus) -> None:
 
 
 def _divide(corpus: Corpus, split: Split) -> tuple[dict[str, str], str]:
-    """Part of each session of the split by its name, and how the corpus was divided."""
+    """Returns the part of each session of the split by name, and the rule of the division."""
     if split not in SPLITS:
         raise SessionError(f"split: {split!r} is unknown; choose from {', '.join(SPLITS)}")
     if split == ALL:

@@ -24,24 +24,24 @@ PredictionsT = TypeVar("PredictionsT", ActPredictions, ActionPredictions)
 
 
 class Metric(ABC, Generic[PredictionsT, PointT]):
-    """One number for the predictions at some points.
+    """Metric of the predictions at some points.
 
     Attributes:
-        name: how tables call it.
+        name: name of the metric in tables.
     """
 
     name: ClassVar[str]
 
     @abstractmethod
     def compute(self, predicted: PredictionsT, points: Sequence[PointT] | PredictionsT) -> float:
-        """Returns a number in [0, 1], or NaN where it is undefined.
+        """Returns a number in [0, 1], or NaN if undefined.
 
         Args:
-            predicted: what a model says of the points.
+            predicted: predictions of a model for the points.
             points: the points, or their labels in the form of a prediction (`act_labels`, `action_labels`).
 
         Raises:
-            ValueError: there are not as many predictions as points.
+            ValueError: the numbers of predictions and points differ.
         """
 
 
@@ -189,7 +189,7 @@ def wrap_degrees(angles: NDArray[np.float64]) -> NDArray[np.float64]:
 def _angles(
     predicted: ActionPredictions, points: Sequence[DecisionPoint] | ActionPredictions, tolerance: float, wrap: bool
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which angles are known (n,), and which of them are right (n,)."""
+    """Returns the masks of known angles (n,) and of correct angles (n,)."""
     error = predicted.angles - action_labels(points).angles
     error = wrap_degrees(error) if wrap else error
     return ~np.isnan(error), np.abs(error) < tolerance
@@ -200,7 +200,7 @@ def _slot_types(slots: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _f1(hits: int, wrong: int) -> float:
-    """F1 from the pairs that are right and those missed or made up."""
+    """Returns F1 from the number of correct pairs and of missing or superfluous pairs."""
     return 2 * hits / (2 * hits + wrong) if hits + wrong else math.nan
 
 
@@ -213,10 +213,10 @@ def _check_lengths(predicted: Predictions, points: Sequence[object] | Prediction
         raise ValueError(f"there are {len(predicted)} predictions for {len(points)} points; give one for each")
 
 
-# --- Which metrics each task has, under which keys, and which of them are the columns of the paper's tabl ------------
+# --- tasks and columns -----------------------------------------------------------------------------------------------
 
 PAPER_SUFFIX: Final = "_paper"
-"""Ends the key of a metric that is computed as the paper's code does it."""
+"""Ending of the key of a metric that follows the protocol of the paper's code."""
 
 ACT_METRICS: Final[Mapping[str, ActMetric]] = MappingProxyType(
     {
@@ -228,7 +228,7 @@ ACT_METRICS: Final[Mapping[str, ActMetric]] = MappingProxyType(
         "slot_f1_paper": SlotScorePaper(),
     }
 )
-"""Metrics of UfN and RfN. The paper's protocol takes moves as we do; its slot score is no F1."""
+"""Metrics of UfN and RfN. The paper's protocol for moves is the same; its slot score is not F1."""
 
 ACTION_METRICS: Final[Mapping[str, ActionMetric]] = MappingProxyType(
     {
@@ -240,7 +240,7 @@ ACTION_METRICS: Final[Mapping[str, ActionMetric]] = MappingProxyType(
         "joint_accuracy_paper": JointAccuracyPaper(),
     }
 )
-"""Metrics of NfD. The paper's protocol takes actions as we do."""
+"""Metrics of NfD. The paper's protocol for actions is the same."""
 
 COLUMNS: Final = (
     "ufn_move_accuracy", "ufn_slot_f1", "rfn_move_accuracy", "rfn_slot_f1", "nfd_action_accuracy", "nfd_joint_accuracy",
@@ -251,10 +251,10 @@ SHOWN: Final = (
     "ufn_move_accuracy", "ufn_slot_f1", "ufn_slot_f1_paper", "rfn_move_accuracy", "rfn_slot_f1", "rfn_slot_f1_paper",
     "nfd_action_accuracy", "nfd_joint_accuracy", "nfd_joint_accuracy_paper",
 )  # fmt: skip
-"""The columns of our table: the paper's, and beside those that it computes otherwise its own protocol."""
+"""Columns of the results table: those of the paper, and its own protocol where that differs."""
 
 TASK_NAMES: Final[Mapping[Task, str]] = MappingProxyType({Task.UFN: "UfN", Task.RFN: "RfN", Task.NFD: "NfD"})
-"""How the paper writes the tasks."""
+"""Names of the tasks in the paper."""
 
 
 def metrics_of(task: Task) -> Mapping[str, Metric[Any, Any]]:
@@ -268,7 +268,7 @@ def keys_of(task: Task) -> tuple[str, ...]:
 
 
 def title_of(key: str) -> str:
-    """Returns what people call the metric of a key with the task's name: "UfN slot F1 (macro)"."""
+    """Returns the title of the metric of a key with the task's name: "UfN slot F1 (macro)"."""
     return f"{task_of(key)} {metric_title(key.partition('_')[2])}"
 
 
@@ -278,7 +278,7 @@ def task_of(key: str) -> str:
 
 
 def metric_title(name: str) -> str:
-    """Returns what people call the metric of a key without the task's name: "slot F1 (macro)"."""
+    """Returns the title of the metric of a key without the task's name: "slot F1 (macro)"."""
     base = name.removesuffix(PAPER_SUFFIX)
     words = _SHORT.get(base) or base.replace("_", " ")
     return f"{words} (paper)" if name.endswith(PAPER_SUFFIX) else words

@@ -1,4 +1,4 @@
-"""The paper's figures, to stand beside ours."""
+"""Results of the paper, shown beside those of this package."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _FILE: Final = "data/paper_results.json"
 
 @dataclass(frozen=True, kw_only=True)
 class PaperFigure:
-    """A figure of the paper and half the width of its interval, shares in [0, 1]."""
+    """Result of the paper and half the width of its interval, as shares in [0, 1]."""
 
     mean: float
     half_width: float
@@ -41,13 +41,13 @@ def paper_figures() -> Mapping[str, Mapping[str, Mapping[str, PaperFigure]]]:
 
 
 def paper_source() -> str:
-    """Returns where the paper's figures are from."""
+    """Returns the source of the results of the paper."""
     page = json.loads(files("dorothie_gym.benchmark").joinpath(_FILE).read_text(encoding="utf-8"))
     return str(page["source"])
 
 
 def paper_figure(model: str, part: str, key: str) -> PaperFigure | None:
-    """Returns the paper's figure of a model, None where it has none.
+    """Returns the result of the paper for a model, or None.
 
     Args:
         model: name of the model, in any case.
@@ -58,6 +58,6 @@ def paper_figure(model: str, part: str, key: str) -> PaperFigure | None:
 
 
 def paper_name(model: str) -> str | None:
-    """Returns how the paper writes the name of a model, whatever its case here; None where it has no such model."""
+    """Returns the spelling of a model's name in the paper, ignoring case; None if the paper has no such model."""
     names = {name.casefold(): name for name in paper_figures()}
     return names.get(model.casefold())

@@ -1,4 +1,4 @@
-"""Reading `predictions.parquet` of whoever wrote it, with one clear message for every row that is wrong."""
+"""Reader of `predictions.parquet`, with a message for every invalid row."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 SHOWN: Final = 5
-"""So many wrong rows are named; of the others there is the number."""
+"""Number of invalid rows that a message names; the others are counted."""
 
 _PAGE: Final = "see docs/predictions.md"
 _REQUIRED: Final = {"version": "int", "model": "str", "seed": "int", "task": "str", "session": "str", "event": "int"}
@@ -38,7 +38,7 @@ _ANSWERS: Final = {"move": "str", "action": "str", "angle": "float", "skipped": 
 _WANTED: Final = {"int": "whole numbers", "str": "texts", "float": "numbers"}
 
 _LAST_EVENT: Final = 2**31
-"""No session has more events."""
+"""Upper bound of event numbers."""
 
 _MOVES: Final = {move.label: int(move) for move in DialogueMove}
 _ACTIONS: Final = {action.label: action.nfd_class for action in NAVIGATION_ACTIONS}
@@ -48,13 +48,13 @@ _PLACES: Final = {text: place for place, text in enumerate(SLOT_TEXTS)}
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """A file's columns as lists of Python values."""
+    """Columns of a file as lists of Python values."""
 
     source: str
     columns: Mapping[str, Sequence[Any]]
 
     def name(self, row: int) -> str:
-        """What a message calls a row."""
+        """Returns the name of a row in messages."""
         values = self.columns
         return f"row {row} (session {values['session'][row]}, event {values['event'][row]}, {values['task'][row]})"
 
@@ -63,7 +63,7 @@ def read_predictions(*paths: Path | str) -> tuple[TaskPredictions, ...]:
     """Reads files of predictions; several may hold several seeds or tasks of one model.
 
     Returns:
-        One for each model, seed and task, in the order in which they come up; models before seeds before tasks.
+        Predictions of each model, seed and task; models in order of appearance, then seeds, then tasks.
 
     Raises:
         PredictionError: a file is no parquet file, lacks a column, a column has another type, a value is none of the
@@ -80,17 +80,19 @@ def read_predictions(*paths: Path | str) -> tuple[TaskPredictions, ...]:
 
 
 def read_about(path: Path | str) -> dict[str, Any]:
-    """Returns what a file tells of how its predictions were made; empty where it tells nothing.
+    """Returns the provenance in the metadata of a file; empty if there is none.
 
     Raises:
-        PredictionError: it is no parquet file, or what it tells is no JSON.
+        PredictionError: the file is no Parquet file, or its metadata is not valid JSON.
         OSError: it cannot be read.
     """
     told = (_open(Path(path)).schema.metadata or {}).get(ABOUT)
     try:
         value = {} if told is None else json.loads(told)
     except ValueError as error:
-        raise PredictionError(f"{path}: {ABOUT.decode()} in its metadata is no JSON ({error}); {_PAGE}") from None
+        raise PredictionError(
+            f"{path}: {ABOUT.decode()} in its metadata is not valid JSON ({error}); {_PAGE}"
+        ) from None
     return value if isinstance(value, dict) else {"about": value}
 
 
@@ -165,7 +167,7 @@ def _is_slots(kind: pa.DataType) -> bool:
 
 
 def _check_required(rows: _Rows) -> None:
-    """Checks the columns that say which point a row is of."""
+    """Checks the columns that identify the point of a row."""
     tasks = {task.value for task in Task}
     wrong = []
     for row in range(len(rows.columns["version"])):
@@ -266,7 +268,7 @@ def _actions(rows: _Rows, members: Sequence[int]) -> ActionPredictions:
 
 
 def _merged(pieces: Sequence[TaskPredictions]) -> TaskPredictions:
-    """Puts together what several files say of one model, seed and task."""
+    """Joins the predictions of several files for one model, seed and task."""
     if len(pieces) == 1:
         return pieces[0]
     first: dict[tuple[str, int], str] = {}
@@ -299,7 +301,7 @@ def _together(pieces: Sequence[Predictions]) -> Predictions:
 
 
 def _refuse(source: str, wrong: Sequence[str]) -> None:
-    """Raises what is wrong with a file, if anything is."""
+    """Raises `PredictionError` with the faults of a file, if any."""
     if wrong:
         more = [f"... and {len(wrong) - SHOWN} more rows"] if len(wrong) > SHOWN else []
         raise PredictionError("\n".join([f"{source}: {wrong[0]}", *wrong[1:SHOWN], *more]))

@@ -1,4 +1,4 @@
-"""What a model predicts for a list of points, as arrays."""
+"""Predictions of a model for a list of points, as arrays and as a Parquet file."""
 
 from __future__ import annotations
 
@@ -124,28 +124,28 @@ def _check_classes(name: str, classes: NDArray[np.int64], count: int) -> None:
         raise ValueError(f"{name} must be one row of classes in 0..{count - 1}, got shape {classes.shape}")
 
 
-# --- `predictions.parquet`: what any model, in any language, says of the points of a corpus (docs/predict ------------
+# --- file ------------------------------------------------------------------------------------------------------------
 
 VERSION: Final = 1
-"""Version of the columns, which every row states."""
+"""Version of the columns, stated in every row."""
 
 ABOUT: Final = b"dorothie_gym.about"
-"""Key of the file's metadata under which a JSON object may tell how the predictions were made."""
+"""Key of the metadata of the file; its value is a JSON object with the provenance of the predictions."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TaskPredictions:
-    """What one model, trained with one seed, says of the points of one task.
+    """Predictions of one model, trained with one seed, for the points of one task.
 
     Attributes:
         model: name of the model, as the table shows it.
-        seed: seed that it was trained with.
+        seed: seed of the training.
         task: the task.
         sessions: (n,) names of the sessions.
         events: (n,) numbers of the points' events within their sessions.
         predicted: the predictions (n).
         left_out: reason for each point that the model cannot predict, by session and event.
-        source: where they are from, for messages.
+        source: origin of the predictions, for messages.
     """
 
     model: str
@@ -169,12 +169,12 @@ class TaskPredictions:
 
 
 def slot_text(value: SlotValue) -> str:
-    """Returns how a slot value is written in a file: "Landmark=KFC"."""
+    """Returns the text of a slot value in a file: "Landmark=KFC"."""
     return f"{value.slot.label}={value.label}"
 
 
 SLOT_TEXTS: Final = tuple(slot_text(value) for value in LABELS)
-"""How each of the 69 labels is written in a file, in the order of `LABELS`."""
+"""Text of each of the 69 labels in a file, in the order of `LABELS`."""
 
 
 def file_schema() -> pa.Schema:
@@ -201,12 +201,12 @@ def file_schema() -> pa.Schema:
 def write_predictions(
     path: Path | str, predictions: Iterable[TaskPredictions], *, about: Mapping[str, Any] | None = None
 ) -> Path:
-    """Writes a file of predictions, which appears when it is whole; an older one is replaced.
+    """Writes a file of predictions in one step; an older file is replaced.
 
     Args:
         path: the file.
-        predictions: of as many models, seeds and tasks as you like.
-        about: how they were made (encoder, configuration, hash of the corpus, ...), JSON types; kept as metadata.
+        predictions: predictions of any models, seeds and tasks.
+        about: provenance (encoder, configuration, hash of the corpus, ...) in JSON types; stored as metadata.
 
     Returns:
         Its path.

@@ -1,4 +1,4 @@
-"""Predictions against labels: every metric of one model and seed, by part of the corpus and by what is handled."""
+"""Scores of predictions: every metric of one model and seed, by part of the corpus and by handled exception."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from dorothie_gym.ontology import NAVIGATION_ACTIONS, DialogueMove
 from dorothie_gym.recording import Task
 
 NEAREST: Final = 3
-"""So many points are named that may have been meant."""
+"""Number of nearby points that a message names."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scores:
-    """What some points come to.
+    """Scores of some points.
 
     Attributes:
-        points: points scored of each task that was predicted.
-        metrics: every metric by its key (`ufn_move_accuracy`, ...), NaN where it is undefined.
+        points: number of scored points of each predicted task.
+        metrics: every metric by key (`ufn_move_accuracy`, ...); NaN if undefined.
         confusion: (classes, classes) counts of each task predicted; rows are labels, columns predictions.
     """
 
@@ -38,15 +38,15 @@ class Scores:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RunScore:
-    """One model, trained with one seed.
+    """Scores of one model, trained with one seed.
 
     Attributes:
         model: name of the model.
-        seed: its seed.
+        seed: seed of the training.
         parts: scores of each part of the corpus, and of `ALL`.
-        handled: scores by part and by what the point's exchange handles.
-        left_out: points that the model did not predict, with its reasons.
-        ignored: rows of sessions that are not in the split.
+        handled: scores by part and by the exception that the exchange of the point handles.
+        left_out: points without prediction, with reasons.
+        ignored: number of rows of sessions outside the split.
     """
 
     model: str
@@ -63,7 +63,7 @@ def class_labels(task: Task) -> tuple[str, ...]:
 
 
 def score_runs(labels: CorpusLabels, predictions: Iterable[TaskPredictions]) -> tuple[RunScore, ...]:
-    """Scores predictions, each model and seed apart.
+    """Scores predictions, separately for each model and seed.
 
     Raises:
         PredictionError: a session is unknown, an event is no point of the task, a point of the split has no row or
@@ -80,7 +80,7 @@ def score_runs(labels: CorpusLabels, predictions: Iterable[TaskPredictions]) -> 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Aligned:
-    """The predictions of one task, in the order of the labels.
+    """Predictions of one task, in the order of the labels.
 
     Attributes:
         labels: the labels of the points predicted (n), in the form of a prediction.
@@ -133,7 +133,7 @@ def _where(given: TaskPredictions) -> str:
 
 
 def _check_other(labels: CorpusLabels, truth: TaskLabels, given: TaskPredictions, key: tuple[str, int]) -> None:
-    """Does nothing for a row of a session that is not in the split; raises where it is of no session or no point."""
+    """Accepts a row of a session outside the split; raises if the session or the point does not exist."""
     session, event = key
     where = f"{_where(given)}, session {session}"
     if session in labels.others or session in labels.unreadable:
@@ -191,7 +191,7 @@ def _scores(pieces: Sequence[_Aligned], part: str, kind: Handled | None = None) 
 
 
 def score_task(task: Task, predicted: Any, labels: Any) -> dict[str, float]:
-    """Returns every metric of a task by its key with the task's name; NaN where it is undefined.
+    """Returns every metric of a task by its key with the task's name; NaN if undefined.
 
     Args:
         task: the task.

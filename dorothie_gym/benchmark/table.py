@@ -1,4 +1,4 @@
-"""The table of the benchmark: every model on every metric, over seeds, by part of the corpus."""
+"""Results table of the benchmark: every model and metric over seeds, by part of the corpus."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ class ResultsTable:
     """Scores of models over seeds.
 
     Attributes:
-        labels: what they were scored against.
-        runs: the scores of each model and seed.
-        missing: why a model could not be run ("no audio"), by its name; it keeps its row.
-        about: how the predictions were made (encoders, configuration, hashes), by model or file, JSON types.
+        labels: labels of the corpus.
+        runs: scores of each model and seed.
+        missing: reason why a model could not be run ("no audio"), by name; it keeps its row.
+        about: provenance of the predictions (encoders, configuration, hashes), by model or file, in JSON types.
     """
 
     labels: CorpusLabels
@@ -43,7 +43,7 @@ class ResultsTable:
 
     @property
     def models(self) -> tuple[str, ...]:
-        """Names of the models: those of the paper in its order, then the others as they came."""
+        """Names of the models: those of the paper in its order, then the others in order of arrival."""
         names = dict.fromkeys([*(run.model for run in self.runs), *self.missing])
         order = list(paper_figures())
         known = sorted(
@@ -53,12 +53,12 @@ class ResultsTable:
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """The parts of the corpus that figures are given for."""
+        """Parts of the corpus with scores."""
         return self.labels.parts
 
     @property
     def tasks(self) -> tuple[Task, ...]:
-        """The tasks that any model predicted."""
+        """Tasks that at least one model predicted."""
         return tuple(task for task in Task if any(task in run.parts[ALL].points for run in self.runs))
 
     def runs_of(self, model: str) -> tuple[RunScore, ...]:

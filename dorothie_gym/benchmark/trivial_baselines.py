@@ -1,4 +1,4 @@
-"""The two simplest models, which see nothing of a point: what any other must beat."""
+"""Trivial baselines, which ignore the input: majority and random."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from dorothie_gym.recording import DecisionPoint, InferencePoint, Task
 
 
 class FloorModel(ABC):
-    """A model that keeps the labels it was shown, and predicts from nothing else."""
+    """Model that predicts from the labels of its training points only."""
 
     def __init__(self) -> None:
         self._acts: ActPredictions | None = None
@@ -52,19 +52,19 @@ class FloorModel(ABC):
 
     def _known_acts(self) -> ActPredictions:
         if self._acts is None:
-            raise ValueError("the model has learnt no dialogue acts: call fit_acts first")
+            raise ValueError("the model is not fitted to dialogue acts: call fit_acts first")
         return self._acts
 
     def _known_actions(self) -> ActionPredictions:
         if self._actions is None:
-            raise ValueError("the model has learnt no navigation actions: call fit_actions first")
+            raise ValueError("the model is not fitted to navigation actions: call fit_actions first")
         return self._actions
 
 
 class MajorityModel(FloorModel):
-    """Always the commonest: move, action, the action's commonest whole angle; slots that over half the points have.
+    """Predicts the most frequent move, action and integer angle of that action, and slots of more than half the points.
 
-    Among equally common ones, the one with the smallest id (angle) is taken. Unknown angles do not count.
+    Ties are broken by the smallest id (angle). Unknown angles are left out.
     """
 
     def predict_acts(self, count: int) -> ActPredictions:
@@ -88,7 +88,7 @@ class MajorityModel(FloorModel):
 
 
 class RandomModel(FloorModel):
-    """For each point the label of a point drawn at random from those it learnt from: chance at the true frequencies.
+    """Predicts for each point the label of a random training point: chance at the true frequencies.
 
     An unknown angle is predicted as 0.
 
@@ -119,23 +119,23 @@ class RandomModel(FloorModel):
 FLOORS: Final[Mapping[str, Callable[[int], FloorModel]]] = MappingProxyType(
     {"majority": lambda seed: MajorityModel(), "random": RandomModel}
 )
-"""How to make each from a seed."""
+"""Constructor of each trivial baseline from a seed."""
 
 
 def make_floor(name: str, seed: int = 0) -> FloorModel:
-    """Returns a new model; raises `ValueError` naming the known ones when there is none of that name."""
+    """Returns a new model; raises `ValueError` with the known names if the name is unknown."""
     if name not in FLOORS:
         raise ValueError(f"model {name!r} is unknown; choose one of {', '.join(FLOORS)}")
     return FLOORS[name](seed)
 
 
 def predict_floor(name: str, train: CorpusLabels, test: CorpusLabels, seed: int = 0) -> tuple[TaskPredictions, ...]:
-    """Returns what a floor that learnt from some labels predicts for the points of others, task by task.
+    """Returns the predictions of a trivial baseline for each task, fitted on other labels.
 
-    A task without anything to learn from has every point left out, with that reason.
+    A task without training points has every point left out, with that reason.
 
     Raises:
-        ValueError: there is no floor of that name.
+        ValueError: the name is unknown.
     """
     return tuple(_predict(make_floor(name, seed), name, seed, train.tasks[task], test.tasks[task]) for task in Task)
 

@@ -1,4 +1,4 @@
-"""What a model is given: a corpus as columns, its points, and batches of what may be seen at them."""
+"""Model inputs: a corpus as columns, its points, and batches of the data visible at points."""
 
 from dorothie_gym.benchmark.features.batch import HISTORY, Batch, BatchSpec, HistorySizes, gather
 from dorothie_gym.benchmark.features.building import build, columns_of

@@ -1,4 +1,4 @@
-"""Some points with all that may be seen there, as arrays of fixed shape."""
+"""Batches of points with the data visible at them, as arrays of fixed shape."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from dorothie_gym.recording.trajectory import TENTHS
 
 @dataclass(frozen=True, kw_only=True)
 class HistorySizes:
-    """How much a model is given of what happened until now: the newest, or nearest, where there is more.
+    """Sizes of the history in a batch; of longer histories the newest (or nearest) entries are kept.
 
     Attributes:
         moves: dialogue moves (M).
-        utterances: what was said (U).
+        utterances: utterances (U).
         actions: physical actions (A).
-        window: tokens of the car's own way (W), `window_step` rows apart (paper, section 6: 100 frames, step 4).
+        window: tokens of the ego's trajectory (W), `window_step` rows apart (paper, section 6: 100 frames, step 4).
         window_step: rows (at 10 Hz) from a token to the next.
         window_objects: nearest objects at each token of the window (V).
         objects: nearest objects now (O).
@@ -46,18 +46,18 @@ class HistorySizes:
 
 
 HISTORY: Final = tuple(field.name for field in fields(HistorySizes))
-"""Names of these sizes."""
+"""Names of the sizes of a history."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BatchSpec(HistorySizes):
-    """How much of each thing is in a batch.
+    """Sizes of a batch.
 
     Attributes:
         landmarks: landmarks (K).
         streets: streets (R).
-        paper_leak: at UfN points the last of the moves is the point's own label, as in the published features. For
-            showing what that does; False for anything else.
+        paper_leak: whether the last move of a UfN point is the point's own label, as in the published features; only
+            to measure the effect of that leak.
 
     Raises:
         ValueError: a size is below 0, or `window_step` below 1; the message names the field.
@@ -82,9 +82,9 @@ def _check_size(sizes: HistorySizes, name: str, *, least: int) -> None:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Batch:
-    """B points. Sequences are oldest first, what is missing is at the end; `*_mask` is True where there is something.
+    """Batch of B points, without labels. Sequences are oldest first, with padding at the end; `*_mask` marks entries.
 
-    It holds no label. Filling is 0, -1 in ids of texts, lanes and streets. Times are seconds since the session began.
+    Padding is 0, or -1 in ids of texts, lanes and streets. Times are seconds since the session began.
 
     Attributes:
         session: (B,) index in `Columns.sessions`.
@@ -167,13 +167,13 @@ class Batch:
 
 
 def gather(columns: Columns, table: PointTable, rows: ArrayLike, spec: BatchSpec | None = None) -> Batch:
-    """Returns some points of a table with what may be seen there.
+    """Returns a batch of points of a table.
 
     Args:
         columns: the corpus.
         table: its points.
-        rows: (B,) which of them, in any order.
-        spec: sizes; the default's where None.
+        rows: (B,) rows of the table, in any order.
+        spec: sizes; the defaults if None.
     """
     spec = spec or BatchSpec()
     chosen = np.asarray(rows, dtype=np.int64).reshape(-1)
@@ -194,7 +194,7 @@ def gather(columns: Columns, table: PointTable, rows: ArrayLike, spec: BatchSpec
 
 
 def _newest(start: Ints, stop: Ints, size: int) -> tuple[NDArray[np.int64], Flags]:
-    """Rows (B, size) of the last `size` of `start:stop`, oldest first, and which places hold one; the others are 0."""
+    """Returns the last `size` rows of `start:stop` (B, size), oldest first and padded with 0, and their mask."""
     first = np.maximum(stop - size, start).astype(np.int64)
     rows = first[:, None] + np.arange(size)
     mask = rows < stop[:, None]
@@ -202,7 +202,7 @@ def _newest(start: Ints, stop: Ints, size: int) -> tuple[NDArray[np.int64], Flag
 
 
 def _take(column: NDArray[Any], rows: NDArray[np.int64], mask: Flags, filler: int = 0) -> NDArray[Any]:
-    """Values at rows, `filler` where the mask is False."""
+    """Returns the values at rows, and `filler` where the mask is False."""
     if not len(column):
         return np.full((*rows.shape, *column.shape[1:]), filler, dtype=column.dtype)
     values: NDArray[Any] = column[rows]
@@ -211,7 +211,7 @@ def _take(column: NDArray[Any], rows: NDArray[np.int64], mask: Flags, filler: in
 
 
 def _moves(columns: Columns, table: PointTable, chosen: NDArray[np.int64], spec: BatchSpec) -> dict[str, Any]:
-    """The history, then the earlier acts of the current utterance."""
+    """Returns the moves of the history, then the earlier moves of the current utterance."""
     start, stop = table.moves_start[chosen], table.moves_stop[chosen]
     spans, spans_stop = table.spans_start[chosen], table.spans_stop[chosen]
     if spec.paper_leak and table.task is Task.UFN:
@@ -258,7 +258,7 @@ def _actions(columns: Columns, table: PointTable, chosen: NDArray[np.int64], siz
 
 
 def _window(columns: Columns, table: PointTable, chosen: NDArray[np.int64], spec: BatchSpec) -> dict[str, Any]:
-    """Every `window_step`-th of the last frames, the last among them."""
+    """Returns every `window_step`-th of the last frames, including the last."""
     start, stop = table.frames_start[chosen].astype(np.int64), table.frames_stop[chosen].astype(np.int64)
     step, size = spec.window_step, spec.window
     count = np.minimum((stop - start + step - 1) // step, size)  # tokens that there are
@@ -280,7 +280,7 @@ def _window(columns: Columns, table: PointTable, chosen: NDArray[np.int64], spec
 
 
 def _now(columns: Columns, table: PointTable, chosen: NDArray[np.int64], size: int) -> dict[str, Any]:
-    """The objects of the last look."""
+    """Returns the objects of the last look."""
     last = table.frames_stop[chosen].astype(np.int64) - 1
     seen = last >= table.frames_start[chosen]
     kind, values, mask = _objects(columns, _take(columns.frames.look, np.where(seen, last, 0), seen, -1), size)
@@ -288,7 +288,7 @@ def _now(columns: Columns, table: PointTable, chosen: NDArray[np.int64], size: i
 
 
 def _objects(columns: Columns, look: Ints, size: int) -> tuple[Ints, Reals, Flags]:
-    """Kind, values and mask of the nearest objects of looks of any shape; -1 is no look."""
+    """Returns kind, values and mask of the nearest objects of looks of any shape; -1 is no look."""
     starts = columns.looks.start
     none = look < 0
     safe = np.where(none, 0, look)

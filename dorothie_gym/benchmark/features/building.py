@@ -1,4 +1,4 @@
-"""A corpus becomes columns."""
+"""Conversion of a corpus to columns, with a cache."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from dorothie_gym.recording.file_names import ACTIONS_FILE
 from dorothie_gym.recording.towns import find_town
 
 _STARTS = {"landmarks": "place", "streets": "text"}
-"""Groups whose rows are found by session, with a column that tells their number."""
+"""Groups whose rows are found by session, with a column that gives their number."""
 
 
 def join(
@@ -36,10 +36,10 @@ def join(
     towns: Sequence[TownGraph],
     unreadable: Sequence[tuple[str, str]],
 ) -> Columns:
-    """Returns the columns of sessions as those of a corpus.
+    """Joins the columns of sessions to those of a corpus.
 
     Args:
-        key: hash of all that decided them.
+        key: hash of everything that determines them.
         names: names of the sessions.
         folds: their folds.
         parts: their columns, in the same order.
@@ -71,7 +71,7 @@ def join(
 
 
 class _Shifted:
-    """The arrays of a session, with texts as numbers of the corpus."""
+    """Arrays of a session, with texts as indices of the corpus."""
 
     def __init__(self, part: SessionColumns, pool: dict[str, int]) -> None:
         self.arrays = part.arrays
@@ -87,7 +87,7 @@ class _Shifted:
 
 
 _POINTS_AT = {("moves", "utterance"): "utterances", ("frames", "look"): "looks", ("looks", "start"): "objects"}
-"""Columns that hold rows of another group."""
+"""Columns that refer to rows of another group."""
 
 
 def _column(rows: Sequence[_Shifted], group: str, name: str) -> NDArray[Any]:
@@ -109,44 +109,46 @@ def _column(rows: Sequence[_Shifted], group: str, name: str) -> NDArray[Any]:
     return np.concatenate(columns)
 
 
-# --- A corpus becomes columns ----------------------------------------------------------------------------------------
+# --- corpus -----------------------------------------------------------------------------------------------------------
 
 _SOURCES: Final = ("ontology", "dialogue", "maps", "sim", "recording", "analysis", "benchmark/features")
-"""Packages that decide what the columns of a session are."""
+"""Packages whose source determines the columns of a session."""
 
 _READ: Final = (".json", ".jsonl", ".csv", ".parquet", ".journal")
-"""Endings of files that sessions are read from."""
+"""Suffixes of the files of sessions."""
 
 
-def build(corpus: Corpus | Path | str, *, cache: bool = True, told: Callable[[], object] | None = None) -> Columns:
-    """Returns a corpus as columns: as it was kept when it was built before, else built and kept for the next time.
+def build(
+    corpus: Corpus | Path | str, *, cache: bool = True, on_session: Callable[[], object] | None = None
+) -> Columns:
+    """Returns a corpus as columns, from the cache or newly built.
 
     Args:
-        corpus: a corpus or its folder.
-        cache: whether to look for it, and keep it, in the user's cache folder (`DOROTHIE_GYM_CACHE`).
-        told: called after each session that was read.
+        corpus: corpus or its folder.
+        cache: whether to use the user's cache folder (`DOROTHIE_GYM_CACHE`).
+        on_session: called after each session that was read.
 
     Raises:
-        SessionError: there is no session, or none can be read.
+        SessionError: no session can be read.
     """
     corpus = corpus if isinstance(corpus, Corpus) else Corpus.load(corpus)
     key = _key(corpus)
     found = recall(key) if cache else None
     if found is None:
-        found = _build(corpus, key, told)
+        found = _build(corpus, key, on_session)
         if cache:
             keep(found)
     return found
 
 
 def columns_of(session: Session, fold: str = "", maps: Path | None = None) -> Columns:
-    """Returns the columns of a session that is in no corpus; they are not kept."""
+    """Returns the columns of a single session; they are not cached."""
     town = find_town(session.header.town, maps)
     part = extract(session, town)
     return join(part.signature, [session.name], [fold], [part], [town_graph(part.town, town)], [])
 
 
-def _build(corpus: Corpus, key: str, told: Callable[[], object] | None) -> Columns:
+def _build(corpus: Corpus, key: str, on_session: Callable[[], object] | None) -> Columns:
     towns: dict[str, Town | None] = {}
     read: list[tuple[CorpusEntry, SessionColumns]] = []
     unreadable = []
@@ -158,8 +160,8 @@ def _build(corpus: Corpus, key: str, told: Callable[[], object] | None) -> Colum
             read.append((entry, extract(session, towns[session.header.town])))
         except (SessionError, TownError) as error:
             unreadable.append((entry.name, str(error)))
-        if told is not None:
-            told()
+        if on_session is not None:
+            on_session()
     if not read:
         reason = unreadable[0][1] if unreadable else "there is none"
         raise SessionError(f"{corpus.root}: no session can be read: {reason}")
@@ -176,7 +178,7 @@ def _build(corpus: Corpus, key: str, told: Callable[[], object] | None) -> Colum
 
 
 def _place(row: tuple[CorpusEntry, SessionColumns]) -> tuple[int, str, int, str]:
-    """Order of sessions: it must not depend on names, which differ between layouts."""
+    """Returns the sort key of a session, which does not depend on names: they differ between layouts."""
     entry, part = row
     fold = entry.fold
     place = FOLDS.index(fold) if fold in FOLDS else len(FOLDS) + (0 if fold is None else 1)
@@ -188,7 +190,7 @@ def _fold_name(fold: Fold | None) -> str:
 
 
 def _key(corpus: Corpus) -> str:
-    """Hash of all that decides the columns: what the sessions' files hold, their names and folds, and our sources."""
+    """Returns the hash of everything that determines the columns: files, names and folds of sessions, and sources."""
     digest = hashlib.sha256(f"{_sources_digest()} {compiler_digest()} numpy {np.__version__}\n".encode())
     for folder in sorted({entry.maps for entry in corpus.entries if entry.maps is not None}):
         _add_files(digest, folder, (".xodr", ".yaml", ".yml"))

@@ -1,8 +1,8 @@
-"""A corpus as columns: what happened in all its sessions, one row for each thing, sessions one after another.
+"""Corpus as columns: one row per move, utterance, action, frame and so on, session after session.
 
-Everything is at the benchmark's rate of 10 Hz: `tenth` counts tenths of a second since the session began, and what
-happened within a tenth carries its number. `texts` holds every distinct text once; columns that end in `text` are its
-indices, -1 where there is none. Rows of a session follow one another, in the order in which they became visible.
+All times are at the rate of the benchmark, 10 Hz: `tenth` is the number of the tenth of a second since the start of the
+session. `texts` holds every distinct text once; columns that end in `text` are its
+indices, -1 for none. Rows of a session are contiguous, in the order in which they become visible.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Reals: TypeAlias = NDArray[np.float32]
 Flags: TypeAlias = NDArray[np.bool_]
 
 NO_TEXT: Final = -1
-"""Index of a text that is not there."""
+"""Index of a missing text."""
 
 PARTICIPANT, CO_WIZARD = 0, 1
 """Values of columns `speaker`."""
@@ -32,13 +32,13 @@ PARTICIPANT, CO_WIZARD = 0, 1
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SessionRows:
-    """The sessions (S,), by fold, town and seed, and by content where that is equal: their names do not count.
+    """Sessions (S,), ordered by fold, town, seed and content, independent of their names.
 
     Attributes:
         names: name of each.
         folds: fold of each, as `Fold`'s value; empty for one that lies in none.
         town: index of its town in `Columns.towns`.
-        has_objects: whether it was recorded what stood and moved around the car.
+        has_objects: whether the objects around the ego were recorded.
     """
 
     names: tuple[str, ...]
@@ -53,8 +53,8 @@ class MoveRows:
 
     Attributes:
         session: index of its session.
-        tenth: when its utterance was over: it is visible later than that.
-        point_tenth: when it is a point: at its own event, which in recordings of people may come before `tenth`.
+        tenth: end of its utterance; the move is visible after it.
+        point_tenth: time of its own event as a point; in recordings of people it may be before `tenth`.
         event: number of its event in the session.
         speaker: 0 participant, 1 Co-Wizard.
         utterance: row of `Columns.utterances`.
@@ -62,7 +62,7 @@ class MoveRows:
         slots: (n, 69) its slot values, in the order of `LABELS`.
         span_text: words of this move.
         flagged: whether it is a point of the benchmark.
-        handling: what its exchange handles, 0 nothing, 1 a task exception, 2 an environmental one (a label, no input).
+        handling: exception that its exchange handles: 0 none, 1 task, 2 environmental (a label, no input).
     """
 
     session: Ints
@@ -80,14 +80,14 @@ class MoveRows:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class UtteranceRows:
-    """What was said (n,).
+    """Utterances (n,) of both speakers.
 
     Attributes:
         session: index of its session.
-        tenth: when it was over.
+        tenth: end of the utterance.
         speaker: 0 participant, 1 Co-Wizard.
         text: its words.
-        recognised_text: what a speech recogniser heard, -1 where there was none.
+        recognised_text: words from the speech recogniser, -1 for none.
     """
 
     session: Ints
@@ -127,7 +127,7 @@ class ActionRows:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FrameRows:
-    """Where the car was (n,), ten rows a second.
+    """Poses of the ego (n,), ten rows a second.
 
     Attributes:
         session: index of its session.
@@ -148,7 +148,7 @@ class FrameRows:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LookRows:
-    """Moments (n,) at which it was recorded what is around the car, about twice a second.
+    """Times (n,) at which the objects around the ego were recorded, about twice a second.
 
     Attributes:
         session: index of its session.
@@ -163,7 +163,7 @@ class LookRows:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ObjectRows:
-    """What was perceived around the car (n,), the nearest of each look first.
+    """Perceived objects around the ego (n,), the nearest of each look first.
 
     Attributes:
         kind: see `dorothie_gym.recording.ObjectKind`.
@@ -208,9 +208,9 @@ class StreetRows:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class GoalRows:
-    """Where the car was to go: a label of the belief head, never an input (hidden landmarks are among them).
+    """Reached subgoals: labels of the belief head, never inputs (they include hidden landmarks).
 
-    The goal at a point is the first of the session that is reached after it.
+    The goal at a point is the first of the session that is reached after the point.
 
     Attributes:
         session: index of its session (n,).
@@ -225,7 +225,7 @@ class GoalRows:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TownGraph:
-    """The lane graph of a town (L lanes, E edges, s streets); no lanes where the town is not known.
+    """Lane graph of a town (L lanes, E edges, s streets); without lanes if the town is unknown.
 
     Attributes:
         name: of the town.
@@ -252,11 +252,11 @@ class TownGraph:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Columns:
-    """A corpus as columns; arrays may be views of files.
+    """Corpus as columns; arrays may be memory maps of files.
 
     Attributes:
-        key: hash of all that decided the content, our own sources among it: what a cache goes by.
-        texts: every distinct text: what was said, what was recognised, names of streets and landmarks.
+        key: hash of everything that determines the content, sources included: key of the cache.
+        texts: every distinct text: utterances, recognised words, names of streets and landmarks.
         towns: towns of the sessions, by name.
         unreadable: sessions that could not be read, (name, reason) each.
         unpointed: flagged events that are no point, (session, event, reason) each.
@@ -293,7 +293,7 @@ class Columns:
 
     @functools.cached_property
     def content(self) -> str:
-        """Hash of what is told of the sessions: the same for the same corpus, whatever its layout and our version."""
+        """Hash of the content, independent of the layout of the corpus and of the version of the package."""
         names = [self.sessions.folds, self.texts, [town.name for town in self.towns]]
         digest = hashlib.sha256(json.dumps(names).encode())
         for part in (*(getattr(self, group) for group in GROUPS), *self.towns):
@@ -309,4 +309,4 @@ GROUPS: Final[dict[str, type[Any]]] = {
     "sessions": SessionRows, "moves": MoveRows, "utterances": UtteranceRows, "actions": ActionRows, "frames": FrameRows,
     "looks": LookRows, "objects": ObjectRows, "landmarks": LandmarkRows, "streets": StreetRows, "goals": GoalRows,
 }  # fmt: skip
-"""The groups of `Columns` that hold arrays over the whole corpus."""
+"""Groups of `Columns`, which hold arrays over the whole corpus."""

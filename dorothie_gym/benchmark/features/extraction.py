@@ -1,4 +1,4 @@
-"""One session as columns."""
+"""Extraction of the columns of one session."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ from dorothie_gym.recording.recorded_perception import OBJECT_VALUES, light_swit
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH, TENTHS
 
 HEADING_STEP: Final = 1e-3
-"""Headings are rounded to this [degrees], so that the last digits do not tell in which unit a file had them."""
+"""Headings are rounded to this [degrees], so that they do not depend on the unit in a file."""
 
 HANDLINGS: Final = (Handled.NONE, Handled.TASK, Handled.ENVIRONMENTAL)
-"""What the numbers in columns `handling` mean."""
+"""Meaning of the numbers in columns `handling`."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SessionColumns:
-    """The columns of one session: rows of groups by "group.field", indices within the session.
+    """Columns of one session by "group.field", with indices within the session.
 
     Attributes:
         arrays: by "group.field".
@@ -46,7 +46,7 @@ class SessionColumns:
         town: name of the town.
         seed: of the session, -1 where there is none.
         unpointed: flagged events that are no point, (event, reason) each.
-        signature: hash of all the above: the same for the same session, whatever layout it was read from.
+        signature: hash of the above, independent of the layout of the session.
     """
 
     arrays: dict[str, NDArray[Any]]
@@ -58,12 +58,12 @@ class SessionColumns:
 
 
 def extract(session: Session, town: Town | None) -> SessionColumns:
-    """Returns the columns of a session; `town` is None where it is not known."""
+    """Returns the columns of a session; `town` is None if it is unknown."""
     session = at_tenths(session)
     pool = _Pool()
     handled = {event: HANDLINGS.index(kind) for event, kind in handling_of_events(Units(session)).items()}
     arrays = {
-        **_places(session, pool),  # first: numbers of texts then do not depend on what is said later
+        **_places(session, pool),  # first, so that indices of texts do not depend on later utterances
         **_said(SessionHistory(session), pool, handled),
         **_done(session, handled),
         **_frames(session, town),
@@ -86,7 +86,7 @@ def extract(session: Session, town: Town | None) -> SessionColumns:
 
 
 class _Pool:
-    """Numbers of texts."""
+    """Indices of texts."""
 
     def __init__(self) -> None:
         self.texts: dict[str, int] = {}
@@ -96,7 +96,7 @@ class _Pool:
 
 
 def _said(history: SessionHistory, pool: _Pool, handled: Mapping[int, int]) -> dict[str, NDArray[Any]]:
-    """Moves and utterances, in the order in which they become visible."""
+    """Returns moves and utterances, in the order in which they become visible."""
     spoken = history.utterances
     over = [utterance.frame // FRAMES_PER_TENTH for utterance in spoken]
     for utterance in spoken:

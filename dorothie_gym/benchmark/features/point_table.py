@@ -19,14 +19,14 @@ from dorothie_gym.recording.splits import check_fold
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PointTable:
-    """The points of a task (n,), by session and event.
+    """Points of a task (n,), by session and event.
 
     Rows `*_start:*_stop` of the columns are visible at a point, by the rule of `dorothie_gym.recording.points`.
 
     Attributes:
         task: the task.
         session: index of the session in `Columns.sessions`.
-        tenth: when the point is [0.1 s].
+        tenth: time of the point [0.1 s].
         event: number of its event in the session.
         row: row of the point itself in `Columns.moves` (UfN, RfN) or `Columns.actions` (NfD): its label, never input.
         handling: 0 nothing, 1 a task exception, 2 an environmental one (`Handled`).
@@ -42,8 +42,8 @@ class PointTable:
         label_angle: (n,) its angle [degrees, positive left]; NaN where unknown, and in UfN and RfN.
         label_belief: (n, 5) way to the next frame dx, dy [m], its heading [degrees], way to the goal dx, dy [m], in the
             town's axes; NaN where unknown.
-        skipped: flagged events that are a point of no task (`task` None), and points of this one that are not scored in
-            whole, and why. Sessions that cannot be read are in `Columns.unreadable`.
+        skipped: flagged events that are points of no task (`task` None), and points of this task that are scored in
+            part, with reasons. Sessions that cannot be read are in `Columns.unreadable`.
     """
 
     task: Task
@@ -125,7 +125,7 @@ def points(columns: Columns, task: Task, fold: Fold | str | None = None) -> Poin
 
 
 def _sessions_of(columns: Columns, fold: Fold | str | None) -> Flags:
-    """Which sessions are in a fold (S,)."""
+    """Returns the mask of the sessions of a fold (S,)."""
     if fold is None:
         return np.ones(len(columns.sessions.names), dtype=np.bool_)
     wanted = check_fold(fold)
@@ -133,7 +133,7 @@ def _sessions_of(columns: Columns, fold: Fold | str | None) -> Flags:
 
 
 def _current(columns: Columns, task: Task, row: NDArray[np.int64]) -> dict[str, Any]:
-    """The utterance to be understood, and its earlier acts."""
+    """Returns the utterance to be understood and its earlier moves."""
     if task is not Task.UFN:
         nothing = np.zeros(len(row), dtype=np.int32)
         return {"spans_start": nothing, "spans_stop": nothing, "current": nothing - 1}

@@ -1,9 +1,8 @@
-"""Columns as files, kept between runs in the user's cache folder.
+"""Cache of columns as files in the user's cache folder.
 
-An entry is a folder of `.npy` files, which are mapped into memory and not read, and `columns.json` with what is no
-array and a checksum of every file. It is found by a hash of all that decides what is in it. Whatever is damaged is
-built anew and replaced. (This guards against accidents; somebody who can write to the user's cache folder can write to
-their programs as well.)
+An entry is a folder of memory-mapped `.npy` files, and `columns.json` with all other values and a checksum of each
+file. Its name is a hash of everything that determines its content. A damaged entry is built again and replaced; the
+checksums guard against accidents, not against attackers with access to the cache folder.
 """
 
 from __future__ import annotations
@@ -30,22 +29,22 @@ from dorothie_gym.user_cache import cache_folder
 INDEX_FILE: Final = "columns.json"
 
 EMPTY: Final = 128
-"""Bytes of an `.npy` file without content: its header."""
+"""Size of an empty `.npy` file, which is its header [bytes]."""
 
 MOST_ENTRIES: Final = 12
-"""When there are more, those that were used longest ago are removed: an entry of 183 sessions takes up about 40 MB."""
+"""Largest number of entries; the least recently used are removed. An entry of 183 sessions has about 40 MB."""
 
 _log = logging.getLogger(__name__)
 
 
 def features_folder() -> Path | None:
-    """Folder that columns are kept in, beside that of towns; None if nothing is to be kept."""
+    """Returns the folder of cached columns; None if the cache is switched off."""
     cache = cache_folder()
     return None if cache is None else cache / "features"
 
 
 def recall(key: str) -> Columns | None:
-    """Returns the columns that were kept under a key; None where there are none, or they are damaged."""
+    """Returns the cached columns of a key; None if they are missing or damaged."""
     folder = features_folder()
     if folder is None:
         return None
@@ -55,13 +54,13 @@ def recall(key: str) -> Columns | None:
     except FileNotFoundError:
         return None
     except (OSError, FeatureStoreError) as error:
-        _log.debug("the cached features %s are of no use and are built anew: %s", folder / key, error)
+        _log.debug("the cached features %s cannot be read and are built again: %s", folder / key, error)
         return None
     return columns if columns.key == key else None
 
 
 def keep(columns: Columns) -> None:
-    """Keeps columns under their key, in one step: other processes see all of them or nothing."""
+    """Caches columns under their key, in one step: other processes see the whole entry or none."""
     folder = features_folder()
     if folder is None:
         return
@@ -79,11 +78,11 @@ def keep(columns: Columns) -> None:
 
 
 def _publish(part: Path, target: Path) -> None:
-    """Gives a finished folder its name, unless another process was faster."""
+    """Renames a finished folder, unless another process was faster."""
     try:
         part.rename(target)
     except OSError:
-        if recall(target.name) is None:  # what stands there is damaged
+        if recall(target.name) is None:  # the existing entry is damaged
             shutil.rmtree(target)
             part.rename(target)
 
@@ -115,10 +114,10 @@ def write_columns(columns: Columns, folder: Path) -> None:
 
 
 def read_columns(folder: Path) -> Columns:
-    """Reads what `write_columns` wrote, arrays as maps of their files.
+    """Reads columns, with arrays as memory maps of their files.
 
     Raises:
-        FileNotFoundError: there is nothing.
+        FileNotFoundError: there is no entry.
         FeatureStoreError: a file is damaged or missing; the message names it.
         OSError: a file cannot be read.
     """
@@ -142,7 +141,7 @@ def _page(path: Path) -> dict[str, Any]:
 def _array(path: Path, digest: str) -> NDArray[Any]:
     if not path.is_file() or _digest(path) != digest:
         raise FeatureStoreError(f"{path}: is missing, or does not fit its checksum")
-    if path.stat().st_size <= EMPTY:  # what is empty cannot be mapped
+    if path.stat().st_size <= EMPTY:  # empty files cannot be mapped
         empty: NDArray[Any] = np.load(path, allow_pickle=False)
         return empty
     mapped: NDArray[Any] = np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
@@ -171,7 +170,7 @@ def _columns(page: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Col
 
 
 def _arrays(columns: Columns) -> dict[str, NDArray[Any]]:
-    """Every array by the name of its file."""
+    """Returns every array by the name of its file."""
     found = {
         f"{group}.{name}": getattr(getattr(columns, group), name)
         for group, kind in GROUPS.items()
@@ -192,7 +191,7 @@ def _digest(path: Path) -> str:
 
 
 def _prune(folder: Path) -> None:
-    """Removes the entries that were used longest ago where there are too many."""
+    """Removes the least recently used entries beyond `MOST_ENTRIES`."""
     entries = sorted(folder.iterdir(), key=lambda entry: (entry.stat().st_mtime_ns, entry.name))
     for entry in entries[:-MOST_ENTRIES]:
         shutil.rmtree(entry, ignore_errors=True)

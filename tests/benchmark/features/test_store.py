@@ -122,5 +122,5 @@ def test_a_corpus_of_which_nothing_can_be_read_is_one_clear_error(tmp_path: Path
 
 def test_progress_is_told(corpus: Path) -> None:
     told: list[int] = []
-    build(corpus, cache=False, told=lambda: told.append(1))
+    build(corpus, cache=False, on_session=lambda: told.append(1))
     assert told == [1]
