@@ -32,7 +32,7 @@ ENV, STOCK, SUMO = "DuoWizardEnv", "intersection-v0", "SUMO"
 WITHOUT_SUMO = "SUMO is not installed; pip install 'dorothie-gym[sumo]' brings it"
 
 
-class Session:
+class IdleSession:
     """A session in which nobody does anything: three agents are observed in full, and the car follows its road.
 
     Args:
@@ -65,7 +65,7 @@ class Session:
 
 def prepare(town: str, vehicles: int, pedestrians: int, seed: int, decisions: int) -> Callable[[], float]:
     """Work for a process of its own: so many decisions, in seconds of the clock on the wall."""
-    session = Session(town, vehicles, pedestrians, seed)
+    session = IdleSession(town, vehicles, pedestrians, seed)
     return partial(session.seconds, decisions, time.perf_counter)
 
 
@@ -102,7 +102,7 @@ def measure(
     from dorothie_gym.sim.highway_reference import StockIntersection
 
     progress("town", 0.0)
-    session = Session(town, vehicles, pedestrians, seed)
+    session = IdleSession(town, vehicles, pedestrians, seed)
     lanes = session.env.town.lanes
     world = session.env.session.world
     stock = StockIntersection(seed)

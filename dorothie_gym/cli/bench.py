@@ -1,4 +1,4 @@
-"""`dorothie-gym bench world|env|vector|rl|train|import`: speeds, each against its reference in the same run."""
+"""`dorothie-gym bench world|env|vector|rl|train|import`: speed measurements, each with its reference."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ if TYPE_CHECKING:
     from dorothie_gym.bench.report import Report
 
 Measure: TypeAlias = Callable[[Callable[[str, float], None]], dict[str, Any]]
-"""Measures, and tells how far it is."""
+"""Measurement; takes a callback for its progress."""
 
 
 _UsageError: Any = typer.BadParameter.__base__
-"""click's `UsageError`, which is in click itself or in typer's own copy, as the version has it."""
+"""`UsageError` of click, or of typer's own copy of click, depending on its version."""
 
 
 class BenchCommand(PictureCommand):
-    """A command whose bad options are told in one line."""
+    """Command that reports invalid options in one line."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parses, and exits with 2 where an option is not as it must be."""
+        """Parses the options; exits with code 2 if one is invalid."""
         try:
             return super().parse_args(ctx, args)
         except _UsageError as error:
@@ -37,18 +37,18 @@ class BenchCommand(PictureCommand):
 
 
 bench = typer.Typer(
-    help="Measure speeds, each against its reference in the same run: the world, the environment of three agents, many "
-    "worlds at once, training, and how soon all is there.",
+    help="Measure speeds, each with a reference in the same run: world, environment of three agents, "
+    "batches of worlds, training, and import time.",
     no_args_is_help=True,
 )
 
 Town = Annotated[str, typer.Option(metavar="NAME|FILE", help="A town's name, or a file (.xodr, .yaml).")]
-Vehicles = Annotated[int, typer.Option(min=0, max=200, help="Vehicles, as many as fit; a few are cyclists.")]
-Pedestrians = Annotated[int, typer.Option(min=0, max=200, help="People on foot.")]
-Seed = Annotated[int, typer.Option(min=0, help="Of places and wishes.")]
-Repeats = Annotated[int, typer.Option(min=1, max=99, help="How often each is measured; the median counts.")]
+Vehicles = Annotated[int, typer.Option(min=0, max=200, help="Number of vehicles, a tenth of them cyclists.")]
+Pedestrians = Annotated[int, typer.Option(min=0, max=200, help="Number of pedestrians.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of positions and destinations.")]
+Repeats = Annotated[int, typer.Option(min=1, max=99, help="Repeats per measurement; the median counts.")]
 Picture = Annotated[
-    Path | None, typer.Option(help="Draw a chart into this PNG file; without a file, into one named after the command.")
+    Path | None, typer.Option(help="Draw a chart into this PNG file; default: named after the command.")
 ]
 
 
@@ -57,13 +57,13 @@ def world(
     town: Town = "northgate",
     vehicles: Vehicles = 30,
     pedestrians: Pedestrians = 20,
-    props: Annotated[int, typer.Option(min=0, max=16, help="Props on lanes that have another lane beside.")] = 4,
+    props: Annotated[int, typer.Option(min=0, max=16, help="Props on lanes with a neighbouring lane.")] = 4,
     seed: Seed = 0,
     repeats: Repeats = 7,
     picture: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Substeps a second of a world with everything on, against highway-env's own road on the same plan."""
+    """Substeps per second of a full world, compared with the road of highway-env on the same map."""
 
     def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
         from dorothie_gym.bench.world import measure
@@ -84,7 +84,7 @@ def env(
     picture: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Steps a second of the environment of three agents, against highway-env's intersection-v0 and SUMO."""
+    """Steps per second of the environment of three agents, compared with intersection-v0 of highway-env and SUMO."""
 
     def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
         from dorothie_gym.bench.env import measure
@@ -98,15 +98,15 @@ def env(
 @bench.command(cls=BenchCommand)
 def vector(
     town: Town = "northgate",
-    worlds: Annotated[int, typer.Option(min=1, max=4096, help="Worlds that are stepped in one call.")] = 64,
+    worlds: Annotated[int, typer.Option(min=1, max=4096, help="Number of worlds in a batch.")] = 64,
     vehicles: Vehicles = 30,
     pedestrians: Pedestrians = 20,
-    threads: Annotated[int, typer.Option(min=2, max=256, help="Threads that are compared with one.")] = 2,
-    repeats: Annotated[int, typer.Option(min=2, max=99, help="How often each is measured; the median counts.")] = 9,
+    threads: Annotated[int, typer.Option(min=2, max=256, help="Number of threads, compared with one.")] = 2,
+    repeats: Annotated[int, typer.Option(min=2, max=99, help="Repeats per measurement; the median counts.")] = 9,
     picture: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Many worlds in one call, on several threads against one, and Gymnasium's ways of many environments."""
+    """Batches of worlds on several threads, compared with one thread, and the vectorization modes of Gymnasium."""
 
     def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
         from dorothie_gym.bench.timing import machine
@@ -123,22 +123,23 @@ def vector(
 def rl(
     env: Annotated[str, typer.Option(metavar="ID", help="Id of the environment.")] = "dorothie_gym/Navigation-v0",
     algorithm: Annotated[str, typer.Option(help="ppo, maskable_ppo or a2c.")] = "ppo",
-    environments: Annotated[int, typer.Option(min=1, max=256, help="How many play at once.")] = 8,
+    environments: Annotated[int, typer.Option(min=1, max=256, help="Number of parallel environments.")] = 8,
     workers: Annotated[
-        int | None, typer.Option(min=0, max=256, help="Processes in the second run; one per core. 0: no such run.")
+        int | None,
+        typer.Option(min=0, max=256, help="Processes of a second run; default one per core; 0: none."),
     ] = None,
-    steps: Annotated[int, typer.Option(min=256, help="Of a run.")] = 16_384,
+    steps: Annotated[int, typer.Option(min=256, help="Steps of a run.")] = 16_384,
     seed: Seed = 0,
     picture: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Environment steps a second of training end to end, and what the time goes into."""
+    """Environment steps per second of a whole training, and the shares of its time."""
 
     def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
         try:
             from dorothie_gym.baselines.rl.measuring import measure
         except ImportError:
-            fail("bench rl needs torch and stable-baselines3; pip install 'dorothie-gym[baselines]' brings them")
+            fail("bench rl needs torch and stable-baselines3; run: pip install 'dorothie-gym[baselines]'")
         from dorothie_gym.errors import SettingsError
 
         settings: dict[str, Any] = {"algorithm": algorithm, "environments": environments, "workers": workers}
@@ -152,7 +153,7 @@ def rl(
 
 @bench.command("import", cls=BenchCommand)
 def importing(repeats: Repeats = 7, picture: Picture = None, as_json: AsJson = False) -> None:
-    """How soon the package and a first environment are there, against importing highway-env."""
+    """Time to import the package and to create a first environment, compared with importing highway-env."""
 
     def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
         from dorothie_gym.bench.importing import measure
@@ -165,17 +166,18 @@ def importing(repeats: Repeats = 7, picture: Picture = None, as_json: AsJson = F
 @bench.command(cls=BenchCommand)
 def train(
     corpus: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Sessions; without it a few are played once and kept.")
+        Path | None, typer.Option(metavar="DIR", help="Corpus; default: a small one that is generated once.")
     ] = None,
     threads: Annotated[
-        int | None, typer.Option(min=1, max=256, help="Of torch; all cores without it. With 1, CPU time is measured.")
+        int | None,
+        typer.Option(min=1, max=256, help="Threads of torch; default all cores; 1 measures CPU time."),
     ] = None,
-    batch: Annotated[int, typer.Option(min=1, max=1024, help="Points of one of our steps.")] = 64,
+    batch: Annotated[int, typer.Option(min=1, max=1024, help="Points of a training step.")] = 64,
     repeats: Repeats = 5,
     picture: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Points a second in training at the published size, against the published loop and the machine's matrix rate."""
+    """Points per second in training at the published size, compared with the published loop and the matrix rate."""
 
     def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
         try:
@@ -195,7 +197,7 @@ def train(
 
 
 def _bench(name: str, measure: Measure, picture: Path | None, as_json: bool) -> None:
-    """Measures, and shows what came of it."""
+    """Runs a measurement and shows its results."""
     if picture == Path(OWN_NAME):
         picture = Path(f"bench_{name}.png")
     if picture is not None:
@@ -204,7 +206,7 @@ def _bench(name: str, measure: Measure, picture: Path | None, as_json: bool) -> 
         with reporting_errors(), _progress() as progress:
             figures = measure(progress)
     except KeyboardInterrupt:
-        stderr().print("Interrupted; a benchmark that is cut short says nothing.", soft_wrap=True)
+        stderr().print("Interrupted; there are no results.", soft_wrap=True)
         raise typer.Exit(INTERRUPTED) from None
     if as_json:
         print_json(figures)
@@ -225,7 +227,7 @@ def _bench(name: str, measure: Measure, picture: Path | None, as_json: bool) -> 
 
 @contextmanager
 def _progress() -> Iterator[Callable[[str, float], None]]:
-    """A bar on standard error while that is a terminal, which goes when all is done."""
+    """Shows a progress bar on a terminal until all is done."""
     console = stderr()
     if not console.is_terminal:
         yield lambda doing, share: None

@@ -1,4 +1,4 @@
-"""`dorothie-gym convert`: sessions from one layout into another."""
+"""`dorothie-gym convert`: conversion of sessions between layouts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class TargetLayout(enum.StrEnum):
-    """What sessions are written as."""
+    """Layout to write."""
 
     SDN = "sdn"
     NATIVE = "native"
@@ -29,21 +29,19 @@ class TargetLayout(enum.StrEnum):
 
 def convert(
     source: Annotated[Path, typer.Argument(metavar="IN", help="A session, or a folder of sessions or of folds.")],
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder to write, which must hold no such session yet.")],
-    to: Annotated[
-        TargetLayout, typer.Option("--to", help="Write the SDN release layout, our own, or two Parquet tables.")
-    ],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder to write, without sessions of these names.")],
+    to: Annotated[TargetLayout, typer.Option("--to", help="Layout: SDN release, native, or two Parquet tables.")],
     maps: Maps = None,
     as_json: AsJson = False,
 ) -> None:
-    """Convert sessions: SDN (release, sample or hub layout) and our own, either way; reports what was not understood.
+    """Convert sessions between SDN (release, sample or hub layout) and the native layout, with a report of losses.
 
     With --to tables it writes utterances.parquet and decision_points.parquet, for pandas and datasets.
 
-    The layout of IN is told by its files. Sessions that cannot be read are named, and the exit code is 2 then.
+    The files of IN determine its layout. Unreadable sessions are listed, and the exit code is then 2.
     """
     if maps is not None and not maps.is_dir():
-        fail(f"{maps}: there is no such folder; give one with maps (.xodr)")
+        fail(f"{maps}: no such folder; give one with maps (.xodr)")
     with reporting_errors():
         from dorothie_gym.recording import Corpus
 
@@ -75,7 +73,7 @@ def _check_out(source: Path, out: Path) -> None:
 
 
 def _write_tables(corpus: Corpus, out: Path, *, as_json: bool) -> None:
-    """The tables of acts and of decision points, of all sessions: one that cannot be read fails the command."""
+    """Writes the tables of all sessions; an unreadable session fails the command."""
     paths = [str(path) for path in corpus.export(out)]
     if as_json:
         print_json({"to": TargetLayout.TABLES.value, "in": str(corpus.root), "out": str(out), "tables": paths})
@@ -106,7 +104,7 @@ def _convert_one(
     *,
     is_one: bool,
 ) -> dict[str, Any]:
-    """Converts a session; returns what --json writes of it."""
+    """Converts a session; returns its row for --json."""
     from dorothie_gym.errors import SessionError, TownError
     from dorothie_gym.recording.sdn import write_sdn
 
@@ -131,7 +129,7 @@ def _convert_one(
 
 
 def _name(session: Session, number: int, to: TargetLayout, folder: Path, taken: set[Path]) -> str:
-    """Name of the folder of a session: the original scripts look for `log_<number>`."""
+    """Returns the name of the folder of a session: the original scripts look for `log_<number>`."""
     if to is TargetLayout.NATIVE or session.name.startswith("log_"):
         return session.name
     seed = session.header.seed

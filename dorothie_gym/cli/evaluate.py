@@ -1,4 +1,4 @@
-"""`dorothie-gym evaluate`: predictions, or the floors, scored on the three tasks."""
+"""`dorothie-gym evaluate`: scores of predictions, or of trivial baselines, on the three tasks."""
 
 from __future__ import annotations
 
@@ -17,41 +17,42 @@ if TYPE_CHECKING:
     from dorothie_gym.recording import Corpus, Task
 
 DETAILED = 2
-"""Up to so many models are shown with everything; more of them as the table."""
+"""Largest number of models that are shown in detail."""
 
 
 def evaluate(
     predictions: Annotated[
-        list[Path] | None, typer.Argument(metavar="PREDICTIONS...", help="Files of predictions; several seeds at will.")
+        list[Path] | None, typer.Argument(metavar="PREDICTIONS...", help="Files of predictions, of one or more seeds.")
     ] = None,
     corpus: Annotated[
         Path | None,
         typer.Option(
-            "--corpus", "--sessions", help="Corpus or folder of sessions; without it, a few are played once and kept."
+            "--corpus", "--sessions", help="Corpus or folder of sessions; default: a small corpus, generated once."
         ),
     ] = None,
     split: Annotated[str, typer.Option(help="train, val, test or all.")] = "test",
-    tasks: Annotated[str, typer.Option(help="all, or some of ufn,rfn,nfd.")] = "all",
+    tasks: Annotated[str, typer.Option(help="all, or a list of ufn,rfn,nfd.")] = "all",
     model: Annotated[
-        str | None, typer.Option(help="majority or random: a floor; without predictions, majority.")
+        str | None, typer.Option(help="Trivial baseline: majority or random; default majority, without predictions.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="What the floor draws from.")] = 0,
-    seeds: Annotated[int, typer.Option(min=1, help="So many seeds of the floor, from --seed on.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the trivial baseline.")] = 0,
+    seeds: Annotated[int, typer.Option(min=1, help="Number of seeds of the trivial baseline, from --seed on.")] = 1,
     save: Annotated[
-        Path | None, typer.Option(metavar="FILE.parquet", help="Write the floor's predictions into a file.")
+        Path | None,
+        typer.Option(metavar="FILE.parquet", help="File for the predictions of the trivial baseline."),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write the table (md, tex, json) and its pictures into a folder.")
     ] = None,
     maps: Maps = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Write JSON, and nothing else.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:
     """Score predictions on the three tasks: understanding (ufn), response (rfn) and navigation (nfd)."""
     files = predictions or []
     floor = model if model is not None or files else "majority"
     if save is not None:
         if floor is None:
-            fail("--save writes the predictions of a floor; give --model majority or --model random with it")
+            fail("--save writes the predictions of a trivial baseline; add --model majority or --model random")
         check_file(save)
     with reporting_errors():
         from dorothie_gym.benchmark import evaluate_predictions, labels_of, read_about
@@ -87,7 +88,7 @@ def _read(files: Sequence[Path], tasks: Sequence[Task]) -> list[TaskPredictions]
     read = [given for given in read_predictions(*files) if given.task in tasks]
     if files and not read:
         names = ", ".join(task.value for task in tasks)
-        fail(f"{', '.join(map(str, files))}: no row is of the task {names}; rows tell theirs in the column 'task'")
+        fail(f"{', '.join(map(str, files))}: no row has the task {names} in its column 'task'")
     return read
 
 
@@ -145,7 +146,7 @@ def _default_sessions() -> Path:
 
 
 def _flat(table: ResultsTable) -> dict[str, Any]:
-    """What a single run comes to over everything that was scored; skipped points are scored in part or not at all."""
+    """Returns the scores of a single run over all parts; skipped points are unscored or scored in part."""
     if len(table.runs) != 1:
         return {}
     from dorothie_gym.benchmark.labels import ALL

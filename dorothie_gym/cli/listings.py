@@ -1,4 +1,4 @@
-"""`dorothie-gym towns` and `dorothie-gym storyboards`: what there is to play."""
+"""`dorothie-gym towns` and `dorothie-gym storyboards`: lists of towns and storyboards."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ FAULTY = 1
 
 def towns(
     town: Annotated[
-        str | None, typer.Argument(help="A town's name, or a file (.xodr, .yaml); without it, all are listed.")
+        str | None, typer.Argument(help="Name of a town, or a file (.xodr, .yaml); default: list all.")
     ] = None,
     check: Annotated[
-        bool, typer.Option("--check", help="Report what a driver would stumble over; exit with 1 if there is anything.")
+        bool, typer.Option("--check", help="Report faults of the map; exit code 1 if there are any.")
     ] = False,
     picture: Annotated[
         Path | None,
-        typer.Option(help="Draw the town's map into this PNG file; without a file, into one named after the town."),
+        typer.Option(help="Draw the map into this PNG file; default: named after the town."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Write JSON, and nothing else.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:
-    """List the towns that are shipped, or describe, check or draw one."""
+    """List the shipped towns, or describe, check or draw one."""
     if town is None:
         _list_towns(check, picture, as_json)
         return
@@ -64,7 +64,7 @@ def towns(
 
 
 def _list_towns(check: bool, picture: Path | None, as_json: bool) -> None:
-    """All towns that are shipped, with the fold that they belong to."""
+    """Lists the shipped towns with their folds."""
     if check:
         fail("--check looks at one town; name it: dorothie-gym towns --check NAME (or a file, .xodr or .yaml)")
     if picture is not None:
@@ -77,9 +77,9 @@ def _list_towns(check: bool, picture: Path | None, as_json: bool) -> None:
 
 
 def storyboards(
-    as_json: Annotated[bool, typer.Option("--json", help="Write JSON, and nothing else.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:
-    """List the storyboards that are shipped, with their stories as templates."""
+    """List the shipped storyboards, with their stories as templates."""
     with reporting_errors():
         from dorothie_gym.tasks import load_template, template_names
 
@@ -139,7 +139,7 @@ def _show_town(facts: Mapping[str, Any]) -> None:
 
 
 def _show_faults(facts: Mapping[str, Any], faults: Sequence[Fault]) -> None:
-    """One line a fault: its kind, where it is, and what is wrong; or what was found to be in order."""
+    """Prints a line per fault with kind, position and message, or a summary without faults."""
     console = stdout()
     for fault in faults:
         x, y = fault.position

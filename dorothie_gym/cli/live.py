@@ -1,4 +1,4 @@
-"""A session on the terminal while it is played: the talk scrolls, tasks and clock stand below it."""
+"""Live display of a session on the terminal: scrolling dialogue, with tasks and clock below."""
 
 from __future__ import annotations
 

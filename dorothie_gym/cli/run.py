@@ -1,4 +1,4 @@
-"""`dorothie-gym run`: plays one session."""
+"""`dorothie-gym run`: play of one session."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ PICTURE = Path("dorothie.png")
 
 @dataclass(frozen=True, kw_only=True)
 class _Plan:
-    """What was asked for on the command line."""
+    """Options of the command line."""
 
     town: str
     storyboard: str | None
@@ -53,30 +53,29 @@ def run(
         str, typer.Option(metavar="NAME|FILE", help="A town's name, or a file (.xodr, .yaml).")
     ] = "brookside",
     storyboard: Annotated[
-        str | None, typer.Option(metavar="NAME|FILE", help="A storyboard's name, or a file (.json); else drawn.")
+        str | None,
+        typer.Option(metavar="NAME|FILE", help="Name of a storyboard, or a file (.json); default: drawn."),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Equal seeds play equal sessions.")] = 0,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Record the session into this folder, which must hold none yet.")
-    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed; equal seeds give equal sessions.")] = 0,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Record the session into this new folder.")] = None,
     picture: Annotated[
         Path | None,
         typer.Option(metavar="P.png", help=f"Draw how it ended; {PICTURE} unless --no-picture or --json is given."),
     ] = None,
     no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw no picture.")] = False,
     video: Annotated[
-        Path | None, typer.Option(metavar="V.mp4", help="Film the session (needs dorothie-gym[video]).")
+        Path | None, typer.Option(metavar="V.mp4", help="Write a video of the session (needs dorothie-gym[video]).")
     ] = None,
     participant: Participant = "scripted",
     co_wizard: CoWizard = "scripted",
     ad_wizard: AdWizard = "scripted",
     max_seconds: Annotated[
-        float | None, typer.Option(min=1.0, max=86400.0, help="Cut the session off after so many simulated seconds.")
+        float | None, typer.Option(min=1.0, max=86400.0, help="Truncate the session after this simulated time [s].")
     ] = None,
     word_errors: WordErrors = 0.0,
     as_json: AsJson = False,
 ) -> None:
-    """Play one session: three roles talk while the car drives. The seed is 0 unless you give another."""
+    """Play one session with the three roles."""
     if no_picture and picture is not None:
         fail("--picture and --no-picture exclude each other; give one of them")
     plan = _Plan(
@@ -103,7 +102,7 @@ def run(
 
 
 def _check_outputs(plan: _Plan) -> None:
-    """Fails before anything takes time where something could not be written in the end."""
+    """Fails early if an output file cannot be written."""
     if plan.picture is not None:
         check_picture(plan.picture)
     if plan.video is not None:
@@ -138,7 +137,7 @@ def _play(plan: _Plan, *, quiet: bool) -> dict[str, Any]:
             ending = play_session(engine, policies, seed=plan.seed, folder=plan.out, on_step=watch)
         except KeyboardInterrupt:
             stack.close()
-            _tell_interruption(engine, plan)
+            _exit_interrupted(engine, plan)
     wall = time.perf_counter() - begun
     if plan.picture is not None:
         _draw(engine, plan.picture)
@@ -146,7 +145,7 @@ def _play(plan: _Plan, *, quiet: bool) -> dict[str, Any]:
 
 
 def _watchers(plan: _Plan, stack: ExitStack, *, quiet: bool) -> list[Callable[[SessionEngine], None]]:
-    """Who looks on: the show on the terminal, and the camera."""
+    """Returns the observers of the session: the display on the terminal, and the video."""
     watchers: list[Callable[[SessionEngine], None]] = []
     if plan.video is not None:
         from dorothie_gym.cli.film import Film
@@ -159,11 +158,11 @@ def _watchers(plan: _Plan, stack: ExitStack, *, quiet: bool) -> list[Callable[[S
     return watchers
 
 
-def _tell_interruption(engine: SessionEngine, plan: _Plan) -> None:
+def _exit_interrupted(engine: SessionEngine, plan: _Plan) -> None:
     if plan.out is None:
         kept = "nothing was recorded (--out DIR records)"
     else:
-        kept = f"what happened until then is kept in {plan.out}"
+        kept = f"the recording until then is in {plan.out}"
     stderr().print(
         f"Interrupted after {engine.session.world.time:.1f} simulated seconds; {kept}.", markup=False, soft_wrap=True
     )
@@ -171,7 +170,7 @@ def _tell_interruption(engine: SessionEngine, plan: _Plan) -> None:
 
 
 def _draw(engine: SessionEngine, path: Path) -> None:
-    """The whole town at the end of the session, with the way that was driven and the talk."""
+    """Draws the whole town at the end of the session, with route and dialogue."""
     from dorothie_gym.engine.session_scene import scene_of
     from dorothie_gym.rendering.frames import SceneRenderer
 

@@ -31,7 +31,7 @@ Encoder = Annotated[
     str, typer.Option(help="Of texts: auto (minilm where installed, else hashing), hashing, minilm, bert.")
 ]
 Out = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="Folder of the trainings; one that was begun is gone on with.")
+    Path | None, typer.Option(metavar="DIR", help="Folder of the trainings; a started training is resumed.")
 ]
 Workers = Annotated[int | None, typer.Option(min=1, max=256, help="Processes; all cores without it.")]
 

@@ -7,7 +7,7 @@ import pytest
 from highway_env.vehicle.behavior import IDMVehicle
 
 from dorothie_gym.bench import env as bench
-from dorothie_gym.bench.env import WITHOUT_SUMO, Session, measure
+from dorothie_gym.bench.env import WITHOUT_SUMO, IdleSession, measure
 from dorothie_gym.sim.highway_reference import StockIntersection
 
 KEYS = [
@@ -50,7 +50,7 @@ def test_sumo_drives_on_a_grid_where_it_is_installed() -> None:
 
 
 def test_a_session_goes_on_after_its_end() -> None:
-    session = Session("brookside", 0, 0, 0)
+    session = IdleSession("brookside", 0, 0, 0)
     session.env.agents = []
     assert session.seconds(3, time.perf_counter) > 0.0
     assert session.env.agents and session.env.session.world.time == 1.5
