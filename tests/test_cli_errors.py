@@ -124,7 +124,7 @@ def test_files_that_cannot_be_written(arguments: list[str], words: str) -> None:
         (["--split", "dev"], "'dev'"),
         (["none.parquet"], "none.parquet: No such file or directory"),
         (["text.parquet", "--corpus", "."], "text.parquet: is no parquet file"),
-        (["text.parquet", "--save", "x.parquet"], "give --model majority or --model random with it"),
+        (["text.parquet", "--save", "x.parquet"], "add --model majority or --model random"),
         (["--save", "none/x.parquet"], "the folder none does not exist"),
     ],
 )

@@ -136,5 +136,5 @@ def test_mistakes_are_told_in_one_line() -> None:
     assert "dorothie-gym stats DIR" in refused()
     assert "--phenomena and --check" in refused("corpus", "--phenomena", "--check")
     assert "nowhere" in refused("nowhere")
-    assert "leave the folder out" in refused("corpus", "--kappa", "a", "b")
+    assert "omit the folder" in refused("corpus", "--kappa", "a", "b")
     assert ".png" in refused("corpus", "--picture", "figure.pdf")

@@ -41,7 +41,7 @@ def convert(
     The files of IN determine its layout. Unreadable sessions are listed, and the exit code is then 2.
     """
     if maps is not None and not maps.is_dir():
-        fail(f"{maps}: no such folder; give one with maps (.xodr)")
+        fail(f"{maps}: there is no such folder; give one with maps (.xodr)")
     with reporting_errors():
         from dorothie_gym.recording import Corpus
 
