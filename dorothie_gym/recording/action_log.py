@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -77,6 +78,6 @@ def read_decisions(folder: Path) -> tuple[tuple[Decision, ...] | None, bool]:
 
 def check_order(decisions: Sequence[Decision], where: str) -> None:
     """Raises `SessionError`, beginning with `where`, if the frames of decisions do not rise."""
-    for number, (before, after) in enumerate(zip(decisions, decisions[1:], strict=False), start=2):
+    for number, (before, after) in enumerate(itertools.pairwise(decisions), start=2):
         if after.frame <= before.frame:
             raise SessionError(f"{where}, line {number}: frame {after.frame} after {before.frame}; frames must rise")

@@ -246,7 +246,7 @@ class AerialView:
 
     def _lost(self, box: _Box) -> float:
         """Returns twice the area of a box outside the picture [px2]."""
-        x, y, width, height = box
+        _x, _y, width, height = box
         inside = _overlap(box, (0.0, 0.0, float(self.size[0]), float(self.size[1])))
         return 2.0 * (width * height - inside)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -286,7 +287,7 @@ def _runs(kinds: NDArray[np.int64], start: int, end: int) -> Iterator[_Run]:
         if row[k - 1] == row[k + 1] != row[k]:
             row[k] = row[k - 1]
     cuts = [0, *(np.flatnonzero(np.diff(row)) + 1).tolist(), len(row)]
-    for a, b in zip(cuts[:-1], cuts[1:], strict=True):
+    for a, b in itertools.pairwise(cuts):
         if row[a] != BorderKind.NONE and b - a > 1:
             yield start + a, start + b, int(row[a])
 

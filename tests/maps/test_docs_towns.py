@@ -89,7 +89,7 @@ def test_the_message_is_the_real_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "heading, keys",
+    ("heading", "keys"),
     [
         ("Of the town", schema.TOWN_KEYS),
         ("Of a junction", schema.JUNCTION_KEYS),
@@ -105,7 +105,7 @@ DEFAULTS = streets.StreetDefaults()
 
 
 @pytest.mark.parametrize(
-    "heading, key, limits, default",
+    ("heading", "key", "limits", "default"),
     [
         ("Of the town", "speed", streets.SPEED, f"{DEFAULTS.speed:g}"),
         ("Of the town", "width", streets.WIDTH, f"{DEFAULTS.width:g}"),

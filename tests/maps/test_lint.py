@@ -157,7 +157,7 @@ class TestCentreLines:
 
     def test_the_smallest_radius_is_the_cars(self) -> None:
         slip = math.atan(0.5 * math.tan(MAX_STEERING))
-        assert SMALLEST_RADIUS == pytest.approx(0.5 * Vehicle.LENGTH / math.sin(slip), abs=0.005)
+        assert pytest.approx(0.5 * Vehicle.LENGTH / math.sin(slip), abs=0.005) == SMALLEST_RADIUS
         assert CAR_WIDTH == Vehicle.WIDTH
 
     def test_a_step_within_a_lane(self) -> None:

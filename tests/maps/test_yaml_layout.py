@@ -224,7 +224,7 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("text, reason", REFUSED.values(), ids=REFUSED.keys())
+@pytest.mark.parametrize(("text", "reason"), REFUSED.values(), ids=REFUSED.keys())
 def test_a_plan_that_does_not_fit_is_refused(tmp_path: Path, text: str, reason: str) -> None:
     with pytest.raises(TownError) as caught:
         laid_out(tmp_path, text)

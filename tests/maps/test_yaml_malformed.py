@@ -35,7 +35,7 @@ def check(path: Path, line: int | None, fragments: str) -> None:
         assert fragment in message
 
 
-@pytest.mark.parametrize("old, new, line, fragments", MISTAKES.values(), ids=MISTAKES.keys())
+@pytest.mark.parametrize(("old", "new", "line", "fragments"), MISTAKES.values(), ids=MISTAKES.keys())
 def test_a_mistake_is_reported_with_line_key_and_advice(
     tmp_path: Path, old: str, new: str, line: int, fragments: str
 ) -> None:
@@ -43,7 +43,7 @@ def test_a_mistake_is_reported_with_line_key_and_advice(
     check(written(tmp_path, MIDTOWN.replace(old, new, 1)), line, fragments)
 
 
-@pytest.mark.parametrize("text, line, fragments", WRONG_FILES.values(), ids=WRONG_FILES.keys())
+@pytest.mark.parametrize(("text", "line", "fragments"), WRONG_FILES.values(), ids=WRONG_FILES.keys())
 def test_a_file_that_is_no_town_is_refused(tmp_path: Path, text: str | bytes, line: int | None, fragments: str) -> None:
     check(written(tmp_path, text), line, fragments)
 

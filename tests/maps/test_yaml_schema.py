@@ -38,7 +38,7 @@ def test_a_roundabout_has_radius_lanes_and_speed(midtown: TownPlan) -> None:
     assert midtown.junctions["cross"].roundabout is None
 
 
-@pytest.mark.parametrize("top, expected", [("", 30.0), ("speed: 60\n", 30.0), ("speed: 20\n", 20.0)])
+@pytest.mark.parametrize(("top", "expected"), [("", 30.0), ("speed: 60\n", 30.0), ("speed: 20\n", 20.0)])
 def test_a_roundabout_is_not_faster_than_the_town(tmp_path: Path, top: str, expected: float) -> None:
     text = f"{top}junctions: {{a: [0, 0], b: {{at: [200, 0, 3], roundabout: 20}}}}\nstreets: {{Road: [a, b]}}\n"
     junction = read_plan(written(tmp_path, text)).junctions["b"]
@@ -63,7 +63,7 @@ def test_a_street_that_says_nothing_has_a_lane_each_way_and_pavements(tmp_path: 
 
 
 @pytest.mark.parametrize(
-    "keys, lanes",
+    ("keys", "lanes"),
     [
         ("lanes: 3", (3, 3)),
         ("lanes: [2, 1]", (2, 1)),
@@ -139,7 +139,7 @@ def test_names_are_texts_even_where_yaml_sees_something_else(tmp_path: Path, nam
 
 
 @pytest.mark.parametrize(
-    "digits, value", [("60", 60), ("-6.5", -6.5), ("+6", 6), (".5", 0.5), ("1e2", 100), ("0.0", 0)]
+    ("digits", "value"), [("60", 60), ("-6.5", -6.5), ("+6", 6), (".5", 0.5), ("1e2", 100), ("0.0", 0)]
 )
 def test_numbers_are_plain_decimal_digits(tmp_path: Path, digits: str, value: float) -> None:
     plan = read_plan(written(tmp_path, f"junctions: {{a: [{digits}, 7], b: [200, 0]}}\nstreets: {{Road: [a, b]}}\n"))
@@ -173,7 +173,7 @@ def test_without_libyaml_the_same_is_read(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize(
-    "text, line",
+    ("text", "line"),
     [("a: [\n1,\n2\n", 1), ("a:\n  b: 'x\nc: 1\n", 2), ("a:\n\tb: 1\n", 2), ("a: 1\nb: c: d\n", 2), ("a: *b\n", 1)],
 )
 def test_both_loaders_find_the_same_line_of_broken_yaml(

@@ -25,7 +25,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def copy(recorded: Path, tmp_path: Path) -> Iterator[Path]:
     folder = tmp_path / "copy"
     shutil.copytree(recorded, folder)
-    yield folder
+    return folder
 
 
 def test_round_trip_preserves_the_session(recorded: Path) -> None:
@@ -122,7 +122,7 @@ def test_moves_are_grouped_into_utterances() -> None:
     spoken = talked.utterances(Role.CO_WIZARD)[0]
     assert (spoken.text, spoken.start, spoken.end) == ("Okay, turning left.", 1.0, 2.0)
     assert [move.act for move in spoken.moves] == [OKAY, TURNING]
-    assert [move.act.move for move in talked.moves(Role.PARTICIPANT)][0] is DialogueMove.INSTRUCT
+    assert next(move.act.move for move in talked.moves(Role.PARTICIPANT)) is DialogueMove.INSTRUCT
 
 
 def test_duration_is_the_last_frame_or_event() -> None:

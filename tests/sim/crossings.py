@@ -115,7 +115,7 @@ def lit(town: Town) -> Town:
                         lanes=(approach.id,),
                         heading=0.0,
                         position=(float(place[0]), float(place[1]), float(place[2])),
-                    )  # fmt: skip
+                    )
                 )
             phases.append(LightPhase(duration=GREEN, green=tuple(ids)))
             phases += [LightPhase(duration=YELLOW, yellow=tuple(ids)), LightPhase(duration=ALL_RED)]

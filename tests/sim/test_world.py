@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -228,7 +229,7 @@ def test_straying_pedestrian_reaches_the_far_kerb(name: str) -> None:
     crossings = 0
     for way in town.walks[town.walks.kind == Footway.STREET]:
         points = town.walk_points[way.first : way.last + 1]
-        for here, there in zip(points, points[1:], strict=False):
+        for here, there in itertools.pairwise(points):
             far = min(here[5], there[5])
             if far <= 0.0:
                 continue

@@ -3,4 +3,4 @@
 from dorothie_gym.analysis.phenomena.catalogue import PHENOMENA
 from dorothie_gym.analysis.phenomena.dialogue_view import DialogueView, Occurrence, Phenomenon, Turn
 
-__all__ = ["PHENOMENA", "Occurrence", "Phenomenon", "DialogueView", "Turn"]
+__all__ = ["PHENOMENA", "DialogueView", "Occurrence", "Phenomenon", "Turn"]

@@ -163,7 +163,7 @@ class Cubics:
         if len(rows) == 1:  # most profiles
             self._simple = not rows[0, 2:].any()
         else:
-            self._simple = len(rows) == 0 or not rows[:, 2:].any() and bool(np.all(rows[:, 1] == rows[0, 1]))
+            self._simple = len(rows) == 0 or (not rows[:, 2:].any() and bool(np.all(rows[:, 1] == rows[0, 1])))
 
     def at(self, s: Array, pick: Array | None = None) -> Array:
         """Returns the values (n,) at distances (n,) [m]; `pick` as in `ReferenceLine.place`."""

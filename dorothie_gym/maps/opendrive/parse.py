@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from pathlib import Path
 from typing import NoReturn, TypeAlias
@@ -315,7 +316,7 @@ class _Parser(ElementReader):
         if not elements:
             self.fail(road, "has no lane section")
         starts = [self.number(e, "s") for e in elements]
-        if any(later < earlier for earlier, later in zip(starts, starts[1:], strict=False)):
+        if any(later < earlier for earlier, later in itertools.pairwise(starts)):
             self.fail(road, "its lane sections are not in the order of s")
         if starts[0] < -ROUNDING or starts[-1] > length + ROUNDING:
             self.fail(road, f"its lane sections must start between 0 and its length of {length:g} m")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -155,7 +156,7 @@ def _on_ring(stretch: Stretch, trim_start: float, trim_end: float) -> Curve:
 def _between(stretch: Stretch, trim_start: float, trim_end: float) -> list[Point]:
     """Returns the corners of a stretch with its ends moved to the edges of its crossings."""
     corners, street = stretch.corners, stretch.street
-    legs = [math.dist(a, b) for a, b in zip(corners, corners[1:], strict=False)]
+    legs = [math.dist(a, b) for a, b in itertools.pairwise(corners)]
     room = legs[0] - trim_start - trim_end if len(legs) == 1 else min(legs[0] - trim_start, legs[-1] - trim_end)
     if room < (SMALLEST_STRETCH if len(legs) == 1 else 0.5):
         street.entry.fail(
@@ -176,7 +177,7 @@ def _check_length(stretch: Stretch, length: float) -> None:
 
 def _radii(stretch: Stretch, points: Sequence[Point]) -> list[float]:
     """Returns the radius of each bend [m]: that of the street, else the largest if bends share their leg evenly."""
-    legs = [math.dist(a, b) for a, b in zip(points, points[1:], strict=False)]
+    legs = [math.dist(a, b) for a, b in itertools.pairwise(points)]
     rooms = [leg if k in (0, len(legs) - 1) else leg / 2.0 for k, leg in enumerate(legs)]
     street, radii = stretch.street, list[float]()
     for k in range(1, len(points) - 1):

@@ -277,5 +277,5 @@ def _check(entry: YamlEntry, lane: Lane, station: float, aside: float, *, kerb: 
     if abs(aside) < lane.width_at(station) / 2.0 + 0.5:
         entry.fail("it stands on the road; move it aside")
     if not kerb or aside < 0.0 or not _STOP_ROOM <= station <= lane.length - _STOP_ROOM:
-        what = "a junction" if lane.in_junction or kerb and aside > 0.0 else "a median"
+        what = "a junction" if lane.in_junction or (kerb and aside > 0.0) else "a median"
         entry.fail(f"the nearest place to stop for it would be {what}; move it to the side of a street")

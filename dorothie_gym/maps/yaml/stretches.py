@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -169,7 +170,7 @@ def _runs(street: StreetPlan, junctions: Mapping[str, JunctionPlan]) -> list[Str
 
 def _check_points(run: StreetRun) -> None:
     points = [run.start.centre, *(bend.at for bend in run.bends), run.end.centre]
-    for a, b in zip(points, points[1:], strict=False):
+    for a, b in itertools.pairwise(points):
         if abs(a[0] - b[0]) + abs(a[1] - b[1]) < 1.0:
             run.street.entry.fail(f"points {list(a)} and {list(b)} of its course are less than 1 m apart; remove one")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -197,7 +198,7 @@ def sorted_rows(rows: Sequence[JsonObject], name: str, report: ReadReport) -> li
     frames = [frame_of(row) or 0 for row in usable]
     report.repair(
         f"{name}: rows were out of order by frame, and were put in order",
-        sum(later < earlier for earlier, later in zip(frames, frames[1:], strict=False)),
+        sum(later < earlier for earlier, later in itertools.pairwise(frames)),
     )
     return sorted(usable, key=lambda row: frame_of(row) or 0)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import defaultdict
 from collections.abc import Sequence
@@ -184,7 +185,7 @@ def _way_on(places: Array, one: int, others: Sequence[int], edges: LaneEdges) ->
             if bow != 0.0:
                 aside = bow / length * np.array([-across[1], across[0], 0.0])
                 line = np.array([line[0], *(line[0] + s * (line[1] - line[0]) + aside for s in (0.25, 0.75)), line[1]])
-            if all(edges.is_clear(leg, float(line[0, 2]), CLEARANCE) for leg in zip(line, line[1:], strict=False)):
+            if all(edges.is_clear(leg, float(line[0, 2]), CLEARANCE) for leg in itertools.pairwise(line)):
                 return other, line
     return None
 

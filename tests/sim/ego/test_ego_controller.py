@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import math
 
 import pytest
@@ -17,7 +18,7 @@ def test_cruise_speed_goes_by_steps_of_five_within_its_range() -> None:
     while ego.change_cruise(up=True) is None:
         seen.append(ego.cruise)
     assert seen[-1] == MAX_CRUISE
-    assert all(b - a == 5.0 for a, b in zip(seen, seen[1:], strict=False))
+    assert all(b - a == 5.0 for a, b in itertools.pairwise(seen))
     while ego.change_cruise(up=False) is None:
         pass
     assert ego.cruise == MIN_CRUISE

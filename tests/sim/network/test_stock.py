@@ -1,5 +1,7 @@
 """Stock highway-env works on a town's road: drivers, observation types, viewer."""
 
+import itertools
+
 import numpy as np
 import pytest
 from highway_env.envs.common.abstract import AbstractEnv
@@ -66,7 +68,7 @@ def test_idm_vehicle_drives_round_a_curve():
     assert off < 0.5
 
 
-@pytest.mark.parametrize("connector, out", [(WEST_EAST, EAST_OUT), (WEST_SOUTH, SOUTH_OUT)])
+@pytest.mark.parametrize(("connector", "out"), [(WEST_EAST, EAST_OUT), (WEST_SOUTH, SOUTH_OUT)])
 def test_idm_vehicle_drives_its_route_through_a_junction(connector, out):
     network = TownNetwork(t_junction_town())
     route = [network.index_of(i) for i in (WEST_IN, connector, out)]
@@ -81,7 +83,7 @@ def test_idm_vehicle_keeps_to_the_links_of_a_town(name):
     start = next(lane.id for lane in network.town.lanes if not lane.in_junction and lane.length > 60)
     visited, _ = drive(network, start, 60)
     assert len(visited) > 3
-    for lane, following in zip(visited, visited[1:], strict=False):
+    for lane, following in itertools.pairwise(visited):
         beside = [network.lane_id(side) for side in network.side_lanes(network.index_of(lane))]
         onward = [link.target for link in network.town.successors(lane)]
         assert following in onward + beside

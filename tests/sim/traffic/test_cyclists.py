@@ -39,7 +39,7 @@ def test_cyclist_keeps_right_and_speeds_up_gently():
 
 def test_cyclist_moves_over_to_the_right_and_does_not_overtake():
     network = TownNetwork(straight_town(lanes=3, roads=6))
-    arrays, world = with_cyclist(network, 0, 20.0)
+    arrays, _world = with_cyclist(network, 0, 20.0)
     add = empty_world(arrays, vehicles=2, pedestrians=0)
     add_vehicle(arrays, add, 0, 20.0, kind=Kind.CYCLIST, desired=5.0)
     add_vehicle(arrays, add, 2 + 3, 20.0, kind=Kind.CYCLIST, desired=4.2)  # 100 m ahead on the rightmost lane
