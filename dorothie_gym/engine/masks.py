@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 
 from dorothie_gym.engine.observation_buffers import ObservationBuffer, Shape
 from dorothie_gym.engine.upcoming_junction import UpcomingJunction
-from dorothie_gym.maps import LinkType
-from dorothie_gym.ontology import SPEED_STEP, ExceptionKind, PhysicalAction, Role
-from dorothie_gym.sim.ego.limits import MAX_CRUISE, MIN_CRUISE
-from dorothie_gym.sim.ego.manoeuvre_lanes import SIDES
+from dorothie_gym.ontology import ExceptionKind, PhysicalAction, Role
+from dorothie_gym.sim.ego.feasibility import may_change_cruise
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import SpaceLimits, action_space
 from dorothie_gym.tasks import TaskState
@@ -62,7 +60,6 @@ class ActionMasks:
         self._buffers[Role.AD_WIZARD].template["exception"][[int(kind) for kind in ALWAYS_FEASIBLE]] = 1
         self._state: tuple[Any, ...] = ()  # state of the ego that the template belongs to
         self._task_state = (-1, -1)
-        self._beside: dict[int, tuple[bool, ...]] = {}  # whether there is a lane to the left and to the right, by lane
 
     def mask(self, role: Role) -> dict[str, Any]:
         """Returns the mask of a role's action space at the present decision; the caller owns it."""
@@ -85,38 +82,24 @@ class ActionMasks:
         if state == self._state:
             return
         self._state = state
-        form = self._buffers[Role.CO_WIZARD].template
-        physical, angle = form["physical"], form["angle"]
-        lane = planner.lane
-        busy = planner.in_manoeuvre or self._world.town.lanes[lane].in_junction
-        beside_left, beside_right = self._lanes_beside(lane)
-        left = not busy and beside_left and planner.may_switch(LinkType.LANE_CHANGE_LEFT, speed)
-        right = not busy and beside_right and planner.may_switch(LinkType.LANE_CHANGE_RIGHT, speed)
-        committed = planner.is_committed(speed)
-        exits = () if committed else self._junction.options().exits
-        leaves = not busy and not committed and (planner.held or planner.manoeuvre[0] is not None)
-        physical[PhysicalAction.LANE_FOLLOW] = leaves
-        physical[PhysicalAction.LANE_SWITCH] = left or right
-        # A U-turn starts from the leftmost lane.
-        physical[PhysicalAction.U_TURN] = not busy and not beside_left and planner.may_turn_round(speed)
+        template = self._buffers[Role.CO_WIZARD].template
+        physical, angle = template["physical"], template["angle"]
+        feasible = planner.feasible(speed)
+        exits = self._junction.options().exits if feasible.j_turn else ()
+        physical[PhysicalAction.LANE_FOLLOW] = feasible.lane_follow
+        physical[PhysicalAction.LANE_SWITCH] = feasible.switch_left or feasible.switch_right
+        physical[PhysicalAction.U_TURN] = feasible.u_turn
         physical[PhysicalAction.J_TURN] = bool(exits)
         physical[PhysicalAction.STOP] = not planner.held
         physical[PhysicalAction.START] = planner.held
-        physical[PhysicalAction.SPEED_CHANGE] = MIN_CRUISE + SPEED_STEP <= cruise or cruise <= MAX_CRUISE - SPEED_STEP
+        physical[PhysicalAction.SPEED_CHANGE] = may_change_cruise(cruise, True) or may_change_cruise(cruise, False)
         planned = None if planner.held else planner.turn_ahead
         angle[:] = 0
         angle[180] = 1
         for way in exits:
             angle[way.angle + 180] = way.angle != planned
-        for side, possible in ((90, left), (-90, right)):
+        for side, possible in ((90, feasible.switch_left), (-90, feasible.switch_right)):
             angle[side + 180] |= possible
-
-    def _lanes_beside(self, lane: int) -> tuple[bool, ...]:
-        found = self._beside.get(lane)
-        if found is None:
-            town = self._world.town
-            found = self._beside[lane] = tuple(town.neighbour(lane, side) is not None for side in SIDES)
-        return found
 
     def _update_exceptions(self) -> None:
         """Updates the mask of exceptions if props or task have changed."""

@@ -17,7 +17,7 @@ from dorothie_gym.engine.scenario import Scenario, draw_scenario
 from dorothie_gym.engine.upcoming_junction import UpcomingJunction
 from dorothie_gym.envs.navigation_config import NavigationConfig
 from dorothie_gym.envs.session_view import RENDER_MODES, SessionView
-from dorothie_gym.maps import LinkType, Town, load_town
+from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import LandmarkName, MentalAction, Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
@@ -27,7 +27,7 @@ from dorothie_gym.policies.navigation.junction_exits import JunctionExits
 from dorothie_gym.policies.navigation.observation_vector import HeardInstruction, NavigationEncoder, Vector
 from dorothie_gym.policies.observation_parser import read_landmarks
 from dorothie_gym.policies.policy import policy_seed
-from dorothie_gym.sim.ego.limits import MAX_CRUISE, MIN_CRUISE
+from dorothie_gym.sim.ego.feasibility import may_change_cruise
 from dorothie_gym.sim.infractions import INFRACTION_KINDS, WorldEventKind
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.world import World
@@ -323,17 +323,16 @@ class NavigationMask:
         mask = np.zeros(len(ACTIONS), dtype=np.int8)
         mask[NavigationAction.NOTHING] = mask[NavigationAction.LIGHTS] = 1
         mask[NavigationAction.STOP], mask[NavigationAction.START] = not planner.held, planner.held
-        mask[NavigationAction.FASTER], mask[NavigationAction.SLOWER] = cruise < MAX_CRUISE, cruise > MIN_CRUISE
-        committed = planner.is_committed(speed)
-        if not (planner.in_manoeuvre or world.town.lanes[planner.lane].in_junction):
-            mask[NavigationAction.SWITCH_LEFT] = planner.may_switch(LinkType.LANE_CHANGE_LEFT, speed)
-            mask[NavigationAction.SWITCH_RIGHT] = planner.may_switch(LinkType.LANE_CHANGE_RIGHT, speed)
-            mask[NavigationAction.U_TURN] = planner.may_turn_round(speed)
-            leaves = planner.held or planner.manoeuvre[0] is not None
-            mask[NavigationAction.LANE_FOLLOW] = leaves and not committed
+        mask[NavigationAction.FASTER] = may_change_cruise(cruise, True)
+        mask[NavigationAction.SLOWER] = may_change_cruise(cruise, False)
+        feasible = planner.feasible(speed)
+        mask[NavigationAction.SWITCH_LEFT] = feasible.switch_left
+        mask[NavigationAction.SWITCH_RIGHT] = feasible.switch_right
+        mask[NavigationAction.U_TURN] = feasible.u_turn
+        mask[NavigationAction.LANE_FOLLOW] = feasible.lane_follow
         for action in UNDER_WAY:
             mask[action] |= prepares(action, seen, self.exits)
-        choice = None if committed else self.choice
+        choice = self.choice if feasible.j_turn else None
         if choice is not None:
             mask[FIRST_TURN:] = [way is not None for way in self.exits.by_sector(choice[0])]
         return mask
