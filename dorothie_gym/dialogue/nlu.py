@@ -48,7 +48,30 @@ _FURTHER = re.compile(
 )
 # First four letters of the words of the patterns above; other texts skip the patterns.
 _SPEED_STEMS = frozenset(
-    "spee fast hurr step floo acce quic up pick hit give move slow brak dece easi ease down drop easy redu lowe".split()
+    [
+        "spee",
+        "fast",
+        "hurr",
+        "step",
+        "floo",
+        "acce",
+        "quic",
+        "up",
+        "pick",
+        "hit",
+        "give",
+        "move",
+        "slow",
+        "brak",
+        "dece",
+        "easi",
+        "ease",
+        "down",
+        "drop",
+        "easy",
+        "redu",
+        "lowe",
+    ]
 )
 _LIGHT_STEMS = frozenset({"ligh", "beam", "head", "lamp"})
 _ORDER_WORDS = frozenset({"before", "after"})

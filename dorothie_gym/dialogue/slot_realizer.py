@@ -60,8 +60,18 @@ class SlotRealizer:
     """
 
     __slots__ = (
-        "_names", "_scene", "_style", "_wording", "chattiness", "fronted", "habit", "idiolect", "manner", "random",
-        "values", "_without",
+        "_names",
+        "_scene",
+        "_style",
+        "_without",
+        "_wording",
+        "chattiness",
+        "fronted",
+        "habit",
+        "idiolect",
+        "manner",
+        "random",
+        "values",
     )  # fmt: skip
 
     def __init__(

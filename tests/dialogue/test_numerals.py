@@ -16,7 +16,7 @@ def test_ordinals_are_read_back(number):
 
 
 def test_digits_and_several_numbers_are_read():
-    assert read_cardinals("30 or forty five or 2".split()) == [30, 45, 2]
+    assert read_cardinals(["30", "or", "forty", "five", "or", "2"]) == [30, 45, 2]
     assert read_ordinal("2nd") == 2
     assert read_ordinal("next") == 1
     assert read_ordinal("left") is None

@@ -52,7 +52,7 @@ def test_gymnasium_accepts_the_environment(env_class: type[TeacherForcedEnv]) ->
 
 @pytest.mark.parametrize(("env_class", "count"), [(UfNEnv, 4), (RfNEnv, 3), (NfDEnv, 5)])
 def test_labels_earn_everything(env_class: type[TeacherForcedEnv], count: int) -> None:
-    observations, rewards, info = play(env_class([session(talk())]))
+    _observations, rewards, info = play(env_class([session(talk())]))
     assert rewards == [1.0] * count
     assert info["points_left"] == 0
     assert set(info["metrics"].values()) == {1.0}
