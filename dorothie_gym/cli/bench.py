@@ -137,7 +137,7 @@ def rl(
 
     def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
         try:
-            from dorothie_gym.baselines.rl.measuring import measure
+            from dorothie_gym.baselines.rl.throughput import measure
         except ImportError:
             fail("bench rl needs torch and stable-baselines3; run: pip install 'dorothie-gym[baselines]'")
         from dorothie_gym.errors import SettingsError

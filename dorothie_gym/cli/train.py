@@ -14,7 +14,7 @@ from dorothie_gym.cli.options import AsJson
 from dorothie_gym.cli.output import FAILED, INTERRUPTED, fail, print_json, reporting_errors, stderr, stdout, wide_stdout
 
 if TYPE_CHECKING:
-    from dorothie_gym.baselines.runs import Job
+    from dorothie_gym.baselines.experiment import Experiment
     from dorothie_gym.baselines.training import Epoch
     from dorothie_gym.benchmark import ResultsTable
 
@@ -48,14 +48,14 @@ def train(
 ) -> None:
     """Train a model with some seeds, test it, and tell its figures. When it is stopped, the same command goes on."""
     with _reporting_errors():
-        from dorothie_gym.baselines.rows import find_row
-        from dorothie_gym.baselines.table import gather_table, table_jobs
+        from dorothie_gym.baselines.experiment import gather_table, table_experiments
+        from dorothie_gym.baselines.model_zoo import find_row
 
         row = find_row(model)
         if row.missing:
             fail(f"{row.name} cannot be trained: {row.missing}")
         folder, where = _places(corpus, out)
-        jobs = table_jobs(folder, where, encoder=encoder, size=size, seeds=seeds, rows=[row])
+        jobs = table_experiments(folder, where, encoder=encoder, size=size, seeds=seeds, rows=[row])
         results = _run(jobs, workers, quiet=as_json)
         table, _ = gather_table(jobs, floors=False)
     if as_json:
@@ -89,14 +89,14 @@ def table(
     """
     begun = time.perf_counter()
     with _reporting_errors():
-        from dorothie_gym.baselines.rows import ROWS, find_row
-        from dorothie_gym.baselines.table import PREDICTIONS, gather_table, table_jobs
+        from dorothie_gym.baselines.experiment import PREDICTIONS, gather_table, table_experiments
+        from dorothie_gym.baselines.model_zoo import ROWS, find_row
         from dorothie_gym.benchmark import write_predictions
         from dorothie_gym.benchmark.report import write_report
 
         rows = ROWS if models == "all" else [find_row(name.strip()) for name in models.split(",")]
         folder, where = _places(corpus, out)
-        jobs = table_jobs(folder, where, encoder=encoder, size=size, seeds=seeds, rows=rows)
+        jobs = table_experiments(folder, where, encoder=encoder, size=size, seeds=seeds, rows=rows)
         results = _run(jobs, workers, quiet=as_json)
         made, predictions = gather_table(jobs)
         write_predictions(where / PREDICTIONS, predictions)
@@ -111,15 +111,15 @@ def table(
     )
 
 
-def _run(jobs: Sequence[Job], workers: int | None, *, quiet: bool) -> list[dict[str, Any]]:
+def _run(jobs: Sequence[Experiment], workers: int | None, *, quiet: bool) -> list[dict[str, Any]]:
     """Runs the jobs, and returns what came of them in their order."""
-    from dorothie_gym.baselines.workers import run_jobs
+    from dorothie_gym.baselines.experiment import run_experiments
     from dorothie_gym.bench.timing import cores
 
     found: dict[Path, dict[str, Any]] = {}
     try:
         with _progress(len(jobs), quiet=quiet) as (on_epoch, on_job):
-            for job, result in run_jobs(jobs, workers or cores(), on_epoch):
+            for job, result in run_experiments(jobs, workers or cores(), on_epoch):
                 found[job.folder] = result
                 on_job(job)
     except KeyboardInterrupt:
@@ -130,7 +130,9 @@ def _run(jobs: Sequence[Job], workers: int | None, *, quiet: bool) -> list[dict[
 
 
 @contextmanager
-def _progress(jobs: int, *, quiet: bool) -> Iterator[tuple[Callable[[Job, Epoch], None], Callable[[Job], None]]]:
+def _progress(
+    jobs: int, *, quiet: bool
+) -> Iterator[tuple[Callable[[Experiment, Epoch], None], Callable[[Experiment], None]]]:
     """A bar on standard error while that is a terminal."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -139,11 +141,11 @@ def _progress(jobs: int, *, quiet: bool) -> Iterator[tuple[Callable[[Job, Epoch]
     with Progress(*columns, console=console, disable=quiet or not console.is_terminal, transient=True) as progress:
         bar = progress.add_task("Trainings", total=jobs)
 
-        def on_epoch(job: Job, epoch: Epoch) -> None:
+        def on_epoch(job: Experiment, epoch: Epoch) -> None:
             loss = f"{epoch.training:.3f} / {epoch.validation:.3f}"
             progress.update(bar, description=f"{job.model}, seed {job.seed}, epoch {epoch.number}: loss {loss}")
 
-        def on_job(job: Job) -> None:
+        def on_job(job: Experiment) -> None:
             progress.update(bar, advance=1, description=f"{job.model}, seed {job.seed}: done")
 
         yield on_epoch, on_job

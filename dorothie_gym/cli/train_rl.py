@@ -16,9 +16,9 @@ from dorothie_gym.cli.output import FAILED, INTERRUPTED, fail, print_json, repor
 from dorothie_gym.ontology import AGENT_ROLES
 
 if TYPE_CHECKING:
-    from dorothie_gym.baselines.rl import Run, TrainingSettings
-    from dorothie_gym.baselines.rl.training import Row
-    from dorothie_gym.baselines.selfplay.training import Row as SelfPlayRow
+    from dorothie_gym.baselines.rl import TrainingResult, TrainingSettings
+    from dorothie_gym.baselines.rl.training import TrainingEvaluation
+    from dorothie_gym.baselines.selfplay.training import SelfPlayEvaluation
 
 
 _OPTIONS = ("steps", "environments", "workers", "seed", "evaluate_every", "episodes")
@@ -224,9 +224,9 @@ def _line(row: Any) -> str:
     )
 
 
-def _show(run: Run[Row], settings: TrainingSettings) -> None:
+def _show(run: TrainingResult[TrainingEvaluation], settings: TrainingSettings) -> None:
+    from dorothie_gym.baselines.rl.checkpoint import DESCRIPTION
     from dorothie_gym.baselines.rl.training import BEST, CURVE, best_of
-    from dorothie_gym.baselines.rl.weights import DESCRIPTION
 
     console = stdout()
     console.print(rate_line(f"{settings.algorithm} on {settings.env}", run), markup=False, soft_wrap=True)
@@ -238,7 +238,7 @@ def _show(run: Run[Row], settings: TrainingSettings) -> None:
     console.print(f"Model: {run.folder / DESCRIPTION}", markup=False, soft_wrap=True)
 
 
-def _facts(run: Run[Row], settings: TrainingSettings) -> dict[str, Any]:
+def _facts(run: TrainingResult[TrainingEvaluation], settings: TrainingSettings) -> dict[str, Any]:
     from dorothie_gym.baselines.rl.training import best_of
 
     best = best_of(run.rows)
@@ -269,7 +269,7 @@ def train_selfplay(
         as_json: whether to print one JSON object and nothing else.
     """
     from dorothie_gym.baselines.selfplay.settings import selfplay_settings
-    from dorothie_gym.baselines.selfplay.training import SelfPlay
+    from dorothie_gym.baselines.selfplay.training import SelfPlayTraining
     from dorothie_gym.errors import ModelFileError, ProcessError, SessionError, SettingsError
 
     with reporting_errors():
@@ -278,7 +278,7 @@ def train_selfplay(
             if changes["workers"] is None and ray is None:
                 settings = replace(settings, workers=processes(settings.environments))
             with training_progress(settings.steps, out, _selfplay_line, quiet=as_json) as (watch, tell):
-                run = SelfPlay(settings, out, watch, ray, tell).go()
+                run = SelfPlayTraining(settings, out, watch, ray, tell).go()
         except (SettingsError, ModelFileError, SessionError) as error:
             fail(str(error))
         except ProcessError as error:
@@ -293,7 +293,7 @@ def train_selfplay(
         exit_interrupted(run.steps, settings.steps, out, shlex.join([*words, *options_of(settings, ray)]))
 
 
-def _selfplay_line(row: SelfPlayRow) -> str:
+def _selfplay_line(row: SelfPlayEvaluation) -> str:
     returns = ", ".join(f"{role} {'-' if value is None else f'{value:.2f}'}" for role, value in row.returns.items())
     return (
         f"{row.steps:>10,} steps, {row.seconds:6.0f} s: success against the scripted Ad-Wizard "
@@ -301,7 +301,7 @@ def _selfplay_line(row: SelfPlayRow) -> str:
     )
 
 
-def _show_selfplay(run: Run[SelfPlayRow]) -> None:
+def _show_selfplay(run: TrainingResult[SelfPlayEvaluation]) -> None:
     from dorothie_gym.baselines.rl.training import CURVE
 
     console = stdout()

@@ -6,10 +6,10 @@ import pytest
 import torch
 
 from dorothie_gym.baselines.inputs import Examples
+from dorothie_gym.baselines.learning_curves import draw_loss_curves
 from dorothie_gym.baselines.toto import TOTOConfig
 from dorothie_gym.baselines.training import BEST_FILE, LAST_FILE, batches, predict, train
 from dorothie_gym.baselines.training.checkpoints import about, restore, save
-from dorothie_gym.baselines.training.curves import draw_curves
 from dorothie_gym.errors import CheckpointError
 from tests.baselines import samples
 from tests.baselines.test_toto import TINY, make
@@ -133,7 +133,7 @@ def test_every_point_is_seen_once_in_an_epoch_in_another_order_each_time():
 
 def test_losses_are_drawn(tmp_path):
     _, trained = run(tmp_path)
-    draw_curves(trained.epochs, "TOTO", tmp_path / "loss.png")
+    draw_loss_curves(trained.epochs, "TOTO", tmp_path / "loss.png")
     assert (tmp_path / "loss.png").read_bytes()[:4] == b"\x89PNG"
 
 

@@ -1,125 +1,120 @@
-"""What a Co-Wizard has seen, heard, said and done so far, as a session that the benchmark's features are read from.
+"""History of a session as the Co-Wizard knows it, encoded step by step for a benchmark model.
 
-Everything comes from its observations and its own actions: nothing that it must not know gets in.
+All content comes from the Co-Wizard's own observations and actions, so that nothing hidden from it gets in.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, Self
+from typing import Any, Self
 
-from dorothie_gym.baselines.acting.glimpses import Glimpse, header_of, scene_of, way_of
+from dorothie_gym.baselines.acting.observation_frames import ObservationFrame, header_of, rows_between, scene_of
+from dorothie_gym.benchmark.features import HistorySizes
+from dorothie_gym.benchmark.features.incremental import IncrementalColumns
 from dorothie_gym.dialogue import Span
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, ArgumentKind, Role, Slot
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.recording import FRAME_RATE, Event, EventType, Session, SessionHeader
+from dorothie_gym.recording import FRAME_RATE, ActionRecord, MoveRecord, UtteranceRecord
+from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.spaces import Physical
 
-KEPT: Final = 12.0
-"""So much of the way, and of what was around it, is kept [s]: more than any window shows (10 s)."""
-
-_TAKES_ANGLE: Final = (ArgumentKind.ANGLE, ArgumentKind.SIDE)
-_TAKES_UP: Final = (ArgumentKind.SPEED_STEP, ArgumentKind.SWITCH)
+_TAKES_ANGLE = (ArgumentKind.ANGLE, ArgumentKind.SIDE)
+_TAKES_UP = (ArgumentKind.SPEED_STEP, ArgumentKind.SWITCH)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class History:
-    """A session as the Co-Wizard has it; every change gives a new one.
+    """Observations, utterances and own actions of a Co-Wizard; every change returns a new object.
 
     Attributes:
-        header: town, streets, and the landmarks that it knows.
-        events: dialogue moves of both speakers and its own physical actions, flagged as points where a recording has
-            them flagged.
-        glimpses: where it was and what it perceived, the last at the end.
-        utterances: how many there were.
-        kept: how long glimpses are kept [s].
+        encoded: what a benchmark model can still be shown of them, as columns.
+        newest: the last observation; None before the first.
+        events: number of dialogue moves and physical actions so far.
+        utterances: number of utterances so far.
+        named_before: label of the landmark that was named last in utterances that are no longer kept.
     """
 
-    header: SessionHeader
-    events: tuple[Event, ...] = ()
-    glimpses: tuple[Glimpse, ...] = ()
+    encoded: IncrementalColumns
+    newest: ObservationFrame | None = None
+    events: int = 0
     utterances: int = 0
-    kept: float = KEPT
+    named_before: str | None = None
 
     @classmethod
-    def begin(cls, observation: Mapping[str, Any], town: Town, kept: float = KEPT) -> Self:
-        """Returns a history in which nothing has happened yet.
+    def begin(cls, observation: Mapping[str, Any], town: Town, sizes: HistorySizes) -> Self:
+        """Returns an empty history.
 
         Args:
-            observation: the first of the session: it tells streets and landmarks.
+            observation: first observation of the session: it has the streets and landmarks.
             town: the map.
-            kept: how long glimpses are kept [s].
+            sizes: how much of the history the model is shown.
         """
-        return cls(header=header_of(observation, town), kept=kept)
+        return cls(encoded=IncrementalColumns.begin(header_of(observation, town), town, sizes))
 
     @property
     def frame(self) -> int:
-        """Frame of the last glimpse."""
-        return self.glimpses[-1].frame
+        """Frame of the last observation; there must be one."""
+        assert self.newest is not None
+        return self.newest.frame
 
     @property
     def landmark(self) -> str | None:
-        """Label of the landmark that was named last, by whomever."""
-        moves = (event.data["slots"] for event in reversed(self.events) if event.type is EventType.DIALOGUE_MOVE)
-        return next((slots[Slot.LANDMARK.label][-1] for slots in moves if Slot.LANDMARK.label in slots), None)
+        """Label of the landmark that was named last, by either speaker."""
+        return _last_landmark(self.encoded.utterances) or self.named_before
 
     def seen(self, view: CoWizardView, town: Town) -> Self:
-        """Returns the history with what an observation shows."""
-        new = Glimpse.of(view, town)
-        since = new.frame - self.kept * FRAME_RATE
-        return replace(self, glimpses=(*(one for one in self.glimpses if one.frame >= since), new))
+        """Returns the history with an observation."""
+        new = ObservationFrame.of(view, town)
+        is_recorded = new.frame >= FRAMES_PER_TENTH and new.frame % FRAMES_PER_TENTH == 0
+        rows = rows_between(self.newest, new)
+        return replace(self, encoded=self.encoded.moved(rows, scene_of(new) if is_recorded else None), newest=new)
 
     def said(self, speaker: Role, spans: Sequence[Span], frame: int) -> Self:
         """Returns the history with an utterance that was over at a frame."""
         text = " ".join(span.text for span in spans)
-        moves = (_move(speaker, self.utterances, text, span, frame) for span in spans)
-        return replace(self, events=(*self.events, *moves), utterances=self.utterances + 1)
+        record = UtteranceRecord(
+            number=self.utterances, speaker=speaker, text=text, start=frame / FRAME_RATE, end=frame / FRAME_RATE,
+            moves=tuple(
+                MoveRecord(
+                    index=self.events + k, frame=frame, speaker=speaker, utterance=self.utterances, text=text,
+                    span=span.text, act=span.act, exchange=None, start=frame / FRAME_RATE, end=frame / FRAME_RATE,
+                    flagged=True,
+                )
+                for k, span in enumerate(spans)
+            ),
+        )  # fmt: skip
+        encoded = self.encoded.said(record)
+        dropped = (*self.encoded.utterances, record)[: -len(encoded.utterances)]
+        return replace(
+            self, encoded=encoded, events=self.events + len(spans), utterances=self.utterances + 1,
+            named_before=_last_landmark(dropped) or self.named_before,
+        )  # fmt: skip
 
     def corrected(self, spans: Sequence[Span]) -> Self:
-        """Returns the history with other acts for the last utterance, whose words stay."""
-        last = self.events[-len(spans) :]
-        text, number = last[0].data["text"], last[0].data["utterance"]
-        moves = (_move(event.source, number, text, span, event.frame) for event, span in zip(last, spans, strict=True))
-        return replace(self, events=(*self.events[: -len(spans)], *moves))
+        """Returns the history with other acts for the participant's last utterance, which keeps its words."""
+        last = next(each for each in reversed(self.encoded.utterances) if each.speaker is Role.PARTICIPANT)
+        moves = tuple(replace(move, span=span.text, act=span.act) for move, span in zip(last.moves, spans, strict=True))
+        return replace(self, encoded=self.encoded.corrected(replace(last, moves=moves)))
 
     def done(self, physical: Physical, frame: int) -> Self:
         """Returns the history with a physical action that was carried out at a frame."""
-        return replace(self, events=(*self.events, _deed(physical, frame)))
-
-    def session(self) -> Session:
-        """Returns the history as a session that was cut off."""
-        return Session(
-            header=self.header,
-            events=self.events,
-            trajectory=way_of(self.glimpses),
-            complete=False,
-            name="live",
-            scene=scene_of(self.glimpses),
+        action = physical.action
+        record = ActionRecord(
+            index=self.events,
+            frame=frame,
+            source=Role.CO_WIZARD,
+            action=action,
+            angle=physical.angle if action.argument in _TAKES_ANGLE else None,
+            up=physical.up if action.argument in _TAKES_UP else None,
+            flagged=action in NAVIGATION_ACTIONS,
         )
+        return replace(self, encoded=self.encoded.acted(record), events=self.events + 1)
 
 
-def _move(speaker: Role, utterance: int, text: str, span: Span, frame: int) -> Event:
-    data = {
-        "utterance": utterance,
-        "text": text,
-        "span": span.text,
-        "move": span.act.move.label,
-        "slots": {label: list(values) for label, values in span.act.slot_labels().items()},
-        "exchange": None,
-        "start": frame / FRAME_RATE,
-        "end": frame / FRAME_RATE,
-    }
-    return Event(frame=frame, type=EventType.DIALOGUE_MOVE, source=speaker, flagged=True, data=data)
-
-
-def _deed(physical: Physical, frame: int) -> Event:
-    action = physical.action
-    data = {
-        "action": action.label,
-        "angle": physical.angle if action.argument in _TAKES_ANGLE else None,
-        "up": physical.up if action.argument in _TAKES_UP else None,
-    }
-    flagged = action in NAVIGATION_ACTIONS
-    return Event(frame=frame, type=EventType.PHYSICAL_ACTION, source=Role.CO_WIZARD, flagged=flagged, data=data)
+def _last_landmark(utterances: Sequence[UtteranceRecord]) -> str | None:
+    """Returns the label of the landmark that was named last in utterances, None for none."""
+    moves = (move for utterance in reversed(utterances) for move in reversed(utterance.moves))
+    named = (move.act.slot_labels().get(Slot.LANDMARK.label) for move in moves)
+    return next((labels[-1] for labels in named if labels), None)

@@ -8,13 +8,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from dorothie_gym.baselines.acting.deeds import Deed, deed_of
-from dorothie_gym.baselines.acting.following import Following
+from dorothie_gym.baselines.acting.action_effects import HistoryTracker
+from dorothie_gym.baselines.acting.action_feasibility import FeasibleAction, feasible_action
+from dorothie_gym.baselines.acting.decision_trigger import TriggerState
 from dorothie_gym.baselines.acting.history import History
-from dorothie_gym.baselines.acting.occasions import Watch
-from dorothie_gym.baselines.acting.segments import spans_of
-from dorothie_gym.baselines.acting.trained import TownModel, Trained
-from dorothie_gym.baselines.outputs import Predicted
+from dorothie_gym.baselines.acting.inference import BenchmarkModel, TownModel
+from dorothie_gym.baselines.acting.utterance_spans import spans_of
+from dorothie_gym.baselines.decoding import Predicted
 from dorothie_gym.dialogue import Span, Wording, draw_style
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import (
@@ -44,7 +44,7 @@ _UNDONE: Final = Physical(action=PhysicalAction.STOP)
 
 
 @dataclass(frozen=True, kw_only=True)
-class CoWizardState:
+class BenchmarkPolicyState:
     """What the policy remembers.
 
     Attributes:
@@ -60,11 +60,11 @@ class CoWizardState:
     town: Town
     voice: SpeechState
     count: int = 0
-    following: Following | None = None
-    watch: Watch = field(default_factory=Watch)
+    following: HistoryTracker | None = None
+    watch: TriggerState = field(default_factory=TriggerState)
 
 
-class BenchmarkCoWizard(Policy[CoWizardState]):
+class BenchmarkCoWizard(Policy[BenchmarkPolicyState]):
     """Plays the Co-Wizard with a model that was trained on recorded points.
 
     After each utterance of the participant it understands (UfN, where acts are not observed), answers (RfN) and drives
@@ -72,7 +72,7 @@ class BenchmarkCoWizard(Policy[CoWizardState]):
     to stop for the place that was named last, it drives. Between decisions the car follows its lane.
     """
 
-    def __init__(self, trained: Trained, limits: SpaceLimits | None = None) -> None:
+    def __init__(self, trained: BenchmarkModel, limits: SpaceLimits | None = None) -> None:
         """Prepares the policy.
 
         Args:
@@ -82,16 +82,18 @@ class BenchmarkCoWizard(Policy[CoWizardState]):
         super().__init__(Role.CO_WIZARD, limits)
         self._trained = trained
 
-    def initial_state(self, seed: int, town: Town) -> CoWizardState:
+    def initial_state(self, seed: int, town: Town) -> BenchmarkPolicyState:
         """A Co-Wizard before its first observation."""
         style = draw_style(Role.CO_WIZARD, np.random.default_rng((seed, 0)))
-        return CoWizardState(seed=seed, town=town, voice=SpeechState(role=Role.CO_WIZARD, style=style))
+        return BenchmarkPolicyState(seed=seed, town=town, voice=SpeechState(role=Role.CO_WIZARD, style=style))
 
-    def step(self, observation: Mapping[str, Any], state: CoWizardState) -> tuple[ActionDict, CoWizardState]:
+    def step(
+        self, observation: Mapping[str, Any], state: BenchmarkPolicyState
+    ) -> tuple[ActionDict, BenchmarkPolicyState]:
         """Listens; where there is an occasion, lets the model decide; says what is to be said."""
         town, count = state.town, state.count + 1
         view = CoWizardView.read(observation, town)
-        before = state.following or Following(history=History.begin(observation, town))
+        before = state.following or HistoryTracker(history=History.begin(observation, town, self._trained.config))
         acts = heard_acts(observation, Role.PARTICIPANT)
         heard = spans_of(str(observation[f"{Role.PARTICIPANT}_text"]), acts, _last_move(state.voice))
         model, voice = self._trained.in_town(town), state.voice
@@ -102,7 +104,7 @@ class BenchmarkCoWizard(Policy[CoWizardState]):
         following = before.observed(view, town, heard)
         occasion, watch = state.watch.look(view, bool(heard), _way_to_place(following.history, view, town))
         waits = view.motion is Motion.WAITING and not heard
-        deed = _drive(model, following.history, view, town, waits) if occasion.drives else Deed(physical=None)
+        deed = _drive(model, following.history, view, town, waits) if occasion.drives else FeasibleAction(physical=None)
         if occasion.speaks and voice.idle:
             voice = _answer(model, following.history, voice, deed)
         speech, voice = voice.speak(view.time, view.speaking, np.random.default_rng((state.seed, count)))
@@ -132,14 +134,14 @@ def _understood(model: TownModel, history: History, heard: tuple[Span, ...]) -> 
     return known
 
 
-def _answer(model: TownModel, history: History, voice: SpeechState, deed: Deed) -> SpeechState:
+def _answer(model: TownModel, history: History, voice: SpeechState, deed: FeasibleAction) -> SpeechState:
     """What is said next: an act as the model tells, worded by the grammar."""
     act = _act(model.answer(history.said(Role.CO_WIZARD, (_UNSAID,), history.frame + FRAMES_PER_TENTH), Task.RFN))
     told = deed.direction if any(value in _TOLD_WAYS for value in act.slots) else None
     return voice.plan(remark(act.move, *act.ordered, wording=Wording(direction=told)))
 
 
-def _drive(model: TownModel, history: History, view: CoWizardView, town: Town, waits: bool) -> Deed:
+def _drive(model: TownModel, history: History, view: CoWizardView, town: Town, waits: bool) -> FeasibleAction:
     """What is done next: the likeliest action of those that can be carried out.
 
     Args:
@@ -154,11 +156,11 @@ def _drive(model: TownModel, history: History, view: CoWizardView, town: Town, w
     while any(allowed):
         predicted = model.answer(asked, Task.NFD, allowed=allowed)
         number = int(predicted.action)
-        deed = deed_of(NAVIGATION_ACTIONS[number], float(predicted.angle), view, town)
+        deed = feasible_action(NAVIGATION_ACTIONS[number], float(predicted.angle), view, town)
         if deed is not None:
             return deed
         allowed[number] = False
-    return Deed(physical=None)
+    return FeasibleAction(physical=None)
 
 
 def _act(predicted: Predicted) -> DialogueAct:

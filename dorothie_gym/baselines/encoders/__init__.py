@@ -6,6 +6,7 @@ from types import MappingProxyType
 from dorothie_gym.baselines.encoders.byte_pairs import PAD, BytePairs
 from dorothie_gym.baselines.encoders.encoder import (
     Encoder,
+    HashingEncoder,
     ImageEncoder,
     SpeechEncoder,
     TextEncoder,
@@ -13,7 +14,6 @@ from dorothie_gym.baselines.encoders.encoder import (
     table_key,
     text_table,
 )
-from dorothie_gym.baselines.encoders.hashing import HashingEncoder
 from dorothie_gym.baselines.encoders.pretrained import (
     BertEncoder,
     HubertEncoder,

@@ -1,11 +1,13 @@
-"""What an encoder is, and the table of vectors that it makes of a corpus's texts, made once and kept."""
+"""Encoders of texts, sounds and images, the cache of text vectors, and the hashing encoder."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Protocol, TypeAlias, TypeVar
+from typing import Any, ClassVar, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,3 +97,44 @@ def _write(path: Path, table: Vectors) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path, shared=True) as part, part.open("wb") as file:
         np.save(file, table, allow_pickle=False)
+
+
+# --- Texts as hashed n-grams: no weights, no download, no training ---------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class HashingEncoder:
+    """One or two words in a row, and letters in a row, each hashed to a place of the vector with a sign.
+
+    Words tell what is said; letters make speech recognition's near misses lie close to what was said.
+
+    Attributes:
+        dim: length of a vector, even: half for words, half for letters. 384 as MiniLM's by default.
+    """
+
+    name: ClassVar[str] = "hashing"
+    dim: int = 384
+
+    def __post_init__(self) -> None:
+        if self.dim < 2 or self.dim % 2:
+            raise ValueError(f"HashingEncoder.dim is {self.dim}; it must be even and at least 2")
+
+    @property
+    def id(self) -> str:
+        """Name, version and length."""
+        return f"hashing-1-{self.dim}"
+
+    def encode(self, texts: Sequence[str]) -> Vectors:
+        """Returns the vectors of texts, float32 (n, dim), each half of length 1, or 0 for a text without words."""
+        if not texts:
+            return np.zeros((0, self.dim), dtype=np.float32)
+        return np.hstack([part.transform(texts).toarray() for part in self._parts]).astype(np.float32)
+
+    @cached_property
+    def _parts(self) -> tuple[Any, Any]:
+        # imported here: slow to import, and vectors are mostly found in the cache
+        from sklearn.feature_extraction.text import HashingVectorizer
+
+        half = {"n_features": self.dim // 2, "norm": "l2", "lowercase": True}
+        words = HashingVectorizer(ngram_range=(1, 2), token_pattern=r"(?u)\w+|\?", **half)
+        return words, HashingVectorizer(analyzer="char_wb", ngram_range=(3, 4), **half)

@@ -1,15 +1,15 @@
 """Reinforcement learning with stable-baselines3: training, evaluation, and weights that are no pickles."""
 
-from dorothie_gym.baselines.rl.evaluating import Outcome, evaluate_policy
+from dorothie_gym.baselines.rl.checkpoint import load_model
+from dorothie_gym.baselines.rl.evaluation import EpisodeStatistics, evaluate_policy
 from dorothie_gym.baselines.rl.settings import ALGORITHMS, TrainingSettings, tuned_settings
-from dorothie_gym.baselines.rl.training import Run, Training
-from dorothie_gym.baselines.rl.weights import load_model
+from dorothie_gym.baselines.rl.training import Training, TrainingResult
 from dorothie_gym.errors import ModelFileError, SettingsError
 
 __all__ = [
     "ALGORITHMS",
-    "Outcome",
-    "Run",
+    "EpisodeStatistics",
+    "TrainingResult",
     "SettingsError",
     "Training",
     "TrainingSettings",

@@ -17,7 +17,7 @@ from dorothie_gym.errors import SettingsError
 from dorothie_gym.spaces.limits import REACH
 
 if TYPE_CHECKING:
-    from dorothie_gym.baselines.rl.sharing import Make
+    from dorothie_gym.baselines.rl.vector_env import MakeEnv
 
 _PLAIN = (spaces.Discrete, spaces.MultiDiscrete, spaces.Box)
 
@@ -80,14 +80,14 @@ def make_vector(settings: TrainingSettings, ray: str | None = None) -> Any:
     """Returns stable-baselines3's vector environment for a run; see `shared_out`."""
     from stable_baselines3.common.vec_env import VecMonitor
 
-    maker = Maker(settings.env, settings.env_settings)
+    maker = EnvFactory(settings.env, settings.env_settings)
     maker().close()  # says in this process what is wrong with the settings
     vector = shared_out(maker, settings.environments, settings.workers, ray)
     vector.seed(settings.seed * 10_000)
     return VecMonitor(vector)
 
 
-def shared_out(make: Make, environments: int, workers: int, ray: str | None = None) -> Any:
+def shared_out(make: MakeEnv, environments: int, workers: int, ray: str | None = None) -> Any:
     """Returns environments as one vector.
 
     Args:
@@ -101,15 +101,15 @@ def shared_out(make: Make, environments: int, workers: int, ray: str | None = No
     """
     from stable_baselines3.common.vec_env import DummyVecEnv
 
-    from dorothie_gym.baselines.rl.on_ray import RayVecEnv
-    from dorothie_gym.baselines.rl.workers import WorkerVecEnv
+    from dorothie_gym.baselines.rl.ray_vector_env import RayVecEnv
+    from dorothie_gym.baselines.rl.vector_env import WorkerVecEnv
 
     if ray is not None:
         return RayVecEnv(make, environments, workers, ray)
     return WorkerVecEnv(make, environments, workers) if workers else DummyVecEnv([make] * environments)
 
 
-class Maker:
+class EnvFactory:
     """Makes one environment; can be sent to another process."""
 
     def __init__(self, name: str, settings: Mapping[str, Any]) -> None:

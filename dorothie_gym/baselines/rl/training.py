@@ -14,12 +14,19 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
-from dorothie_gym.baselines.rl.cloning import Cloned, CriticFirst, Tell, clone, read_lessons, silent
-from dorothie_gym.baselines.rl.curve import draw_curve
-from dorothie_gym.baselines.rl.environments import Maker, make_vector
-from dorothie_gym.baselines.rl.evaluating import SEEDS_FROM, Outcome, act_with, evaluate_policy
+from dorothie_gym.baselines.learning_curves import draw_reward_curve
+from dorothie_gym.baselines.rl.behaviour_cloning import (
+    CloningResult,
+    CriticWarmUp,
+    ReportProgress,
+    clone,
+    read_lessons,
+    silent,
+)
+from dorothie_gym.baselines.rl.checkpoint import DESCRIPTION, make_model, read_description, restore, save_model
+from dorothie_gym.baselines.rl.environments import EnvFactory, make_vector
+from dorothie_gym.baselines.rl.evaluation import SEEDS_FROM, EpisodeStatistics, act_with, evaluate_policy
 from dorothie_gym.baselines.rl.settings import TrainingSettings
-from dorothie_gym.baselines.rl.weights import DESCRIPTION, make_model, read_description, restore, save_model
 from dorothie_gym.errors import SettingsError
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS
 from dorothie_gym.recording import Fold
@@ -35,17 +42,17 @@ LOGGED_STEPS, LOGGED_EPISODES = 1024, 4
 """TensorBoard is told of training about as often: after so many steps, or so many episodes."""
 
 Evaluation = TypeVar("Evaluation")
-Watch = Callable[[int, int, "Evaluation | None"], None]
+OnProgress = Callable[[int, int, "Evaluation | None"], None]
 """Is told the steps done, those there will be, and the last evaluation."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row:
+class TrainingEvaluation:
     """An evaluation: after how many steps, and after how many seconds of training [s]."""
 
     steps: int
     seconds: float
-    outcome: Outcome
+    outcome: EpisodeStatistics
 
     def as_json(self) -> dict[str, Any]:
         """In JSON types."""
@@ -53,7 +60,7 @@ class Row:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run(Generic[Evaluation]):
+class TrainingResult(Generic[Evaluation]):
     """What came of a run.
 
     Attributes:
@@ -71,7 +78,7 @@ class Run(Generic[Evaluation]):
     finished: bool
 
 
-def best_of(rows: Sequence[Row]) -> Row | None:
+def best_of(rows: Sequence[TrainingEvaluation]) -> TrainingEvaluation | None:
     """The evaluation with most successes; of equal ones that with the highest reward."""
     return max(rows, key=lambda row: (row.outcome.success, row.outcome.reward), default=None)
 
@@ -80,9 +87,13 @@ class Training:
     """A run; `go` trains until all steps are done or Ctrl-C is pressed."""
 
     def __init__(
-        self, settings: TrainingSettings, folder: Path, watch: Watch[Row] | None = None, ray: str | None = None,
-        tell: Tell = silent,
-    ) -> None:  # fmt: skip
+        self,
+        settings: TrainingSettings,
+        folder: Path,
+        watch: OnProgress[TrainingEvaluation] | None = None,
+        ray: str | None = None,
+        tell: ReportProgress = silent,
+    ) -> None:
         """Prepares a run, or takes up one that is in the folder.
 
         Args:
@@ -100,9 +111,9 @@ class Training:
         """
         self.settings, self.folder = settings, folder
         self._watch, self._tell = watch or (lambda done, total, row: None), tell
-        self.rows: list[Row] = []
+        self.rows: list[TrainingEvaluation] = []
         self.seconds = 0.0
-        self.cloned: Cloned | None = None
+        self.cloned: CloningResult | None = None
         begun = (folder / DESCRIPTION).is_file()
         if begun:
             check_same(settings, TrainingSettings(**read_description(folder)["settings"]), folder)
@@ -122,7 +133,7 @@ class Training:
             self._vector.close()
             raise
 
-    def go(self) -> Run[Row]:
+    def go(self) -> TrainingResult[TrainingEvaluation]:
         """Trains.
 
         Returns:
@@ -135,7 +146,7 @@ class Training:
             if left > 0:
                 callbacks: list[BaseCallback] = [_Evaluations(self)]
                 if settings.warm_start is not None:
-                    callbacks.append(CriticFirst())
+                    callbacks.append(CriticWarmUp())
                 model.learn(left, callback=callbacks, reset_num_timesteps=False, log_interval=_log_interval(model))
                 finished = True
         except KeyboardInterrupt:
@@ -144,8 +155,8 @@ class Training:
             self._vector.close()
         save_model(model, settings, self.folder, self.seconds)
         if self.rows:
-            draw_curve([row.as_json() for row in self.rows], _title(settings), self.folder / CURVE)
-        return Run(
+            draw_reward_curve([row.as_json() for row in self.rows], _title(settings), self.folder / CURVE)
+        return TrainingResult(
             folder=self.folder, rows=tuple(self.rows), steps=int(model.num_timesteps), seconds=self.seconds,
             finished=finished,
         )  # fmt: skip
@@ -163,8 +174,8 @@ class Training:
         """Plays the evaluation's episodes, and saves the model with what came of them."""
         settings = self.settings
         act = act_with(self.model, masked=settings.masked)
-        outcome = evaluate_policy(Maker(settings.env, settings.env_settings), act, settings.episodes, SEEDS_FROM)
-        row = Row(steps=int(self.model.num_timesteps), seconds=round(self.seconds, 2), outcome=outcome)
+        outcome = evaluate_policy(EnvFactory(settings.env, settings.env_settings), act, settings.episodes, SEEDS_FROM)
+        row = TrainingEvaluation(steps=int(self.model.num_timesteps), seconds=round(self.seconds, 2), outcome=outcome)
         self.rows.append(row)
         for name in ("success", "reward", "length"):
             self.model.logger.record(f"eval/{name}", getattr(outcome, name))
@@ -174,7 +185,7 @@ class Training:
             save_model(self.model, settings, self.folder / BEST, self.seconds)
         with (self.folder / PROGRESS).open("a", encoding="utf-8") as file:
             file.write(json.dumps(row.as_json()) + "\n")
-        draw_curve([row.as_json() for row in self.rows], _title(settings), self.folder / CURVE)
+        draw_reward_curve([row.as_json() for row in self.rows], _title(settings), self.folder / CURVE)
         self._watch(row.steps, settings.steps, row)
 
     def note(self, seconds: float, steps: int) -> None:
@@ -242,12 +253,12 @@ def _log_interval(model: Any) -> int:
     return max(LOGGED_STEPS // (model.n_steps * model.n_envs), 1)
 
 
-def _read_rows(path: Path) -> list[Row]:
+def _read_rows(path: Path) -> list[TrainingEvaluation]:
     rows = []
     for line in path.read_text(encoding="utf-8").splitlines() if path.is_file() else ():
         found = json.loads(line)
         steps, seconds = found.pop("steps"), found.pop("seconds")
-        rows.append(Row(steps=steps, seconds=seconds, outcome=Outcome(**found)))
+        rows.append(TrainingEvaluation(steps=steps, seconds=seconds, outcome=EpisodeStatistics(**found)))
     return rows
 
 

@@ -1,5 +1,6 @@
-"""Self-play: Co-Wizard and participant against the Ad-Wizard, each learning at once; see docs/selfplay.md.
+"""Self-play: Co-Wizard and participant against the Ad-Wizard, all learning at once (docs/selfplay.md).
 
-A seat (`seat.Seat`) is what a role's network takes in and can do; `env.SelfPlayEnv` has all three in one row;
-`game.Game` lets learners play; `training.SelfPlay` is a run in a folder; `policy.LearnedPolicy` plays what was learned.
+`role_interface.RoleInterface` defines what a role's network observes and can do, `env.SelfPlayEnv` plays all three
+roles as one environment, `multi_agent_rollout.MultiAgentRollout` collects their experience,
+`training.SelfPlayTraining` is a training in a folder, and `policy.LearnedPolicy` plays the result.
 """

@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from dorothie_gym.baselines.selfplay.heard import Remark, listen
-from dorothie_gym.baselines.selfplay.seat import Mask, Seat
+from dorothie_gym.baselines.selfplay.role_interface import Mask, RoleInterface
+from dorothie_gym.baselines.selfplay.utterance_memory import HeardRemark, listen
 from dorothie_gym.ontology import ExceptionKind, PropKind, Role, Sensor, WeatherParameter
 from dorothie_gym.policies.ad_wizard import AdWizardConfig, task_message
 from dorothie_gym.policies.observation_parser import SeenSubgoal, place_on_path, read_landmarks, read_subgoals, scalar
@@ -24,7 +24,7 @@ CROWD, EXTENT = 3, 25
 """How many appear at once, and half the side of the square that they appear in [m]."""
 
 
-class Caper(enum.IntEnum):
+class AdWizardTrick(enum.IntEnum):
     """What the Ad-Wizard can do."""
 
     NOTHING = 0
@@ -47,20 +47,20 @@ class Caper(enum.IntEnum):
 
 
 _WEATHER = {
-    Caper.FOG: (WeatherParameter.FOG_DENSITY, 0.8),
-    Caper.RAIN: (WeatherParameter.PRECIPITATION, 0.9),
-    Caper.NIGHT: (WeatherParameter.SUN_ALTITUDE_ANGLE, 0.25),
-    Caper.CLEAR: (WeatherParameter.FOG_DENSITY, 0.0),
+    AdWizardTrick.FOG: (WeatherParameter.FOG_DENSITY, 0.8),
+    AdWizardTrick.RAIN: (WeatherParameter.PRECIPITATION, 0.9),
+    AdWizardTrick.NIGHT: (WeatherParameter.SUN_ALTITUDE_ANGLE, 0.25),
+    AdWizardTrick.CLEAR: (WeatherParameter.FOG_DENSITY, 0.0),
 }
-_FAULTS = {Caper.BLUR: Sensor.BLUR, Caper.NO_GPS: Sensor.GPS, Caper.NO_VIEW: Sensor.VIEW}
+_FAULTS = {AdWizardTrick.BLUR: Sensor.BLUR, AdWizardTrick.NO_GPS: Sensor.GPS, AdWizardTrick.NO_VIEW: Sensor.VIEW}
 _CROWDS = {
-    Caper.VEHICLES: ExceptionKind.SPAWN_VEHICLES,
-    Caper.PEDESTRIANS: ExceptionKind.SPAWN_PEDESTRIANS,
+    AdWizardTrick.VEHICLES: ExceptionKind.SPAWN_VEHICLES,
+    AdWizardTrick.PEDESTRIANS: ExceptionKind.SPAWN_PEDESTRIANS,
 }
 _TASKS = {
-    Caper.TRIGGER: ExceptionKind.TASK_TRIGGER,
-    Caper.DROP: ExceptionKind.TASK_DELETE,
-    Caper.CHANGE: ExceptionKind.TASK_CHANGE,
+    AdWizardTrick.TRIGGER: ExceptionKind.TASK_TRIGGER,
+    AdWizardTrick.DROP: ExceptionKind.TASK_DELETE,
+    AdWizardTrick.CHANGE: ExceptionKind.TASK_CHANGE,
 }
 _NOTHING = AdWizardAction()
 _KINDS = [
@@ -77,18 +77,18 @@ _KINDS = [
 class AdWizardMemory:
     """What the Ad-Wizard remembers: the others' last remarks, and when it played its last trick [s]."""
 
-    participant: Remark | None = None
-    co_wizard: Remark | None = None
+    participant: HeardRemark | None = None
+    co_wizard: HeardRemark | None = None
     last: float = -math.inf
 
 
-class AdWizardSeat(Seat[AdWizardMemory]):
-    """See `Caper` for what it can do: one at a time, with as much time between them as the scripted one leaves."""
+class AdWizardInterface(RoleInterface[AdWizardMemory]):
+    """Interface of the Ad-Wizard: one `AdWizardTrick` at a time, as far apart as those of the scripted policy."""
 
     role = Role.AD_WIZARD
     speakers = (Role.PARTICIPANT, Role.CO_WIZARD)
     fields = ("hidden", "landmarks", "motion", "props", "sensors", "speed", "subgoals", "time", "waypoints", "weather")
-    actions = len(Caper)
+    actions = len(AdWizardTrick)
     own_size: ClassVar[int] = 2
 
     def begin(self) -> AdWizardMemory:
@@ -103,7 +103,7 @@ class AdWizardSeat(Seat[AdWizardMemory]):
             co_wizard=listen(observation, Role.CO_WIZARD, memory.co_wizard),
         )
 
-    def remarks(self, memory: AdWizardMemory) -> tuple[Remark | None, ...]:
+    def remarks(self, memory: AdWizardMemory) -> tuple[HeardRemark | None, ...]:
         """Of the participant and of the Co-Wizard."""
         return memory.participant, memory.co_wizard
 
@@ -115,13 +115,13 @@ class AdWizardSeat(Seat[AdWizardMemory]):
     def mask(self, observation: Mapping[str, Any], memory: AdWizardMemory) -> Mask:
         """What there is occasion for; nothing else while the last trick is still fresh."""
         mask = np.zeros(self.actions, dtype=np.bool_)
-        mask[Caper.NOTHING] = True
+        mask[AdWizardTrick.NOTHING] = True
         if scalar(observation, "time") < max(memory.last + AdWizardConfig.spacing, AdWizardConfig.first_at):
             return mask
         mask[[*_WEATHER, *_FAULTS]] = True
         props = observation["props"][:, PropColumn.KIND] > 0
-        mask[Caper.ROADBLOCK] = not props.all() and place_on_path(self.town, observation, NEAR) is not None
-        mask[Caper.UNBLOCK] = props.any()
+        mask[AdWizardTrick.ROADBLOCK] = not props.all() and place_on_path(self.town, observation, NEAR) is not None
+        mask[AdWizardTrick.UNBLOCK] = props.any()
         mask[list(_CROWDS)] = place_on_path(self.town, observation, FARTHER) is not None
         for caper in _TASKS:
             mask[caper] = self._subgoal(caper, observation) is not None
@@ -135,7 +135,7 @@ class AdWizardSeat(Seat[AdWizardMemory]):
         self, choice: int, observation: Mapping[str, Any], memory: AdWizardMemory
     ) -> tuple[AdWizardAction, AdWizardMemory]:  # fmt: skip
         """Plays a trick."""
-        action = self._action(Caper(choice), observation)
+        action = self._action(AdWizardTrick(choice), observation)
         if action.exception is ExceptionKind.NONE:
             return action, memory
         return action, replace(memory, last=scalar(observation, "time"))
@@ -146,27 +146,27 @@ class AdWizardSeat(Seat[AdWizardMemory]):
         """The trick of the same kind, with the same weather or sensor."""
         if action.exception is ExceptionKind.WEATHER:
             about = {k: share for k, (parameter, share) in _WEATHER.items() if parameter is action.weather}
-            return min(about, key=lambda k: abs(about[k] - action.share), default=Caper.NOTHING)
+            return min(about, key=lambda k: abs(about[k] - action.share), default=AdWizardTrick.NOTHING)
         if action.exception is ExceptionKind.SENSOR_FAULT:
-            fault = next((k for k, sensor in _FAULTS.items() if sensor is action.sensor), Caper.NOTHING)
-            return fault if action.on else Caper.NOTHING
-        return next((k for k in Caper if _KINDS[k] == action.exception), Caper.NOTHING)
+            fault = next((k for k, sensor in _FAULTS.items() if sensor is action.sensor), AdWizardTrick.NOTHING)
+            return fault if action.on else AdWizardTrick.NOTHING
+        return next((k for k in AdWizardTrick if _KINDS[k] == action.exception), AdWizardTrick.NOTHING)
 
-    def _action(self, caper: Caper, observation: Mapping[str, Any]) -> AdWizardAction:
+    def _action(self, caper: AdWizardTrick, observation: Mapping[str, Any]) -> AdWizardAction:
         if caper in _WEATHER:
             parameter, share = _WEATHER[caper]
             return AdWizardAction(exception=ExceptionKind.WEATHER, weather=parameter, share=share)
         if caper in _FAULTS:
             return AdWizardAction(exception=ExceptionKind.SENSOR_FAULT, sensor=_FAULTS[caper], on=True)
-        if caper is Caper.UNBLOCK:
+        if caper is AdWizardTrick.UNBLOCK:
             return AdWizardAction(exception=ExceptionKind.DELETE_PROP)
         if caper in _TASKS:
             return self._task(caper, observation)
-        if caper is Caper.NOTHING:
+        if caper is AdWizardTrick.NOTHING:
             return _NOTHING
         return self._on_the_way(caper, observation)
 
-    def _on_the_way(self, caper: Caper, observation: Mapping[str, Any]) -> AdWizardAction:
+    def _on_the_way(self, caper: AdWizardTrick, observation: Mapping[str, Any]) -> AdWizardAction:
         found = place_on_path(self.town, observation, FARTHER if caper in _CROWDS else NEAR)
         if found is None:
             return _NOTHING
@@ -175,12 +175,16 @@ class AdWizardSeat(Seat[AdWizardMemory]):
             return AdWizardAction(exception=_CROWDS[caper], place=place, count=CROWD, extent=EXTENT)
         return AdWizardAction(exception=ExceptionKind.PLACE_PROP, prop=PropKind.STREET_BARRIER, place=place)
 
-    def _subgoal(self, caper: Caper, observation: Mapping[str, Any]) -> SeenSubgoal | None:
+    def _subgoal(self, caper: AdWizardTrick, observation: Mapping[str, Any]) -> SeenSubgoal | None:
         """The first subgoal with which a trick can be played."""
-        may = {Caper.TRIGGER: "can_trigger", Caper.DROP: "can_delete", Caper.CHANGE: "can_change"}[caper]
+        may = {
+            AdWizardTrick.TRIGGER: "can_trigger",
+            AdWizardTrick.DROP: "can_delete",
+            AdWizardTrick.CHANGE: "can_change",
+        }[caper]
         return next((subgoal for subgoal in read_subgoals(observation) if getattr(subgoal, may)), None)
 
-    def _task(self, caper: Caper, observation: Mapping[str, Any]) -> AdWizardAction:
+    def _task(self, caper: AdWizardTrick, observation: Mapping[str, Any]) -> AdWizardAction:
         subgoal, kind = self._subgoal(caper, observation), _TASKS[caper]
         if subgoal is None:
             return _NOTHING

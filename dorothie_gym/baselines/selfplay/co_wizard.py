@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from dorothie_gym.angles import wrap_degrees
-from dorothie_gym.baselines.selfplay.heard import Remark, listen
-from dorothie_gym.baselines.selfplay.seat import Mask, Seat
+from dorothie_gym.baselines.selfplay.role_interface import Mask, RoleInterface
+from dorothie_gym.baselines.selfplay.utterance_memory import HeardRemark, listen
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
@@ -36,7 +36,7 @@ from dorothie_gym.policies.route_progress import CANONICAL
 from dorothie_gym.spaces import CoWizardAction, ExitColumn, Mental, Physical, SpaceLimits, Speech
 
 
-class OtherAction(enum.IntEnum):
+class ExtraAction(enum.IntEnum):
     """What the Co-Wizard can do beside driving; numbers go on where `NavigationAction` ends."""
 
     NOTE_GOAL = len(ACTIONS)
@@ -47,11 +47,11 @@ class OtherAction(enum.IntEnum):
 
 
 _SPEECH: Mapping[int, Speech] = {
-    OtherAction.ACKNOWLEDGE: Speech(act=DialogueAct.of(DialogueMove.ACKNOWLEDGE), text="Okay."),
-    OtherAction.ASK_GOAL: Speech(
+    ExtraAction.ACKNOWLEDGE: Speech(act=DialogueAct.of(DialogueMove.ACKNOWLEDGE), text="Okay."),
+    ExtraAction.ASK_GOAL: Speech(
         act=DialogueAct.of(DialogueMove.QUERY_W, LandmarkName.QUERIED), text="Where do you want to go?"
     ),
-    OtherAction.ASK_WAY: Speech(act=DialogueAct.of(DialogueMove.QUERY_W, ActionValue.QUERIED), text="Which way now?"),
+    ExtraAction.ASK_WAY: Speech(act=DialogueAct.of(DialogueMove.QUERY_W, ActionValue.QUERIED), text="Which way now?"),
 }
 
 
@@ -62,20 +62,20 @@ class CoWizardMemory:
     `told` is the same as a driver of `Navigation-v0` has it; `seen` is what was observed at the decision before.
     """
 
-    heard: Remark | None = None
+    heard: HeardRemark | None = None
     named: LandmarkName | None = None
     noted: LandmarkName | None = None
     told: HeardInstruction = field(default_factory=HeardInstruction)
     seen: Mapping[str, Any] | None = None
 
 
-class CoWizardSeat(Seat[CoWizardMemory]):
-    """See `NavigationAction` for how it drives, `OtherAction` for the rest, and `FIELDS` for what it sees."""
+class CoWizardInterface(RoleInterface[CoWizardMemory]):
+    """See `NavigationAction` for how it drives, `ExtraAction` for the rest, and `FIELDS` for what it sees."""
 
     role = Role.CO_WIZARD
     speakers = (Role.PARTICIPANT,)
     fields = ("speaking",)
-    actions = len(ACTIONS) + len(OtherAction)
+    actions = len(ACTIONS) + len(ExtraAction)
     own_size: ClassVar[int] = sum(FIELDS.values()) + 2
 
     def __init__(self, town: Town, limits: SpaceLimits) -> None:
@@ -98,7 +98,7 @@ class CoWizardSeat(Seat[CoWizardMemory]):
                 named, told = heard.landmark, replace(told, goal=self._place(observation, heard.landmark))
         return replace(memory, heard=heard, named=named, told=told, seen=observation)
 
-    def remarks(self, memory: CoWizardMemory) -> tuple[Remark | None, ...]:
+    def remarks(self, memory: CoWizardMemory) -> tuple[HeardRemark | None, ...]:
         """The participant's."""
         return (memory.heard,)
 
@@ -112,7 +112,7 @@ class CoWizardSeat(Seat[CoWizardMemory]):
         """What the car would follow, as far as the Co-Wizard can tell; what would change nothing is left out."""
         mask = np.zeros(self.actions, dtype=np.bool_)
         mask[: len(ACTIONS)] = self._likely.mask(observation)
-        mask[OtherAction.NOTE_GOAL] = memory.named is not None and memory.named is not memory.noted
+        mask[ExtraAction.NOTE_GOAL] = memory.named is not None and memory.named is not memory.noted
         mask[list(_SPEECH)] = scalar(observation, "speaking") <= 0.0
         return mask
 
@@ -133,7 +133,7 @@ class CoWizardSeat(Seat[CoWizardMemory]):
         self, choice: int, observation: Mapping[str, Any], memory: CoWizardMemory
     ) -> tuple[CoWizardAction, CoWizardMemory]:  # fmt: skip
         """Drives, speaks or notes."""
-        if choice == OtherAction.NOTE_GOAL and memory.named is not None:
+        if choice == ExtraAction.NOTE_GOAL and memory.named is not None:
             note = Mental(action=MentalAction.GOAL_UPDATE, goals=(memory.named,))
             return CoWizardAction(mental=note), replace(memory, noted=memory.named)
         if choice in _SPEECH:
@@ -146,7 +146,7 @@ class CoWizardSeat(Seat[CoWizardMemory]):
         if physical is not None:
             return self._driven(physical, observation)
         if mental is not None and mental.action is MentalAction.GOAL_UPDATE and memory.named in mental.goals:
-            return OtherAction.NOTE_GOAL
+            return ExtraAction.NOTE_GOAL
         if speech is None:
             return NavigationAction.NOTHING
         same = (choice for choice, known in _SPEECH.items() if known.act.move is speech.act.move)
@@ -159,7 +159,7 @@ class CoWizardSeat(Seat[CoWizardMemory]):
             return NavigationAction.LIGHTS
         return action_of(physical, observation, self._ways)
 
-    def _instruction(self, observation: Mapping[str, Any], heard: Remark) -> NavigationInstruction:
+    def _instruction(self, observation: Mapping[str, Any], heard: HeardRemark) -> NavigationInstruction:
         """What was said as a driver of `Navigation-v0` hears it; turns are those at the next choice of ways."""
         exits = observation["exits"][observation["exits"][:, ExitColumn.PRESENT] > 0.0]
         turns = ActionValue.J_TURN in heard.act.slots

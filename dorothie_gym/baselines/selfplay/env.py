@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from dorothie_gym.baselines.selfplay.seats import Table, make_seat
+from dorothie_gym.baselines.selfplay.role_layout import RoleLayout, make_interface
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.navigation_config import TRAFFIC
@@ -29,7 +29,7 @@ _PARTICIPANT = AGENT_ROLES.index(Role.PARTICIPANT)
 class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
     """All three roles of a session at once.
 
-    Observations are rows of a `Table`: three vectors and three masks. Actions are three numbers, see the seats.
+    Observations are rows of a `RoleLayout`: three vectors and three masks. Actions are three numbers, see the seats.
     Participant and Co-Wizard get the mean of their rewards, the Ad-Wizard its own; both as `DuoWizardEnv` has them,
     and for each metre by which the way to the present errand has got shorter `progress` more, the Ad-Wizard less.
     `info["rewards"]` has the three rewards; the reward itself is the team's.
@@ -68,8 +68,8 @@ class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
         limits = self.duo.limits
         self.scripted = scripted
         self._policies = {role: make_policy("scripted", role, limits) for role in AGENT_ROLES}
-        self._seats = [make_seat(role, self.duo.town, limits) for role in AGENT_ROLES]
-        self.table = Table.of(limits)
+        self._seats = [make_interface(role, self.duo.town, limits) for role in AGENT_ROLES]
+        self.table = RoleLayout.of(limits)
         self.observation_space = spaces.Box(-1.0, 1.0, (self.table.width,), dtype=np.float32)
         self.action_space = spaces.MultiDiscrete(list(self.table.actions))
         self._way_left = CostToGo(self.duo.town)

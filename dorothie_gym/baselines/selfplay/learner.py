@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from stable_baselines3.common.logger import Logger, configure
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from dorothie_gym.baselines.rl.cloning import Cloned, Lessons, Tell, clone, hold_actor
+from dorothie_gym.baselines.rl.behaviour_cloning import CloningResult, Demonstrations, ReportProgress, clone, hold_actor
+from dorothie_gym.baselines.rl.checkpoint import make_model
 from dorothie_gym.baselines.rl.settings import TrainingSettings
-from dorothie_gym.baselines.rl.weights import make_model
-from dorothie_gym.baselines.selfplay.seat import Mask, Vector
-from dorothie_gym.baselines.selfplay.seats import Table, pad_masks, pad_vectors
+from dorothie_gym.baselines.selfplay.role_interface import Mask, Vector
+from dorothie_gym.baselines.selfplay.role_layout import RoleLayout, pad_masks, pad_vectors
 
 Rows = NDArray[np.int64]
 
@@ -60,8 +60,13 @@ class Learner:
     """
 
     def __init__(
-        self, name: str, settings: TrainingSettings, table: Table, places: Mapping[int, Sequence[int]], log: Path | None
-    ) -> None:  # fmt: skip
+        self,
+        name: str,
+        settings: TrainingSettings,
+        table: RoleLayout,
+        places: Mapping[int, Sequence[int]],
+        log: Path | None,
+    ) -> None:
         """Prepares a learner that has learned nothing yet.
 
         Args:
@@ -146,11 +151,17 @@ class Learner:
         model.train()
         model.rollout_buffer.reset()
 
-    def clone(self, shown: Mapping[int, Lessons], held_out: Mapping[int, Lessons], seed: int, tell: Tell) -> Cloned:
+    def clone(
+        self,
+        shown: Mapping[int, Demonstrations],
+        held_out: Mapping[int, Demonstrations],
+        seed: int,
+        tell: ReportProgress,
+    ) -> CloningResult:
         """Learns what others did in its roles: lessons by role, some to learn from and some that are held out."""
         return clone(self.model, self._merged(shown), self._merged(held_out), seed, tell)
 
-    def _merged(self, lessons: Mapping[int, Lessons]) -> Lessons:
+    def _merged(self, lessons: Mapping[int, Demonstrations]) -> Demonstrations:
         if not self.padded:
             return lessons[self.roles[0]]
         own = [lessons[role] for role in self.roles]
@@ -158,7 +169,7 @@ class Learner:
             pad_vectors(part.observations.numpy(), role, self.size) for role, part in zip(self.roles, own, strict=True)
         ]
         masks = [pad_masks(part.masks.numpy(), self.actions) for part in own]
-        return Lessons(
+        return Demonstrations(
             torch.from_numpy(np.concatenate(vectors)), torch.from_numpy(np.concatenate(masks)),
             torch.cat([part.actions for part in own]),
         )  # fmt: skip

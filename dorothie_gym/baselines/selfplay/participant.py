@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from dorothie_gym.baselines.selfplay.heard import Remark, listen
-from dorothie_gym.baselines.selfplay.seat import Mask, Seat, one_hot
+from dorothie_gym.baselines.selfplay.role_interface import Mask, RoleInterface, one_hot
+from dorothie_gym.baselines.selfplay.utterance_memory import HeardRemark, listen
 from dorothie_gym.dialogue import Direction, load_lexicon, understand
 from dorothie_gym.maps.routing import LaneEntry, Place
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role
@@ -25,7 +25,7 @@ _DIRECTIONS = tuple(Direction)
 _ENTRIES = (LaneEntry.CHANGE_LEFT, LaneEntry.CHANGE_RIGHT, LaneEntry.U_TURN)
 
 
-class Phrase(enum.IntEnum):
+class ParticipantPhrase(enum.IntEnum):
     """What the participant can say."""
 
     NOTHING = 0
@@ -43,36 +43,36 @@ class Phrase(enum.IntEnum):
     NO = 11
 
 
-_INSTRUCTIONS: Mapping[Phrase, tuple[ActionValue, str]] = {
-    Phrase.TURN_LEFT: (ActionValue.J_TURN, "Turn left at the next junction."),
-    Phrase.TURN_RIGHT: (ActionValue.J_TURN, "Turn right at the next junction."),
-    Phrase.STRAIGHT_ON: (ActionValue.J_TURN, "Go straight on at the next junction."),
-    Phrase.TURN_ROUND: (ActionValue.U_TURN, "Please turn around."),
-    Phrase.SWITCH_LEFT: (ActionValue.LANE_SWITCH, "Change to the left lane."),
-    Phrase.SWITCH_RIGHT: (ActionValue.LANE_SWITCH, "Change to the right lane."),
-    Phrase.STOP: (ActionValue.STOP, "Stop here, please."),
-    Phrase.GO_ON: (ActionValue.START, "Start driving again, please."),
+_INSTRUCTIONS: Mapping[ParticipantPhrase, tuple[ActionValue, str]] = {
+    ParticipantPhrase.TURN_LEFT: (ActionValue.J_TURN, "Turn left at the next junction."),
+    ParticipantPhrase.TURN_RIGHT: (ActionValue.J_TURN, "Turn right at the next junction."),
+    ParticipantPhrase.STRAIGHT_ON: (ActionValue.J_TURN, "Go straight on at the next junction."),
+    ParticipantPhrase.TURN_ROUND: (ActionValue.U_TURN, "Please turn around."),
+    ParticipantPhrase.SWITCH_LEFT: (ActionValue.LANE_SWITCH, "Change to the left lane."),
+    ParticipantPhrase.SWITCH_RIGHT: (ActionValue.LANE_SWITCH, "Change to the right lane."),
+    ParticipantPhrase.STOP: (ActionValue.STOP, "Stop here, please."),
+    ParticipantPhrase.GO_ON: (ActionValue.START, "Start driving again, please."),
 }
-_ANSWERS: Mapping[Phrase, Speech] = {
-    Phrase.YES: Speech(act=DialogueAct.of(DialogueMove.REPLY_Y), text="Yes."),
-    Phrase.NO: Speech(act=DialogueAct.of(DialogueMove.REPLY_N), text="No."),
+_ANSWERS: Mapping[ParticipantPhrase, Speech] = {
+    ParticipantPhrase.YES: Speech(act=DialogueAct.of(DialogueMove.REPLY_Y), text="Yes."),
+    ParticipantPhrase.NO: Speech(act=DialogueAct.of(DialogueMove.REPLY_N), text="No."),
 }
-_REPLIES = {DialogueMove.REPLY_Y: Phrase.YES, DialogueMove.REPLY_N: Phrase.NO}
-_PHRASES: Mapping[tuple[ActionValue, Direction | None], Phrase] = {
-    (ActionValue.J_TURN, Direction.LEFT): Phrase.TURN_LEFT,
-    (ActionValue.J_TURN, Direction.RIGHT): Phrase.TURN_RIGHT,
-    (ActionValue.J_TURN, Direction.STRAIGHT): Phrase.STRAIGHT_ON,
-    (ActionValue.LANE_SWITCH, Direction.LEFT): Phrase.SWITCH_LEFT,
-    (ActionValue.LANE_SWITCH, Direction.RIGHT): Phrase.SWITCH_RIGHT,
-    (ActionValue.U_TURN, None): Phrase.TURN_ROUND,
-    (ActionValue.STOP, None): Phrase.STOP,
-    (ActionValue.START, None): Phrase.GO_ON,
+_REPLIES = {DialogueMove.REPLY_Y: ParticipantPhrase.YES, DialogueMove.REPLY_N: ParticipantPhrase.NO}
+_PHRASES: Mapping[tuple[ActionValue, Direction | None], ParticipantPhrase] = {
+    (ActionValue.J_TURN, Direction.LEFT): ParticipantPhrase.TURN_LEFT,
+    (ActionValue.J_TURN, Direction.RIGHT): ParticipantPhrase.TURN_RIGHT,
+    (ActionValue.J_TURN, Direction.STRAIGHT): ParticipantPhrase.STRAIGHT_ON,
+    (ActionValue.LANE_SWITCH, Direction.LEFT): ParticipantPhrase.SWITCH_LEFT,
+    (ActionValue.LANE_SWITCH, Direction.RIGHT): ParticipantPhrase.SWITCH_RIGHT,
+    (ActionValue.U_TURN, None): ParticipantPhrase.TURN_ROUND,
+    (ActionValue.STOP, None): ParticipantPhrase.STOP,
+    (ActionValue.START, None): ParticipantPhrase.GO_ON,
 }
 """What an act that carries an action is among the phrases, with the direction of its words where that matters."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Errand:
+class SubgoalRoute:
     """The way to the subgoal that is next; `goal` is a row of the landmarks."""
 
     subgoal: int
@@ -85,17 +85,17 @@ class Errand:
 class ParticipantMemory:
     """What the participant remembers: the Co-Wizard's last remark, and the errand that it is on."""
 
-    heard: Remark | None = None
-    errand: Errand | None = None
+    heard: HeardRemark | None = None
+    errand: SubgoalRoute | None = None
 
 
-class ParticipantSeat(Seat[ParticipantMemory]):
-    """See `Phrase` for what it can say."""
+class ParticipantInterface(RoleInterface[ParticipantMemory]):
+    """See `ParticipantPhrase` for what it can say."""
 
     role = Role.PARTICIPANT
     speakers = (Role.CO_WIZARD,)
     fields = ("lights", "speaking", "speed", "subgoals", "time")
-    actions = len(Phrase)
+    actions = len(ParticipantPhrase)
     own_size: ClassVar[int] = 4 + 2 + len(Direction) + 1 + len(_ENTRIES)
 
     def begin(self) -> ParticipantMemory:
@@ -108,7 +108,7 @@ class ParticipantSeat(Seat[ParticipantMemory]):
         place = int(observation["lane"]), scalar(observation, "station")
         return ParticipantMemory(heard=heard, errand=self._errand(observation, place, memory.errand))
 
-    def remarks(self, memory: ParticipantMemory) -> tuple[Remark | None, ...]:
+    def remarks(self, memory: ParticipantMemory) -> tuple[HeardRemark | None, ...]:
         """The Co-Wizard's."""
         return (memory.heard,)
 
@@ -132,8 +132,8 @@ class ParticipantSeat(Seat[ParticipantMemory]):
     def mask(self, observation: Mapping[str, Any], memory: ParticipantMemory) -> Mask:
         """Whoever speaks lets its words out first; a goal is named where there is one."""
         mask = np.full(self.actions, scalar(observation, "speaking") <= 0.0)
-        mask[Phrase.NOTHING] = True
-        mask[Phrase.NAME_GOAL] &= memory.errand is not None
+        mask[ParticipantPhrase.NOTHING] = True
+        mask[ParticipantPhrase.NAME_GOAL] &= memory.errand is not None
         return mask
 
     def allowed(self, observation: Mapping[str, Any], masks: Mapping[str, Any]) -> Mask:
@@ -144,7 +144,7 @@ class ParticipantSeat(Seat[ParticipantMemory]):
         self, choice: int, observation: Mapping[str, Any], memory: ParticipantMemory
     ) -> tuple[ParticipantAction, ParticipantMemory]:  # fmt: skip
         """Says a phrase."""
-        return ParticipantAction(speech=_speech(Phrase(choice), memory.errand)), memory
+        return ParticipantAction(speech=_speech(ParticipantPhrase(choice), memory.errand)), memory
 
     def choice_of(
         self, action: ParticipantAction, observation: Mapping[str, Any], memory: ParticipantMemory
@@ -152,7 +152,7 @@ class ParticipantSeat(Seat[ParticipantMemory]):
         """The phrase that says the same, by act and direction; the name of the place counts where it is the next."""
         speech = action.speech
         if speech is None:
-            return Phrase.NOTHING
+            return ParticipantPhrase.NOTHING
         if speech.act.move in _REPLIES:
             return _REPLIES[speech.act.move]
         actions = [value for value in speech.act.ordered if isinstance(value, ActionValue)]
@@ -161,9 +161,9 @@ class ParticipantSeat(Seat[ParticipantMemory]):
             if phrase := _PHRASES.get((value, direction)) or _PHRASES.get((value, None)):
                 return phrase
         named = memory.errand is not None and memory.errand.name in speech.act.slots
-        return Phrase.NAME_GOAL if named else Phrase.NOTHING
+        return ParticipantPhrase.NAME_GOAL if named else ParticipantPhrase.NOTHING
 
-    def _errand(self, observation: Mapping[str, Any], place: Place, errand: Errand | None) -> Errand | None:
+    def _errand(self, observation: Mapping[str, Any], place: Place, errand: SubgoalRoute | None) -> SubgoalRoute | None:
         subgoals = read_subgoals(observation)
         if errand is not None:
             now = subgoals[errand.subgoal]
@@ -174,7 +174,7 @@ class ParticipantSeat(Seat[ParticipantMemory]):
             mark = landmarks.get(subgoal.landmark)
             if subgoal.open and subgoal.allowed and mark is not None:
                 journey = RouteProgress.plan(self.town, place, mark.place)
-                return Errand(subgoal=subgoal.index, goal=mark.row, name=mark.name, journey=journey)
+                return SubgoalRoute(subgoal=subgoal.index, goal=mark.row, name=mark.name, journey=journey)
         return None
 
     def _followed(self, journey: RouteProgress, place: Place) -> RouteProgress:
@@ -182,11 +182,11 @@ class ParticipantSeat(Seat[ParticipantMemory]):
         return journey.replanned(self.town, place) if journey.lost(place[1]) else journey
 
 
-def _speech(phrase: Phrase, errand: Errand | None) -> Speech | None:
+def _speech(phrase: ParticipantPhrase, errand: SubgoalRoute | None) -> Speech | None:
     if phrase in _INSTRUCTIONS:
         action, text = _INSTRUCTIONS[phrase]
         return Speech(act=DialogueAct.of(DialogueMove.INSTRUCT, action), text=text)
-    if phrase is Phrase.NAME_GOAL and errand is not None:
+    if phrase is ParticipantPhrase.NAME_GOAL and errand is not None:
         name = load_lexicon().forms(errand.name, "say")[0]
         return Speech(act=DialogueAct.of(DialogueMove.INSTRUCT, errand.name), text=f"We need to go to {name}.")
     return _ANSWERS.get(phrase)

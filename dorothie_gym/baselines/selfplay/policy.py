@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import torch
 
+from dorothie_gym.baselines.rl.checkpoint import DESCRIPTION, read_description, restore
 from dorothie_gym.baselines.rl.settings import TrainingSettings
-from dorothie_gym.baselines.rl.weights import DESCRIPTION, read_description, restore
 from dorothie_gym.baselines.selfplay.learner import draw, make_network
-from dorothie_gym.baselines.selfplay.seat import Seat
-from dorothie_gym.baselines.selfplay.seats import Table, make_seat, pad_masks, pad_vectors
+from dorothie_gym.baselines.selfplay.role_interface import RoleInterface
+from dorothie_gym.baselines.selfplay.role_layout import RoleLayout, make_interface, pad_masks, pad_vectors
 from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings
 from dorothie_gym.errors import ModelFileError
 from dorothie_gym.maps import Town
@@ -24,16 +24,16 @@ from dorothie_gym.spaces import ActionDict, SpaceLimits
 
 
 @dataclass(frozen=True, kw_only=True)
-class Play:
+class LearnedPolicyState:
     """Where a role is in a session: at its seat, with what it remembers, after so many decisions."""
 
-    seat: Seat[Any]
+    seat: RoleInterface[Any]
     memory: Any
     seed: int
     count: int = 0
 
 
-class LearnedPolicy(Policy[Play]):
+class LearnedPolicy(Policy[LearnedPolicyState]):
     """Plays a role as it was learned: what its network takes in follows from the observation as in training.
 
     Policies are not told `info["action_mask"]`: what it may do is what makes sense as far as the role can tell. The
@@ -52,12 +52,12 @@ class LearnedPolicy(Policy[Play]):
         super().__init__(role, limits)
         self._model, self._padded = model, padded
 
-    def initial_state(self, seed: int, town: Town) -> Play:
+    def initial_state(self, seed: int, town: Town) -> LearnedPolicyState:
         """Takes the seat."""
-        seat = make_seat(self.role, town, self.limits)
-        return Play(seat=seat, memory=seat.begin(), seed=seed)
+        seat = make_interface(self.role, town, self.limits)
+        return LearnedPolicyState(seat=seat, memory=seat.begin(), seed=seed)
 
-    def step(self, observation: Mapping[str, Any], state: Play) -> tuple[ActionDict, Play]:
+    def step(self, observation: Mapping[str, Any], state: LearnedPolicyState) -> tuple[ActionDict, LearnedPolicyState]:
         """Draws an action from what the network takes for good."""
         seat = state.seat
         memory = seat.notice(observation, state.memory)
@@ -94,7 +94,7 @@ def read_policy(path: Path, role: Role, limits: SpaceLimits) -> LearnedPolicy:
         raise ModelFileError(f"{folder / DESCRIPTION}: is no model of self-play ({error!r})") from None
     if learned is not role:
         raise ModelFileError(f"{folder}: plays {learned}, not {role}")
-    table, place = Table.of(limits), AGENT_ROLES.index(role)
+    table, place = RoleLayout.of(limits), AGENT_ROLES.index(role)
     if (size, actions) != (table.sizes[place], table.actions[place]):
         raise ModelFileError(
             f"{folder / DESCRIPTION}: takes in {size} numbers and has {actions} actions, {role} has "

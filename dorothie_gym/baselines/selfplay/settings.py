@@ -10,11 +10,10 @@ from typing import Any, Final
 import yaml
 
 from dorothie_gym.baselines.rl.settings import TrainingSettings
-from dorothie_gym.baselines.selfplay.loading import KIND
 from dorothie_gym.errors import SettingsError
 
-SELFPLAY: Final = KIND
-"""Name of the algorithm at the command line."""
+SELFPLAY: Final = "selfplay"
+"""Name of the algorithm at the command line, and kind of its models in `model.json`."""
 
 ARGUMENTS: Final = ("town", "storyboard", "traffic", "max_seconds", "progress")
 """Fields that are arguments of `SelfPlayEnv`."""

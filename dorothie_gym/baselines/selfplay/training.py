@@ -14,14 +14,14 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from dorothie_gym.baselines.rl.cloning import Tell, silent
-from dorothie_gym.baselines.rl.evaluating import SEEDS_FROM, Act, Outcome, evaluate_policy
-from dorothie_gym.baselines.rl.training import CLONED, CURVE, PROGRESS, Run, Watch, check_same
-from dorothie_gym.baselines.rl.weights import DESCRIPTION, read_description, restore, save_model
-from dorothie_gym.baselines.selfplay.cloning import read_lessons
-from dorothie_gym.baselines.selfplay.curve import draw_curve
-from dorothie_gym.baselines.selfplay.game import AD_WIZARD, Game, Maker
+from dorothie_gym.baselines.learning_curves import draw_selfplay_curve
+from dorothie_gym.baselines.rl.behaviour_cloning import ReportProgress, silent
+from dorothie_gym.baselines.rl.checkpoint import DESCRIPTION, read_description, restore, save_model
+from dorothie_gym.baselines.rl.evaluation import SEEDS_FROM, Act, EpisodeStatistics, evaluate_policy
+from dorothie_gym.baselines.rl.training import CLONED, CURVE, PROGRESS, OnProgress, TrainingResult, check_same
+from dorothie_gym.baselines.selfplay.demonstrations import read_lessons
 from dorothie_gym.baselines.selfplay.learner import draw
+from dorothie_gym.baselines.selfplay.multi_agent_rollout import AD_WIZARD, MultiAgentRollout, SelfPlayEnvFactory
 from dorothie_gym.baselines.selfplay.settings import SELFPLAY, SelfPlaySettings
 from dorothie_gym.errors import ModelFileError
 from dorothie_gym.ontology import AGENT_ROLES, Role
@@ -35,7 +35,7 @@ STRETCH = 16
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row:
+class SelfPlayEvaluation:
     """How things stood after some training.
 
     Attributes:
@@ -49,8 +49,8 @@ class Row:
 
     steps: int
     seconds: float
-    scripted: Outcome
-    learned: Outcome
+    scripted: EpisodeStatistics
+    learned: EpisodeStatistics
     returns: Mapping[str, float | None]
 
     def as_json(self) -> dict[str, Any]:
@@ -58,13 +58,13 @@ class Row:
         return asdict(self)
 
     @classmethod
-    def from_json(cls, found: Mapping[str, Any]) -> Row:
+    def from_json(cls, found: Mapping[str, Any]) -> SelfPlayEvaluation:
         """What `as_json` made."""
-        outcomes = {name: Outcome(**found[name]) for name in OPPONENTS}
+        outcomes = {name: EpisodeStatistics(**found[name]) for name in OPPONENTS}
         return cls(steps=found["steps"], seconds=found["seconds"], returns=found["returns"], **outcomes)
 
 
-class SelfPlay:
+class SelfPlayTraining:
     """A run; `go` trains until all steps are done or Ctrl-C is pressed.
 
     Attributes:
@@ -75,9 +75,13 @@ class SelfPlay:
     """
 
     def __init__(
-        self, settings: SelfPlaySettings, folder: Path, watch: Watch[Row] | None = None, ray: str | None = None,
-        tell: Tell = silent,
-    ) -> None:  # fmt: skip
+        self,
+        settings: SelfPlaySettings,
+        folder: Path,
+        watch: OnProgress[SelfPlayEvaluation] | None = None,
+        ray: str | None = None,
+        tell: ReportProgress = silent,
+    ) -> None:
         """Prepares a run, or takes up one that is in the folder.
 
         Args:
@@ -95,7 +99,7 @@ class SelfPlay:
         """
         self.settings, self.folder = settings, folder
         self._watch, self._tell = watch or (lambda done, total, row: None), tell
-        self.rows: list[Row] = []
+        self.rows: list[SelfPlayEvaluation] = []
         self.seconds, self.steps = 0.0, 0
         self._tally = _tally([])  # of the sessions of training since the last row
         begun = (folder / AGENT_ROLES[AD_WIZARD] / DESCRIPTION).is_file()
@@ -105,7 +109,7 @@ class SelfPlay:
         folder.mkdir(parents=True, exist_ok=True)
         torch.set_num_threads(1)  # small networks: more threads only wait for one another
         log = folder / "tensorboard" if find_spec("tensorboard") is not None else None
-        self.game = Game(settings, log, ray)
+        self.game = MultiAgentRollout(settings, log, ray)
         try:
             if begun:
                 self._take_up()
@@ -115,7 +119,7 @@ class SelfPlay:
             self.game.close()
             raise
 
-    def go(self) -> Run[Row]:
+    def go(self) -> TrainingResult[SelfPlayEvaluation]:
         """Trains.
 
         Returns:
@@ -130,7 +134,9 @@ class SelfPlay:
             pass  # what was done since the last stretch ended will be done again
         finally:
             self.game.close()
-        return Run(folder=self.folder, rows=tuple(self.rows), steps=self.steps, seconds=self.seconds, finished=finished)
+        return TrainingResult(
+            folder=self.folder, rows=tuple(self.rows), steps=self.steps, seconds=self.seconds, finished=finished
+        )
 
     def _learn_from(self, corpus: Path) -> None:
         """Begins with what the roles of a corpus did; the first row of the progress is what that is worth."""
@@ -162,7 +168,7 @@ class SelfPlay:
         game.past.keep(game.actor(AD_WIZARD).model)
         self._keep(steps, seconds, tally, row)
 
-    def _keep(self, steps: int, seconds: float, tally: NDArray[np.float64], row: Row | None) -> None:
+    def _keep(self, steps: int, seconds: float, tally: NDArray[np.float64], row: SelfPlayEvaluation | None) -> None:
         """Writes everything as it is after so many steps."""
         self.steps, self.seconds, self._tally = steps, seconds, tally
         if row is not None:
@@ -170,21 +176,21 @@ class SelfPlay:
             self._tally = _tally([])
         self._save()
         if row is not None:
-            draw_curve([row.as_json() for row in self.rows], _title(self.settings), self.folder / CURVE)
+            draw_selfplay_curve([row.as_json() for row in self.rows], _title(self.settings), self.folder / CURVE)
             self._watch(steps, self.settings.steps, row)
 
-    def _evaluate(self, steps: int, seconds: float, tally: NDArray[np.float64]) -> Row:
+    def _evaluate(self, steps: int, seconds: float, tally: NDArray[np.float64]) -> SelfPlayEvaluation:
         """Plays the evaluation's sessions."""
         outcomes = {name: self._outcome(name) for name in OPPONENTS}
-        row = Row(
+        row = SelfPlayEvaluation(
             steps=steps, seconds=round(seconds, 2), returns=_means(tally),
             scripted=outcomes["scripted"], learned=outcomes["learned"],
         )  # fmt: skip
         self._log(row)
         return row
 
-    def _outcome(self, ad_wizard: str) -> Outcome:
-        maker = Maker(self.settings.env_settings, (Role.AD_WIZARD,) if ad_wizard == "scripted" else ())
+    def _outcome(self, ad_wizard: str) -> EpisodeStatistics:
+        maker = SelfPlayEnvFactory(self.settings.env_settings, (Role.AD_WIZARD,) if ad_wizard == "scripted" else ())
         return evaluate_policy(maker, self.act_with(SEEDS_FROM), self.settings.episodes, SEEDS_FROM)
 
     def act_with(self, seed: int) -> Act:
@@ -201,7 +207,7 @@ class SelfPlay:
 
         return act
 
-    def _log(self, row: Row) -> None:
+    def _log(self, row: SelfPlayEvaluation) -> None:
         logger = self.game.learners[0].model.logger
         for name, outcome in (("scripted", row.scripted), ("learned", row.learned)):
             logger.record(f"eval/success_against_{name}", outcome.success)
@@ -233,7 +239,9 @@ class SelfPlay:
         self.game.past.load(self.folder)
         lines = (self.folder / PROGRESS).read_text(encoding="utf-8").splitlines()
         self.steps = steps.pop()
-        self.rows = [row for row in map(Row.from_json, map(json.loads, lines)) if row.steps <= self.steps]
+        self.rows = [
+            row for row in map(SelfPlayEvaluation.from_json, map(json.loads, lines)) if row.steps <= self.steps
+        ]
         about = found[AGENT_ROLES[AD_WIZARD]]
         self.seconds, self._tally = float(about["seconds"]), np.array(about["tally"], dtype=np.float64)
 

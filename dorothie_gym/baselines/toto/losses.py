@@ -9,8 +9,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from dorothie_gym.baselines.decoding import Outputs
 from dorothie_gym.baselines.inputs import NFD, RFN, Labels
-from dorothie_gym.baselines.outputs import Outputs
 from dorothie_gym.baselines.toto.config import LossWeights, TOTOConfig
 from dorothie_gym.ontology import VECTOR_SLOTS
 from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS

@@ -12,8 +12,8 @@ from typing import Final, TypeAlias
 import torch
 from torch import Tensor, nn
 
+from dorothie_gym.baselines.decoding import Outputs, Predicted, decode
 from dorothie_gym.baselines.inputs import Inputs, Labels
-from dorothie_gym.baselines.outputs import Outputs, Predicted, decode
 from dorothie_gym.baselines.toto.config import Channel, TOTOConfig
 from dorothie_gym.baselines.toto.layers import Block, GraphAttention, segment_softmax, time_encoding
 from dorothie_gym.baselines.toto.losses import point_losses

@@ -13,8 +13,8 @@ from typing import Any, Final, Protocol
 import torch
 from torch import Tensor, nn
 
+from dorothie_gym.baselines.decoding import Predicted
 from dorothie_gym.baselines.inputs import Examples, Inputs, Labels
-from dorothie_gym.baselines.outputs import Predicted
 from dorothie_gym.baselines.training import checkpoints
 from dorothie_gym.benchmark.features import BatchSpec
 from dorothie_gym.errors import CheckpointError
@@ -94,7 +94,7 @@ OnEpoch = Callable[[Epoch], None]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trained:
+class TrainingSummary:
     """What came of a training.
 
     Attributes:
@@ -120,7 +120,7 @@ def train(
     seed: int,
     about: Mapping[str, Any],
     on_epoch: OnEpoch = lambda epoch: None,
-) -> Trained:
+) -> TrainingSummary:
     """Trains a model until its validation loss no longer falls, and leaves it with the weights of the best epoch.
 
     On a CPU the same seed gives the same losses to the last digit. After each epoch all is kept in the folder; called
@@ -154,7 +154,7 @@ def train(
             run.keep(epochs, better)
             on_epoch(epochs[-1])
     checkpoints.restore(folder / BEST_FILE, model)
-    return Trained(epochs=tuple(epochs), points=len(training))
+    return TrainingSummary(epochs=tuple(epochs), points=len(training))
 
 
 def predict(model: Model, examples: Examples) -> Predicted:

@@ -18,8 +18,12 @@ from dorothie_gym.maps.lane_graph import FEATURES
 from dorothie_gym.ontology import LABELS, GoalStatus
 from dorothie_gym.recording import (
     NO_LANE,
+    ActionRecord,
     EventType,
     Session,
+    SessionHeader,
+    Trajectory,
+    UtteranceRecord,
     history_angle,
     is_decision,
     label_angle,
@@ -60,24 +64,27 @@ class SessionColumns:
 def extract(session: Session, town: Town | None) -> SessionColumns:
     """Returns the columns of a session; `town` is None if it is unknown."""
     session = at_tenths(session)
-    pool = _Pool()
+    texts = TextPool()
     handled = {event: HANDLINGS.index(kind) for event, kind in handling_of_events(Units(session)).items()}
+    rows = session.trajectory
+    pose = poses(rows)
+    looks = tuple(perceived(session.scene, pose, rows["frame"], light_switches(session), town))
     arrays = {
-        **_places(session, pool),  # first, so that indices of texts do not depend on later utterances
-        **_said(SessionHistory(session), pool, handled),
-        **_done(session, handled),
-        **_frames(session, town),
+        **place_columns(session.header, texts),  # first: numbers of texts then do not depend on what is said later
+        **utterance_columns(SessionHistory(session).utterances, texts, handled),
+        **action_columns(session.physical_actions, handled),
+        **frame_columns(rows, pose, _speeds(rows), looks, known=town is not None),
         **_goals(session),
+        "sessions.has_objects": np.array([len(session.scene.actors) > 0]),
     }
-    arrays["sessions.has_objects"] = np.array([len(session.scene.actors) > 0])
     unpointed = unpointed_events(session)
-    content = hashlib.sha256(repr((session.header.town, list(pool.texts), unpointed)).encode())
+    content = hashlib.sha256(repr((session.header.town, list(texts.numbers), unpointed)).encode())
     for name in sorted(arrays):
         content.update(f"{name} {arrays[name].dtype} {arrays[name].shape}".encode() + arrays[name].tobytes())
     seed = session.header.seed
     return SessionColumns(
         arrays=arrays,
-        texts=tuple(pool.texts),
+        texts=tuple(texts.numbers),
         town=session.header.town,
         seed=-1 if seed is None else seed,
         unpointed=unpointed,
@@ -85,29 +92,37 @@ def extract(session: Session, town: Town | None) -> SessionColumns:
     )
 
 
-class _Pool:
-    """Indices of texts."""
+class TextPool:
+    """Numbers of distinct texts, in the order in which they first occur."""
 
     def __init__(self) -> None:
-        self.texts: dict[str, int] = {}
+        self.numbers: dict[str, int] = {}
 
     def number(self, text: str | None) -> int:
-        return NO_TEXT if text is None else self.texts.setdefault(text, len(self.texts))
+        """Returns the number of a text, a new one if the text is new; `NO_TEXT` for None."""
+        return NO_TEXT if text is None else self.numbers.setdefault(text, len(self.numbers))
 
 
-def _said(history: SessionHistory, pool: _Pool, handled: Mapping[int, int]) -> dict[str, NDArray[Any]]:
-    """Returns moves and utterances, in the order in which they become visible."""
-    spoken = history.utterances
+def utterance_columns(
+    spoken: Sequence[UtteranceRecord], texts: TextPool, handled: Mapping[int, int]
+) -> dict[str, NDArray[Any]]:
+    """Returns the columns of moves and utterances.
+
+    Args:
+        spoken: utterances of participant and Co-Wizard, by the frame at which they were over.
+        texts: numbers of texts; gets those of the utterances.
+        handled: value of the columns `handling` by number of the event.
+    """
     over = [utterance.frame // FRAMES_PER_TENTH for utterance in spoken]
     for utterance in spoken:
         for text in (utterance.text, utterance.moves[0].recognised, *(move.span for move in utterance.moves)):
-            pool.number(text)
+            texts.number(text)
     moves = [(row, move) for row, utterance in enumerate(spoken) for move in utterance.moves]
     return {
         "utterances.tenth": _ints(over),
         "utterances.speaker": _ints([SPEAKERS.index(utterance.speaker) for utterance in spoken]),
-        "utterances.text": _ints([pool.number(utterance.text) for utterance in spoken]),
-        "utterances.recognised_text": _ints([pool.number(utterance.moves[0].recognised) for utterance in spoken]),
+        "utterances.text": _ints([texts.number(utterance.text) for utterance in spoken]),
+        "utterances.recognised_text": _ints([texts.number(utterance.moves[0].recognised) for utterance in spoken]),
         "moves.tenth": _ints([over[row] for row, _ in moves]),
         "moves.point_tenth": _ints([move.frame // FRAMES_PER_TENTH for _, move in moves]),
         "moves.event": _ints([move.index for _, move in moves]),
@@ -115,37 +130,59 @@ def _said(history: SessionHistory, pool: _Pool, handled: Mapping[int, int]) -> d
         "moves.utterance": _ints([row for row, _ in moves]),
         "moves.move": _ints([int(move.act.move) for _, move in moves]),
         "moves.slots": np.array([move.act.vector for _, move in moves], dtype=np.bool_).reshape(-1, len(LABELS)),
-        "moves.span_text": _ints([pool.number(move.span) for _, move in moves]),
+        "moves.span_text": _ints([texts.number(move.span) for _, move in moves]),
         "moves.flagged": np.array([move.flagged for _, move in moves], dtype=np.bool_),
         "moves.handling": _ints([handled[move.index] for _, move in moves]),
     }
 
 
-def _done(session: Session, handled: Mapping[int, int]) -> dict[str, NDArray[Any]]:
-    done = session.physical_actions
+def action_columns(actions: Sequence[ActionRecord], handled: Mapping[int, int]) -> dict[str, NDArray[Any]]:
+    """Returns the columns of physical actions; `handled` is as of `utterance_columns`."""
     return {
-        "actions.tenth": _ints([act.frame // FRAMES_PER_TENTH for act in done]),
-        "actions.event": _ints([act.index for act in done]),
-        "actions.action": _ints([act.action.value - 1 for act in done]),
-        "actions.angle": np.array([history_angle(act) for act in done], dtype=np.float32),
-        "actions.up": _ints([0 if act.up is None else (1 if act.up else -1) for act in done]),
-        "actions.label_angle": np.array([label_angle(act) for act in done], dtype=np.float32),
-        "actions.flagged": np.array([is_decision(act) for act in done], dtype=np.bool_),
-        "actions.handling": _ints([handled[act.index] for act in done]),
+        "actions.tenth": _ints([act.frame // FRAMES_PER_TENTH for act in actions]),
+        "actions.event": _ints([act.index for act in actions]),
+        "actions.action": _ints([act.action.value - 1 for act in actions]),
+        "actions.angle": np.array([history_angle(act) for act in actions], dtype=np.float32),
+        "actions.up": _ints([0 if act.up is None else (1 if act.up else -1) for act in actions]),
+        "actions.label_angle": np.array([label_angle(act) for act in actions], dtype=np.float32),
+        "actions.flagged": np.array([is_decision(act) for act in actions], dtype=np.bool_),
+        "actions.handling": _ints([handled[act.index] for act in actions]),
     }
 
 
-def _frames(session: Session, town: Town | None) -> dict[str, NDArray[Any]]:
-    """Where the car was, and what was perceived around it."""
-    rows = session.trajectory
+def poses(rows: Trajectory) -> NDArray[np.float64]:
+    """Returns x, y [m] and heading [degrees, clockwise, in [-180, 180)] of rows of a trajectory (n, 3)."""
     degrees = np.rint(np.degrees(rows["heading"]) / HEADING_STEP) * HEADING_STEP
-    pose = np.stack([rows["x"], rows["y"], (degrees + 180.0) % 360.0 - 180.0], axis=1)
-    tenths = rows["frame"] // FRAMES_PER_TENTH
+    return np.stack([rows["x"], rows["y"], (degrees + 180.0) % 360.0 - 180.0], axis=1)
+
+
+def _speeds(rows: Trajectory) -> NDArray[np.float64]:
+    """Returns the speed over the tenth before each row (n,) [m/s]; 0 for the first."""
     speed = np.zeros(len(rows))
     if len(rows) > 1:
         way = np.hypot(np.diff(rows["x"]), np.diff(rows["y"]))
-        speed[1:] = way / (np.diff(tenths) / TENTHS)
-    looks = list(perceived(session.scene, pose, rows["frame"], light_switches(session), town))
+        speed[1:] = way / (np.diff(rows["frame"] // FRAMES_PER_TENTH) / TENTHS)
+    return speed
+
+
+def frame_columns(
+    rows: Trajectory,
+    pose: NDArray[np.float64],
+    speed: NDArray[np.float64],
+    looks: Sequence[tuple[int, NDArray[np.int64], NDArray[np.float64]]],
+    *,
+    known: bool,
+) -> dict[str, NDArray[Any]]:
+    """Returns the columns of frames, looks and objects.
+
+    Args:
+        rows: trajectory at tenths of a second (n,).
+        pose: (n, 3) as `poses` returns them.
+        speed: (n,) [m/s].
+        looks: frame, kinds and values of each look, as `perceived` yields them.
+        known: whether the lanes of the town are known.
+    """
+    tenths = rows["frame"] // FRAMES_PER_TENTH
     look_tenths = np.array([frame // FRAMES_PER_TENTH for frame, _, _ in looks], dtype=np.int64)
     kinds = [kind for _, kind, _ in looks]
     values = [value for _, _, value in looks]
@@ -153,7 +190,7 @@ def _frames(session: Session, town: Town | None) -> dict[str, NDArray[Any]]:
         "frames.tenth": tenths.astype(np.int32),
         "frames.pose": pose.astype(np.float32),
         "frames.speed": speed.astype(np.float32),
-        "frames.lane": (rows["lane"] if town is not None else np.full(len(rows), NO_LANE)).astype(np.int32),
+        "frames.lane": (rows["lane"] if known else np.full(len(rows), NO_LANE)).astype(np.int32),
         "frames.look": (np.searchsorted(look_tenths, tenths, side="right") - 1).astype(np.int32),
         "looks.tenth": look_tenths.astype(np.int32),
         "looks.start": np.concatenate(([0], np.cumsum([len(kind) for kind in kinds]))).astype(np.int64)[:-1],
@@ -162,15 +199,15 @@ def _frames(session: Session, town: Town | None) -> dict[str, NDArray[Any]]:
     }
 
 
-def _places(session: Session, pool: _Pool) -> dict[str, NDArray[Any]]:
-    """Landmarks that the Co-Wizard knows, and streets."""
-    known = [row for row in session.header.landmarks if not row["hidden"]]
+def place_columns(header: SessionHeader, texts: TextPool) -> dict[str, NDArray[Any]]:
+    """Returns the columns of streets, and of the landmarks that the Co-Wizard knows."""
+    known = [row for row in header.landmarks if not row["hidden"]]
     return {
         "landmarks.place": _pairs([(row["x"], row["y"]) for row in known]),
         "landmarks.lane": _ints([row["lane"] for row in known]),
         "landmarks.street": _ints([row["street"] for row in known]),
-        "landmarks.text": _ints([pool.number(row["name"]) for row in known]),
-        "streets.text": _ints([pool.number(name) for name in session.header.street_names]),
+        "landmarks.text": _ints([texts.number(row["name"]) for row in known]),
+        "streets.text": _ints([texts.number(name) for name in header.street_names]),
     }
 
 
@@ -184,6 +221,11 @@ def _goals(session: Session) -> dict[str, NDArray[Any]]:
                 landmark = header.landmarks[header.subgoals[number]["landmark"]]
                 tenths.append(event.frame // FRAMES_PER_TENTH)
                 places.append((landmark["x"], landmark["y"]))
+    return goal_columns(tenths, places)
+
+
+def goal_columns(tenths: Sequence[int], places: Sequence[tuple[float, float]]) -> dict[str, NDArray[Any]]:
+    """Returns the columns of goals that were reached at tenths (n,), at places x, y (n, 2) [m]."""
     return {"goals.tenth": _ints(tenths), "goals.place": _pairs(places)}
 
 

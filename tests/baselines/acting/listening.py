@@ -1,4 +1,4 @@
-"""A Co-Wizard whose observations and actions are followed as the learned one follows its own."""
+"""A Co-Wizard whose observations and actions are encoded as the learned one encodes its own."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dorothie_gym.baselines.acting.following import Following
-from dorothie_gym.baselines.acting.history import KEPT, History
-from dorothie_gym.baselines.acting.segments import spans_of
+from dorothie_gym.baselines.acting.action_effects import HistoryTracker
+from dorothie_gym.baselines.acting.history import History
+from dorothie_gym.baselines.acting.utterance_spans import spans_of
+from dorothie_gym.benchmark.features import HistorySizes
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.maps import Town
@@ -18,46 +19,58 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.recording import Session
 from dorothie_gym.rollout import play_session
 from dorothie_gym.spaces import ActionDict, CoWizardAction, heard_acts
+from tests.baselines.acting.whole_history import WholeHistory
+
+EVERYTHING = HistorySizes(moves=1 << 20, utterances=1 << 20, actions=1 << 20, window=1 << 20)
+"""Sizes with which the incremental history drops nothing."""
 
 
 class Listening(Policy[Any]):
-    """Plays as another policy does.
+    """Plays as another policy does, and keeps histories of what it observes and does.
 
     Attributes:
-        following: what has happened so far, all of it.
-        moments: after each decision with something new: what a policy that plays has then, and all that there is.
+        tracker: tracker of a history of which everything is kept.
+        moments: histories after each decision with something new: with what a batch of the default sizes shows, and
+            the reference, with everything.
     """
 
     def __init__(self, policy: Policy[Any]) -> None:
         super().__init__(policy.role, policy.limits)
         self._policy = policy
-        self.moments: list[tuple[History, History]] = []
+        self.moments: list[tuple[History, WholeHistory]] = []
 
     def initial_state(self, seed: int, town: Town) -> Any:
         self.town = town
-        self.following: Following | None = None
-        self._live: Following | None = None
+        self._trackers: list[HistoryTracker] = []
         return self._policy.initial_state(seed, town)
+
+    @property
+    def tracker(self) -> HistoryTracker:
+        return self._trackers[0]
 
     def step(self, observation: Mapping[str, Any], state: Any) -> tuple[ActionDict, Any]:
         action, state = self._policy.step(observation, state)
         view = CoWizardView.read(observation, self.town)
         heard = spans_of(str(observation["participant_text"]), heard_acts(observation, Role.PARTICIPANT))
         taken = CoWizardAction.decode(action, self.limits)
-
-        def follow(before: Following | None, kept: float) -> Following:
-            known = before or Following(history=History.begin(observation, self.town, kept))
-            return known.observed(view, self.town, heard).acted(taken.speech, taken.physical, view, self.limits.spans)
-
-        before = self.following.history.events if self.following else ()
-        self.following, self._live = follow(self.following, float("inf")), follow(self._live, KEPT)
-        if self.following.history.events != before:
-            self.moments.append((self._live.history, self.following.history))
+        known: Any = self._trackers or [
+            HistoryTracker(history=History.begin(observation, self.town, EVERYTHING)),
+            HistoryTracker(history=History.begin(observation, self.town, HistorySizes())),
+            HistoryTracker(history=WholeHistory.begin(observation, self.town)),
+        ]
+        events = known[-1].history.events
+        self._trackers = [
+            tracker.observed(view, self.town, heard).acted(taken.speech, taken.physical, view, self.limits.spans)
+            for tracker in known
+        ]
+        _, shown, whole = (tracker.history for tracker in self._trackers)
+        if whole.events != events:
+            self.moments.append((shown, whole))
         return action, state
 
 
 class Played(NamedTuple):
-    """A session that was recorded, and what its Co-Wizard had of it."""
+    """A recorded session, and the histories of its Co-Wizard."""
 
     session: Session
     listener: Listening

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 import dorothie_gym.baselines  # noqa: F401  # makes the files playable
-from dorothie_gym.baselines.acting.trained import Trained
-from dorothie_gym.baselines.material import Material
-from dorothie_gym.baselines.runs import Job, run
+from dorothie_gym.baselines.acting.inference import BenchmarkModel
+from dorothie_gym.baselines.dataset import Dataset
+from dorothie_gym.baselines.experiment import Experiment, run_experiment
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED, find_player
@@ -30,10 +30,12 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Small models, trained on a few points."""
     root = tmp_path_factory.mktemp("trained")
     sessions = corpus(root / "corpus")
-    material = Material.load(sessions, "hashing")
-    jobs = [Job(corpus=sessions, encoder="hashing", model=name, size="small", seed=0, out=root) for name in MODELS]
+    material = Dataset.load(sessions, "hashing")
+    jobs = [
+        Experiment(corpus=sessions, encoder="hashing", model=name, size="small", seed=0, out=root) for name in MODELS
+    ]
     for job in jobs:
-        run(job, material)
+        run_experiment(job, material)
     return {job.model: job.folder for job in jobs}
 
 
@@ -89,14 +91,14 @@ def test_another_encoder_than_the_model_was_trained_with_is_refused(folders: dic
     page = json.loads((other / "model.json").read_text())
     (other / "model.json").write_text(json.dumps({**page, "encoder_id": "hashing-0"}))
     with pytest.raises(ValueError, match="was trained with the encoder hashing-0"):
-        Trained.load(other)
+        BenchmarkModel.load(other)
 
 
 def test_a_description_of_another_version_is_told(folders: dict[str, Path], tmp_path: Path) -> None:
     other = shutil.copytree(folders["toto"], tmp_path / "other")
     (other / "model.json").write_text('{"kind": "benchmark"}')
     with pytest.raises(ValueError, match="describes no model of this version"):
-        Trained.load(other)
+        BenchmarkModel.load(other)
 
 
 def test_making_files_playable_does_not_import_torch() -> None:

@@ -11,9 +11,9 @@ pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
 from dorothie_gym.baselines.rl import Training, TrainingSettings, tuned_settings
-from dorothie_gym.baselines.rl.cloning import clone, read_lessons  # noqa: E402
+from dorothie_gym.baselines.rl.behaviour_cloning import clone, read_lessons  # noqa: E402
+from dorothie_gym.baselines.rl.checkpoint import make_model  # noqa: E402
 from dorothie_gym.baselines.rl.environments import make_env  # noqa: E402
-from dorothie_gym.baselines.rl.weights import make_model  # noqa: E402
 from dorothie_gym.engine.config import EnvConfig  # noqa: E402
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv  # noqa: E402
 from dorothie_gym.errors import SessionError, SettingsError

@@ -11,7 +11,7 @@ import dorothie_gym.baselines  # noqa: E402, F401  (makes what is learned there 
 from dorothie_gym import DuoWizardEnv  # noqa: E402
 from dorothie_gym.baselines.selfplay.env import SelfPlayEnv  # noqa: E402
 from dorothie_gym.baselines.selfplay.policy import read_policy  # noqa: E402
-from dorothie_gym.baselines.selfplay.training import SelfPlay  # noqa: E402
+from dorothie_gym.baselines.selfplay.training import SelfPlayTraining  # noqa: E402
 from dorothie_gym.ontology import AGENT_ROLES, Role  # noqa: E402
 from dorothie_gym.policies import find_player  # noqa: E402
 from dorothie_gym.rollout.play import play_session  # noqa: E402
@@ -21,7 +21,7 @@ from tests.baselines.selfplay.test_training import settings_for  # noqa: E402
 @pytest.fixture(scope="module", params=[False, True], ids=["independent", "shared"])
 def folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
-    SelfPlay(settings_for(shared=request.param, steps=32), folder).go()
+    SelfPlayTraining(settings_for(shared=request.param, steps=32), folder).go()
     return folder
 
 

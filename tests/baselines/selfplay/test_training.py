@@ -15,7 +15,7 @@ from safetensors.torch import load_file  # noqa: E402
 from dorothie_gym.baselines.selfplay import training as training_module  # noqa: E402
 from dorothie_gym.baselines.selfplay.env import SelfPlayEnv  # noqa: E402
 from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings, selfplay_settings  # noqa: E402
-from dorothie_gym.baselines.selfplay.training import SelfPlay  # noqa: E402
+from dorothie_gym.baselines.selfplay.training import SelfPlayTraining  # noqa: E402
 from dorothie_gym.errors import ModelFileError, SettingsError
 from dorothie_gym.ontology import AGENT_ROLES, Role  # noqa: E402
 
@@ -53,7 +53,7 @@ def assert_same(one: Path, two: Path) -> None:
 @pytest.mark.parametrize("shared", [False, True])
 def test_networks_learn_and_lie_in_folders(shared: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(training_module, "STRETCH", 16)  # the Ad-Wizard has nothing to choose from at first
-    play = SelfPlay(settings_for(shared=shared, max_seconds=30.0), tmp_path)
+    play = SelfPlayTraining(settings_for(shared=shared, max_seconds=30.0), tmp_path)
     before = [
         {name: value.clone() for name, value in learner.model.policy.state_dict().items()}
         for learner in play.game.learners
@@ -74,15 +74,15 @@ def test_networks_learn_and_lie_in_folders(shared: bool, tmp_path: Path, monkeyp
 @pytest.mark.parametrize("shared", [False, True])
 def test_what_was_interrupted_goes_on_to_the_same_weights(shared: bool, tmp_path: Path) -> None:
     settings = settings_for(shared=shared, max_seconds=5.0)
-    SelfPlay(settings, tmp_path / "whole").go()
+    SelfPlayTraining(settings, tmp_path / "whole").go()
 
     def press_ctrl_c(done: int, total: int, row: Any) -> None:
         if done == 80:
             raise KeyboardInterrupt
 
-    cut = SelfPlay(settings, tmp_path / "cut", press_ctrl_c).go()
+    cut = SelfPlayTraining(settings, tmp_path / "cut", press_ctrl_c).go()
     assert not cut.finished and cut.steps == 64
-    again = SelfPlay(settings, tmp_path / "cut").go()
+    again = SelfPlayTraining(settings, tmp_path / "cut").go()
     assert again.finished and again.steps == 128
     assert_same(tmp_path / "whole", tmp_path / "cut")
     rows = [json.loads((tmp_path / name / "progress.jsonl").read_text(encoding="utf-8")) for name in ("whole", "cut")]
@@ -91,10 +91,10 @@ def test_what_was_interrupted_goes_on_to_the_same_weights(shared: bool, tmp_path
 
 def test_the_same_seed_learns_the_same_with_worker_processes(tmp_path: Path) -> None:
     more = {"steps": 64, "environments": 4, "coached_environments": 2}
-    SelfPlay(settings_for(**more), tmp_path / "here").go()
-    SelfPlay(settings_for(**more, workers=2), tmp_path / "there").go()
+    SelfPlayTraining(settings_for(**more), tmp_path / "here").go()
+    SelfPlayTraining(settings_for(**more, workers=2), tmp_path / "there").go()
     assert_same(tmp_path / "here", tmp_path / "there")
-    SelfPlay(settings_for(**more, seed=1), tmp_path / "other").go()
+    SelfPlayTraining(settings_for(**more, seed=1), tmp_path / "other").go()
     name = "co_wizard/policy/action_net.weight"
     assert not torch.equal(weights(tmp_path / "here")[name], weights(tmp_path / "other")[name])
 
@@ -102,7 +102,7 @@ def test_the_same_seed_learns_the_same_with_worker_processes(tmp_path: Path) -> 
 @pytest.mark.parametrize("shared", [False, True])
 def test_who_is_coached_learns_beside_scripted_roles(shared: bool, tmp_path: Path) -> None:
     settings = settings_for(environments=4, coached_environments=2, shared=shared)
-    game = SelfPlay(settings, tmp_path).game
+    game = SelfPlayTraining(settings, tmp_path).game
     learns = {
         env: {AGENT_ROLES[role] for learner in game.learners for k, role in learner.players.tolist() if k == env}
         for env in range(4)
@@ -127,13 +127,13 @@ def test_nobody_does_what_is_masked(shared: bool, tmp_path: Path, monkeypatch: p
         return step(self, action)
 
     monkeypatch.setattr(SelfPlayEnv, "step", watched)
-    SelfPlay(settings_for(shared=shared, max_seconds=60.0), tmp_path).go()
+    SelfPlayTraining(settings_for(shared=shared, max_seconds=60.0), tmp_path).go()
     assert len(seen) > 3 * 128 and all(seen)
 
 
 def test_tensorboard_gets_rewards_losses_and_success(tmp_path: Path) -> None:
     accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
-    SelfPlay(settings_for(steps=32, max_seconds=5.0), tmp_path).go()
+    SelfPlayTraining(settings_for(steps=32, max_seconds=5.0), tmp_path).go()
     tags = set()
     for folder in (tmp_path / "tensorboard").iterdir():
         events = accumulator.EventAccumulator(str(folder))
@@ -145,12 +145,12 @@ def test_tensorboard_gets_rewards_losses_and_success(tmp_path: Path) -> None:
 
 
 def test_runs_of_other_settings_and_damaged_ones_are_left_alone(tmp_path: Path) -> None:
-    SelfPlay(settings_for(), tmp_path).go()
+    SelfPlayTraining(settings_for(), tmp_path).go()
     with pytest.raises(SettingsError, match="another shared"):
-        SelfPlay(settings_for(shared=True), tmp_path)
+        SelfPlayTraining(settings_for(shared=True), tmp_path)
     (tmp_path / "past.safetensors").write_bytes(b"nothing")
     with pytest.raises(ModelFileError, match=r"past\.safetensors"):
-        SelfPlay(settings_for(), tmp_path)
+        SelfPlayTraining(settings_for(), tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,120 @@
+"""What a model tells becomes an action of the car, where it can be carried out as far as the Co-Wizard can see."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from dorothie_gym.angles import wrap_degrees
+from dorothie_gym.dialogue import Direction
+from dorothie_gym.maps import Exit, Town
+from dorothie_gym.maps.model import LinkType
+from dorothie_gym.ontology import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, PhysicalAction
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, u_turn_start
+from dorothie_gym.policies.route_progress import (
+    SAME_WAY,
+    Choice,
+    direction_of,
+    lanes_beside,
+)
+from dorothie_gym.spaces import Motion, Physical
+
+AT_END: Final = 6.0
+"""A car that stands this near to a junction has no room left to drive up to it [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FeasibleAction:
+    """Something that the car can do now.
+
+    Attributes:
+        physical: the action; None where the car does so anyway.
+        direction: which way it leads, for the words.
+    """
+
+    physical: Physical | None
+    direction: Direction | None = None
+
+
+def feasible_action(action: PhysicalAction, angle: float, view: CoWizardView, town: Town) -> FeasibleAction | None:
+    """Returns what the car does for a navigation action, or None if it cannot be carried out.
+
+    Args:
+        action: one of the six navigation actions.
+        angle: its argument [degrees, positive left]; of a turn the exit nearest to it is taken, of a lane switch its
+            sign counts.
+        view: what the Co-Wizard observes.
+        town: the map.
+    """
+    match action:
+        case PhysicalAction.STOP:
+            return FeasibleAction(physical=Physical(action=action)) if view.motion is not Motion.STOPPED else None
+        case PhysicalAction.START:
+            starts = view.motion is Motion.STOPPED and not _at_end(view)
+            return FeasibleAction(physical=Physical(action=action)) if starts else None
+        case PhysicalAction.LANE_FOLLOW:
+            return _follow(view)
+        case PhysicalAction.J_TURN:
+            return _turn(angle, view, town)
+        case PhysicalAction.U_TURN:
+            return _turn_round(view, town)
+        case PhysicalAction.LANE_SWITCH:
+            return _switch(angle >= 0.0, view, town)
+    return None
+
+
+def _follow(view: CoWizardView) -> FeasibleAction | None:
+    """The car follows its lane by itself, unless it stands, or prepares something else."""
+    if view.motion is Motion.WAITING or _at_end(view):
+        return None
+    idle = view.motion is not Motion.STOPPED and view.manoeuvre is None
+    return FeasibleAction(physical=None if idle else Physical(action=PhysicalAction.LANE_FOLLOW))
+
+
+def _at_end(view: CoWizardView) -> bool:
+    """Whether the car stands before a junction that it could only wait at: no turn is planned."""
+    near = view.choice is not None and view.choice.distance < AT_END
+    return near and view.standing and view.manoeuvre is None
+
+
+def _turn(angle: float, view: CoWizardView, town: Town) -> FeasibleAction | None:
+    if view.choice is None or view.manoeuvring:
+        return None
+    way = _nearest_exit(angle, view.choice, town)
+    planned = view.manoeuvre is PhysicalAction.J_TURN and abs(wrap_degrees(view.angle - way.angle)) < 1.0
+    turns = planned and view.motion is not Motion.STOPPED
+    physical = None if turns else Physical(action=PhysicalAction.J_TURN, angle=way.angle)
+    return FeasibleAction(physical=physical, direction=direction_of(way))
+
+
+def _nearest_exit(angle: float, choice: Choice, town: Town) -> Exit:
+    """The exit nearest in angle: of the own lane, or where none leads that way, of a lane beside it."""
+
+    def misfit(way: Exit) -> tuple[float, int]:
+        return abs(float(wrap_degrees(way.angle - angle))), way.connector
+
+    own = min(choice.exits, key=misfit)
+    beside = [way for lane in lanes_beside(town, choice.lane) for way in town.exits(lane) if way.junction_id >= 0]
+    return own if misfit(own)[0] <= SAME_WAY else min([own, *beside], key=misfit)
+
+
+def _turn_round(view: CoWizardView, town: Town) -> FeasibleAction | None:
+    lane = town.lanes[view.lane]
+    if view.manoeuvre is PhysicalAction.U_TURN and view.motion is not Motion.STOPPED:
+        return FeasibleAction(physical=None, direction=Direction.BACK)
+    if lane.in_junction or view.manoeuvring or town.neighbour(view.lane, LinkType.LANE_CHANGE_LEFT) is not None:
+        return None
+    if not can_turn_round(town, view.lane, u_turn_start(view.station, view.speed)):
+        return None
+    return FeasibleAction(physical=Physical(action=PhysicalAction.U_TURN), direction=Direction.BACK)
+
+
+def _switch(left: bool, view: CoWizardView, town: Town) -> FeasibleAction | None:
+    lane = town.lanes[view.lane]
+    side = LinkType.LANE_CHANGE_LEFT if left else LinkType.LANE_CHANGE_RIGHT
+    if lane.in_junction or view.manoeuvring or not can_switch_lane(town, view.lane, view.station, side):
+        return None
+    angle = int(LANE_SWITCH_LEFT if left else LANE_SWITCH_RIGHT)
+    direction = Direction.LEFT if left else Direction.RIGHT
+    return FeasibleAction(physical=Physical(action=PhysicalAction.LANE_SWITCH, angle=angle), direction=direction)

@@ -1,0 +1,163 @@
+"""A trained model that is asked about sessions while they are played."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import torch
+
+from dorothie_gym.baselines.acting.history import History
+from dorothie_gym.baselines.dataset import Dataset
+from dorothie_gym.baselines.decoding import Predicted
+from dorothie_gym.baselines.encoders import BytePairs, TextEncoder, Vectors, text_encoder
+from dorothie_gym.baselines.inputs import Examples
+from dorothie_gym.baselines.model_card import ModelCard, sha256_of
+from dorothie_gym.baselines.model_zoo import build_model, find_row, retell
+from dorothie_gym.baselines.toto import TOTO, TOTOConfig
+from dorothie_gym.baselines.training.checkpoints import restore
+from dorothie_gym.benchmark.features import Columns, PointTable, points
+from dorothie_gym.benchmark.features.extraction import town_graph
+from dorothie_gym.errors import CheckpointError
+from dorothie_gym.maps import Town
+from dorothie_gym.recording import Task
+
+_TOWNS: Final = 4
+"""Towns that a model is kept ready for."""
+
+_TEXTS: Final = 1 << 16
+
+
+class BenchmarkModel:
+    """A trained model.
+
+    Args:
+        description: what it was made with.
+        folder: where its weights are.
+
+    Raises:
+        ValueError: the weights are not those described, or the encoder of texts is not here or another.
+    """
+
+    def __init__(self, description: ModelCard, folder: Path):
+        self.description = description
+        self.weights = folder / description.weights
+        self.row = find_row(description.row)
+        self.config = TOTOConfig.from_json(description.config)
+        if not self.weights.is_file() or sha256_of(self.weights) != description.weights_sha256:
+            raise ValueError(f"{self.weights}: is missing or not what was trained; train the model again")
+        encoder = text_encoder(description.encoder)
+        if encoder.id != description.encoder_id:
+            raise ValueError(f"{folder}: was trained with the encoder {description.encoder_id}; here is {encoder.id}")
+        self.encoder: TextEncoder = _OneByOne(encoder)
+        self.pairs = None if description.merges is None else BytePairs(description.merges)
+        self.in_town = lru_cache(maxsize=_TOWNS)(self._in_town)
+
+    @classmethod
+    @lru_cache(maxsize=8)
+    def load(cls, path: Path) -> BenchmarkModel:
+        """Reads a model; once in a process.
+
+        Raises:
+            ValueError: as above, or the description cannot be read.
+        """
+        return cls(ModelCard.read(path), path if path.is_dir() else path.parent)
+
+    def _in_town(self, town: Town) -> TownModel:
+        return TownModel(self, town)
+
+
+class TownModel:
+    """A trained model in a town. The same history gives the same answer, whatever was asked before."""
+
+    def __init__(self, trained: BenchmarkModel, town: Town):
+        self._trained = trained
+        self._graph = town_graph(town.name, town)
+        self._model: TOTO | None = None
+
+    def answer(
+        self, history: History, task: Task, *, last: int = 1, allowed: Sequence[bool] | None = None
+    ) -> Predicted:
+        """Returns what the model takes for true at the last point of a history (one point, B = 1).
+
+        Args:
+            history: what is known; the point is the `last` event from the end that is one of the task.
+            task: the task.
+            last: 1 for the last point.
+            allowed: (6,) which navigation actions it may be; None: all.
+        """
+        columns = history.encoded.columns(self._graph)
+        table = points(columns, task)
+        with _one_thread(), torch.inference_mode():
+            model = self._ready(columns)
+            examples = Examples.gather(columns, [_only(table, len(table) - last)], model.spec)
+            mask = None if allowed is None else torch.tensor([list(allowed)])
+            inputs, labels = examples.take(torch.arange(1))
+            return model.predict(inputs, labels.task, mask)
+
+    def _ready(self, columns: Columns) -> TOTO:
+        """The model, with the texts of the history."""
+        trained = self._trained
+        material = _LiveMaterial(columns, trained.encoder, trained.pairs)
+        if self._model is None:
+            model = build_model(trained.row, trained.config, material, trained.description.spread)
+            try:
+                restore(trained.weights, model)
+            except CheckpointError as error:
+                raise ValueError(str(error)) from None
+            self._model = model.eval()
+        else:
+            retell(self._model, material)
+        return self._model
+
+
+def _only(table: PointTable, row: int) -> PointTable:
+    """A table of one of its points."""
+    columns: dict[str, Any] = {
+        name: value[row : row + 1] for name, value in vars(table).items() if isinstance(value, np.ndarray)
+    }
+    return replace(table, **columns, skipped=())
+
+
+class _LiveMaterial(Dataset):
+    """A history made ready, with what was learnt from the training sessions."""
+
+    def __init__(self, columns: Columns, encoder: TextEncoder, pairs: BytePairs | None):
+        super().__init__(columns, encoder)
+        self._pairs = pairs
+
+    def byte_pairs(self, vocabulary: int) -> BytePairs:
+        """Returns the pieces that the model was trained with."""
+        if self._pairs is None:
+            raise ValueError("the model reads pieces of words, but its description has none; train it again")
+        return self._pairs
+
+
+class _OneByOne:
+    """Encodes each text alone, once: beside others its vector would differ in the last digits."""
+
+    def __init__(self, encoder: TextEncoder):
+        self.name, self.id, self.dim = encoder.name, encoder.id, encoder.dim
+        self._vector = lru_cache(maxsize=_TEXTS)(lambda text: encoder.encode([text])[0])
+
+    def encode(self, texts: Sequence[str]) -> Vectors:
+        """Returns the vectors of texts, float32 (n, dim)."""
+        if not texts:
+            return np.zeros((0, self.dim), dtype=np.float32)
+        return np.stack([self._vector(text) for text in texts])
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """While this is on, sums come out the same on every machine's number of cores; small models are faster, too."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)

@@ -1,0 +1,98 @@
+"""A corpus made ready for models: its points as tensors, its texts as vectors and as pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final, Self
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from dorothie_gym.baselines.encoders import BytePairs, TextEncoder, text_encoder, text_table
+from dorothie_gym.baselines.inputs import TASKS, Examples
+from dorothie_gym.benchmark.features import BatchSpec, Columns, PointTable, build, points
+from dorothie_gym.errors import SessionError
+from dorothie_gym.recording import Fold
+from dorothie_gym.user_cache import cache_folder
+
+_TABLES: Final = "texts"
+
+TRAIN: Final = "train"
+VALIDATION: Final = "val"
+TEST: Final = "test"
+
+
+class Dataset:
+    """A corpus made ready. What is slow to make is kept in the user's cache.
+
+    Args:
+        columns: the corpus.
+        encoder: of its texts.
+        cache: folder for vectors of texts; None keeps none.
+    """
+
+    def __init__(self, columns: Columns, encoder: TextEncoder, cache: Path | None = None):
+        self.columns = columns
+        self.encoder = encoder
+        self._cache = cache
+        self._examples: dict[tuple[str, BatchSpec], Examples] = {}
+
+    @classmethod
+    def load(cls, corpus: Path | str, encoder: str = "auto") -> Self:
+        """Reads a corpus.
+
+        Args:
+            corpus: its folder.
+            encoder: name of the encoder of its texts, see `text_encoder`.
+
+        Raises:
+            SessionError: it cannot be read, or lacks a fold.
+            EncoderError: the encoder is unknown, or what it needs is not here.
+        """
+        cache = cache_folder()
+        return cls(build(corpus), text_encoder(encoder), None if cache is None else cache / _TABLES)
+
+    def about(self) -> dict[str, Any]:
+        """Returns what decided the features, in JSON types: part of every checkpoint and of every result."""
+        return {"corpus": self.columns.content, "encoder": self.encoder.id}
+
+    def tables(self, fold: str) -> tuple[PointTable, ...]:
+        """Returns the points of a fold, task by task.
+
+        Raises:
+            SessionError: the fold has no points.
+        """
+        found = tuple(points(self.columns, task, Fold(fold)) for task in TASKS)
+        if not any(len(table) for table in found):
+            folds = sorted({fold or "none" for fold in self.columns.sessions.folds})
+            raise SessionError(
+                f"the corpus has no points in the fold {fold!r} (its folds: {', '.join(folds)}); training needs train, "
+                "val and test, as `dorothie-gym generate` makes them"
+            )
+        return found
+
+    def examples(self, fold: str, spec: BatchSpec) -> Examples:
+        """Returns the points of a fold as tensors; made once."""
+        if (fold, spec) not in self._examples:
+            self._examples[fold, spec] = Examples.gather(self.columns, self.tables(fold), spec)
+        return self._examples[fold, spec]
+
+    @cached_property
+    def vectors(self) -> Tensor:
+        """The vectors of all texts (n, dim), float32."""
+        return torch.from_numpy(text_table(self.encoder, self.columns.texts, self._cache).copy())
+
+    def byte_pairs(self, vocabulary: int) -> BytePairs:
+        """Returns pieces of words, learnt from the training sessions alone."""
+        columns = self.columns
+        trained = np.flatnonzero([fold.split("/")[0] == TRAIN for fold in columns.sessions.folds])
+        said = columns.utterances
+        rows = np.unique(said.text[np.isin(said.session, trained)])
+        return BytePairs.train([columns.texts[row] for row in rows if row >= 0], vocabulary)
+
+    def tokens(self, texts: Sequence[str] | None, pairs: BytePairs, length: int) -> Tensor:
+        """Returns the pieces of texts (n, length), int64; of all texts of the corpus where None."""
+        return torch.from_numpy(pairs.table(self.columns.texts if texts is None else texts, length)).long()

@@ -1,0 +1,324 @@
+"""Trainings of models on a corpus: one job, several jobs side by side, and the table of their results."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+import torch
+
+from dorothie_gym._version import __version__
+from dorothie_gym.baselines.dataset import TEST, TRAIN, VALIDATION, Dataset
+from dorothie_gym.baselines.decoding import Predicted
+from dorothie_gym.baselines.inputs import TASKS
+from dorothie_gym.baselines.learning_curves import draw_loss_curves
+from dorothie_gym.baselines.model_card import ModelCard, sha256_of
+from dorothie_gym.baselines.model_zoo import ROWS, SIZES, ModelEntry, find_row, make_model, needs_pieces
+from dorothie_gym.baselines.toto import TOTO, FrozenTexts
+from dorothie_gym.baselines.training import BEST_FILE, TrainingSummary, predict, train
+from dorothie_gym.baselines.training.trainer import Epoch, OnEpoch
+from dorothie_gym.benchmark import (
+    FLOORS,
+    ActionPredictions,
+    ActPredictions,
+    ResultsTable,
+    TaskPredictions,
+    evaluate_predictions,
+    labels_of,
+    predict_floor,
+    read_predictions,
+    write_predictions,
+)
+from dorothie_gym.benchmark.features import Columns, PointTable
+from dorothie_gym.errors import CheckpointError
+from dorothie_gym.files import write_atomically
+from dorothie_gym.recording import Corpus, Task
+from dorothie_gym.rollout.processes import run_tasks
+
+PREDICTIONS_FILE: Final = "predictions.parquet"
+RESULT_FILE: Final = "result.json"
+CURVES_FILE: Final = "loss.png"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """What is to be trained.
+
+    Attributes:
+        corpus: folder of the corpus.
+        encoder: name of the encoder of texts.
+        model: command of the model's row.
+        size: "small" or "paper".
+        seed: of weights, order and dropout.
+        out: folder under which every run has its own.
+    """
+
+    corpus: Path
+    encoder: str
+    model: str
+    size: str
+    seed: int
+    out: Path
+
+    @property
+    def row(self) -> ModelEntry:
+        """The model's row."""
+        return find_row(self.model)
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the run."""
+        return self.out / self.model / self.size / f"seed-{self.seed}"
+
+
+def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambda epoch: None) -> dict[str, Any]:
+    """Trains, tests and keeps a model, or reads what was done before; returns what came of it, in JSON types.
+
+    Raises:
+        CheckpointError: in its folder lies the training of another corpus, encoder or configuration.
+        SessionError: the corpus lacks a fold.
+        OSError: the folder cannot be written.
+    """
+    about = {"model": job.row.name, "version": __version__, **material.about()}
+    if job.row.kind in ("ppo", "cloning"):
+        return _run_policy(job, about)
+    model = make_model(job.row, job.size, material, job.seed)
+    spec = model.spec
+    started = time.perf_counter(), time.process_time()
+    trained = train(
+        model,
+        material.examples(TRAIN, spec),
+        material.examples(VALIDATION, spec),
+        folder=job.folder,
+        seed=job.seed,
+        about=about,
+        on_epoch=on_epoch,
+    )
+    wall, cpu = time.perf_counter() - started[0], time.process_time() - started[1]
+    kept = job.folder / RESULT_FILE
+    if (job.folder / PREDICTIONS_FILE).is_file() and kept.is_file():
+        done = dict(json.loads(kept.read_text(encoding="utf-8")))
+        _describe(job, model, material, done)
+        return done
+    predicted = predict(model, material.examples(TEST, spec))
+    rows = task_predictions(job, material.columns, material.tables(TEST), predicted)
+    write_predictions(job.folder / PREDICTIONS_FILE, rows, about={**about, "config": model.config.to_json()})
+    draw_loss_curves(trained.epochs, job.row.name, job.folder / CURVES_FILE)
+    result = {**about, **_told(job, model, trained), "seconds": round(wall, 3), "cpu_seconds": round(cpu, 3)}
+    write_atomically(kept, json.dumps(result, indent=1) + "\n")
+    _describe(job, model, material, result)
+    return result
+
+
+def _describe(job: Experiment, model: TOTO, material: Dataset, result: Mapping[str, Any]) -> None:
+    """Writes what who plays the model must know beside its weights."""
+    pairs = material.byte_pairs(model.config.vocabulary) if needs_pieces(job.row, model.config) else None
+    ModelCard(
+        row=job.row.command,
+        config=model.config.to_json(),
+        corpus=material.columns.content,
+        encoder=material.encoder.name,
+        encoder_id=material.encoder.id,
+        spread=model.texts.spread if isinstance(model.texts, FrozenTexts) else None,
+        merges=None if pairs is None else pairs.merges,
+        weights=BEST_FILE,
+        weights_sha256=sha256_of(job.folder / BEST_FILE),
+        steps=result["points"] * result["epochs"],
+        seconds=result["seconds"],
+    ).write(job.folder)
+
+
+def _run_policy(job: Experiment, about: dict[str, Any]) -> dict[str, Any]:
+    """Trains and tests policies, unless that was done before."""
+    # imported here: stable-baselines3 is slow to import
+    from dorothie_gym.baselines.policy_rows import run_policy
+
+    kept = job.folder / RESULT_FILE
+    if (job.folder / PREDICTIONS_FILE).is_file() and kept.is_file():
+        done = dict(json.loads(kept.read_text(encoding="utf-8")))
+        if done.get("corpus") != about["corpus"]:
+            message = f"{kept}: was trained on another corpus than is asked for now; choose another folder or delete it"
+            raise CheckpointError(message)
+        return done
+    started = time.perf_counter()
+    predicted, told = run_policy(job.corpus, job.row.kind, job.seed, job.folder, job.row.name)
+    write_predictions(job.folder / PREDICTIONS_FILE, predicted, about=about)
+    seconds = round(time.perf_counter() - started, 3)
+    of = {"command": job.model, "size": job.size, "seed": job.seed, "folder": str(job.folder)}
+    result = {**about, **of, "tasks": told, "seconds": seconds}
+    write_atomically(kept, json.dumps(result, indent=1) + "\n")
+    return result
+
+
+def task_predictions(
+    job: Experiment, columns: Columns, tables: tuple[PointTable, ...], predicted: Predicted
+) -> tuple[TaskPredictions, ...]:
+    """Returns predictions of points, which follow one another by task as in the tables, as they are scored."""
+    found = []
+    start = 0
+    for task, table in zip(TASKS, tables, strict=True):
+        rows = slice(start, start + len(table))
+        start += len(table)
+        names = np.array(columns.sessions.names)[table.session]
+        answers: ActionPredictions | ActPredictions
+        if task is Task.NFD:
+            angles = predicted.angle[rows].double().numpy()
+            answers = ActionPredictions(actions=predicted.action[rows].numpy(), angles=angles)
+        else:
+            answers = ActPredictions(moves=predicted.move[rows].numpy(), slots=predicted.slots[rows].numpy())
+        found.append(
+            TaskPredictions(
+                model=job.row.name,
+                seed=job.seed,
+                task=task,
+                sessions=names,
+                events=table.event.astype(np.int64),
+                predicted=answers,
+                source=job.row.name,
+            )
+        )
+    return tuple(found)
+
+
+def _told(job: Experiment, model: torch.nn.Module, trained: TrainingSummary) -> dict[str, Any]:
+    last = trained.epochs[-1]
+    return {
+        "command": job.row.command,
+        "size": job.size,
+        "seed": job.seed,
+        "parameters": sum(weights.numel() for weights in model.parameters()),
+        "points": trained.points,
+        "epochs": len(trained.epochs),
+        "best_epoch": last.best,
+        "validation_loss": last.lowest,
+        "folder": str(job.folder),
+    }
+
+
+# --- Trainings side by side: each process has one thread, so that what comes out is the same however many ------------
+
+OnExperimentEpoch: TypeAlias = Callable[[Experiment, Epoch], None]
+"""Is told of each epoch of each job that runs in the calling process."""
+
+
+def run_experiments(
+    jobs: Sequence[Experiment], workers: int, on_epoch: OnExperimentEpoch = lambda job, epoch: None
+) -> Iterator[tuple[Experiment, dict[str, Any]]]:
+    """Runs jobs of one corpus, as many at a time as there are workers, and yields what comes of them as it comes.
+
+    Models of the published sizes take all cores, or the GPU, by themselves: they run one after another in this process.
+
+    Args:
+        jobs: what is to be trained.
+        workers: processes; with 1 everything happens in this one.
+        on_epoch: is told of each epoch that happens in this process.
+
+    Raises:
+        CheckpointError: in the folder of a job lies another training.
+        ProcessError: a job failed in another process.
+        EncoderError: the encoder is not here.
+        SessionError: the corpus cannot be read.
+        OSError: a folder cannot be written.
+    """
+    if not jobs:
+        return
+    alone = workers <= 1 or len(jobs) == 1 or any(_is_large(job) for job in jobs)
+    threads = torch.get_num_threads()
+    trainer = _ExperimentWorker(jobs[0].corpus, jobs[0].encoder)
+    if not alone:
+        _ = trainer.load().vectors  # the others find them in the cache
+        yield from run_tasks(trainer.prepare, jobs, workers=min(workers, len(jobs)))
+        return
+    material = trainer.load()
+    try:
+        for job in jobs:
+            torch.set_num_threads(threads if _is_large(job) else 1)
+            yield job, run_experiment(job, material, partial(on_epoch, job))
+    finally:
+        torch.set_num_threads(threads)
+
+
+@dataclass(frozen=True)
+class _ExperimentWorker:
+    """What a process needs in order to train."""
+
+    corpus: Path
+    encoder: str
+
+    def load(self) -> Dataset:
+        return Dataset.load(self.corpus, self.encoder)
+
+    def prepare(self) -> Callable[[Experiment], tuple[Experiment, dict[str, Any]]]:
+        torch.set_num_threads(1)
+        material = self.load()
+        return lambda job: (job, run_experiment(job, material))
+
+
+def _is_large(job: Experiment) -> bool:
+    return torch.cuda.is_available() or SIZES[job.size]().width > SIZES["small"]().width
+
+
+# --- The whole table: every model trained with every seed on a corpus, tested, and scored ----------------------------
+
+PREDICTIONS: Final = PREDICTIONS_FILE
+"""Name of the file with the predictions of all models and seeds."""
+
+
+def table_experiments(
+    corpus: Path,
+    out: Path,
+    *,
+    encoder: str = "auto",
+    size: str = "small",
+    seeds: int = 5,
+    rows: Sequence[ModelEntry] = ROWS,
+) -> list[Experiment]:
+    """Returns the trainings of a table, seed by seed, so that there is a whole table as soon as may be."""
+    return [
+        Experiment(corpus=corpus, encoder=encoder, model=row.command, size=size, seed=seed, out=out)
+        for seed in range(seeds)
+        for row in rows
+        if not row.missing
+    ]
+
+
+def gather_table(
+    jobs: Sequence[Experiment], *, floors: bool = True
+) -> tuple[ResultsTable, tuple[TaskPredictions, ...]]:
+    """Scores what finished trainings predicted, and the floors beside them.
+
+    Args:
+        jobs: trainings of one corpus, all done.
+        floors: whether the floors get rows, drawn with the same seeds.
+
+    Returns:
+        The table, and the predictions behind it.
+
+    Raises:
+        ValueError: there is no job.
+        PredictionError: a file of predictions does not fit the corpus.
+        SessionError: the corpus cannot be read.
+    """
+    if not jobs:
+        raise ValueError("there is nothing to put into the table: choose a model")
+    corpus = Corpus.load(jobs[0].corpus)
+    labels = labels_of(corpus, TEST)
+    predicted = list(read_predictions(*(job.folder / PREDICTIONS_FILE for job in jobs)))
+    if floors:
+        training = labels_of(corpus, "train")
+        seeds = sorted({job.seed for job in jobs})
+        predicted += [part for name in FLOORS for seed in seeds for part in predict_floor(name, training, labels, seed)]
+    about: dict[str, Any] = {}
+    for job in jobs:
+        told = json.loads((job.folder / RESULT_FILE).read_text(encoding="utf-8"))
+        about.setdefault(job.row.name, {})[str(job.seed)] = told
+    chosen = {job.model for job in jobs}
+    whole = chosen >= {row.command for row in ROWS if not row.missing}
+    missing = {row.name: row.missing for row in ROWS if row.missing} if whole else {}
+    return evaluate_predictions(predicted, labels, missing=missing, about=about), tuple(predicted)

@@ -1,0 +1,103 @@
+"""Input features of the Junction Reader: slot values named in texts, and the most recent events."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from functools import cache, lru_cache
+from typing import Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.nn import functional as F
+
+from dorothie_gym.baselines.encoders.byte_pairs import words
+from dorothie_gym.baselines.inputs import Inputs
+from dorothie_gym.ontology import LABELS, DialogueMove, PhysicalAction
+
+_PARTS: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z][a-z]*|[a-z]+")
+
+
+_WAYS: Final = ({"left"}, {"right"}, {"straight", "ahead", "across", "forward"})
+
+
+def label_words(label: str) -> tuple[str, ...]:
+    """Returns the words of a label in small letters: "BurgerKing" is "burger", "king"."""
+    return tuple(part.lower() for part in _PARTS.findall(label))
+
+
+def mentions(texts: Sequence[str]) -> NDArray[np.bool_]:
+    """Returns which slot values each text names (n, 69): all words of the label stand in it, one after another."""
+    table = np.zeros((len(texts), len(LABELS)), dtype=bool)
+    for row, text in zip(table, texts, strict=True):
+        row[list(_named(text))] = True
+    return table
+
+
+def ways(texts: Sequence[str]) -> NDArray[np.bool_]:
+    """Returns which ways each text names (n, 3): left, right, straight on."""
+    table = np.zeros((len(texts), len(_WAYS)), dtype=bool)
+    for row, text in zip(table, texts, strict=True):
+        said = set(words(text))
+        row[:] = [bool(said & names) for names in _WAYS]
+    return table
+
+
+@lru_cache(maxsize=16384)
+def _named(text: str) -> tuple[int, ...]:
+    said = f" {' '.join(words(text))} "
+    return tuple(k for k, spellings in enumerate(_spellings()) if any(f" {name} " in said for name in spellings))
+
+
+@cache
+def _spellings() -> tuple[tuple[str, str], ...]:
+    names = (" ".join(label_words(value.label)) for value in LABELS)
+    return tuple((name, name.replace(" ", "")) for name in names)
+
+
+# --- What happened last, in numbers: the moves, how long ago they were, and what the car did since -------------------
+
+MOVES: Final = 3
+"""Last moves that are told apart by how many came after."""
+
+DECAYS: Final = (1.0, 4.0, 15.0)
+"""An age is told as what is left after it of something that decays this fast [s]."""
+
+_WHO_AND_WHAT: Final = 2 * len(DialogueMove)
+
+SIZE: Final = MOVES * _WHO_AND_WHAT + len(LABELS) + len(PhysicalAction) + 3 * len(DECAYS)
+"""Numbers that `recent` gives."""
+
+
+def recent(inputs: Inputs) -> Tensor:
+    """Returns what happened last before each of B points (B, SIZE): numbers from 0 to 1, zeros for what was not.
+
+    The last moves, each by whom and which; the slots of the last; the last physical action; how fresh the last move of
+    each speaker and the last action are.
+    """
+    mask, actions = inputs["move_mask"], inputs["action_mask"]
+    moves = inputs["move"] * 2 + inputs["move_speaker"]
+    parts = [_last_kind(moves, mask, back, _WHO_AND_WHAT) for back in range(1, MOVES + 1)]
+    newest = (mask.sum(1) - 1).clamp(min=0)[:, None, None].expand(-1, 1, len(LABELS))
+    parts.append(inputs["move_slots"].gather(1, newest)[:, 0].float() * mask.any(1, keepdim=True))
+    parts.append(_last_kind(inputs["action"], actions, 1, len(PhysicalAction)))
+    for speaker in range(2):
+        own = mask & (inputs["move_speaker"] == speaker)
+        parts.append(_freshness(inputs["time"], inputs["move_time"], own))
+    parts.append(_freshness(inputs["time"], inputs["action_time"], actions))
+    return torch.cat(parts, dim=-1)
+
+
+def _last_kind(kinds: Tensor, mask: Tensor, back: int, count: int) -> Tensor:
+    """Which of `count` kinds the last of a sequence is (B, count), or one before."""
+    place = mask.sum(1, keepdim=True) - back
+    kind = kinds.gather(1, place.clamp(min=0))[:, 0].clamp(0, count - 1)
+    return F.one_hot(kind, count).float() * (place >= 0)
+
+
+def _freshness(now: Tensor, times: Tensor, mask: Tensor) -> Tensor:
+    """How fresh the newest of a sequence is (B, 3), from 1, now, to 0."""
+    age = (now[:, None] - times).clamp(min=0.0).masked_fill(~mask, torch.inf).amin(1)
+    return torch.stack([torch.exp(-age / decay) for decay in DECAYS], dim=-1)

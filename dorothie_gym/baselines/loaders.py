@@ -1,0 +1,71 @@
+"""Loaders of trained models as policies; torch is imported when a model is loaded, not before.
+
+`dorothie_gym.policies.policy_loader` names these functions by kind of model.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dorothie_gym.ontology import Role
+from dorothie_gym.spaces import SpaceLimits
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.acting.policy import BenchmarkCoWizard
+    from dorothie_gym.baselines.selfplay.policy import LearnedPolicy
+    from dorothie_gym.policies.navigation import NavigationPolicy
+
+
+def load_benchmark_model(path: Path, role: Role, limits: SpaceLimits) -> BenchmarkCoWizard:
+    """Returns a Co-Wizard that acts on the predictions of a benchmark model (`dorothie-gym train`).
+
+    Args:
+        path: folder of the training, or its `model.json`.
+        role: the role to play.
+        limits: sizes of the spaces.
+
+    Raises:
+        ValueError: the role is not the Co-Wizard, or a file of the model is missing or damaged.
+    """
+    if role is not Role.CO_WIZARD:
+        raise ValueError(f"{path}: benchmark models play the Co-Wizard, not the {role}")
+    from dorothie_gym.baselines.acting.inference import BenchmarkModel
+    from dorothie_gym.baselines.acting.policy import BenchmarkCoWizard
+
+    return BenchmarkCoWizard(BenchmarkModel.load(path.resolve()), limits)
+
+
+def load_navigation_model(path: Path, role: Role, limits: SpaceLimits) -> NavigationPolicy:
+    """Returns a Co-Wizard that drives by a model trained in `Navigation-v0` (`dorothie-gym train-rl`).
+
+    Args:
+        path: folder of the model, or a file in it.
+        role: the role to play.
+        limits: sizes of the spaces.
+
+    Raises:
+        ValueError: the role is not the Co-Wizard, the model was trained in another environment, or its files are
+            missing or damaged.
+    """
+    if role is not Role.CO_WIZARD:
+        raise ValueError(f"{path}: navigation models play the co_wizard, not the {role}")
+    from dorothie_gym.baselines.rl.evaluation import make_player
+
+    return make_player(path, limits)
+
+
+def load_selfplay_model(path: Path, role: Role, limits: SpaceLimits) -> LearnedPolicy:
+    """Returns the policy that self-play has learned for a role (`dorothie-gym train-rl selfplay`).
+
+    Args:
+        path: folder of the role, or `model.json` in it.
+        role: the role to play.
+        limits: sizes of the spaces.
+
+    Raises:
+        ValueError: the files are missing or damaged, or of another role or version.
+    """
+    from dorothie_gym.baselines.selfplay.policy import read_policy
+
+    return read_policy(path, role, limits)

@@ -1,0 +1,198 @@
+"""The rows of the table: every model by its name in the paper, and how it is made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any, Final, Literal, TypeAlias
+
+import torch
+from torch import Tensor
+
+from dorothie_gym.baselines.dataset import Dataset
+from dorothie_gym.baselines.encoders.pretrained import find_transformers, has_minilm, load_pretrained, minilm_folder
+from dorothie_gym.baselines.junction_reader import JunctionReader, reader_config
+from dorothie_gym.baselines.toto import (
+    ABLATIONS,
+    TOTO,
+    Channel,
+    FrozenTexts,
+    PretrainedBert,
+    SmallBert,
+    Texts,
+    TOTOConfig,
+    Towns,
+    TrainedTexts,
+)
+
+Kind = Literal["toto", "reader", "ppo", "cloning"]
+
+Change: TypeAlias = Callable[[TOTOConfig], TOTOConfig]
+
+SIZES: Final[Mapping[str, Callable[[], TOTOConfig]]] = MappingProxyType(
+    {"small": TOTOConfig.small, "paper": TOTOConfig.paper}
+)
+"""The configurations that a user may choose."""
+
+NO_AUDIO: Final = "no audio: the sessions contain no sound"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelEntry:
+    """A row of the table.
+
+    Attributes:
+        name: as the paper's table has it.
+        command: as it is written on a command line and in paths.
+        change: what makes its config from that of TOTO; None for a policy, and where it cannot be run.
+        missing: why it cannot be run, or empty.
+        kind: what is trained: "toto" (with its ablations and rivals), our "reader", or a policy by "ppo" or "cloning".
+    """
+
+    name: str
+    command: str
+    change: Change | None = None
+    missing: str = ""
+    kind: Kind = "toto"
+
+
+def _bert(config: TOTOConfig) -> TOTOConfig:
+    return replace(config, text="trained")
+
+
+def _without(name: str) -> Change:
+    return lambda config: config.without(*ABLATIONS[name])
+
+
+def _only(*channels: Channel) -> Change:
+    return lambda config: config.only(channels)
+
+
+_EPISODIC: Final = (Channel.ACTIONS, Channel.MOVES, Channel.TRANSCRIPT, Channel.VISION)
+"""Inputs of the Episodic Transformer (Pashevich et al., 2021): actions, text and the images of the window."""
+
+ROWS: Final[tuple[ModelEntry, ...]] = (
+    ModelEntry(name="TOTO", command="toto", change=lambda config: config),
+    ModelEntry(
+        name="TOTO (+ Belief Tracking)", command="toto-belief", change=lambda config: replace(config, belief=True)
+    ),
+    ModelEntry(name="TOTO (+ Fine-tuned BERT)", command="toto-bert", change=_bert),
+    *(
+        ModelEntry(name=f"TOTO (- {name})", command=f"toto-no-{name.lower().replace(' ', '-')}", change=_without(name))
+        for name in ABLATIONS
+    ),
+    ModelEntry(
+        name="Fine-tuned BERT Only",
+        command="bert-trained",
+        change=lambda config: _bert(config.only((Channel.TRANSCRIPT,))),
+    ),
+    ModelEntry(name="BERT Only", command="bert", change=_only(Channel.TRANSCRIPT)),
+    ModelEntry(name="HuBERT Only", command="hubert", missing=NO_AUDIO),
+    ModelEntry(name="Deformable-DETR Only", command="detector", change=_only(Channel.OBJECTS)),
+    ModelEntry(name="Map Encoder Only", command="map", change=_only(Channel.MAP)),
+    ModelEntry(name="E.T.", command="et", change=_only(*_EPISODIC)),
+    ModelEntry(name="E.T. (+ Fine-tuned BERT)", command="et-bert", change=lambda config: _bert(config.only(_EPISODIC))),
+    ModelEntry(
+        name="TOTO (point clock)",
+        command="toto-point-clock",
+        change=lambda config: replace(config, clock="point"),
+    ),
+    ModelEntry(name="Behaviour Cloning", command="cloning", kind="cloning"),
+    ModelEntry(name="PPO", command="ppo", kind="ppo"),
+    ModelEntry(name="Junction Reader (ours)", command="reader", change=reader_config, kind="reader"),
+)
+"""The rows of the paper's table, in its order; then TOTO with another clock, policies, and our own model."""
+
+
+class EpisodicTransformer(TOTO):
+    """E.T. (Pashevich et al., 2021): TOTO's encoder over actions, text and images alone."""
+
+
+def find_row(name: str) -> ModelEntry:
+    """Returns a row by its command or its name; raises `ValueError` naming all where there is none."""
+    for row in ROWS:
+        if name.casefold() in (row.command, row.name.casefold()):
+            return row
+    raise ValueError(f"there is no model {name!r}; choose from {', '.join(row.command for row in ROWS)}")
+
+
+def make_model(row: ModelEntry, size: str, material: Dataset, seed: int) -> TOTO:
+    """Returns a model with weights drawn from a seed.
+
+    Raises:
+        ValueError: the size is unknown, or the row cannot be run.
+    """
+    if size not in SIZES:
+        raise ValueError(f"there is no config {size!r}; choose from {', '.join(SIZES)}")
+    if row.change is None:
+        raise ValueError(f"{row.name} is no model of its own: {row.missing or 'it is a policy'}")
+    torch.manual_seed(seed)
+    return build_model(row, row.change(SIZES[size]()), material)
+
+
+def build_model(row: ModelEntry, config: TOTOConfig, material: Dataset, spread: float | None = None) -> TOTO:
+    """Returns the model of a row with weights drawn by chance.
+
+    Args:
+        row: whose model.
+        config: its sizes and inputs.
+        material: towns and texts that it is made for.
+        spread: of the vectors of texts that it learns from, or has learnt from; this material's where None.
+    """
+    towns, texts = Towns(material.columns.towns), make_texts(config, material, spread)
+    if row.kind == "reader":
+        assert isinstance(texts, FrozenTexts)  # of `reader_config`
+        return JunctionReader(config, towns, texts, material.columns, _pieces(config, material), config.vocabulary)
+    kind = EpisodicTransformer if set(config.channels) == set(_EPISODIC) else TOTO
+    return kind(config, towns, texts)
+
+
+def retell(model: TOTO, material: Dataset) -> None:
+    """Puts the texts of other material in the place of those that a model has: its inputs then count those."""
+    config = model.config
+    if config.text == "frozen":
+        model.texts.take(material.vectors)
+    else:
+        model.texts.take(_tokens(config, material))
+    if isinstance(model, JunctionReader):
+        model.take_words(material.columns.texts, _pieces(config, material))
+
+
+def make_texts(config: TOTOConfig, material: Dataset, spread: float | None = None) -> Texts:
+    """Returns how a model reads the texts of a corpus: vectors that stay, or an encoder that learns."""
+    if config.text == "frozen":
+        return FrozenTexts(material.vectors, spread)
+    tokens = _tokens(config, material)
+    if _is_minilm(config):
+        model: Any = load_pretrained(find_transformers("minilm").BertModel, minilm_folder(), "minilm")
+        return TrainedTexts(tokens, PretrainedBert(model), int(model.config.hidden_size))
+    width = config.text_width
+    reader = SmallBert(config.vocabulary, config.text_tokens, width, config.text_layers, config.dropout)
+    return TrainedTexts(tokens, reader, width)
+
+
+def needs_pieces(row: ModelEntry, config: TOTOConfig) -> bool:
+    """Whether a model reads pieces of words that were learnt from its training sessions."""
+    return row.kind == "reader" or (config.text == "trained" and not _is_minilm(config))
+
+
+def _is_minilm(config: TOTOConfig) -> bool:
+    return config.pretrained_text and has_minilm()
+
+
+def _tokens(config: TOTOConfig, material: Dataset) -> Tensor:
+    """The pieces of all texts (n, length), as a trained encoder reads them."""
+    if not _is_minilm(config):
+        return _pieces(config, material)
+    tokenizer: Any = load_pretrained(find_transformers("minilm").AutoTokenizer, minilm_folder(), "minilm")
+    pieces = tokenizer(
+        list(material.columns.texts), padding="max_length", truncation=True, max_length=config.text_tokens,
+        return_tensors="pt",
+    )  # fmt: skip
+    ids: Tensor = pieces["input_ids"]
+    return ids
+
+
+def _pieces(config: TOTOConfig, material: Dataset) -> Tensor:
+    return material.tokens(None, material.byte_pairs(config.vocabulary), config.text_tokens)

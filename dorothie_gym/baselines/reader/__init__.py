@@ -1,7 +1,0 @@
-"""The Junction Reader, our own model."""
-
-from dorothie_gym.baselines.reader.exits import ExitTable, exit_table
-from dorothie_gym.baselines.reader.mentions import mentions
-from dorothie_gym.baselines.reader.model import JunctionReader, reader_config
-
-__all__ = ["ExitTable", "JunctionReader", "exit_table", "mentions", "reader_config"]

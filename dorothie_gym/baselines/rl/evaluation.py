@@ -1,0 +1,148 @@
+"""Greedy play of trained models: evaluation over seeded episodes, and the Co-Wizard in rollouts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.baselines.rl.checkpoint import load_model
+from dorothie_gym.baselines.rl.environments import masks_of
+from dorothie_gym.baselines.rl.settings import NAVIGATION
+from dorothie_gym.errors import SettingsError
+from dorothie_gym.policies.navigation import NavigationPolicy
+from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vector
+from dorothie_gym.spaces import SpaceLimits
+
+SEEDS_FROM = 1_000_000
+"""Seeds of evaluations begin here; training draws others."""
+
+AT_ONCE = 8
+"""Episodes that are played at once: networks are faster with several observations."""
+
+Z = 1.96
+"""Quantile of the normal distribution for an interval of 95 %."""
+
+Act = Callable[[NDArray[Any], NDArray[np.bool_] | None], Sequence[Any]]
+"""Chooses actions for observations (n, ...), and masks (n, m) where environments tell them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpisodeStatistics:
+    """What came of episodes.
+
+    Attributes:
+        success: share of episodes that succeeded.
+        low: lower end of its interval of 95 % (Wilson 1927).
+        high: upper end.
+        reward: mean sum of rewards.
+        length: mean number of steps.
+        episodes: how many were played.
+    """
+
+    success: float
+    low: float
+    high: float
+    reward: float
+    length: float
+    episodes: int
+
+
+def evaluate_policy(
+    make: Callable[[], gym.Env[Any, Any]], act: Act, episodes: int, seed: int = SEEDS_FROM
+) -> EpisodeStatistics:
+    """Plays episodes with the seeds from `seed` on.
+
+    Args:
+        make: makes an environment.
+        act: the policy.
+        episodes: how many.
+        seed: of the first.
+    """
+    envs = [make() for _ in range(min(AT_ONCE, episodes))]
+    successes, rewards, lengths = np.zeros(episodes), np.zeros(episodes), np.zeros(episodes)
+    playing = dict(enumerate(range(len(envs))))  # environment: episode
+    observations = {k: env.reset(seed=seed + k)[0] for k, env in enumerate(envs)}
+    following = len(envs)
+    while playing:
+        masks = [masks_of(envs[k]) for k in playing]
+        known = [mask for mask in masks if mask is not None]
+        stacked = np.stack(known) if len(known) == len(masks) else None
+        actions = act(np.stack([observations[k] for k in playing]), stacked)
+        for (k, episode), action in zip(list(playing.items()), actions, strict=True):
+            observations[k], reward, terminated, truncated, info = envs[k].step(action)
+            rewards[episode] += float(reward)
+            lengths[episode] += 1
+            if terminated or truncated:
+                successes[episode] = bool(info.get("is_success", False))
+                del playing[k]
+                if following < episodes:
+                    playing[k] = following
+                    observations[k] = envs[k].reset(seed=seed + following)[0]
+                    following += 1
+    for env in envs:
+        env.close()
+    low, high = wilson(int(successes.sum()), episodes)
+    return EpisodeStatistics(
+        success=float(successes.mean()), low=low, high=high, reward=float(rewards.mean()),
+        length=float(lengths.mean()), episodes=episodes,
+    )  # fmt: skip
+
+
+def act_with(model: Any, *, masked: bool) -> Act:
+    """Acts as a model of stable-baselines3 does when it does not explore."""
+
+    def act(observations: NDArray[Any], masks: NDArray[np.bool_] | None) -> Sequence[Any]:
+        more = {"action_masks": masks} if masked and masks is not None else {}
+        actions: Sequence[Any] = model.predict(observations, deterministic=True, **more)[0]
+        return actions
+
+    return act
+
+
+def wilson(successes: int, trials: int) -> tuple[float, float]:
+    """Interval of 95 % of a share (Wilson 1927, JASA 22, 209-212)."""
+    share = successes / trials
+    middle = share + Z**2 / (2 * trials)
+    half = Z * math.sqrt(share * (1 - share) / trials + Z**2 / (4 * trials**2))
+    scale = 1 + Z**2 / trials
+    return max((middle - half) / scale, 0.0), min((middle + half) / scale, 1.0)
+
+
+# --- Models of `train-rl` as Co-Wizards ------------------------------------------------------------------------------
+
+
+def make_player(path: Path, limits: SpaceLimits) -> NavigationPolicy:
+    """A Co-Wizard who drives as a model does when it does not explore.
+
+    Args:
+        path: folder of the model, or a file in it.
+        limits: sizes of the spaces.
+
+    Raises:
+        ModelFileError: the files are missing or damaged.
+        SettingsError: the model did not learn in `Navigation-v0`.
+    """
+    model, settings = load_model(path)
+    if settings.env != NAVIGATION:
+        raise SettingsError(f"{path}: learned in {settings.env}; only drivers of {NAVIGATION} can play the co_wizard")
+    seconds = settings.env_settings.get("max_seconds", MAX_SECONDS)
+    return NavigationPolicy(Chooser(model, masked=settings.masked), limits, max_seconds=seconds)
+
+
+class Chooser:
+    """Chooses what a model finds best."""
+
+    def __init__(self, model: Any, *, masked: bool) -> None:
+        self._model, self._masked = model, masked
+
+    def __call__(self, observation: Vector, mask: NDArray[np.bool_]) -> int:
+        """One of the actions of `Navigation-v0`; masked algorithms keep to the mask (18,)."""
+        more = {"action_masks": mask} if self._masked else {}
+        return int(self._model.predict(observation, deterministic=True, **more)[0])

@@ -1,0 +1,146 @@
+"""How fast training goes, and what its time goes into."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import torch
+from stable_baselines3.common.callbacks import BaseCallback
+
+from dorothie_gym.baselines.rl.checkpoint import make_model
+from dorothie_gym.baselines.rl.environments import make_vector
+from dorothie_gym.baselines.rl.settings import TrainingSettings, tuned_settings
+from dorothie_gym.bench.timing import Progress, cores, machine, quiet, rounded
+from dorothie_gym.envs.driving_session import DrivingSession
+from dorothie_gym.errors import SettingsError
+from dorothie_gym.policies.navigation.instructor import Instructor
+
+TARGET = 1000.0
+"""Environment steps a second end to end that training is to reach on two cores."""
+
+SHARES = ("environment", "partners", "policy", "learner")
+"""What the time goes into: physics and observations; the scripted others; choosing actions; learning."""
+
+
+def measure(
+    env: str = "dorothie_gym/Navigation-v0",
+    *,
+    algorithm: str = "ppo",
+    environments: int = 8,
+    workers: int | None = None,
+    steps: int = 16_384,
+    seed: int = 0,
+    progress: Progress = quiet,
+) -> dict[str, Any]:
+    """Trains for a while in this process, then with worker processes.
+
+    Args:
+        env: id of the environment.
+        algorithm: one that learns from rollouts: ppo, maskable_ppo or a2c.
+        environments: how many play at once.
+        workers: processes for the second run; None for one per core, 0 leaves it out.
+        steps: of a run, after a first rollout that is not counted.
+        seed: of all.
+        progress: is told what is being done.
+
+    Raises:
+        SettingsError: nothing can be trained with these.
+    """
+    if algorithm not in ("ppo", "maskable_ppo", "a2c"):
+        raise SettingsError(f"algorithm is {algorithm!r}; shares are told of ppo, maskable_ppo and a2c")
+    settings = tuned_settings(algorithm, env, environments=environments, seed=seed, workers=0)
+    progress("one process", 0.0)
+    alone = _run(settings, steps)
+    workers = min(cores(), environments) if workers is None else workers
+    together: dict[str, float] | None = None
+    if workers:
+        progress(f"{workers} worker processes", 0.5)
+        together = _run(replace(settings, workers=workers), steps)
+    total = alone["seconds"]
+    partners = alone["partners"]
+    shares = (alone["step"] - partners, partners, alone["rollout"] - alone["step"], total - alone["rollout"])
+    rates = [steps / run["seconds"] for run in (alone, together) if run is not None]
+    return {
+        "env": env,
+        "algorithm": algorithm,
+        "environments": environments,
+        "network": list(settings.network),
+        "steps": steps,
+        "steps_per_second": rounded(max(rates)),
+        "one_process_steps_per_second": rounded(rates[0]),
+        "workers": workers,
+        "workers_steps_per_second": rounded(rates[1]) if together is not None else None,
+        "shares": {name: round(value / total, 3) for name, value in zip(SHARES, shares, strict=True)},
+        "target": TARGET,
+        "machine": machine(),
+    }
+
+
+def _run(settings: TrainingSettings, steps: int) -> dict[str, float]:
+    """Seconds of a run: of all, of rollouts, of the environments' steps, and of the partners in them."""
+    torch.set_num_threads(1)
+    vector = make_vector(settings)
+    try:
+        with _timed(vector, "step_wait") as step, _timed(Instructor, "instruct") as told:
+            with _timed(DrivingSession, "interfere") as played:
+                model = make_model(settings, vector)
+                model.learn(1, log_interval=None)  # the first rollout compiles and warms up
+                for seconds in (step, told, played):
+                    seconds[0] = 0.0
+                clock = _Clock()
+                begun, done = time.perf_counter(), model.num_timesteps
+                model.learn(steps, callback=clock, reset_num_timesteps=False, log_interval=None)
+                spent, more = time.perf_counter() - begun, model.num_timesteps - done
+    finally:
+        vector.close()
+    scale = steps / more  # whole rollouts are played, so that there are a few more steps
+    return {
+        "seconds": spent * scale,
+        "rollout": clock.seconds * scale,
+        "step": step[0] * scale,
+        "partners": (told[0] + played[0]) * scale,
+    }
+
+
+@contextmanager
+def _timed(holder: Any, name: str) -> Iterator[list[float]]:
+    """Adds up the time that a method takes while this lasts; yields a list of one number [s]."""
+    seconds, method = [0.0], getattr(holder, name)
+    own = name in vars(holder)
+
+    def timed(*arguments: Any, **named: Any) -> Any:
+        start = time.perf_counter()
+        try:
+            return method(*arguments, **named)
+        finally:
+            seconds[0] += time.perf_counter() - start
+
+    setattr(holder, name, timed)
+    try:
+        yield seconds
+    finally:
+        if own:
+            setattr(holder, name, method)
+        else:
+            delattr(holder, name)
+
+
+class _Clock(BaseCallback):
+    """Keeps the time of rollouts."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.seconds, self._since = 0.0, 0.0
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_start(self) -> None:
+        self._since = time.perf_counter()
+
+    def _on_rollout_end(self) -> None:
+        self.seconds += time.perf_counter() - self._since

@@ -1,0 +1,33 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
+
+from dorothie_gym.baselines.rl import evaluate_policy  # noqa: E402
+from dorothie_gym.baselines.rl.evaluation import wilson  # noqa: E402
+from dorothie_gym.envs.navigation_v0 import NavigationEnv  # noqa: E402
+from tests.envs.navigation_drivers import follow_lane, obey  # noqa: E402
+
+
+def test_wilson_s_interval_is_that_of_the_textbook() -> None:
+    assert wilson(0, 10) == pytest.approx((0.0, 0.278), abs=1e-3)
+    assert wilson(8, 10) == pytest.approx((0.490, 0.943), abs=1e-3)
+    assert wilson(10, 10)[1] == 1.0
+
+
+def test_episodes_have_the_same_seeds_however_many_play_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    def act(observations: Any, masks: Any) -> list[int]:
+        return [obey(observation, mask) for observation, mask in zip(observations, masks, strict=True)]
+
+    at_once = evaluate_policy(lambda: NavigationEnv(traffic="none", max_seconds=60.0), act, 5, seed=3)
+    monkeypatch.setattr("dorothie_gym.baselines.rl.evaluation.AT_ONCE", 1)
+    one_by_one = evaluate_policy(lambda: NavigationEnv(traffic="none", max_seconds=60.0), act, 5, seed=3)
+    assert at_once == one_by_one and at_once.episodes == 5
+
+
+def test_who_follows_the_lane_has_no_success() -> None:
+    outcome = evaluate_policy(lambda: NavigationEnv(patience=10.0), lambda o, m: [follow_lane(o, m)] * len(o), 3)
+    assert outcome.success == 0.0 and outcome.low == 0.0 and outcome.high > 0.5

@@ -1,0 +1,34 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
+
+from dorothie_gym.baselines.rl.throughput import SHARES, measure  # noqa: E402
+from dorothie_gym.bench.report import rl_report  # noqa: E402
+from dorothie_gym.cli.app import app  # noqa: E402
+from dorothie_gym.errors import SettingsError
+from dorothie_gym.policies.navigation.instructor import Instructor  # noqa: E402
+
+
+def test_shares_of_the_time_add_up() -> None:
+    instruct = Instructor.instruct
+    figures = measure(environments=2, workers=0, steps=512)
+    assert Instructor.instruct is instruct  # measuring leaves no trace
+    assert set(figures["shares"]) == set(SHARES)
+    assert sum(figures["shares"].values()) == pytest.approx(1.0, abs=0.01)
+    assert min(figures["shares"].values()) > 0.0
+    assert figures["workers_steps_per_second"] is None
+    report = rl_report(figures)
+    assert "environment steps a second" in report.headline and len(report.rows) == 1
+    json.dumps(figures, allow_nan=False)
+
+
+def test_what_has_no_rollouts_is_refused() -> None:
+    with pytest.raises(SettingsError, match="algorithm"):
+        measure(algorithm="dqn")
+    result = CliRunner().invoke(app, ["bench", "rl", "--algorithm", "dqn"])
+    assert result.exit_code == 2 and "algorithm is 'dqn'" in " ".join(result.stderr.split())

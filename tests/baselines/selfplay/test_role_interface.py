@@ -1,0 +1,186 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
+
+from dorothie_gym import DuoWizardEnv  # noqa: E402
+from dorothie_gym.baselines.selfplay.ad_wizard import AdWizardInterface, AdWizardTrick  # noqa: E402
+from dorothie_gym.baselines.selfplay.co_wizard import CoWizardInterface, ExtraAction  # noqa: E402
+from dorothie_gym.baselines.selfplay.env import SelfPlayEnv  # noqa: E402
+from dorothie_gym.baselines.selfplay.participant import ParticipantInterface, ParticipantMemory, ParticipantPhrase  # noqa: E402
+from dorothie_gym.dialogue import Direction  # noqa: E402
+from dorothie_gym.errors import SettingsError
+from dorothie_gym.ontology import AGENT_ROLES, ActionValue, DialogueAct, DialogueMove, Role  # noqa: E402
+from dorothie_gym.policies.navigation import NavigationAction  # noqa: E402
+from dorothie_gym.spaces import ParticipantAction, Speech  # noqa: E402
+
+NOTHING = np.zeros(3, dtype=np.int64)
+
+
+@pytest.fixture
+def env() -> SelfPlayEnv:
+    env = SelfPlayEnv(traffic="none", max_seconds=60.0)
+    env.reset(seed=0)
+    return env
+
+
+def test_rows_have_what_is_at_the_three_seats(env: SelfPlayEnv) -> None:
+    rng = np.random.default_rng(1)
+    row, _ = env.reset(seed=1)
+    refused = []
+    for _ in range(120):
+        assert env.observation_space.contains(row)
+        masks = [env.table.masks(row[None], role, padded=False)[0] for role in range(3)]
+        assert all(mask[0] for mask in masks)  # nothing can always be done
+        row, team, *_, info = env.step(np.array([rng.choice(np.flatnonzero(mask)) for mask in masks]))
+        refused += [reason for reasons in env.duo.session.refused.values() for reason in reasons]
+        assert info["rewards"][0] == info["rewards"][1] == pytest.approx(team)
+    assert len(refused) <= 2  # fields are masked one by one; how they combine may still not do
+
+
+def test_one_network_for_all_is_told_who_it_is(env: SelfPlayEnv) -> None:
+    row, _ = env.reset(seed=0)
+    for role in range(3):
+        vectors = env.table.vectors(row[None], role, padded=True)
+        assert vectors.shape == (1, env.table.padded_size)
+        np.testing.assert_array_equal(vectors[0, -3:], np.eye(3)[role])
+        mask = env.table.masks(row[None], role, padded=True)[0]
+        assert not mask[env.table.actions[role] :].any()
+
+
+def test_the_co_wizard_hears_which_way_and_remembers(env: SelfPlayEnv) -> None:
+    env.step(np.array([ParticipantPhrase.TURN_LEFT, 0, 0]))
+    for _ in range(12):
+        env.step(NOTHING)
+    heard = env._memories[1].heard
+    assert heard.act.move is DialogueMove.INSTRUCT and ActionValue.J_TURN in heard.act.slots
+    assert heard.direction is Direction.LEFT
+
+
+def test_the_co_wizard_notes_the_goal_that_was_named(env: SelfPlayEnv) -> None:
+    row, *_ = env.step(np.array([ParticipantPhrase.NAME_GOAL, 0, 0]))
+    assert not env.table.masks(row[None], 1, padded=False)[0][ExtraAction.NOTE_GOAL]
+    for _ in range(12):
+        row, *_ = env.step(NOTHING)
+    assert env.table.masks(row[None], 1, padded=False)[0][ExtraAction.NOTE_GOAL]
+    row, *_ = env.step(np.array([0, ExtraAction.NOTE_GOAL, 0]))
+    assert env.duo.session.beliefs.goals == (env._memories[0].errand.name,)
+    assert not env.table.masks(row[None], 1, padded=False)[0][ExtraAction.NOTE_GOAL]
+
+
+def test_the_co_wizard_takes_the_exit_of_a_sector() -> None:
+    duo = DuoWizardEnv()
+    observations, infos = duo.reset(seed=0)
+    seat, seen = CoWizardInterface(duo.town, duo.limits), observations["co_wizard"]
+    memory = seat.notice(seen, seat.begin())
+    mask = seat.mask(seen, memory) & seat.allowed(seen, infos["co_wizard"]["action_mask"])
+    turns = [
+        k for k in np.flatnonzero(mask) if k < len(NavigationAction) and NavigationAction(int(k)).sector is not None
+    ]
+    assert turns
+    for choice in turns:
+        physical = seat.act(int(choice), seen, memory)[0].physical
+        assert physical is not None and physical.angle in seen["exits"][:, 1]
+
+
+def test_the_ad_wizard_leaves_time_between_its_tricks() -> None:
+    duo = DuoWizardEnv()
+    observations, _ = duo.reset(seed=0)
+    seat = AdWizardInterface(duo.town, duo.limits)
+    seen = dict(observations["ad_wizard"])
+    assert seat.mask(seen, seat.begin()).sum() == 1  # not at once
+    seen["time"] = np.array([40.0])
+    assert seat.mask(seen, seat.begin())[AdWizardTrick.FOG]
+    _, memory = seat.act(AdWizardTrick.FOG, seen, seat.begin())
+    seen["time"] = np.array([60.0])
+    assert np.flatnonzero(seat.mask(seen, memory)).tolist() == [AdWizardTrick.NOTHING]
+
+
+def test_the_participant_has_the_first_errand_and_the_way_to_it() -> None:
+    duo = DuoWizardEnv()
+    observations, _ = duo.reset(seed=0)
+    seat, seen = ParticipantInterface(duo.town, duo.limits), observations["participant"]
+    errand = seat.notice(seen, seat.begin()).errand
+    assert errand is not None and errand.journey.left(float(seen["station"][0])) > 0.0
+    assert seen["subgoals"][errand.subgoal, 0] == 1.0
+
+
+def test_a_scripted_ad_wizard_can_play_instead() -> None:
+    env = SelfPlayEnv(max_seconds=60.0, scripted=[Role.AD_WIZARD])
+    env.reset(seed=0)
+    for _ in range(119):
+        _, _, terminated, truncated, _ = env.step(np.array([0, 0, AdWizardTrick.NOTHING]))
+    assert not (terminated or truncated)
+    *_, truncated, info = env.step(NOTHING)
+    assert truncated and info["is_success"] is False
+    assert env.duo.summary()["exceptions"] > 0
+
+
+def test_what_was_done_at_a_seat_is_read_back(env: SelfPlayEnv) -> None:
+    rng = np.random.default_rng(2)
+    read = [set[int](), set[int](), set[int]()]
+    row, _ = env.reset(seed=2)
+    for _ in range(119):
+        choices = np.zeros(3, dtype=np.int64)
+        for k, (role, seat) in enumerate(zip(AGENT_ROLES, env._seats, strict=True)):
+            choices[k] = rng.choice(np.flatnonzero(env.table.masks(row[None], k, padded=False)[0]))
+            seen, memory = env._seen[role], env._memories[k]
+            done, _ = seat.act(int(choices[k]), seen, memory)
+            found = seat.choice_of(done, seen, memory)
+            assert found == choices[k] or done == type(done)()  # a turn that is planned already is asked for by nothing
+            read[k].add(found)
+        row, *_ = env.step(choices)
+    assert [len(numbers) for numbers in read] > [11, 12, 3]
+
+
+@pytest.mark.parametrize(
+    ("act", "text", "phrase"),
+    [
+        (
+            DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.J_TURN),
+            "could you take a right at the lights",
+            ParticipantPhrase.TURN_RIGHT,
+        ),
+        (DialogueAct.of(DialogueMove.REPLY_W, ActionValue.J_TURN), "Left, I think.", ParticipantPhrase.TURN_LEFT),
+        (
+            DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.U_TURN),
+            "we have to turn around",
+            ParticipantPhrase.TURN_ROUND,
+        ),
+        (DialogueAct.of(DialogueMove.REPLY_N), "Not at all.", ParticipantPhrase.NO),
+        (DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE), "a bit slower", ParticipantPhrase.NOTHING),
+    ],
+)
+def test_what_people_say_has_a_phrase_or_none(
+    env: SelfPlayEnv, act: DialogueAct, text: str, phrase: ParticipantPhrase
+) -> None:
+    said = ParticipantAction(speech=Speech(act=act, text=text))
+    assert ParticipantInterface(env.duo.town, env.duo.limits).choice_of(said, {}, ParticipantMemory()) is phrase
+
+
+def test_scripted_roles_finish_their_errands_whatever_is_chosen_for_them() -> None:
+    env = SelfPlayEnv(max_seconds=900.0, scripted=AGENT_ROLES)
+    env.reset(seed=0)
+    ended = False
+    while not ended:
+        _, _, terminated, truncated, info = env.step(
+            np.array([ParticipantPhrase.STOP, NavigationAction.STOP, AdWizardTrick.FOG])
+        )
+        ended = terminated or truncated
+    assert info["is_success"]
+    env.scripted = ()
+    env.reset(seed=0)
+    for _ in range(120):
+        env.step(NOTHING)
+    assert env.duo.summary()["exceptions"] == 0
+
+
+def test_what_nobody_can_do_is_refused(env: SelfPlayEnv) -> None:
+    with pytest.raises(ValueError, match=f"action of {Role.AD_WIZARD} is 99"):
+        env.step(np.array([0, 0, 99]))
+    with pytest.raises(SettingsError, match="traffic"):
+        SelfPlayEnv(traffic="jam")
+    with pytest.raises(SettingsError, match="atlantis"):
+        SelfPlayEnv(town="atlantis")
