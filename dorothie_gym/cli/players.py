@@ -21,11 +21,9 @@ def find_cast(participant: str, co_wizard: str, ad_wizard: str) -> dict[Role, Pl
     """
     from dorothie_gym.errors import PolicyLoadError
     from dorothie_gym.ontology import AGENT_ROLES
-    from dorothie_gym.policies import find_player, policy_names
+    from dorothie_gym.policies import find_player
 
     given = dict(zip(AGENT_ROLES, (participant, co_wizard, ad_wizard), strict=True))
-    if any(name not in policy_names(role) for role, name in given.items()):
-        import dorothie_gym.baselines  # noqa: F401  # registers the loaders of learned policies
     try:
         cast = {role: find_player(name, role) for role, name in given.items()}
     except PolicyLoadError as error:

@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final, TypeAlias
@@ -66,7 +67,17 @@ DESCRIPTION: Final = "model.json"
 
 _COSTS: Final = ("steps", "seconds")
 
+MODEL_LOADERS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "benchmark": "dorothie_gym.baselines.loaders:load_benchmark_model",
+        "dorothie_gym-rl": "dorothie_gym.baselines.loaders:load_navigation_model",
+        "selfplay": "dorothie_gym.baselines.loaders:load_selfplay_model",
+    }
+)
+"""Loaders of the models that `dorothie-gym train` and `train-rl` write, by kind, as "module:function"."""
+
 _LOADERS: Final[dict[str, Loader]] = {}
+"""Loaders that users have registered, by kind."""
 
 
 def register_loader(kind: str, loader: Loader) -> None:
@@ -79,13 +90,24 @@ def register_loader(kind: str, loader: Loader) -> None:
     Raises:
         ValueError: another loader has the kind.
     """
+    if kind in MODEL_LOADERS:
+        raise ValueError(f"files of the kind {kind!r} have a loader already: {MODEL_LOADERS[kind]}")
     if _LOADERS.setdefault(kind, loader) is not loader:
         raise ValueError(f"files of the kind {kind!r} have a loader already: {_LOADERS[kind].__qualname__}")
 
 
 def loadable_kinds() -> tuple[str, ...]:
     """Returns the kinds of files that have a loader, sorted."""
-    return tuple(sorted(_LOADERS))
+    return tuple(sorted({*MODEL_LOADERS, *_LOADERS}))
+
+
+def _loader_of(kind: str) -> Loader | None:
+    """Returns the loader of a kind of files, None for none; imports the loader of a model of the package."""
+    if kind not in MODEL_LOADERS:
+        return _LOADERS.get(kind)
+    module, _, name = MODEL_LOADERS[kind].partition(":")
+    loader: Loader = getattr(import_module(module), name)
+    return loader
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,9 +166,9 @@ def find_player(given: str, role: Role) -> Player:
         )
     description = _description(path)
     kinds = _kinds_of(path, description)
-    loader = next((_LOADERS[kind] for kind in kinds if kind in _LOADERS), None)
+    loader = next((found for kind in kinds if (found := _loader_of(kind))), None)
     if loader is None:
-        known = ", ".join(loadable_kinds()) or "none: is dorothie-gym[baselines] installed?"
+        known = ", ".join(loadable_kinds())
         raise PolicyLoadError(
             f"{role}: {given} is of the kind {' or '.join(kinds)}, which cannot be played (known: {known})"
         )

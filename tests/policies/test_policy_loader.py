@@ -48,7 +48,7 @@ def test_file_is_read_by_loader_of_its_kind(tmp_path: Path, as_folder: bool) -> 
     (tmp_path / "model.json").write_text(json.dumps({"kind": "quiet"}))
     player = find_player(str(tmp_path if as_folder else tmp_path / "model.json"), Role.CO_WIZARD)
     assert isinstance(player.make(Role.CO_WIZARD, LIMITS), SilentPolicy)
-    assert loadable_kinds() == ("quiet",)
+    assert loadable_kinds() == ("benchmark", "dorothie_gym-rl", "quiet", "selfplay")
 
 
 def test_file_without_kind_is_read_by_suffix(tmp_path: Path) -> None:
@@ -61,10 +61,11 @@ def test_file_without_kind_is_read_by_suffix(tmp_path: Path) -> None:
 
 def test_kind_without_loader_raises_error(tmp_path: Path) -> None:
     (tmp_path / "model.json").write_text(json.dumps({"kind": "quiet"}))
-    with pytest.raises(PolicyLoadError, match=r"of the kind quiet or .json, which cannot be played \(known: none"):
+    message = r"of the kind quiet or .json, which cannot be played \(known: benchmark, dorothie_gym-rl, selfplay\)"
+    with pytest.raises(PolicyLoadError, match=message):
         find_player(str(tmp_path / "model.json"), Role.CO_WIZARD)
     register_loader(".weights", load_silent)
-    with pytest.raises(PolicyLoadError, match=r"known: .weights"):
+    with pytest.raises(PolicyLoadError, match=r"known: \.weights, benchmark"):
         find_player(str(tmp_path), Role.CO_WIZARD)
 
 
@@ -81,3 +82,5 @@ def test_second_loader_of_kind_raises_error() -> None:
     register_loader("quiet", load_silent)
     with pytest.raises(ValueError, match="have a loader already"):
         register_loader("quiet", lambda path, role, limits: SilentPolicy(role, limits))
+    with pytest.raises(ValueError, match="have a loader already: dorothie_gym.baselines"):
+        register_loader("benchmark", load_silent)

@@ -115,15 +115,10 @@ def test_incremental_columns_give_the_batches_of_the_whole_session_at_every_mome
 
 def _ask(history: Any, task: Task) -> Any:
     """Returns a history with a point of a task at its end."""
+    frame = history.frame + FRAMES_PER_TENTH
     if task is Task.RFN:
-        return history.said(
-            Role.CO_WIZARD, (Span("-", DialogueAct(DialogueMove.IRRELEVANT)),), history.frame + FRAMES_PER_TENTH
-        )
-    return (
-        history.done(Physical(action=PhysicalAction.STOP), history.frame + FRAMES_PER_TENTH)
-        if task is Task.NFD
-        else history
-    )
+        return history.said(Role.CO_WIZARD, (Span("-", DialogueAct(DialogueMove.IRRELEVANT)),), frame)
+    return history.done(Physical(action=PhysicalAction.STOP), frame) if task is Task.NFD else history
 
 
 def test_switched_head_lights_change_what_was_perceived_since(played: Played) -> None:

@@ -11,7 +11,6 @@ import pytest
 pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
-import dorothie_gym.baselines  # noqa: E402, F401
 from dorothie_gym.baselines.rl import Training, TrainingSettings
 from dorothie_gym.engine.config import EnvConfig  # noqa: E402
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv  # noqa: E402
@@ -69,9 +68,9 @@ def test_a_model_of_another_environment_is_refused(tmp_path: Path) -> None:
         find_player(str(tmp_path), Role.CO_WIZARD).make(Role.CO_WIZARD, DuoWizardEnv("brookside").limits)
 
 
-def test_learned_players_make_themselves_known_without_torch() -> None:
+def test_kinds_of_models_and_their_loaders_are_known_without_torch() -> None:
     script = (
-        "import sys, dorothie_gym.baselines; from dorothie_gym.policies import loadable_kinds;"
+        "import sys, dorothie_gym.baselines.loaders; from dorothie_gym.policies import loadable_kinds;"
         "sys.exit('torch' in sys.modules or 'dorothie_gym-rl' not in loadable_kinds())"
     )
     assert subprocess.run([sys.executable, "-c", script], timeout=120, check=False).returncode == 0

@@ -7,7 +7,6 @@ import pytest
 
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
-import dorothie_gym.baselines  # noqa: E402, F401  (makes what is learned there playable)
 from dorothie_gym import DuoWizardEnv  # noqa: E402
 from dorothie_gym.baselines.selfplay.env import SelfPlayEnv  # noqa: E402
 from dorothie_gym.baselines.selfplay.policy import read_policy  # noqa: E402

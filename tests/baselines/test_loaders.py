@@ -1,0 +1,20 @@
+"""The table of loaders names functions and kinds that exist."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
+pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
+
+from dorothie_gym.baselines import loaders, model_card  # noqa: E402
+from dorothie_gym.baselines.rl import checkpoint  # noqa: E402
+from dorothie_gym.baselines.selfplay import settings  # noqa: E402
+from dorothie_gym.policies.policy_loader import MODEL_LOADERS  # noqa: E402
+
+
+def test_each_kind_of_model_has_a_loader() -> None:
+    assert set(MODEL_LOADERS) == {model_card.KIND, checkpoint.KIND, settings.SELFPLAY}
+    for entry in MODEL_LOADERS.values():
+        module, name = entry.split(":")
+        assert module == loaders.__name__ and callable(getattr(loaders, name))
