@@ -1,4 +1,4 @@
-"""How fast TOTO trains and answers at the published size, against the published loop and the machine's matrix rate."""
+"""Training and inference speed of TOTO at the published size, against the published loop and the matrix rate."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def measure(
         threads: of torch; None takes all cores. With one, CPU time is measured, which other programs disturb little.
         batch_size: points of one of our steps.
         repeats: how often each is measured; the median counts.
-        progress: is told what is being measured.
+        progress: called with the name of each measurement and the share done.
 
     Raises:
         SessionError: the corpus cannot be read.
@@ -113,7 +113,7 @@ Batch = tuple[dict[str, Tensor], Any]
 
 
 def _ours(columns: Columns, senses: Senses, batch_size: int) -> tuple[TOTO, Batch]:
-    """Our model, and a batch with what cameras and microphones would give."""
+    """Returns TOTO, and a batch with random image, sound and detector features."""
     config = TOTOConfig.published()
     tables = [points(columns, task) for task in TASKS]
     examples = Examples.gather(columns, tables, config.spec)
@@ -132,7 +132,7 @@ Turn = Callable[[], tuple[Session, Point]]
 
 
 class _Turns:
-    """The points of some sessions one after another, for ever, as the published loop goes through them."""
+    """Endless sequence of the points of some sessions, in the order of the published loop."""
 
     def __init__(self, sessions: Sequence[Session], columns: Columns, senses: Senses):
         town = dict(zip(columns.sessions.names, columns.sessions.town.tolist(), strict=True))
@@ -144,7 +144,7 @@ class _Turns:
         self._points = itertools.cycle([found[place] for place in order[::step]])
 
     def next(self) -> tuple[Any, Point]:
-        """The next point with its features, rebuilt."""
+        """Returns the next point with its features, rebuilt."""
         session, point = next(self._points)
         return rebuild(session, point.view, self._graphs[session.name], self._senses), point
 

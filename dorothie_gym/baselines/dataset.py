@@ -1,4 +1,4 @@
-"""A corpus made ready for models: its points as tensors, its texts as vectors and as pieces."""
+"""Dataset of a corpus: its points as tensors, its texts as vectors and as byte pairs."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ TEST: Final = "test"
 
 
 class Dataset:
-    """A corpus made ready. What is slow to make is kept in the user's cache.
+    """Dataset of a corpus. Vectors of texts are kept in the user's cache.
 
     Args:
         columns: the corpus.
-        encoder: of its texts.
-        cache: folder for vectors of texts; None keeps none.
+        encoder: encoder of its texts.
+        cache: folder for vectors of texts; None for no cache.
     """
 
     def __init__(self, columns: Columns, encoder: TextEncoder, cache: Path | None = None):
@@ -56,7 +56,7 @@ class Dataset:
         return cls(build(corpus), text_encoder(encoder), None if cache is None else cache / _TABLES)
 
     def about(self) -> dict[str, Any]:
-        """Returns what decided the features, in JSON types: part of every checkpoint and of every result."""
+        """Returns the identity of the features in JSON types; part of every checkpoint and every result."""
         return {"corpus": self.columns.content, "encoder": self.encoder.id}
 
     def tables(self, fold: str) -> tuple[PointTable, ...]:
@@ -75,18 +75,18 @@ class Dataset:
         return found
 
     def examples(self, fold: str, spec: BatchSpec) -> Examples:
-        """Returns the points of a fold as tensors; made once."""
+        """Returns the points of a fold as tensors; computed once."""
         if (fold, spec) not in self._examples:
             self._examples[fold, spec] = Examples.gather(self.columns, self.tables(fold), spec)
         return self._examples[fold, spec]
 
     @cached_property
     def vectors(self) -> Tensor:
-        """The vectors of all texts (n, dim), float32."""
+        """Vectors of all texts (n, dim), float32."""
         return torch.from_numpy(text_table(self.encoder, self.columns.texts, self._cache).copy())
 
     def byte_pairs(self, vocabulary: int) -> BytePairs:
-        """Returns pieces of words, learnt from the training sessions alone."""
+        """Returns the byte pairs learned from the training sessions."""
         columns = self.columns
         trained = np.flatnonzero([fold.split("/")[0] == TRAIN for fold in columns.sessions.folds])
         said = columns.utterances
@@ -94,5 +94,5 @@ class Dataset:
         return BytePairs.train([columns.texts[row] for row in rows if row >= 0], vocabulary)
 
     def tokens(self, texts: Sequence[str] | None, pairs: BytePairs, length: int) -> Tensor:
-        """Returns the pieces of texts (n, length), int64; of all texts of the corpus where None."""
+        """Returns the byte pairs of texts (n, length), int64; of all texts of the corpus if `texts` is None."""
         return torch.from_numpy(pairs.table(self.columns.texts if texts is None else texts, length)).long()

@@ -1,4 +1,4 @@
-"""What a model says at points, and what of it is taken for true."""
+"""Outputs of a model, and their decoding into predictions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dorothie_gym.ontology.actions import ArgumentKind
 
 @dataclass(frozen=True, eq=False)
 class Outputs:
-    """What a model says at B points.
+    """Outputs of a model at B points.
 
     Attributes:
         move: (B, 2, 15) scores of the moves, for the participant (UfN) and for the Co-Wizard (RfN).
@@ -36,7 +36,7 @@ class Outputs:
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """What a model takes for true at B points; of fields that a point's task does not have anything may stand.
+    """Predictions of a model at B points; fields that a point's task does not have are arbitrary.
 
     Attributes:
         move: (B,) int64.
@@ -59,12 +59,12 @@ TAKES_SIDE: Final = tuple(action.argument is ArgumentKind.SIDE for action in NAV
 
 
 def decode(outputs: Outputs, task: Tensor, allowed: Tensor | None = None) -> Predicted:
-    """Returns the likeliest of everything, as the ontology allows it (see `allowed_angle`).
+    """Returns the likeliest values that the ontology allows (see `allowed_angle`).
 
     Args:
-        outputs: what a model says.
+        outputs: outputs of a model.
         task: (B,) number of each point's task.
-        allowed: (B, 6) which actions it may be; all of them where None.
+        allowed: (B, 6) actions that may be predicted; all if None.
     """
     role = (task == RFN).long()  # (B,)
     points = torch.arange(len(task), device=task.device)

@@ -48,15 +48,15 @@ CURVES_FILE: Final = "loss.png"
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
-    """What is to be trained.
+    """Training of one model with one seed on one corpus.
 
     Attributes:
         corpus: folder of the corpus.
-        encoder: name of the encoder of texts.
+        encoder: name of the text encoder.
         model: command of the model's row.
         size: "small" or "paper".
-        seed: of weights, order and dropout.
-        out: folder under which every run has its own.
+        seed: seed of weights, order and dropout.
+        out: parent of the folders of all trainings.
     """
 
     corpus: Path
@@ -68,20 +68,20 @@ class Experiment:
 
     @property
     def row(self) -> ModelEntry:
-        """The model's row."""
+        """Entry of the model in the table."""
         return find_row(self.model)
 
     @property
     def folder(self) -> Path:
-        """Folder of the run."""
+        """Folder of the training."""
         return self.out / self.model / self.size / f"seed-{self.seed}"
 
 
 def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambda epoch: None) -> dict[str, Any]:
-    """Trains, tests and keeps a model, or reads what was done before; returns what came of it, in JSON types.
+    """Trains, tests and saves a model, or reads an earlier result; returns the result in JSON types.
 
     Raises:
-        CheckpointError: in its folder lies the training of another corpus, encoder or configuration.
+        CheckpointError: its folder holds the training of another corpus, encoder or configuration.
         SessionError: the corpus lacks a fold.
         OSError: the folder cannot be written.
     """
@@ -117,7 +117,7 @@ def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambd
 
 
 def _describe(job: Experiment, model: TOTO, material: Dataset, result: Mapping[str, Any]) -> None:
-    """Writes what who plays the model must know beside its weights."""
+    """Writes the model card beside the weights."""
     pairs = material.byte_pairs(model.config.vocabulary) if needs_pieces(job.row, model.config) else None
     ModelCard(
         row=job.row.command,
@@ -135,7 +135,7 @@ def _describe(job: Experiment, model: TOTO, material: Dataset, result: Mapping[s
 
 
 def _run_policy(job: Experiment, about: dict[str, Any]) -> dict[str, Any]:
-    """Trains and tests policies, unless that was done before."""
+    """Trains and tests policies, or reads an earlier result."""
     # imported here: stable-baselines3 is slow to import
     from dorothie_gym.baselines.policy_rows import run_policy
 
@@ -159,7 +159,7 @@ def _run_policy(job: Experiment, about: dict[str, Any]) -> dict[str, Any]:
 def task_predictions(
     job: Experiment, columns: Columns, tables: tuple[PointTable, ...], predicted: Predicted
 ) -> tuple[TaskPredictions, ...]:
-    """Returns predictions of points, which follow one another by task as in the tables, as they are scored."""
+    """Returns the predictions by task, in the form in which they are scored."""
     found = []
     start = 0
     for task, table in zip(TASKS, tables, strict=True):
@@ -204,25 +204,25 @@ def _told(job: Experiment, model: torch.nn.Module, trained: TrainingSummary) -> 
 # --- Trainings side by side: each process has one thread, so that what comes out is the same however many ------------
 
 OnExperimentEpoch: TypeAlias = Callable[[Experiment, Epoch], None]
-"""Is told of each epoch of each job that runs in the calling process."""
+"""Callback after each epoch of each training in the calling process."""
 
 
 def run_experiments(
     jobs: Sequence[Experiment], workers: int, on_epoch: OnExperimentEpoch = lambda job, epoch: None
 ) -> Iterator[tuple[Experiment, dict[str, Any]]]:
-    """Runs jobs of one corpus, as many at a time as there are workers, and yields what comes of them as it comes.
+    """Runs trainings on one corpus, one per worker at a time, and yields each with its result when it is complete.
 
-    Models of the published sizes take all cores, or the GPU, by themselves: they run one after another in this process.
+    Models of the published sizes use all cores, or the GPU: they run one after another in this process.
 
     Args:
-        jobs: what is to be trained.
+        jobs: the trainings.
         workers: processes; with 1 everything happens in this one.
-        on_epoch: is told of each epoch that happens in this process.
+        on_epoch: called after each epoch in this process.
 
     Raises:
-        CheckpointError: in the folder of a job lies another training.
-        ProcessError: a job failed in another process.
-        EncoderError: the encoder is not here.
+        CheckpointError: the folder of a training holds another one.
+        ProcessError: a training failed in another process.
+        EncoderError: the encoder is not available.
         SessionError: the corpus cannot be read.
         OSError: a folder cannot be written.
     """
@@ -246,7 +246,7 @@ def run_experiments(
 
 @dataclass(frozen=True)
 class _ExperimentWorker:
-    """What a process needs in order to train."""
+    """Arguments of a worker process."""
 
     corpus: Path
     encoder: str
@@ -294,7 +294,7 @@ def gather_table(
     """Scores what finished trainings predicted, and the floors beside them.
 
     Args:
-        jobs: trainings of one corpus, all done.
+        jobs: complete trainings on one corpus.
         floors: whether the floors get rows, drawn with the same seeds.
 
     Returns:
@@ -306,7 +306,7 @@ def gather_table(
         SessionError: the corpus cannot be read.
     """
     if not jobs:
-        raise ValueError("there is nothing to put into the table: choose a model")
+        raise ValueError("the table has no rows: choose a model")
     corpus = Corpus.load(jobs[0].corpus)
     labels = labels_of(corpus, TEST)
     predicted = list(read_predictions(*(job.folder / PREDICTIONS_FILE for job in jobs)))

@@ -23,12 +23,12 @@ UFN, RFN, NFD = range(len(TASKS))
 """Numbers of the tasks."""
 
 _GATHERED: Final = 512
-"""Points that are gathered at once."""
+"""Number of points that are gathered at once."""
 
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """What is to be predicted at B points; a field that its task does not have is filled as in `PointTable`.
+    """Labels at B points; fields that a point's task does not have are filled as in `PointTable`.
 
     Attributes:
         task: (B,) number of the task, int64.
@@ -73,7 +73,7 @@ class Labels:
 
 @dataclass(frozen=True, eq=False)
 class Examples:
-    """Points of all three tasks, gathered once: a training loop only picks rows.
+    """Points of all three tasks as tensors, gathered once.
 
     Attributes:
         inputs: fields (N, ...).

@@ -62,7 +62,7 @@ DOTS = 150
 
 @contextmanager
 def sheet(path: Path) -> Iterator[Any]:
-    """An empty figure, which is written into a PNG file when all is drawn.
+    """Yields an empty figure, which is written to a PNG file afterwards.
 
     Raises:
         OSError: the file cannot be written.

@@ -1,4 +1,4 @@
-"""`model.json`: what a trained model was made with, as far as its weights do not tell; who plays it reads this."""
+"""Model card of a trained benchmark model, in `model.json` beside its weights."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from dorothie_gym.files import write_atomically
 from dorothie_gym.policies.policy_loader import DESCRIPTION
 
 KIND: Final = "benchmark"
-"""Kind of these files, by which they are played."""
+"""Kind of these files in `policy_loader`."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModelCard:
-    """What is in a `model.json`.
+    """Content of a `model.json`.
 
     Attributes:
-        row: command of the model's row.
+        row: command of the model in the table.
         config: fields of its `TOTOConfig`.
         corpus: hash of the corpus.
-        encoder: name of the encoder of texts.
+        encoder: name of the text encoder.
         encoder_id: its id: equal ids, equal vectors.
-        spread: what the vectors of texts are divided by; None where the model's text encoder learns.
-        merges: byte pairs that were learnt from the training sessions; None where the model reads none.
+        spread: divisor of the vectors of texts; None if the model's text encoder is trained.
+        merges: byte pairs learned from the training sessions; None if the model uses none.
         weights: name of the file with the weights, in the same folder.
-        weights_sha256: its SHA-256; so what is said of this file is said of the weights.
-        steps: points that it was trained on: those of an epoch times the epochs.
-        seconds: that the training took.
+        weights_sha256: its SHA-256; a hash of this file thereby covers the weights.
+        steps: points of an epoch times the number of epochs.
+        seconds: duration of the training [s].
     """
 
     row: str
@@ -47,19 +47,19 @@ class ModelCard:
     seconds: float
 
     def write(self, folder: Path) -> None:
-        """Writes it into the folder of the weights, whole or not at all."""
+        """Writes the card into the folder of the weights, atomically."""
         page = {"kind": KIND, **asdict(self)}
         write_atomically(folder / DESCRIPTION, json.dumps(page) + "\n")
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Reads what `write` wrote.
+        """Reads a card.
 
         Args:
             path: the file, or its folder.
 
         Raises:
-            ValueError: it cannot be read, or is of another version; the message names it.
+            ValueError: the file cannot be read, or is of another version; the message names it.
         """
         file = path / DESCRIPTION if path.is_dir() else path
         try:

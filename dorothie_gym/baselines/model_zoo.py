@@ -1,4 +1,4 @@
-"""The rows of the table: every model by its name in the paper, and how it is made."""
+"""Models of the table by their names in the paper, and their construction."""
 
 from __future__ import annotations
 
@@ -33,21 +33,21 @@ Change: TypeAlias = Callable[[TOTOConfig], TOTOConfig]
 SIZES: Final[Mapping[str, Callable[[], TOTOConfig]]] = MappingProxyType(
     {"small": TOTOConfig.small, "paper": TOTOConfig.paper}
 )
-"""The configurations that a user may choose."""
+"""Configurations by name."""
 
 NO_AUDIO: Final = "no audio: the sessions contain no sound"
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModelEntry:
-    """A row of the table.
+    """Model of the table.
 
     Attributes:
-        name: as the paper's table has it.
-        command: as it is written on a command line and in paths.
-        change: what makes its config from that of TOTO; None for a policy, and where it cannot be run.
-        missing: why it cannot be run, or empty.
-        kind: what is trained: "toto" (with its ablations and rivals), our "reader", or a policy by "ppo" or "cloning".
+        name: name in the paper's table.
+        command: name on the command line and in paths.
+        change: function from TOTO's config to the model's; None for a policy, and if it cannot be run.
+        missing: reason why it cannot be run, or empty.
+        kind: "toto" (with ablations and rivals), "reader" (Junction Reader), or a policy by "ppo" or "cloning".
     """
 
     name: str
@@ -102,7 +102,7 @@ ROWS: Final[tuple[ModelEntry, ...]] = (
     ModelEntry(name="PPO", command="ppo", kind="ppo"),
     ModelEntry(name="Junction Reader (ours)", command="reader", change=reader_config, kind="reader"),
 )
-"""The rows of the paper's table, in its order; then TOTO with another clock, policies, and our own model."""
+"""Models of the paper's table, in its order; then TOTO with another clock, policies, and the Junction Reader."""
 
 
 class EpisodicTransformer(TOTO):
@@ -110,7 +110,7 @@ class EpisodicTransformer(TOTO):
 
 
 def find_row(name: str) -> ModelEntry:
-    """Returns a row by its command or its name; raises `ValueError` naming all where there is none."""
+    """Returns a model by its command or name; raises `ValueError` listing all for an unknown one."""
     for row in ROWS:
         if name.casefold() in (row.command, row.name.casefold()):
             return row
@@ -121,7 +121,7 @@ def make_model(row: ModelEntry, size: str, material: Dataset, seed: int) -> TOTO
     """Returns a model with weights drawn from a seed.
 
     Raises:
-        ValueError: the size is unknown, or the row cannot be run.
+        ValueError: the size is unknown, or the model cannot be run.
     """
     if size not in SIZES:
         raise ValueError(f"there is no config {size!r}; choose from {', '.join(SIZES)}")
@@ -132,13 +132,13 @@ def make_model(row: ModelEntry, size: str, material: Dataset, seed: int) -> TOTO
 
 
 def build_model(row: ModelEntry, config: TOTOConfig, material: Dataset, spread: float | None = None) -> TOTO:
-    """Returns the model of a row with weights drawn by chance.
+    """Returns a model with random weights.
 
     Args:
-        row: whose model.
+        row: the model's entry.
         config: its sizes and inputs.
-        material: towns and texts that it is made for.
-        spread: of the vectors of texts that it learns from, or has learnt from; this material's where None.
+        material: dataset with its towns and texts.
+        spread: divisor of the vectors of texts; computed from this dataset if None.
     """
     towns, texts = Towns(material.columns.towns), make_texts(config, material, spread)
     if row.kind == "reader":
@@ -149,7 +149,7 @@ def build_model(row: ModelEntry, config: TOTOConfig, material: Dataset, spread: 
 
 
 def retell(model: TOTO, material: Dataset) -> None:
-    """Puts the texts of other material in the place of those that a model has: its inputs then count those."""
+    """Replaces the texts of a model by those of another dataset."""
     config = model.config
     if config.text == "frozen":
         model.texts.take(material.vectors)
@@ -160,7 +160,7 @@ def retell(model: TOTO, material: Dataset) -> None:
 
 
 def make_texts(config: TOTOConfig, material: Dataset, spread: float | None = None) -> Texts:
-    """Returns how a model reads the texts of a corpus: vectors that stay, or an encoder that learns."""
+    """Returns the text embedding of a model: frozen vectors, or a trained encoder."""
     if config.text == "frozen":
         return FrozenTexts(material.vectors, spread)
     tokens = _tokens(config, material)
@@ -173,7 +173,7 @@ def make_texts(config: TOTOConfig, material: Dataset, spread: float | None = Non
 
 
 def needs_pieces(row: ModelEntry, config: TOTOConfig) -> bool:
-    """Whether a model reads pieces of words that were learnt from its training sessions."""
+    """Returns whether a model uses byte pairs learned from its training sessions."""
     return row.kind == "reader" or (config.text == "trained" and not _is_minilm(config))
 
 
@@ -182,7 +182,7 @@ def _is_minilm(config: TOTOConfig) -> bool:
 
 
 def _tokens(config: TOTOConfig, material: Dataset) -> Tensor:
-    """The pieces of all texts (n, length), as a trained encoder reads them."""
+    """Returns the token ids of all texts (n, length) for a trained encoder."""
     if not _is_minilm(config):
         return _pieces(config, material)
     tokenizer: Any = load_pretrained(find_transformers("minilm").AutoTokenizer, minilm_folder(), "minilm")

@@ -30,10 +30,10 @@ from dorothie_gym.wrappers.flatten import FlattenAction, FlattenObservation
 ENVS: Final[dict[Task, type[TeacherForcedEnv]]] = {Task.UFN: UfNEnv, Task.RFN: RfNEnv, Task.NFD: NfDEnv}
 
 WIDTH: Final = 64
-"""Numbers of each of the two layers of a policy: stable-baselines3's own default."""
+"""Width of each of the two layers of a policy: stable-baselines3's default."""
 
 PASSES: Final = 3
-"""How often PPO sees each point."""
+"""Passes of PPO over the points."""
 
 _STEPS: Final = 512
 _EPOCHS, _PATIENCE, _MAX_EPOCHS = 10, 5, 40
@@ -69,7 +69,7 @@ class FlatTask(gym.ObservationWrapper[NDArray[np.float32], Any, Any]):
 
 @dataclass(frozen=True, eq=False)
 class TaskDemonstrations:
-    """All points of a fold as an environment shows them: observations (n, D), labels (n, A), sessions, events (n,)."""
+    """Points of a fold as an environment shows them: observations (n, D), labels (n, A), sessions, events (n,)."""
 
     observations: torch.Tensor
     labels: torch.Tensor
@@ -78,12 +78,12 @@ class TaskDemonstrations:
 
 
 def make_task(corpus: Path, task: Task, split: str) -> FlatTask:
-    """Returns the environment of a task over a fold of a corpus; raises `SessionError` where the fold has no point."""
+    """Returns the environment of a task over a fold of a corpus; raises `SessionError` if the fold has no point."""
     return FlatTask(ENVS[task](corpus, split=split))
 
 
 def demonstrate(env: FlatTask, sessions: int) -> TaskDemonstrations:
-    """Walks through the sessions of an environment and notes what is seen and what was done."""
+    """Returns the observations and labels of all points in the sessions of an environment."""
     seen, done, names, events = [], [], [], []
     wanted = np.zeros(env.flat.action_space.shape or (), dtype=np.int64)
     for number in range(sessions):
@@ -109,7 +109,7 @@ def demonstrate(env: FlatTask, sessions: int) -> TaskDemonstrations:
 def run_policy(
     corpus: Path, kind: str, seed: int, folder: Path, name: str
 ) -> tuple[tuple[TaskPredictions, ...], dict[str, Any]]:
-    """Trains a policy for each task, and returns what they predict for the test sessions, and what was done.
+    """Trains a policy for each task, and returns their predictions for the test sessions, and facts about the training.
 
     Args:
         corpus: folder of the corpus.
@@ -143,7 +143,7 @@ def run_policy(
 
 
 def _clone(policy: Any, shown: TaskDemonstrations, validation: TaskDemonstrations, seed: int) -> int:
-    """Makes what was done likely; keeps the policy of the epoch that is best on other sessions. Returns the epochs."""
+    """Maximises the likelihood of the labels; keeps the best epoch on the validation fold. Returns the epochs."""
     optimiser = torch.optim.AdamW(policy.parameters(), lr=_RATE, weight_decay=1e-2)
     generator = torch.Generator().manual_seed(seed)
     lowest, best, weights = float("inf"), 0, {}

@@ -1,8 +1,8 @@
-"""The published model and its training loop, as they were: what our speed is measured against.
+"""Reference implementation of the published model and its training loop, for measurements of speed.
 
 One point at a time, its features rebuilt from the recording, one step of the optimiser for each; the map flattened to
 one size, and all queries of the detector flattened into one linear layer, which holds 59 of its 93 million numbers.
-What frozen encoders say (BERT, ResNet-50, HuBERT, the detector) is drawn at random and costs neither side anything.
+Outputs of frozen encoders (BERT, ResNet-50, HuBERT, the detector) are random and cost neither side anything.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LANES, ROADS, JUNCTIONS = 486, 259, 34
 """Sizes that the published model is tied to; towns beyond them are cut off."""
 
 WORDS, IMAGE, SOUND, QUERIES, QUERY = 768, 1000, 1024, 300, 256
-"""What the frozen encoders give: BERT, ResNet-50, HuBERT-large, and the detector's queries."""
+"""Output sizes of the frozen encoders: BERT, ResNet-50, HuBERT-large, and the detector's queries."""
 
 IDS: Final = 50
 _LANE: Final = 64
@@ -38,7 +38,7 @@ _FRAMES_APART: Final = 3  # recorded at 30 Hz, looked at with 10 Hz
 
 
 class Senses:
-    """What frozen encoders would say, at random: a row of a table for each text, frame or utterance.
+    """Random outputs of frozen encoders: a row of a table for each text, frame or utterance.
 
     Args:
         seed: of the tables.

@@ -1,1 +1,1 @@
-"""Models of the benchmark as Co-Wizards: what they were trained to tell at recorded points, they do (closed loop)."""
+"""Closed-loop play: benchmark models as Co-Wizards."""

@@ -1,4 +1,4 @@
-"""What a model tells becomes an action of the car, where it can be carried out as far as the Co-Wizard can see."""
+"""Feasibility of predicted navigation actions, as far as the Co-Wizard's observation shows it."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from dorothie_gym.policies.route_progress import (
 from dorothie_gym.spaces import Motion, Physical
 
 AT_END: Final = 6.0
-"""A car that stands this near to a junction has no room left to drive up to it [m]."""
+"""Distance to a junction below which a standing car has no room to drive up to it [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FeasibleAction:
-    """Something that the car can do now.
+    """Action that the car can carry out now.
 
     Attributes:
-        physical: the action; None where the car does so anyway.
-        direction: which way it leads, for the words.
+        physical: the action; None if the car does so anyway.
+        direction: direction of the action, for its wording.
     """
 
     physical: Physical | None
@@ -38,13 +38,13 @@ class FeasibleAction:
 
 
 def feasible_action(action: PhysicalAction, angle: float, view: CoWizardView, town: Town) -> FeasibleAction | None:
-    """Returns what the car does for a navigation action, or None if it cannot be carried out.
+    """Returns the feasible action for a predicted navigation action, or None if there is none.
 
     Args:
         action: one of the six navigation actions.
-        angle: its argument [degrees, positive left]; of a turn the exit nearest to it is taken, of a lane switch its
-            sign counts.
-        view: what the Co-Wizard observes.
+        angle: its argument [degrees, positive left]; a turn takes the exit nearest to it, a lane switch its
+            sign.
+        view: observation of the Co-Wizard.
         town: the map.
     """
     match action:
@@ -65,7 +65,7 @@ def feasible_action(action: PhysicalAction, angle: float, view: CoWizardView, to
 
 
 def _follow(view: CoWizardView) -> FeasibleAction | None:
-    """The car follows its lane by itself, unless it stands, or prepares something else."""
+    """Returns lane following: nothing to do unless the car is stopped or prepares a manoeuvre."""
     if view.motion is Motion.WAITING or _at_end(view):
         return None
     idle = view.motion is not Motion.STOPPED and view.manoeuvre is None
@@ -73,7 +73,7 @@ def _follow(view: CoWizardView) -> FeasibleAction | None:
 
 
 def _at_end(view: CoWizardView) -> bool:
-    """Whether the car stands before a junction that it could only wait at: no turn is planned."""
+    """Returns whether the car stands before a junction without a planned turn, so that it could only wait."""
     near = view.choice is not None and view.choice.distance < AT_END
     return near and view.standing and view.manoeuvre is None
 
@@ -89,7 +89,7 @@ def _turn(angle: float, view: CoWizardView, town: Town) -> FeasibleAction | None
 
 
 def _nearest_exit(angle: float, choice: Choice, town: Town) -> Exit:
-    """The exit nearest in angle: of the own lane, or where none leads that way, of a lane beside it."""
+    """Returns the exit nearest in angle, from the own lane or, if none leads that way, from a lane beside it."""
 
     def misfit(way: Exit) -> tuple[float, int]:
         return abs(float(wrap_degrees(way.angle - angle))), way.connector

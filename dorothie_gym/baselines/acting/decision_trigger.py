@@ -1,4 +1,4 @@
-"""When a model that knows no "do nothing" decides; between decisions the car follows its lane."""
+"""Triggers of decisions, for models without a "do nothing" class; between decisions the car follows its lane."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from dorothie_gym.policies.route_progress import stopping_distance
 from dorothie_gym.spaces import Motion
 
 BEFORE_JUNCTION: Final = 40.0
-"""A junction without a turn is an occasion when it is this near [m]."""
+"""Distance to a junction without a planned turn at which a decision is triggered [m]."""
 
 AGAIN: Final = 10.0
-"""Who waits at a junction without a turn, or stands by Stop, decides again after this time [s]."""
+"""Time after which a car that waits at a junction without a turn, or has stopped, decides again [s]."""
 
 NEAR: Final = 1.0
-"""Who stands so near to a place has come there [m]."""
+"""Distance at which a place counts as reached [m]."""
 
 REST: Final = 4.0
-"""A car that stands by Stop does not brake for anything: what it stopped for is taken to last so long [s]."""
+"""Assumed duration of the hazard for which the car has stopped [s]; a standing car shows no braking."""
 
 
 @dataclass(frozen=True)
 class DecisionTrigger:
-    """What is to be decided now: what to say, and what to do."""
+    """Decisions that are due: an utterance, a navigation action."""
 
     speaks: bool = False
     drives: bool = False
@@ -36,15 +36,15 @@ class DecisionTrigger:
 
 @dataclass(frozen=True, kw_only=True)
 class TriggerState:
-    """What has been decided upon; every change gives a new one.
+    """State of the triggers; every change returns a new object.
 
     Attributes:
-        junction: lane before the junction at which it was decided, -1 for none.
-        waited: when it was decided last at a junction [s].
-        drove: when it was decided last what to do [s].
-        hazard: since when something has been in the way [s], infinite where nothing is.
-        at_place: whether the place that was named last is where the car would stop now.
-        owed: whether a decision about what to do is put off until a lane switch or U-turn is over.
+        junction: lane before the junction of the last decision, -1 for none.
+        waited: time of the last decision at a junction [s].
+        drove: time of the last navigation decision [s].
+        hazard: time since which there has been a hazard [s], infinite for none.
+        at_place: whether the car would stop at the last-named place now.
+        owed: whether a navigation decision is postponed until a lane switch or U-turn is complete.
     """
 
     junction: int = -1
@@ -55,12 +55,12 @@ class TriggerState:
     owed: bool = False
 
     def look(self, view: CoWizardView, heard: bool, place: float | None = None) -> tuple[DecisionTrigger, Self]:
-        """Returns what is to be decided, and the watch for the next observation.
+        """Returns the decisions that are due, and the state for the next observation.
 
         Args:
-            view: what is observed.
+            view: the observation.
             heard: whether the participant has spoken.
-            place: how far the place that was named last is along the way [m]; None where it is not near, or not known.
+            place: distance along the way to the last-named place [m]; None if it is not near, or not known.
         """
         hazard = self._hazard(view)
         changed = math.isinf(hazard) is not math.isinf(self.hazard)
@@ -79,7 +79,7 @@ class TriggerState:
         return DecisionTrigger(speaks=speaks, drives=drives), replace(watch, drove=drove, owed=wanted and not drives)
 
     def _lacks_turn(self, view: CoWizardView) -> bool:
-        """Whether the car comes to a junction, or has waited there long, and no turn is planned."""
+        """Returns whether the car approaches a junction, or has waited there long, without a planned turn."""
         assert view.choice is not None
         if view.motion is Motion.STOPPED or view.manoeuvring or view.manoeuvre is PhysicalAction.J_TURN:
             return False
@@ -94,5 +94,5 @@ class TriggerState:
 
 
 def _would_stop_at(place: float, speed: float) -> bool:
-    """Whether it is time for a car at a speed [m/s] to stop at a place so far ahead [m]."""
+    """Returns whether a car at a speed [m/s] must begin to stop for a place at a distance ahead [m]."""
     return -CoWizardConfig.passed < place < stopping_distance(speed) + DECISION_INTERVAL * speed + NEAR

@@ -1,4 +1,4 @@
-"""A trained model that is asked about sessions while they are played."""
+"""Predictions of a trained model in a session in progress."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ from dorothie_gym.maps import Town
 from dorothie_gym.recording import Task
 
 _TOWNS: Final = 4
-"""Towns that a model is kept ready for."""
+"""Largest number of towns that a model is kept ready for."""
 
 _TEXTS: Final = 1 << 16
 
 
 class BenchmarkModel:
-    """A trained model.
+    """Trained benchmark model.
 
     Args:
-        description: what it was made with.
-        folder: where its weights are.
+        description: its model card.
+        folder: folder of its weights.
 
     Raises:
-        ValueError: the weights are not those described, or the encoder of texts is not here or another.
+        ValueError: the weights or the text encoder differ from the model card, or are missing.
     """
 
     def __init__(self, description: ModelCard, folder: Path):
@@ -50,7 +50,7 @@ class BenchmarkModel:
         self.row = find_row(description.row)
         self.config = TOTOConfig.from_json(description.config)
         if not self.weights.is_file() or sha256_of(self.weights) != description.weights_sha256:
-            raise ValueError(f"{self.weights}: is missing or not what was trained; train the model again")
+            raise ValueError(f"{self.weights}: is missing, or differs from the trained weights; train the model again")
         encoder = text_encoder(description.encoder)
         if encoder.id != description.encoder_id:
             raise ValueError(f"{folder}: was trained with the encoder {description.encoder_id}; here is {encoder.id}")
@@ -61,7 +61,7 @@ class BenchmarkModel:
     @classmethod
     @lru_cache(maxsize=8)
     def load(cls, path: Path) -> BenchmarkModel:
-        """Reads a model; once in a process.
+        """Reads a model, once in a process.
 
         Raises:
             ValueError: as above, or the description cannot be read.
@@ -73,7 +73,7 @@ class BenchmarkModel:
 
 
 class TownModel:
-    """A trained model in a town. The same history gives the same answer, whatever was asked before."""
+    """Trained model in a town. Equal histories give equal answers, in any order of calls."""
 
     def __init__(self, trained: BenchmarkModel, town: Town):
         self._trained = trained
@@ -83,13 +83,13 @@ class TownModel:
     def answer(
         self, history: History, task: Task, *, last: int = 1, allowed: Sequence[bool] | None = None
     ) -> Predicted:
-        """Returns what the model takes for true at the last point of a history (one point, B = 1).
+        """Returns the prediction at one of the last points of a history (B = 1).
 
         Args:
-            history: what is known; the point is the `last` event from the end that is one of the task.
+            history: the history, which contains the point.
             task: the task.
-            last: 1 for the last point.
-            allowed: (6,) which navigation actions it may be; None: all.
+            last: place of the point among those of the task, counted from the end; 1 for the last.
+            allowed: (6,) navigation actions that may be predicted; None for all.
         """
         columns = history.encoded.columns(self._graph)
         table = points(columns, task)
@@ -101,7 +101,7 @@ class TownModel:
             return model.predict(inputs, labels.task, mask)
 
     def _ready(self, columns: Columns) -> TOTO:
-        """The model, with the texts of the history."""
+        """Returns the model with the texts of the history."""
         trained = self._trained
         material = _LiveMaterial(columns, trained.encoder, trained.pairs)
         if self._model is None:
@@ -117,7 +117,7 @@ class TownModel:
 
 
 def _only(table: PointTable, row: int) -> PointTable:
-    """A table of one of its points."""
+    """Returns a table of one point of a table."""
     columns: dict[str, Any] = {
         name: value[row : row + 1] for name, value in vars(table).items() if isinstance(value, np.ndarray)
     }
@@ -125,21 +125,21 @@ def _only(table: PointTable, row: int) -> PointTable:
 
 
 class _LiveMaterial(Dataset):
-    """A history made ready, with what was learnt from the training sessions."""
+    """Dataset of a history, with the byte pairs of the training sessions."""
 
     def __init__(self, columns: Columns, encoder: TextEncoder, pairs: BytePairs | None):
         super().__init__(columns, encoder)
         self._pairs = pairs
 
     def byte_pairs(self, vocabulary: int) -> BytePairs:
-        """Returns the pieces that the model was trained with."""
+        """Returns the byte pairs that the model was trained with."""
         if self._pairs is None:
             raise ValueError("the model reads pieces of words, but its description has none; train it again")
         return self._pairs
 
 
 class _OneByOne:
-    """Encodes each text alone, once: beside others its vector would differ in the last digits."""
+    """Encodes each text alone, once: in a batch its vector would differ in the last digits."""
 
     def __init__(self, encoder: TextEncoder):
         self.name, self.id, self.dim = encoder.name, encoder.id, encoder.dim
@@ -154,7 +154,7 @@ class _OneByOne:
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """While this is on, sums come out the same on every machine's number of cores; small models are faster, too."""
+    """Limits torch to one thread: sums then do not depend on the number of cores, and small models are faster."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

@@ -1,4 +1,4 @@
-"""A Co-Wizard that does what a model of the benchmark tells: it understands, says and drives by the three tasks."""
+"""Co-Wizard that understands, speaks and drives by the predictions of a benchmark model."""
 
 from __future__ import annotations
 
@@ -36,24 +36,24 @@ from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.spaces import ActionDict, CoWizardAction, Motion, Physical, SpaceLimits, heard_acts
 
 _TOLD_WAYS: Final = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)
-"""Slot values whose words tell which way."""
+"""Slot values whose wording contains a direction."""
 
 _UNSAID: Final = Span("-", DialogueAct(DialogueMove.IRRELEVANT))
 _UNDONE: Final = Physical(action=PhysicalAction.STOP)
-"""What stands for the next act and the next action at a point; no point shows its own label."""
+"""Placeholders of the next act and the next action at a point; no point shows its own label."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BenchmarkPolicyState:
-    """What the policy remembers.
+    """State of the policy.
 
     Attributes:
-        seed: of all chance.
+        seed: seed of all random numbers.
         town: the map.
-        voice: what is still to be said.
-        count: decisions taken.
-        following: what has happened, None before the first observation.
-        watch: what has been decided upon.
+        voice: state of the own speech.
+        count: number of decisions so far.
+        following: tracker of the history, None before the first observation.
+        watch: state of the decision triggers.
     """
 
     seed: int
@@ -65,11 +65,11 @@ class BenchmarkPolicyState:
 
 
 class BenchmarkCoWizard(Policy[BenchmarkPolicyState]):
-    """Plays the Co-Wizard with a model that was trained on recorded points.
+    """Co-Wizard that acts on the predictions of a model trained on recorded points.
 
-    After each utterance of the participant it understands (UfN, where acts are not observed), answers (RfN) and drives
-    (NfD); before a junction without a turn it speaks and drives; when a hazard begins or ends, and where it would have
-    to stop for the place that was named last, it drives. Between decisions the car follows its lane.
+    After each utterance of the participant it predicts the act (UfN, unless acts are observed), answers (RfN) and
+    drives (NfD); before a junction without a planned turn it speaks and drives; when a hazard begins or ends, and where
+    it has to stop for the last-named place, it drives. Between decisions the car follows its lane.
     """
 
     def __init__(self, trained: BenchmarkModel, limits: SpaceLimits | None = None) -> None:
@@ -83,14 +83,14 @@ class BenchmarkCoWizard(Policy[BenchmarkPolicyState]):
         self._trained = trained
 
     def initial_state(self, seed: int, town: Town) -> BenchmarkPolicyState:
-        """A Co-Wizard before its first observation."""
+        """Returns the state before the first observation."""
         style = draw_style(Role.CO_WIZARD, np.random.default_rng((seed, 0)))
         return BenchmarkPolicyState(seed=seed, town=town, voice=SpeechState(role=Role.CO_WIZARD, style=style))
 
     def step(
         self, observation: Mapping[str, Any], state: BenchmarkPolicyState
     ) -> tuple[ActionDict, BenchmarkPolicyState]:
-        """Listens; where there is an occasion, lets the model decide; says what is to be said."""
+        """Updates the history, queries the model if a decision is due, and returns utterance and action."""
         town, count = state.town, state.count + 1
         view = CoWizardView.read(observation, town)
         before = state.following or HistoryTracker(history=History.begin(observation, town, self._trained.config))
@@ -118,14 +118,14 @@ def _last_move(voice: SpeechState) -> DialogueMove | None:
 
 
 def _way_to_place(history: History, view: CoWizardView, town: Town) -> float | None:
-    """How far the place that was named last is along the way [m]; None where it is not near, or not on the map."""
+    """Returns the distance along the way to the last-named place [m]; None if it is not near, or not on the map."""
     name = history.landmark
     named = next((landmark for landmark in view.landmarks if landmark.name.label == name), None)
     return None if named is None else default_lane_distance(town, view.here, named.place, IN_VIEW)
 
 
 def _understood(model: TownModel, history: History, heard: tuple[Span, ...]) -> tuple[Span, ...]:
-    """The spans of an utterance, which is the last of the history, with the acts that the model understands."""
+    """Returns the spans of the participant's last utterance with the acts that the model predicts."""
     known: tuple[Span, ...] = ()
     for k, span in enumerate(heard):
         predicted = model.answer(history, Task.UFN, last=len(heard) - k)
@@ -135,21 +135,21 @@ def _understood(model: TownModel, history: History, heard: tuple[Span, ...]) -> 
 
 
 def _answer(model: TownModel, history: History, voice: SpeechState, deed: FeasibleAction) -> SpeechState:
-    """What is said next: an act as the model tells, worded by the grammar."""
+    """Returns the speech state with the predicted act, worded by the grammar."""
     act = _act(model.answer(history.said(Role.CO_WIZARD, (_UNSAID,), history.frame + FRAMES_PER_TENTH), Task.RFN))
     told = deed.direction if any(value in _TOLD_WAYS for value in act.slots) else None
     return voice.plan(remark(act.move, *act.ordered, wording=Wording(direction=told)))
 
 
 def _drive(model: TownModel, history: History, view: CoWizardView, town: Town, waits: bool) -> FeasibleAction:
-    """What is done next: the likeliest action of those that can be carried out.
+    """Returns the likeliest feasible action.
 
     Args:
-        model: that is asked.
-        history: what is known.
-        view: what is observed.
+        model: the model.
+        history: the history.
+        view: the observation.
         town: the map.
-        waits: whether the car waits for a turn: nothing would come of stopping.
+        waits: whether the car waits for a turn, where stopping has no effect.
     """
     asked = history.done(_UNDONE, history.frame + FRAMES_PER_TENTH)
     allowed = [not waits or action is not PhysicalAction.STOP for action in NAVIGATION_ACTIONS]

@@ -1,4 +1,4 @@
-"""The spans of an utterance of which only the words are heard, or the words and the acts."""
+"""Splitting of a heard utterance into spans, with or without known acts."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from dorothie_gym.ontology import DialogueAct, DialogueMove
 _CLAUSE_END: Final = re.compile(r"(?<=[,.?!]) ")
 
 _MOST: Final = 8
-"""Clauses of an utterance that are looked at; longer ones are parted among the first."""
+"""Largest number of clauses; the last one gets the rest of a longer utterance."""
 
 
 def spans_of(text: str, acts: Sequence[DialogueAct] | None, after: DialogueMove | None = None) -> tuple[Span, ...]:
     """Returns the spans of an utterance.
 
-    Where the acts are known, the words are parted at the ends of clauses so that the rules that guess acts from words
-    agree with them as far as can be; where they are not, those rules part the words and guess the acts.
+    If the acts are known, the words are split at ends of clauses so that the rule-based act classifier agrees
+    with them best; otherwise that classifier splits the words and predicts the acts.
 
     Args:
-        text: the words; blank where nothing was said.
-        acts: what they do, in order; None where that is not known.
-        after: move of what the listener said last, for the guess.
+        text: the words; blank for no utterance.
+        acts: the acts in order; None if they are not known.
+        after: move of the listener's last utterance, for the classifier.
     """
     if acts is None:
         return guess_spans(text, after)
@@ -44,14 +44,14 @@ def spans_of(text: str, acts: Sequence[DialogueAct] | None, after: DialogueMove 
 
 
 def _partings(clauses: Sequence[str], count: int) -> Iterator[tuple[str, ...]]:
-    """Yields every way to put clauses together to so many pieces, the first pieces as long as can be at first."""
+    """Yields every grouping of clauses into a number of pieces, those with long first pieces first."""
     for cuts in reversed(list(itertools.combinations(range(1, len(clauses)), count - 1))):
         ends = (0, *cuts, len(clauses))
         yield tuple(" ".join(clauses[start:end]) for start, end in itertools.pairwise(ends))
 
 
 def _fit(pieces: Sequence[str], acts: Sequence[DialogueAct]) -> tuple[int, int]:
-    """How many moves, and how many acts in whole, the rules guess as they are."""
+    """Returns how many moves, and how many slot sets, the classifier predicts correctly."""
     guessed = [_guess(piece) for piece in pieces]
     moves = sum(guess.move is act.move for guess, act in zip(guessed, acts, strict=True))
     return moves, sum(guess.slots == act.slots for guess, act in zip(guessed, acts, strict=True))

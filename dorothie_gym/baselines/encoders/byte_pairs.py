@@ -65,7 +65,7 @@ class BytePairs:
         return cls(tuple(merges))
 
     def __len__(self) -> int:
-        """How many ids there are, padding included."""
+        """Returns the number of ids, padding included."""
         return 1 + _BYTES + len(self.merges)
 
     @cached_property

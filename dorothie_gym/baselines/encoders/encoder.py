@@ -20,10 +20,10 @@ ItemT = TypeVar("ItemT", contravariant=True)
 
 
 class Encoder(Protocol[ItemT]):
-    """Turns texts, sounds or pictures into vectors of one length, the same for the same item always.
+    """Deterministic mapping of texts, sounds or images to vectors of one length.
 
     Attributes:
-        name: how a user calls it.
+        name: name for users.
         id: name, version and sizes, or a hash of the weights: equal ids, equal vectors. Part of the key of every cache
             and of every result.
         dim: length of a vector.
@@ -55,9 +55,9 @@ def text_table(encoder: TextEncoder, texts: Sequence[str], cache: Path | None = 
     """Returns the vectors of texts, float32 (n, dim), from the cache where they are in there.
 
     Args:
-        encoder: what makes them.
+        encoder: the encoder.
         texts: of a corpus, each once.
-        cache: folder to keep them in; None: they are made anew.
+        cache: folder to keep them in; None for no cache.
 
     Raises:
         OSError: the cache cannot be written.
@@ -75,7 +75,7 @@ def text_table(encoder: TextEncoder, texts: Sequence[str], cache: Path | None = 
 
 
 def table_key(encoder_id: str, texts: Sequence[str]) -> str:
-    """Returns the name under which a table is kept: a hash of the encoder's id and of all texts in their order."""
+    """Returns the cache key of a table: a hash of the encoder's id and of all texts in their order."""
     digest = hashlib.sha256(encoder_id.encode())
     for text in texts:
         part = text.encode("utf-8", "surrogatepass")
@@ -84,7 +84,7 @@ def table_key(encoder_id: str, texts: Sequence[str]) -> str:
 
 
 def _read(path: Path, shape: tuple[int, int]) -> Vectors | None:
-    """A kept table; None where the file is damaged, which is made anew then."""
+    """Returns a cached table; None if the file is damaged."""
     try:
         table = np.load(path, allow_pickle=False)
     except (ValueError, EOFError):
@@ -93,7 +93,7 @@ def _read(path: Path, shape: tuple[int, int]) -> Vectors | None:
 
 
 def _write(path: Path, table: Vectors) -> None:
-    """Writes whole or not at all; two processes may write the same at once."""
+    """Writes a table atomically; two processes may write the same one at once."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path, shared=True) as part, part.open("wb") as file:
         np.save(file, table, allow_pickle=False)
@@ -104,9 +104,9 @@ def _write(path: Path, table: Vectors) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class HashingEncoder:
-    """One or two words in a row, and letters in a row, each hashed to a place of the vector with a sign.
+    """Signed feature hashing of word unigrams and bigrams and of character n-grams.
 
-    Words tell what is said; letters make speech recognition's near misses lie close to what was said.
+    Words carry the content; letters place misrecognised words near the spoken ones.
 
     Attributes:
         dim: length of a vector, even: half for words, half for letters. 384 as MiniLM's by default.
@@ -121,7 +121,7 @@ class HashingEncoder:
 
     @property
     def id(self) -> str:
-        """Name, version and length."""
+        """Name, version and vector length."""
         return f"hashing-1-{self.dim}"
 
     def encode(self, texts: Sequence[str]) -> Vectors:

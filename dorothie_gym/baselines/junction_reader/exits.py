@@ -78,7 +78,7 @@ def _ways(graph: TownGraph, successors: list[list[int]], lane: int) -> tuple[lis
 
 
 def _turn(graph: TownGraph, successors: list[list[int]], lane: int, way: int) -> tuple[float, int]:
-    """Yaw from a lane's end to where the way leaves the junction, and the lane there."""
+    """Returns the change of yaw from a lane's end to the exit of the junction, and the lane after it."""
     for _ in range(_HOPS):
         if graph.junction[way] == 0 or len(successors[way]) != 1:
             break

@@ -60,10 +60,10 @@ def _spellings() -> tuple[tuple[str, str], ...]:
 # --- What happened last, in numbers: the moves, how long ago they were, and what the car did since -------------------
 
 MOVES: Final = 3
-"""Last moves that are told apart by how many came after."""
+"""Number of last moves with features of their own."""
 
 DECAYS: Final = (1.0, 4.0, 15.0)
-"""An age is told as what is left after it of something that decays this fast [s]."""
+"""Time constants of the exponential decays that encode an age [s]."""
 
 _WHO_AND_WHAT: Final = 2 * len(DialogueMove)
 
@@ -72,7 +72,7 @@ SIZE: Final = MOVES * _WHO_AND_WHAT + len(LABELS) + len(PhysicalAction) + 3 * le
 
 
 def recent(inputs: Inputs) -> Tensor:
-    """Returns what happened last before each of B points (B, SIZE): numbers from 0 to 1, zeros for what was not.
+    """Returns features of the most recent events before B points (B, SIZE), in 0..1; zeros for missing events.
 
     The last moves, each by whom and which; the slots of the last; the last physical action; how fresh the last move of
     each speaker and the last action are.
@@ -91,13 +91,13 @@ def recent(inputs: Inputs) -> Tensor:
 
 
 def _last_kind(kinds: Tensor, mask: Tensor, back: int, count: int) -> Tensor:
-    """Which of `count` kinds the last of a sequence is (B, count), or one before."""
+    """Returns the kind of an element counted from a sequence's end, one-hot (B, count); zeros for none."""
     place = mask.sum(1, keepdim=True) - back
     kind = kinds.gather(1, place.clamp(min=0))[:, 0].clamp(0, count - 1)
     return F.one_hot(kind, count).float() * (place >= 0)
 
 
 def _freshness(now: Tensor, times: Tensor, mask: Tensor) -> Tensor:
-    """How fresh the newest of a sequence is (B, 3), from 1, now, to 0."""
+    """Returns exponential decays of the age of a sequence's newest element (B, 3), 1 for now; zeros for none."""
     age = (now[:, None] - times).clamp(min=0.0).masked_fill(~mask, torch.inf).amin(1)
     return torch.stack([torch.exp(-age / decay) for decay in DECAYS], dim=-1)

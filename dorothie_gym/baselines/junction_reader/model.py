@@ -33,26 +33,26 @@ NEAR_ENOUGH: Final = 15.0
 """An exit is the labelled one within this angle [degrees] (paper, section 5, Evaluation)."""
 
 SLOT_THRESHOLD: Final = 0.3
-"""A slot value is told from this probability on: F1 is highest at half of what it then is (Lipton et al., 2014)."""
+"""Probability from which a slot value is predicted: F1 is maximal at half its optimum (Lipton et al., 2014)."""
 
 _RECENTLY: Final = 30.0
-"""Words are as old as this at most [s]."""
+"""Largest age of words; older ones count as this old [s]."""
 
 _SPANS: Final = 4
 _SAME_TIME: Final = 0.05
 _MEMORY: Final = (1, 2, 4, 8)
 _NAMED: Final = 3 + 2 * len(_MEMORY) + 2
-"""What is known of a slot value: who named it, in how many of the last moves of each it was, whether it is here."""
+"""Features of a slot value: who named it, presence in the last moves of each speaker, presence in the town."""
 
 _HIDDEN: Final = 32
 _SIDES: Final = 2
 _STATE: Final = 9
 _AT_PLACE: Final = 20.0
-"""How near the place that was named is, is told as what is left after this way of something that decays [m]."""
+"""Decay length of the exponential that encodes the distance to the last-named place [m]."""
 
 
 class JunctionReader(TOTO):
-    """TOTO's channels and encoder, with what it lacks.
+    """TOTO's channels and encoder with map exits, subwords and slot-wise scores.
 
     Time is told back from the point, and what happened last stands apart; the last words are read piece by piece, and
     what was understood of the current utterance already is marked; the exits of the next junction are tokens, and a
@@ -113,7 +113,7 @@ class JunctionReader(TOTO):
     lane_street: Tensor
 
     def take_words(self, texts: Sequence[str], pieces: Tensor) -> None:
-        """Puts other texts in the place of those that there are.
+        """Replaces the texts.
 
         Args:
             texts: (n) of them.
@@ -155,7 +155,7 @@ class JunctionReader(TOTO):
         return torch.where(labels.task == NFD, decision, act).mean()
 
     def predict(self, inputs: Inputs, task: Tensor, allowed: Tensor | None = None) -> Predicted:
-        """Returns what the model takes for true at B points; see `TOTO.predict`."""
+        """Returns the predictions at B points; see `TOTO.predict`."""
         last, exits, there, angles = self._look(inputs, task)
         move, values = self._act(inputs, task, last)
         scores, side, direction = self._decision(last)
@@ -168,7 +168,7 @@ class JunctionReader(TOTO):
         return Predicted(move.argmax(-1), values.sigmoid() > SLOT_THRESHOLD, action, allowed_angle(action, angle))
 
     def _look(self, inputs: Inputs, task: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """The readout (B, d), the exits' scores (B, X), which of them there are (B, X), their angles (B, X)."""
+        """Returns the readout (B, d), the scores (B, X), mask (B, X) and angles (B, X) of the exits."""
         exits, there, angles, distance = self._exits(inputs)
         channels = self._channels(inputs)
         _, here, now = channels[0]
@@ -187,7 +187,7 @@ class JunctionReader(TOTO):
         return last, scores, there, angles
 
     def _act(self, inputs: Inputs, task: Tensor, last: Tensor) -> tuple[Tensor, Tensor]:
-        """Scores of the moves (B, 15) and of the slot values (B, 69), for who speaks in the task."""
+        """Returns the scores of the moves (B, 15) and of the slot values (B, 69), for the speaker of the task."""
         named = self._named(inputs)  # (B, 69, n)
         words = self.texts(self._heard(inputs))  # (B, E)
         heard = self.direct(words).split((len(DialogueMove), len(LABELS)), dim=-1)
@@ -215,7 +215,7 @@ class JunctionReader(TOTO):
         masked = scores.masked_fill(~there, -1e4)
         return torch.where(known, F.cross_entropy(masked, which, reduction="none"), 0.0)
 
-    # --- what it is given beyond TOTO ---------------------------------------------------------------------------------
+    # --- inputs beyond TOTO's -----------------------------------------------------------------------------------------
 
     def _moves(self, inputs: Inputs) -> Tokens:
         tokens, mask, times = super()._moves(inputs)
@@ -242,7 +242,7 @@ class JunctionReader(TOTO):
         return tokens, there, angles, distance
 
     def _told_way(self, inputs: Inputs, sides: Tensor) -> Tensor:
-        """Whether the human's last words name the side of each exit (B, X, 3), whether any way, and their age.
+        """Returns whether the participant's last words name each exit's side, any side, and their age (B, X, 3).
 
         Args:
             inputs: of the points.
@@ -269,7 +269,7 @@ class JunctionReader(TOTO):
         return vectors
 
     def _wanted_place(self, inputs: Inputs) -> tuple[Tensor, Tensor]:
-        """Where the landmark is that was named last (B, 2) [m], and whether its place is known (B,)."""
+        """Returns the place of the last-named landmark (B, 2) [m], and whether it is known (B,)."""
         names = self.mentions[inputs["landmark_text"]] * inputs["landmark_mask"].unsqueeze(-1)  # (B, K, 69)
         moves = inputs["move_slots"].float() * inputs["move_mask"].unsqueeze(-1)  # (B, M, 69)
         said = torch.einsum("bmv,bkv->bmk", moves, names) > 0
@@ -280,7 +280,7 @@ class JunctionReader(TOTO):
         return place, best > 0
 
     def _understood(self, inputs: Inputs) -> tuple[Tensor, Tensor]:
-        """Which moves are earlier acts of the current utterance (B, M), and how many of its pieces they took (B,)."""
+        """Returns the mask of earlier acts of the current utterance (B, M), and the number of their pieces (B,)."""
         now = (inputs["time"][:, None] - inputs["move_time"]).abs() < _SAME_TIME
         spans = now & inputs["move_mask"] & (inputs["current_text"] >= 0)[:, None]
         spans = spans & (inputs["move_speaker"] == PARTICIPANT)
@@ -288,7 +288,7 @@ class JunctionReader(TOTO):
         return spans, (taken * spans).sum(1)
 
     def _words(self, inputs: Inputs) -> list[Tokens]:
-        """The pieces of the current utterance and of the last two, each told apart (B, P, d)."""
+        """Returns tokens of the pieces of the current utterance and of the last two (B, P, d)."""
         _, taken = self._understood(inputs)
         found = []
         for back in range(RECENT):
@@ -308,12 +308,12 @@ class JunctionReader(TOTO):
         return found
 
     def _heard(self, inputs: Inputs) -> Tensor:
-        """The text that matters most (B,): the current utterance, else the last that was said."""
+        """Returns the current utterance, or the last one if there is none (B,)."""
         last = _newest(inputs["utterance_text"], inputs["utterance_mask"])
         return torch.where(inputs["current_text"] >= 0, inputs["current_text"], last)
 
     def _named(self, inputs: Inputs) -> Tensor:
-        """What is known of each slot value (B, 69, n): who named it, how long ago, whether there is such a place."""
+        """Returns features of each slot value (B, 69, n): who named it, how long ago, whether the town has it."""
         mask = inputs["move_mask"]
         after = mask.sum(1, keepdim=True) - 1 - torch.arange(mask.shape[1], device=mask.device)
         slots = inputs["move_slots"].float() * mask.unsqueeze(-1)  # (B, M, 69)
@@ -328,7 +328,7 @@ class JunctionReader(TOTO):
         return torch.stack(parts, dim=-1)
 
     def _state(self, inputs: Inputs, there: Tensor, distance: Tensor) -> Tensor:
-        """Where the car stands, in numbers of about 1 (B, 9)."""
+        """Returns the state of the car in numbers of about 1 (B, 9)."""
         speed = _newest(inputs["window_speed"], inputs["window_mask"])
         ahead = inputs["values"][..., 0].masked_fill(~inputs["objects_mask"], METRES).amin(1)
         place, known = self._wanted_place(inputs)
@@ -347,7 +347,7 @@ def reader_config(config: TOTOConfig) -> TOTOConfig:
 
 
 def _newest(values: Tensor, mask: Tensor, back: int = 1) -> Tensor:
-    """The newest of each sequence (B,), or the one before; -1 (0 of reals) where there is none."""
+    """Returns the element at a place from each sequence's end (B,); -1 (0 of reals) for none."""
     place = mask.sum(1) - back
     empty: Any = 0.0 if values.is_floating_point() else -1
     return torch.where(place >= 0, values.gather(1, place.clamp(min=0)[:, None])[:, 0], empty)

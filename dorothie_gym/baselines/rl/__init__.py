@@ -1,4 +1,4 @@
-"""Reinforcement learning with stable-baselines3: training, evaluation, and weights that are no pickles."""
+"""Reinforcement learning with stable-baselines3: training, evaluation, and checkpoints without pickles."""
 
 from dorothie_gym.baselines.rl.checkpoint import load_model
 from dorothie_gym.baselines.rl.evaluation import EpisodeStatistics, evaluate_policy

@@ -1,4 +1,4 @@
-"""Behaviour cloning: a policy learns what the Co-Wizards of a corpus did, before it learns by itself."""
+"""Behaviour cloning of the Co-Wizards of a corpus, as a warm start of reinforcement learning."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ from dorothie_gym.rollout import watch_session
 from dorothie_gym.spaces import CoWizardAction, SpaceLimits
 
 NOTHING = int(NavigationAction.NOTHING)
-"""Doing nothing has this number everywhere."""
+"""Number of the action "nothing" in every action space."""
 
 LEARNING_RATE, BATCH = 1e-3, 64
 MOST_EPOCHS, PATIENCE = 60, 5
-"""It ends after so many passes, or when the held-out sessions have got no likelier for so many [passes]."""
+"""Largest number of passes, and passes without a better held-out likelihood after which cloning stops."""
 
 
 ReportProgress = Callable[[str, int, int], None]
-"""Is told what is being done, how much of it is done, and how much there is."""
+"""Callback with the name of the stage, the steps done and their total."""
 
 CRITIC_ALONE = 20_000
-"""So many steps the critic learns what a cloned actor is worth before that changes: else it would be led astray."""
+"""Steps in which only the critic learns: an untrained critic would spoil the cloned actor."""
 
 
 @dataclass(frozen=True, eq=False)
 class Demonstrations:
-    """Decisions of those who are watched.
+    """Recorded decisions to clone.
 
     Attributes:
-        observations: what the learner would have observed at each (n, m), float32.
-        masks: which actions were likely to be carried out (n, k), bool.
-        actions: what was done (n,), int64.
+        observations: the learner's observation at each decision (n, m), float32.
+        masks: actions likely to be carried out (n, k), bool.
+        actions: the actions taken (n,), int64.
     """
 
     observations: torch.Tensor
@@ -61,21 +61,21 @@ class Demonstrations:
         )  # fmt: skip
 
     def __len__(self) -> int:
-        """How many."""
+        """Returns the number of decisions."""
         return len(self.actions)
 
 
 @dataclass(frozen=True, kw_only=True)
 class CloningResult:
-    """What came of cloning.
+    """Result of behaviour cloning.
 
     Attributes:
-        lessons: decisions learned from.
+        lessons: number of training decisions.
         epochs: passes over them.
         losses: mean negative log-likelihood of the held-out decisions, before and after [nats].
-        agreement: share of the held-out decisions at which the policy's best action is what was done.
-        majority: the same of a policy that always does what is most often done.
-        deeds: as `agreement`, of those in which something was done.
+        agreement: share of held-out decisions at which the policy's best action is the recorded one.
+        majority: the same for a policy that always takes the most frequent action.
+        deeds: as `agreement`, over decisions other than "nothing".
     """
 
     lessons: int
@@ -87,19 +87,19 @@ class CloningResult:
 
 
 def silent(what: str, done: int, total: int) -> None:
-    """Tells nobody."""
+    """Ignores the progress."""
 
 
 def read_lessons(
     corpus: Path, fold: str, max_seconds: float = MAX_SECONDS, tell: ReportProgress = silent
 ) -> Demonstrations:  # fmt: skip
-    """Plays the sessions of a fold again, and watches.
+    """Replays the sessions of a fold and returns their decisions.
 
     Args:
         corpus: its folder.
         fold: of `Fold`.
         max_seconds: time limit of the environment that the driver is trained in [s].
-        tell: is told how far it is.
+        tell: callback for the progress.
 
     Raises:
         SessionError: the corpus cannot be read or played again, or has nothing in the fold.
@@ -127,7 +127,7 @@ def sessions_of(corpus: Path, fold: str, tell: ReportProgress = silent) -> Itera
 
 
 def lessons_of(session: Session, town: Town, max_seconds: float = MAX_SECONDS) -> list[Demonstration]:
-    """What there is to learn from a session."""
+    """Returns the decisions of a session."""
     apprentice, limits = DemonstrationRecorder(town, max_seconds), SpaceLimits.for_town(town)
     role = str(Role.CO_WIZARD)
     watched = (
@@ -140,14 +140,14 @@ def lessons_of(session: Session, town: Town, max_seconds: float = MAX_SECONDS) -
 def clone(
     model: Any, shown: Demonstrations, held_out: Demonstrations, seed: int, tell: ReportProgress = silent
 ) -> CloningResult:
-    """Makes what was done likely; of all passes, that is kept after which the held-out decisions are likeliest.
+    """Maximises the likelihood of decisions; keeps the pass with the highest held-out likelihood.
 
     Args:
         model: of stable-baselines3, PPO, MaskablePPO or A2C; its actor learns, its critic does not.
-        shown: what it learns from.
-        held_out: decisions of other sessions.
-        seed: of the order.
-        tell: is told how far it is.
+        shown: training decisions.
+        held_out: decisions of other sessions, for early stopping.
+        seed: seed of the order.
+        tell: callback for the progress.
     """
     policy, generator = model.policy, torch.Generator().manual_seed(seed)
     optimiser = torch.optim.Adam(policy.parameters(), lr=LEARNING_RATE)
@@ -178,7 +178,7 @@ def clone(
 
 
 class CriticWarmUp(BaseCallback):
-    """Keeps the actor as it was cloned for the first steps of a run (`CRITIC_ALONE`)."""
+    """Freezes the cloned actor during the first steps of a training (`CRITIC_ALONE`)."""
 
     def _on_step(self) -> bool:
         return True
@@ -188,7 +188,7 @@ class CriticWarmUp(BaseCallback):
 
 
 def hold_actor(policy: Any, steps: int) -> None:
-    """Lets the actor of a cloned policy learn only when `CRITIC_ALONE` steps have been done."""
+    """Freezes the actor of a cloned policy until `CRITIC_ALONE` steps are done."""
     for part in (policy.mlp_extractor.policy_net, policy.action_net):
         part.requires_grad_(steps > CRITIC_ALONE)
 
@@ -201,7 +201,7 @@ def _distribution(policy: Any, lessons: Demonstrations, rows: torch.Tensor) -> A
 
 
 def _surprise(policy: Any, lessons: Demonstrations, rows: torch.Tensor) -> torch.Tensor:
-    """Mean negative log-likelihood of what was done [nats]."""
+    """Returns the mean negative log-likelihood of the recorded actions [nats]."""
     likely: torch.Tensor = _distribution(policy, lessons, rows).log_prob(lessons.actions[rows])
     return -likely.mean()
 

@@ -1,4 +1,4 @@
-"""Models on disk: tensors in safetensors, everything else in JSON. stable-baselines3's own files hold pickles."""
+"""Checkpoints of stable-baselines3 models without pickles: tensors in safetensors, everything else in JSON."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ FORMAT = 1
 
 
 def make_model(settings: TrainingSettings, env: Any, *, log: Path | None = None) -> Any:
-    """A model that has learned nothing yet.
+    """Returns an untrained model.
 
     Args:
-        settings: what is trained.
+        settings: settings of the training.
         env: an environment, or a vector of them.
         log: folder for TensorBoard, or None.
 
@@ -55,13 +55,13 @@ def make_model(settings: TrainingSettings, env: Any, *, log: Path | None = None)
 
 
 class LinearSchedule:
-    """A learning rate that falls in a line."""
+    """Linearly falling learning rate."""
 
     def __init__(self, first: float, last: float) -> None:
         self._first, self._last = first, last
 
     def __call__(self, remaining: float) -> float:
-        """The rate where this share of all steps is still to come."""
+        """Returns the rate for a share of remaining steps."""
         return self._last + (self._first - self._last) * remaining
 
 
@@ -70,13 +70,13 @@ def save_model(
 ) -> None:  # fmt: skip
     """Writes a model with the state of its optimisers into a folder; an older one stays whole until it is replaced.
 
-    What an algorithm has in its replay buffer is not kept.
+    Replay buffers are not saved.
 
     Args:
         model: of stable-baselines3.
-        settings: what it was trained with; has `as_json`.
-        folder: where the two files go.
-        seconds: for which it was trained [s].
+        settings: settings of the training; has `as_json`.
+        folder: folder of the two files.
+        seconds: duration of the training [s].
         more: further fields of the description.
     """
     tensors: dict[str, torch.Tensor] = {}
@@ -107,7 +107,7 @@ def save_model(
 
 
 def read_description(folder: Path) -> dict[str, Any]:
-    """What `model.json` in a folder says.
+    """Returns the content of `model.json` in a folder.
 
     Raises:
         ModelFileError: it is missing, or not as it must be.
@@ -116,7 +116,7 @@ def read_description(folder: Path) -> dict[str, Any]:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise ModelFileError(f"{path}: there is no model; `dorothie-gym train-rl --out {folder}` makes one") from None
+        raise ModelFileError(f"{path}: does not exist; `dorothie-gym train-rl --out {folder}` makes one") from None
     except json.JSONDecodeError as error:
         raise ModelFileError(f"{path}, line {error.lineno}: {error.msg}") from None
     if not isinstance(found, dict) or found.get("format") != FORMAT:
@@ -125,7 +125,7 @@ def read_description(folder: Path) -> dict[str, Any]:
 
 
 def restore(model: Any, folder: Path) -> None:
-    """Gives a model the weights and optimisers that were saved in a folder, and its count of steps.
+    """Restores weights, optimisers and step count of a model from a folder.
 
     Raises:
         ModelFileError: the files are missing or damaged, or of a model with other layers.
@@ -153,10 +153,10 @@ def restore(model: Any, folder: Path) -> None:
 
 
 def load_model(folder: str | Path) -> tuple[Any, TrainingSettings]:
-    """A trained model and what it was trained with.
+    """Returns a trained model and the settings of its training.
 
     Args:
-        folder: of `train-rl`, or `model.json` or `model.safetensors` in it.
+        folder: folder of `train-rl`, or `model.json` or `model.safetensors` in it.
 
     Raises:
         ModelFileError: the files are missing or damaged.
@@ -172,7 +172,7 @@ def load_model(folder: str | Path) -> tuple[Any, TrainingSettings]:
 
 
 def _for_one(settings: TrainingSettings) -> TrainingSettings:
-    """The same for a single environment, which fills no large batches: stable-baselines3 would warn."""
+    """Returns the settings for a single environment, with a batch size that it can fill."""
     parameters = dict(settings.parameters)
     if {"n_steps", "batch_size"} <= set(parameters):
         parameters["batch_size"] = math.gcd(parameters["n_steps"], parameters["batch_size"])
@@ -180,7 +180,7 @@ def _for_one(settings: TrainingSettings) -> TrainingSettings:
 
 
 def _variables(model: Any) -> Iterator[tuple[str, torch.Tensor]]:
-    """Tensors of an algorithm that are in no network (SAC: the logarithm of its temperature)."""
+    """Yields tensors of an algorithm outside its networks (SAC: the logarithm of its temperature)."""
     for name in model._get_torch_save_params()[1]:
         value = getattr(model, name)
         if value is not None:

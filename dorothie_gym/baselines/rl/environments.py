@@ -57,19 +57,19 @@ class Squashed(gym.ObservationWrapper[NDArray[np.float32], Any, Any]):
         self.observation_space = spaces.Box(-1.0, 1.0, shape, dtype=np.float32)
 
     def observation(self, observation: Any) -> NDArray[np.float32]:
-        """The squashed vector."""
+        """Returns the squashed vector."""
         values = np.asarray(observation["observation"], dtype=np.float64)
         squashed = np.sign(values) * np.log1p(np.abs(values)) / math.log1p(REACH)
         return np.clip(squashed, -1.0, 1.0).astype(np.float32)
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """Of the environment inside, see `FlattenAction`."""
+        """Returns the mask of the wrapped environment, see `FlattenAction`."""
         masks: NDArray[np.bool_] = self.env.get_wrapper_attr("action_masks")()
         return masks
 
 
 def masks_of(env: gym.Env[Any, Any]) -> NDArray[np.bool_] | None:
-    """Which actions an environment would carry out now; None where it does not tell."""
+    """Returns the action mask of an environment; None if it has none."""
     if not env.has_wrapper_attr("action_masks"):
         return None
     masks: NDArray[np.bool_] = env.get_wrapper_attr("action_masks")()
@@ -110,11 +110,11 @@ def shared_out(make: MakeEnv, environments: int, workers: int, ray: str | None =
 
 
 class EnvFactory:
-    """Makes one environment; can be sent to another process."""
+    """Picklable factory of an environment."""
 
     def __init__(self, name: str, settings: Mapping[str, Any]) -> None:
         self._name, self._settings = name, dict(settings)
 
     def __call__(self) -> gym.Env[Any, Any]:
-        """A new environment."""
+        """Returns a new environment."""
         return make_env(self._name, self._settings)

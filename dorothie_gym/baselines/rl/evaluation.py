@@ -24,18 +24,18 @@ SEEDS_FROM = 1_000_000
 """Seeds of evaluations begin here; training draws others."""
 
 AT_ONCE = 8
-"""Episodes that are played at once: networks are faster with several observations."""
+"""Episodes played at once: networks are faster on batches."""
 
 Z = 1.96
 """Quantile of the normal distribution for an interval of 95 %."""
 
 Act = Callable[[NDArray[Any], NDArray[np.bool_] | None], Sequence[Any]]
-"""Chooses actions for observations (n, ...), and masks (n, m) where environments tell them."""
+"""Function from observations (n, ...) and masks (n, m), if environments have them, to actions."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class EpisodeStatistics:
-    """What came of episodes.
+    """Statistics of episodes.
 
     Attributes:
         success: share of episodes that succeeded.
@@ -43,7 +43,7 @@ class EpisodeStatistics:
         high: upper end.
         reward: mean sum of rewards.
         length: mean number of steps.
-        episodes: how many were played.
+        episodes: number of episodes.
     """
 
     success: float
@@ -61,7 +61,7 @@ def evaluate_policy(
 
     Args:
         make: makes an environment.
-        act: the policy.
+        act: policy.
         episodes: how many.
         seed: of the first.
     """
@@ -96,7 +96,7 @@ def evaluate_policy(
 
 
 def act_with(model: Any, *, masked: bool) -> Act:
-    """Acts as a model of stable-baselines3 does when it does not explore."""
+    """Returns the greedy policy of a stable-baselines3 model."""
 
     def act(observations: NDArray[Any], masks: NDArray[np.bool_] | None) -> Sequence[Any]:
         more = {"action_masks": masks} if masked and masks is not None else {}
@@ -107,7 +107,7 @@ def act_with(model: Any, *, masked: bool) -> Act:
 
 
 def wilson(successes: int, trials: int) -> tuple[float, float]:
-    """Interval of 95 % of a share (Wilson 1927, JASA 22, 209-212)."""
+    """Returns the 95 % interval of a share (Wilson 1927, JASA 22, 209-212)."""
     share = successes / trials
     middle = share + Z**2 / (2 * trials)
     half = Z * math.sqrt(share * (1 - share) / trials + Z**2 / (4 * trials**2))
@@ -119,7 +119,7 @@ def wilson(successes: int, trials: int) -> tuple[float, float]:
 
 
 def make_player(path: Path, limits: SpaceLimits) -> NavigationPolicy:
-    """A Co-Wizard who drives as a model does when it does not explore.
+    """Returns a Co-Wizard that drives by the greedy policy of a model.
 
     Args:
         path: folder of the model, or a file in it.
@@ -127,7 +127,7 @@ def make_player(path: Path, limits: SpaceLimits) -> NavigationPolicy:
 
     Raises:
         ModelFileError: the files are missing or damaged.
-        SettingsError: the model did not learn in `Navigation-v0`.
+        SettingsError: the model was trained in another environment than `Navigation-v0`.
     """
     model, settings = load_model(path)
     if settings.env != NAVIGATION:
@@ -137,12 +137,12 @@ def make_player(path: Path, limits: SpaceLimits) -> NavigationPolicy:
 
 
 class Chooser:
-    """Chooses what a model finds best."""
+    """Greedy policy of a model in `Navigation-v0`."""
 
     def __init__(self, model: Any, *, masked: bool) -> None:
         self._model, self._masked = model, masked
 
     def __call__(self, observation: Vector, mask: NDArray[np.bool_]) -> int:
-        """One of the actions of `Navigation-v0`; masked algorithms keep to the mask (18,)."""
+        """Returns an action of `Navigation-v0`; masked algorithms respect the mask (18,)."""
         more = {"action_masks": mask} if self._masked else {}
         return int(self._model.predict(observation, deterministic=True, **more)[0])

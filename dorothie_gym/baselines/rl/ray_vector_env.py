@@ -83,7 +83,7 @@ class RayVecEnv(SharedVecEnv):
 
 
 class _Actor:
-    """What a machine of the cluster holds: some environments."""
+    """Ray actor that holds some environments."""
 
     def __init__(self, make: MakeEnv, count: int) -> None:
         self._vector = DummyVecEnv([make] * count)
@@ -94,13 +94,13 @@ class _Actor:
 
 
 def _begins_all(sent: Sent) -> bool:
-    """Whether nothing is left of the steps before: every environment begins anew with a seed."""
+    """Returns whether a command resets every environment with a seed, which makes earlier commands irrelevant."""
     command, arguments = sent
     return command == "reset" and None not in arguments[0]
 
 
 def _changes(sent: Sent) -> bool:
-    """Whether an environment may be another one after a command."""
+    """Returns whether a command can change an environment."""
     command, arguments = sent
     asked = arguments[0] if command == "some" else command
     if asked == "env_method":

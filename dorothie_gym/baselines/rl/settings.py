@@ -1,4 +1,4 @@
-"""What is trained, how and for how long; the defaults that were tuned are in data files."""
+"""Settings of reinforcement learning; tuned defaults are in data files."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ ALGORITHMS: Mapping[str, tuple[str, str]] = {
 """Algorithms by name: the package and the class."""
 
 CLONING = ("ppo", "maskable_ppo", "a2c")
-"""Algorithms whose policies can begin with what the Co-Wizards of a corpus did."""
+"""Algorithms that support a warm start by behaviour cloning."""
 
 NAVIGATION = "dorothie_gym/Navigation-v0"
-"""Id of the environment whose drivers can play the Co-Wizard."""
+"""Id of the environment whose policies can play the Co-Wizard."""
 
 DEFAULT = "default"
-"""Entry of a data file for environments that have none of their own."""
+"""Entry of a data file for environments without an own one."""
 
 FINAL_RATE = "final_learning_rate"
-"""Parameter of ours: the learning rate falls in a line from `learning_rate` to this."""
+"""Additional parameter: the learning rate falls linearly from `learning_rate` to this."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,14 +42,14 @@ class TrainingSettings:
         env: id of the environment.
         env_settings: arguments of the environment.
         steps: of all environments together.
-        environments: how many play at once.
+        environments: number of parallel environments.
         workers: processes that step them; 0 steps them in the process that learns.
         seed: of networks, environments and exploration.
         evaluate_every: steps between evaluations.
         episodes: of an evaluation.
         network: widths of the hidden layers.
         parameters: of the algorithm, as stable-baselines3 names them; see `FINAL_RATE`.
-        warm_start: folder of a corpus whose Co-Wizards' driving is learned first; None for nothing.
+        warm_start: folder of a corpus whose Co-Wizards are cloned first; None for none.
     """
 
     algorithm: str
@@ -84,7 +84,7 @@ class TrainingSettings:
 
     @property
     def masked(self) -> bool:
-        """Whether the algorithm keeps to the mask of actions."""
+        """Whether the algorithm respects the action mask."""
         return self.algorithm == "maskable_ppo"
 
     def as_json(self) -> dict[str, Any]:
@@ -93,7 +93,7 @@ class TrainingSettings:
 
 
 def tuned_settings(algorithm: str, env: str, **changes: Any) -> TrainingSettings:
-    """The settings that were tuned for an algorithm and an environment, with changes.
+    """Returns the tuned settings of an algorithm and an environment, with changes.
 
     Args:
         algorithm: one of `ALGORITHMS`.

@@ -1,4 +1,4 @@
-"""How fast training goes, and what its time goes into."""
+"""Training throughput, and the shares of its time."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from dorothie_gym.errors import SettingsError
 from dorothie_gym.policies.navigation.instructor import Instructor
 
 TARGET = 1000.0
-"""Environment steps a second end to end that training is to reach on two cores."""
+"""Target of environment steps per second, end to end, on two cores."""
 
 SHARES = ("environment", "partners", "policy", "learner")
-"""What the time goes into: physics and observations; the scripted others; choosing actions; learning."""
+"""Shares of the time: physics and observations; scripted partners; action selection; learning."""
 
 
 def measure(
@@ -45,13 +45,13 @@ def measure(
         workers: processes for the second run; None for one per core, 0 leaves it out.
         steps: of a run, after a first rollout that is not counted.
         seed: of all.
-        progress: is told what is being done.
+        progress: called with the name of each stage and the share done.
 
     Raises:
-        SettingsError: nothing can be trained with these.
+        SettingsError: an argument is invalid.
     """
     if algorithm not in ("ppo", "maskable_ppo", "a2c"):
-        raise SettingsError(f"algorithm is {algorithm!r}; shares are told of ppo, maskable_ppo and a2c")
+        raise SettingsError(f"algorithm is {algorithm!r}; it must be ppo, maskable_ppo or a2c")
     settings = tuned_settings(algorithm, env, environments=environments, seed=seed, workers=0)
     progress("one process", 0.0)
     alone = _run(settings, steps)
@@ -108,7 +108,7 @@ def _run(settings: TrainingSettings, steps: int) -> dict[str, float]:
 
 @contextmanager
 def _timed(holder: Any, name: str) -> Iterator[list[float]]:
-    """Adds up the time that a method takes while this lasts; yields a list of one number [s]."""
+    """Measures the time spent in a method; yields a list with the running total [s]."""
     seconds, method = [0.0], getattr(holder, name)
     own = name in vars(holder)
 

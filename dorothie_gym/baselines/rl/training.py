@@ -1,4 +1,4 @@
-"""A training run in a folder: it evaluates, saves and draws as it goes, and goes on where it was stopped."""
+"""Resumable training in a folder, with evaluations, checkpoints and a learning curve."""
 
 from __future__ import annotations
 
@@ -36,38 +36,38 @@ PROGRESS, CURVE, BEST, CLONED = "progress.jsonl", "curve.png", "best", "cloned.j
 came of cloning."""
 
 LIVE = ("steps", "evaluate_every", "episodes", "workers")
-"""Settings in which a run that goes on may differ from how it began."""
+"""Settings that may change when a training is resumed."""
 
 LOGGED_STEPS, LOGGED_EPISODES = 1024, 4
-"""TensorBoard is told of training about as often: after so many steps, or so many episodes."""
+"""Approximate interval of TensorBoard records [steps, episodes]."""
 
 Evaluation = TypeVar("Evaluation")
 OnProgress = Callable[[int, int, "Evaluation | None"], None]
-"""Is told the steps done, those there will be, and the last evaluation."""
+"""Callback with the steps done, their total, and a new evaluation if there is one."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrainingEvaluation:
-    """An evaluation: after how many steps, and after how many seconds of training [s]."""
+    """Evaluation after a number of steps and a duration of training [s]."""
 
     steps: int
     seconds: float
     outcome: EpisodeStatistics
 
     def as_json(self) -> dict[str, Any]:
-        """In JSON types."""
+        """Returns the evaluation in JSON types."""
         return {"steps": self.steps, "seconds": self.seconds, **asdict(self.outcome)}
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrainingResult(Generic[Evaluation]):
-    """What came of a run.
+    """Result of a training.
 
     Attributes:
-        folder: where all is.
+        folder: folder of the training.
         rows: evaluations, in order.
-        steps: done and saved, with those of earlier calls.
-        seconds: of training that they took, evaluations left out [s].
+        steps: number of steps, with those before the resumption.
+        seconds: duration of the training without evaluations [s].
         finished: whether all steps were done.
     """
 
@@ -79,12 +79,12 @@ class TrainingResult(Generic[Evaluation]):
 
 
 def best_of(rows: Sequence[TrainingEvaluation]) -> TrainingEvaluation | None:
-    """The evaluation with most successes; of equal ones that with the highest reward."""
+    """Returns the evaluation with the highest success rate; of equal ones that with the highest reward."""
     return max(rows, key=lambda row: (row.outcome.success, row.outcome.reward), default=None)
 
 
 class Training:
-    """A run; `go` trains until all steps are done or Ctrl-C is pressed."""
+    """Training; `go` trains until all steps are done or Ctrl-C is pressed."""
 
     def __init__(
         self,
@@ -94,17 +94,17 @@ class Training:
         ray: str | None = None,
         tell: ReportProgress = silent,
     ) -> None:
-        """Prepares a run, or takes up one that is in the folder.
+        """Prepares a training, or resumes the one in the folder.
 
         Args:
-            settings: what is trained.
-            folder: where all is written.
-            watch: is told how far it is.
+            settings: settings of the training.
+            folder: output folder.
+            watch: callback for the progress.
             ray: address of a Ray cluster that steps the environments; None: this machine does.
-            tell: is told how far a warm start is.
+            tell: callback for the progress of a warm start.
 
         Raises:
-            SettingsError: the folder has a run with other settings, or nothing can be trained with these.
+            SettingsError: the folder holds a training with other settings, or the settings are invalid.
             ProcessError: Ray is not installed, or there is no cluster at the address.
             SessionError: the corpus of the warm start cannot be read or played again.
             ModelFileError: the run in the folder is damaged.
@@ -137,7 +137,7 @@ class Training:
         """Trains.
 
         Returns:
-            What came of it, also where Ctrl-C came between; then everything so far is in the folder.
+            The result; after Ctrl-C that of the steps so far, which are saved in the folder.
         """
         settings, model = self.settings, self.model
         left = settings.steps - int(model.num_timesteps)
@@ -162,7 +162,7 @@ class Training:
         )  # fmt: skip
 
     def _learn_from(self, corpus: Path) -> None:
-        """Begins with what the Co-Wizards of a corpus did."""
+        """Clones the Co-Wizards of a corpus."""
         since = time.perf_counter()
         max_seconds = self.settings.env_settings.get("max_seconds", MAX_SECONDS)
         shown, held_out = (read_lessons(corpus, fold, max_seconds, self._tell) for fold in (Fold.TRAIN, Fold.VAL))
@@ -171,7 +171,7 @@ class Training:
         (self.folder / CLONED).write_text(json.dumps(asdict(self.cloned), indent=1) + "\n", encoding="utf-8")
 
     def evaluate(self) -> None:
-        """Plays the evaluation's episodes, and saves the model with what came of them."""
+        """Plays the episodes of an evaluation, and saves the model and the result."""
         settings = self.settings
         act = act_with(self.model, masked=settings.masked)
         outcome = evaluate_policy(EnvFactory(settings.env, settings.env_settings), act, settings.episodes, SEEDS_FROM)
@@ -189,7 +189,7 @@ class Training:
         self._watch(row.steps, settings.steps, row)
 
     def note(self, seconds: float, steps: int) -> None:
-        """Counts time of training [s], and tells how far it is."""
+        """Adds time of training [s], and reports the progress."""
         self.seconds += seconds
         self._watch(steps, self.settings.steps, None)
 
@@ -247,7 +247,7 @@ def check_same(wanted: Any, begun: Any, folder: Path) -> None:
 
 
 def _log_interval(model: Any) -> int:
-    """After how many rollouts TensorBoard is told of rewards and losses; of episodes where there are no rollouts."""
+    """Returns the interval of TensorBoard records in rollouts, or in episodes for off-policy algorithms."""
     if not isinstance(model, OnPolicyAlgorithm):
         return LOGGED_EPISODES
     return max(LOGGED_STEPS // (model.n_steps * model.n_envs), 1)

@@ -20,7 +20,7 @@ MakeEnv = Callable[[], gym.Env[Any, Any]]
 class SharedVecEnv(VecEnv, ABC):
     """stable-baselines3's interface to environments that workers step, each a few of them.
 
-    What happens depends on the seeds and actions only, not on the number of workers. A worker does what it is sent by
+    Results depend on seeds and actions only, not on the number of workers. A worker executes commands with
     `carry_out`, one command after another.
     """
 
@@ -42,7 +42,7 @@ class SharedVecEnv(VecEnv, ABC):
 
     @abstractmethod
     def _receive(self, worker: int) -> tuple[bool, Any]:
-        """Whether a worker carried out what it was sent, and its answer, or else what went wrong."""
+        """Returns whether a worker's command succeeded, and its answer or error."""
 
     @abstractmethod
     def _end(self) -> None:
@@ -69,7 +69,7 @@ class SharedVecEnv(VecEnv, ABC):
         return [by_number[k] for k in numbers]
 
     def _answers(self, workers: Iterable[int]) -> list[Any]:
-        """What workers answer; all of them are heard before it is told that one failed."""
+        """Returns the answers of workers; waits for all before it raises the error of one."""
         received = [self._receive(worker) for worker in workers]
         for done, answer in received:
             if not done:
@@ -89,12 +89,12 @@ class SharedVecEnv(VecEnv, ABC):
         return np.concatenate([observations for observations, _ in answers])
 
     def step_async(self, actions: Any) -> None:
-        """Sends the actions out."""
+        """Sends the actions to the workers."""
         for worker, share in enumerate(self._shares):
             self._send(worker, "step", (actions[share.start : share.stop],))
 
     def step_wait(self) -> Any:
-        """Waits for what came of them."""
+        """Waits for the results of a step."""
         answers = self._answers(range(len(self._shares)))
         observations, rewards, dones, infos = zip(*answers, strict=True)
         told = [info for part in infos for info in part]
@@ -107,7 +107,7 @@ class SharedVecEnv(VecEnv, ABC):
             self._end()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute of some environments."""
+        """Returns an attribute of some environments."""
         return self._ask_some(indices, "get_attr", attr_name)
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
@@ -119,11 +119,11 @@ class SharedVecEnv(VecEnv, ABC):
         return self._ask_some(indices, "env_method", method_name, *arguments, **named)
 
     def has_attr(self, attr_name: str) -> bool:
-        """Whether the environments have an attribute."""
+        """Returns whether the environments have an attribute."""
         return all(self._ask("has_attr", attr_name))
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """Whether some environments are wrapped so."""
+        """Returns whether some environments have a wrapper."""
         return self._ask_some(indices, "env_is_wrapped", wrapper_class)
 
     def get_images(self) -> list[Any]:
@@ -141,7 +141,7 @@ def carry_out(vector: DummyVecEnv, command: str, arguments: tuple[Any, ...]) -> 
     """Does what a worker is sent; returns whether it could be done, and the answer, or else what went wrong."""
     try:
         return True, _done(vector, command, arguments)
-    except Exception as error:  # whatever it is, the caller is told
+    except Exception as error:  # of any type: the caller raises it
         return False, f"{type(error).__name__}: {error}"
 
 
@@ -212,7 +212,7 @@ class WorkerVecEnv(SharedVecEnv):
 
 
 def _serve(connection: Connection, make: MakeEnv, count: int) -> None:
-    """What a process does."""
+    """Serves commands in a worker process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the caller decides what it means
     vector = DummyVecEnv([make] * count)
     try:

@@ -1,4 +1,4 @@
-"""The Ad-Wizard's seat: the tricks of the scripted one, to be played when and where it likes."""
+"""Interface of the Ad-Wizard: the exceptions of the scripted policy, at freely chosen times."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from dorothie_gym.policies.observation_parser import SeenSubgoal, place_on_path,
 from dorothie_gym.spaces import AdWizardAction, LanePosition, PropColumn
 
 NEAR, FARTHER = 60.0, 100.0
-"""How far ahead of the car a roadblock is placed, and a crowd [m]."""
+"""Distance ahead of the car of a roadblock, and of spawned actors [m]."""
 
 CROWD, EXTENT = 3, 25
-"""How many appear at once, and half the side of the square that they appear in [m]."""
+"""Number of actors spawned at once, and half the side of their square [m]."""
 
 
 class AdWizardTrick(enum.IntEnum):
-    """What the Ad-Wizard can do."""
+    """Actions of the Ad-Wizard."""
 
     NOTHING = 0
     FOG = 1
     RAIN = 2
     NIGHT = 3
     CLEAR = 4
-    """Takes the fog away."""
+    """Removes the fog."""
     ROADBLOCK = 5
     UNBLOCK = 6
-    """Takes away the oldest prop."""
+    """Removes the oldest prop."""
     BLUR = 7
     NO_GPS = 8
     NO_VIEW = 9
@@ -70,12 +70,12 @@ _KINDS = [
         ExceptionKind.DELETE_PROP, *(ExceptionKind.SENSOR_FAULT for _ in _FAULTS), *_CROWDS.values(), *_TASKS.values(),
     )
 ]  # fmt: skip
-"""Of what kind each caper is."""
+"""Kind of exception of each action."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class AdWizardMemory:
-    """What the Ad-Wizard remembers: the others' last remarks, and when it played its last trick [s]."""
+    """Memory of the Ad-Wizard: the others' last utterances, and the time of its last exception [s]."""
 
     participant: HeardRemark | None = None
     co_wizard: HeardRemark | None = None
@@ -92,11 +92,11 @@ class AdWizardInterface(RoleInterface[AdWizardMemory]):
     own_size: ClassVar[int] = 2
 
     def begin(self) -> AdWizardMemory:
-        """Nothing has happened."""
+        """Returns an empty memory."""
         return AdWizardMemory()
 
     def notice(self, observation: Mapping[str, Any], memory: AdWizardMemory) -> AdWizardMemory:
-        """Overhears the others."""
+        """Returns the memory with what the others said."""
         return replace(
             memory,
             participant=listen(observation, Role.PARTICIPANT, memory.participant),
@@ -104,16 +104,16 @@ class AdWizardInterface(RoleInterface[AdWizardMemory]):
         )
 
     def remarks(self, memory: AdWizardMemory) -> tuple[HeardRemark | None, ...]:
-        """Of the participant and of the Co-Wizard."""
+        """Returns the last utterances of the participant and of the Co-Wizard."""
         return memory.participant, memory.co_wizard
 
     def own(self, observation: Mapping[str, Any], memory: AdWizardMemory) -> list[float]:
-        """How long until the next trick, and whether one can be played ahead on the path."""
+        """Returns the time until the next exception, and whether one can be placed ahead on the path."""
         wait = max(memory.last + AdWizardConfig.spacing, AdWizardConfig.first_at) - scalar(observation, "time")
         return [max(wait, 0.0) / AdWizardConfig.spacing, float(place_on_path(self.town, observation, NEAR) is not None)]
 
     def mask(self, observation: Mapping[str, Any], memory: AdWizardMemory) -> Mask:
-        """What there is occasion for; nothing else while the last trick is still fresh."""
+        """Returns the actions that have a target; only "nothing" for `SPACING` after the last exception."""
         mask = np.zeros(self.actions, dtype=np.bool_)
         mask[AdWizardTrick.NOTHING] = True
         if scalar(observation, "time") < max(memory.last + AdWizardConfig.spacing, AdWizardConfig.first_at):
@@ -128,13 +128,13 @@ class AdWizardInterface(RoleInterface[AdWizardMemory]):
         return mask
 
     def allowed(self, observation: Mapping[str, Any], masks: Mapping[str, Any]) -> Mask:
-        """By the kind of exception."""
+        """Returns the actions whose kind of exception the environment allows."""
         return np.asarray(masks["exception"])[_KINDS].astype(np.bool_)
 
     def act(
         self, choice: int, observation: Mapping[str, Any], memory: AdWizardMemory
     ) -> tuple[AdWizardAction, AdWizardMemory]:  # fmt: skip
-        """Plays a trick."""
+        """Returns the exception of an action."""
         action = self._action(AdWizardTrick(choice), observation)
         if action.exception is ExceptionKind.NONE:
             return action, memory
@@ -143,7 +143,7 @@ class AdWizardInterface(RoleInterface[AdWizardMemory]):
     def choice_of(
         self, action: AdWizardAction, observation: Mapping[str, Any], memory: AdWizardMemory
     ) -> int:  # fmt: skip
-        """The trick of the same kind, with the same weather or sensor."""
+        """Returns the action of the same kind, with the same weather parameter or sensor."""
         if action.exception is ExceptionKind.WEATHER:
             about = {k: share for k, (parameter, share) in _WEATHER.items() if parameter is action.weather}
             return min(about, key=lambda k: abs(about[k] - action.share), default=AdWizardTrick.NOTHING)
@@ -176,7 +176,7 @@ class AdWizardInterface(RoleInterface[AdWizardMemory]):
         return AdWizardAction(exception=ExceptionKind.PLACE_PROP, prop=PropKind.STREET_BARRIER, place=place)
 
     def _subgoal(self, caper: AdWizardTrick, observation: Mapping[str, Any]) -> SeenSubgoal | None:
-        """The first subgoal with which a trick can be played."""
+        """Returns the first subgoal that a task exception can change."""
         may = {
             AdWizardTrick.TRIGGER: "can_trigger",
             AdWizardTrick.DROP: "can_delete",

@@ -37,7 +37,7 @@ from dorothie_gym.spaces import CoWizardAction, ExitColumn, Mental, Physical, Sp
 
 
 class ExtraAction(enum.IntEnum):
-    """What the Co-Wizard can do beside driving; numbers go on where `NavigationAction` ends."""
+    """Actions of the Co-Wizard besides driving, numbered after `NavigationAction`."""
 
     NOTE_GOAL = len(ACTIONS)
     """Heads for the place that was named last: the car comes up to it slowly."""
@@ -85,7 +85,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
         self._viewpoint = NavigationEncoder(town, self._ways, EnvConfig.max_seconds)
 
     def begin(self) -> CoWizardMemory:
-        """Nothing has been heard."""
+        """Returns an empty memory."""
         return CoWizardMemory()
 
     def notice(self, observation: Mapping[str, Any], memory: CoWizardMemory) -> CoWizardMemory:
@@ -99,17 +99,17 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
         return replace(memory, heard=heard, named=named, told=told, seen=observation)
 
     def remarks(self, memory: CoWizardMemory) -> tuple[HeardRemark | None, ...]:
-        """The participant's."""
+        """Returns the participant's last utterance."""
         return (memory.heard,)
 
     def own(self, observation: Mapping[str, Any], memory: CoWizardMemory) -> list[float]:
-        """What a driver of `Navigation-v0` observes; whether a goal is noted, and whether it is the one named last."""
+        """Returns the observation of `Navigation-v0`, whether a goal is noted, and whether it is the last-named one."""
         view: list[float] = self._viewpoint.observe(observation, memory.told, ()).tolist()
         noted = memory.noted is not None
         return [*view, float(noted), float(noted and memory.noted is memory.named)]
 
     def mask(self, observation: Mapping[str, Any], memory: CoWizardMemory) -> Mask:
-        """What the car would follow, as far as the Co-Wizard can tell; what would change nothing is left out."""
+        """Returns the actions that the car would probably carry out and that change something."""
         mask = np.zeros(self.actions, dtype=np.bool_)
         mask[: len(ACTIONS)] = self._likely.mask(observation)
         mask[ExtraAction.NOTE_GOAL] = memory.named is not None and memory.named is not memory.noted
@@ -117,7 +117,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
         return mask
 
     def allowed(self, observation: Mapping[str, Any], masks: Mapping[str, Any]) -> Mask:
-        """What the car would carry out, or is about to do anyway."""
+        """Returns the actions that the car would carry out, or already prepares."""
         allowed = np.ones(self.actions, dtype=np.bool_)
         for action in ACTIONS[1:]:
             if prepares(action, observation, self._ways):
@@ -141,7 +141,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
         return CoWizardAction(physical=physical_of(NavigationAction(choice), observation, self._ways)), memory
 
     def choice_of(self, action: CoWizardAction, observation: Mapping[str, Any], memory: CoWizardMemory) -> int:
-        """What was driven, else the goal that was noted, else what was said, as far as it has a number."""
+        """Returns the number of the driving action, else of the noted goal, else of the utterance."""
         physical, mental, speech = action.physical, action.mental, action.speech
         if physical is not None:
             return self._driven(physical, observation)
@@ -160,7 +160,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
         return action_of(physical, observation, self._ways)
 
     def _instruction(self, observation: Mapping[str, Any], heard: HeardRemark) -> NavigationInstruction:
-        """What was said as a driver of `Navigation-v0` hears it; turns are those at the next choice of ways."""
+        """Returns an utterance as an instruction of `Navigation-v0`; turns refer to the next junction with a choice."""
         exits = observation["exits"][observation["exits"][:, ExitColumn.PRESENT] > 0.0]
         turns = ActionValue.J_TURN in heard.act.slots
         distance = float(exits[0, ExitColumn.DISTANCE]) if turns and len(exits) else 0.0
@@ -168,14 +168,14 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
         return NavigationInstruction(act=heard.act, sector=sector, distance=distance, time=heard.time)
 
     def _sector(self, observation: Mapping[str, Any], angle: float) -> int:
-        """The sector of the way on that comes closest to an angle [degrees]."""
+        """Returns the sector of the exit nearest to an angle [degrees]."""
         choice = self._ways.choice_ahead(observation)
         ways = () if choice is None else self._ways.by_sector(choice)
         misfits = {k: abs(float(wrap_degrees(way.angle - angle))) for k, way in enumerate(ways) if way is not None}
         return min(misfits, key=misfits.__getitem__) if misfits else nearest_sector(angle)
 
     def _place(self, observation: Mapping[str, Any], name: LandmarkName) -> Place | None:
-        """Where one stops for the nearest landmark of a name that is on the map."""
+        """Returns the stopping place of the nearest landmark of a name on the map."""
         x, y, _ = observation["pose"].tolist()
         marks = [mark for mark in read_landmarks(observation, self.town) if mark.name is name]
         return min(marks, key=lambda mark: math.hypot(mark.x - x, mark.y - y)).place if marks else None

@@ -1,4 +1,4 @@
-"""What those who played the sessions of a corpus did, as a learner at each seat would have seen and done it."""
+"""Decisions of all roles in a corpus, in the interfaces of the learners."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from dorothie_gym.rollout import watch_session
 from dorothie_gym.spaces import ActionDecoder, AdWizardAction, RoleAction, SpaceLimits
 
 Lesson: TypeAlias = tuple[Vector, Mask, int]
-"""What a seat took in, what made sense, and the number of what was done."""
+"""Vector, mask and action number of a decision."""
 
 
 def read_lessons(corpus: Path, fold: str, tell: ReportProgress = silent) -> dict[int, Demonstrations]:
-    """Plays the sessions of a fold again, and watches all roles.
+    """Replays the sessions of a fold and returns the decisions of all roles.
 
     Args:
         corpus: its folder.
         fold: of `Fold`.
-        tell: is told how far it is.
+        tell: callback for the progress.
 
     Returns:
-        What there is to learn for each role, by its place in `AGENT_ROLES`.
+        The decisions of each role, by its place in `AGENT_ROLES`.
 
     Raises:
         SessionError: the corpus cannot be read or played again, or has nothing in the fold.
@@ -50,7 +50,7 @@ def read_lessons(corpus: Path, fold: str, tell: ReportProgress = silent) -> dict
 
 
 def lessons_of(session: Session, town: Town) -> dict[int, list[Lesson]]:
-    """The decisions of a session, by the role's place in `AGENT_ROLES`.
+    """Returns the decisions of a session, by the role's place in `AGENT_ROLES`.
 
     What could not have been done at the seat is left out. Words that join an utterance in the air count where that
     begins, if it begins with nothing that the seat can say.

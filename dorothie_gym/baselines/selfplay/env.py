@@ -124,7 +124,7 @@ class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
         self.duo.close()
 
     def _row(self, infos: Mapping[str, Mapping[str, Any]]) -> NDArray[np.float32]:
-        """What is at the three seats now."""
+        """Returns the row of the three roles' vectors and masks."""
         vectors, masks = [], []
         for k, (role, seat) in enumerate(zip(AGENT_ROLES, self._seats, strict=True)):
             seen = self._seen[role]
@@ -134,13 +134,13 @@ class SelfPlayEnv(gym.Env[NDArray[np.float32], NDArray[np.int64]]):
         return np.concatenate([*vectors, *masks]).astype(np.float32)
 
     def _aim(self) -> None:
-        """Measures the way left to the errand that the participant is on."""
+        """Measures the remaining way to the participant's current subgoal."""
         errand = self._memories[_PARTICIPANT].errand
         self._way_left.aim(None if errand is None else errand.journey.goal)
         self._left = self._measured()
 
     def _nearer(self) -> float:
-        """By how much the way to the errand of the last decision has got shorter [m]."""
+        """Returns by how much the way to the last decision's subgoal has become shorter [m]."""
         left = self._measured()
         return self._left - left if math.isfinite(left) and math.isfinite(self._left) else 0.0
 

@@ -35,7 +35,7 @@ class Spaces(gym.Env[Vector, np.int64]):
 
 
 def make_network(settings: TrainingSettings, size: int, actions: int, rows: int = 1) -> Any:
-    """A MaskablePPO for vectors (size,) and so many actions that learns from so many rows at once.
+    """Returns a MaskablePPO for vectors (size,), a number of actions, and a number of rows per update.
 
     Batches get smaller where the rows of a rollout cannot be shared out among them evenly.
     """
@@ -67,7 +67,7 @@ class Learner:
         places: Mapping[int, Sequence[int]],
         log: Path | None,
     ) -> None:
-        """Prepares a learner that has learned nothing yet.
+        """Prepares an untrained learner.
 
         Args:
             name: of the role, or "all".
@@ -114,7 +114,7 @@ class Learner:
         rewards[envs, roles] += self.model.gamma * beyond
 
     def learn_from(self, rewards: NDArray[np.float32], starts: NDArray[np.bool_]) -> None:
-        """Keeps the last choice with what came of it.
+        """Stores the last choice with its result.
 
         Args:
             rewards: of all environments and roles (N, 3).
@@ -128,7 +128,7 @@ class Learner:
         )  # fmt: skip
 
     def values(self, rows: Vector) -> torch.Tensor:
-        """What is still to come for each of `players` (n,), as far as the network can tell."""
+        """Returns the estimated values for each of `players` (n,)."""
         with torch.no_grad():
             found: torch.Tensor = self.model.policy.predict_values(torch.from_numpy(self._own(rows))).flatten()
         return found

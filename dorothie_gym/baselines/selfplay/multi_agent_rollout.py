@@ -32,7 +32,7 @@ class SelfPlayEnvFactory:
         self._settings, self._scripted = dict(settings), tuple(scripted)
 
     def __call__(self) -> gym.Env[Any, Any]:
-        """A new environment."""
+        """Returns a new environment."""
         return SelfPlayEnv(**self._settings, scripted=self._scripted)
 
 
@@ -119,7 +119,7 @@ class MultiAgentRollout:
         self._vector.close()
 
     def actor(self, role: int) -> Learner:
-        """The learner that plays a role, given by its place in `AGENT_ROLES`."""
+        """Returns the learner of a role, given by its place in `AGENT_ROLES`."""
         return next(learner for learner in self.learners if role in learner.roles)
 
     def _step(self) -> None:
@@ -146,7 +146,7 @@ class MultiAgentRollout:
         self._starts = dones
 
     def _play_past(self) -> NDArray[np.int64]:
-        """What past Ad-Wizards do; before there is one, they do as they like."""
+        """Returns the actions of past Ad-Wizards; random ones before the pool has a member."""
         padded = self._settings.shared
         rows = self._rows[self._old]
         vectors = self.table.vectors(rows, AD_WIZARD, padded=padded)
@@ -162,7 +162,7 @@ class MultiAgentRollout:
 
 
 def _coached(settings: SelfPlaySettings) -> dict[int, tuple[Role, ...]]:
-    """The environments where one of the team learns beside scripted roles, and which roles those are."""
+    """Returns the environments in which one team role learns beside scripted ones, and the scripted roles."""
     found = {}
     for env in range(settings.coached_environments):
         learns = TEAM[env % len(TEAM)]

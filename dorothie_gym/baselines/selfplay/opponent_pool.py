@@ -1,4 +1,4 @@
-"""Ad-Wizards of earlier times: who only plays against the present one learns to beat nobody else."""
+"""Opponent pool of past Ad-Wizard checkpoints, against overfitting to the present one."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from dorothie_gym.errors import ModelFileError
 FILE: Final = "past.safetensors"
 
 KEPT: Final = 5
-"""So many are kept, the latest."""
+"""Largest number of checkpoints; the latest are kept."""
 
 
 class OpponentPool:
-    """Weights of a network at the ends of the last few stretches of training."""
+    """Weights of a network at the ends of the last stretches of training."""
 
     def __init__(self) -> None:
         self._weights: list[dict[str, torch.Tensor]] = []
@@ -29,16 +29,16 @@ class OpponentPool:
         return len(self._weights)
 
     def keep(self, model: Any) -> None:
-        """Keeps the weights of a model as they are."""
+        """Adds the present weights of a model."""
         now = {name: value.detach().clone() for name, value in model.policy.state_dict().items()}
         self._weights = [*self._weights, now][-KEPT:]
 
     def revive(self, model: Any, rng: np.random.Generator) -> None:
-        """Gives a model the weights of one of those times; there must be one."""
+        """Loads a random member of the pool, which must not be empty, into a model."""
         model.policy.load_state_dict(self._weights[int(rng.integers(len(self._weights)))])
 
     def save(self, folder: Path) -> None:
-        """Writes all into a folder."""
+        """Writes the pool into a folder."""
         flat: Mapping[str, torch.Tensor] = {
             f"{k}/{name}": value.contiguous()
             for k, weights in enumerate(self._weights)
@@ -47,7 +47,7 @@ class OpponentPool:
         save_file(dict(flat), folder / FILE)
 
     def load(self, folder: Path) -> None:
-        """Reads what `save` has written; raises `ModelFileError` where that cannot be done."""
+        """Reads a saved pool; raises `ModelFileError` if it cannot be read."""
         path = folder / FILE
         try:
             tensors = load_file(path)

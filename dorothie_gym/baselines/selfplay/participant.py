@@ -1,4 +1,4 @@
-"""The participant's seat: it knows the errands and the way, and has a dozen things to say."""
+"""Interface of the participant, which knows the subgoals and the route and has a dozen utterances."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.spaces import ParticipantAction, Speech
 
 ACROSS, FAR, CLOSE = 500.0, 100.0, 10.0
-"""Ways are shares of these [m]."""
+"""Scales of distances [m]."""
 
 _DIRECTIONS = tuple(Direction)
 _ENTRIES = (LaneEntry.CHANGE_LEFT, LaneEntry.CHANGE_RIGHT, LaneEntry.U_TURN)
 
 
 class ParticipantPhrase(enum.IntEnum):
-    """What the participant can say."""
+    """Utterances of the participant."""
 
     NOTHING = 0
     TURN_LEFT = 1
@@ -38,7 +38,7 @@ class ParticipantPhrase(enum.IntEnum):
     STOP = 7
     GO_ON = 8
     NAME_GOAL = 9
-    """Names the place to go to next."""
+    """Names the next place to go to."""
     YES = 10
     NO = 11
 
@@ -68,7 +68,7 @@ _PHRASES: Mapping[tuple[ActionValue, Direction | None], ParticipantPhrase] = {
     (ActionValue.STOP, None): ParticipantPhrase.STOP,
     (ActionValue.START, None): ParticipantPhrase.GO_ON,
 }
-"""What an act that carries an action is among the phrases, with the direction of its words where that matters."""
+"""Utterance for each instructed action, with the direction of its words where there is one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,14 +83,14 @@ class SubgoalRoute:
 
 @dataclass(frozen=True, kw_only=True)
 class ParticipantMemory:
-    """What the participant remembers: the Co-Wizard's last remark, and the errand that it is on."""
+    """Memory of the participant: the Co-Wizard's last utterance, and the route to the current subgoal."""
 
     heard: HeardRemark | None = None
     errand: SubgoalRoute | None = None
 
 
 class ParticipantInterface(RoleInterface[ParticipantMemory]):
-    """See `ParticipantPhrase` for what it can say."""
+    """Interface of the participant; `ParticipantPhrase` lists its utterances."""
 
     role = Role.PARTICIPANT
     speakers = (Role.CO_WIZARD,)
@@ -99,7 +99,7 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
     own_size: ClassVar[int] = 4 + 2 + len(Direction) + 1 + len(_ENTRIES)
 
     def begin(self) -> ParticipantMemory:
-        """Nothing has been heard, and there is no errand yet."""
+        """Returns an empty memory."""
         return ParticipantMemory()
 
     def notice(self, observation: Mapping[str, Any], memory: ParticipantMemory) -> ParticipantMemory:
@@ -109,11 +109,11 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
         return ParticipantMemory(heard=heard, errand=self._errand(observation, place, memory.errand))
 
     def remarks(self, memory: ParticipantMemory) -> tuple[HeardRemark | None, ...]:
-        """The Co-Wizard's."""
+        """Returns the Co-Wizard's last utterance."""
         return (memory.heard,)
 
     def own(self, observation: Mapping[str, Any], memory: ParticipantMemory) -> list[float]:
-        """How far it is, where the next turn leads, and the next lane change or U-turn."""
+        """Returns the remaining distance, the direction of the next turn, and the next lane change or U-turn."""
         errand = memory.errand
         if errand is None:
             return [0.0] * self.own_size
@@ -130,14 +130,14 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
         ]  # fmt: skip
 
     def mask(self, observation: Mapping[str, Any], memory: ParticipantMemory) -> Mask:
-        """Whoever speaks lets its words out first; a goal is named where there is one."""
+        """Returns the possible utterances: none while speaking; naming a goal only if there is one."""
         mask = np.full(self.actions, scalar(observation, "speaking") <= 0.0)
         mask[ParticipantPhrase.NOTHING] = True
         mask[ParticipantPhrase.NAME_GOAL] &= memory.errand is not None
         return mask
 
     def allowed(self, observation: Mapping[str, Any], masks: Mapping[str, Any]) -> Mask:
-        """Talk is never masked."""
+        """Returns all actions: the environment never masks speech."""
         return np.ones(self.actions, dtype=np.bool_)
 
     def act(
@@ -149,7 +149,7 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
     def choice_of(
         self, action: ParticipantAction, observation: Mapping[str, Any], memory: ParticipantMemory
     ) -> int:  # fmt: skip
-        """The phrase that says the same, by act and direction; the name of the place counts where it is the next."""
+        """Returns the utterance with the same act and direction; a named place must be the next one."""
         speech = action.speech
         if speech is None:
             return ParticipantPhrase.NOTHING

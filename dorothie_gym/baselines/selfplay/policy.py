@@ -1,4 +1,4 @@
-"""What self-play has learned as a policy for rollouts."""
+"""Self-play models as policies for rollouts."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from dorothie_gym.spaces import ActionDict, SpaceLimits
 
 @dataclass(frozen=True, kw_only=True)
 class LearnedPolicyState:
-    """Where a role is in a session: at its seat, with what it remembers, after so many decisions."""
+    """State of a role in a session: its interface, its memory, and the number of decisions."""
 
     seat: RoleInterface[Any]
     memory: Any
@@ -34,31 +34,31 @@ class LearnedPolicyState:
 
 
 class LearnedPolicy(Policy[LearnedPolicyState]):
-    """Plays a role as it was learned: what its network takes in follows from the observation as in training.
+    """Plays a role with a trained network, whose input is computed as in training.
 
-    Policies are not told `info["action_mask"]`: what it may do is what makes sense as far as the role can tell. The
-    few actions that the car or the world refuse all the same do nothing.
+    Policies do not receive `info["action_mask"]`: the mask contains what the role itself can infer. The
+    few actions that the environment refuses nevertheless have no effect.
     """
 
     def __init__(self, role: Role, limits: SpaceLimits, model: Any, padded: tuple[int, int] | None) -> None:
-        """Takes a network.
+        """Prepares the policy.
 
         Args:
-            role: whom it plays.
+            role: the role.
             limits: sizes of the spaces.
             model: MaskablePPO.
-            padded: numbers and actions that the network has for all roles; None where it is the role's own.
+            padded: sizes of the vector and of the mask of a network shared by all roles; None for an own network.
         """
         super().__init__(role, limits)
         self._model, self._padded = model, padded
 
     def initial_state(self, seed: int, town: Town) -> LearnedPolicyState:
-        """Takes the seat."""
+        """Returns the state before the first observation."""
         seat = make_interface(self.role, town, self.limits)
         return LearnedPolicyState(seat=seat, memory=seat.begin(), seed=seed)
 
     def step(self, observation: Mapping[str, Any], state: LearnedPolicyState) -> tuple[ActionDict, LearnedPolicyState]:
-        """Draws an action from what the network takes for good."""
+        """Samples an action from the network."""
         seat = state.seat
         memory = seat.notice(observation, state.memory)
         vectors, masks = seat.vector(observation, memory)[None], seat.mask(observation, memory)[None]
@@ -72,11 +72,11 @@ class LearnedPolicy(Policy[LearnedPolicyState]):
 
 
 def read_policy(path: Path, role: Role, limits: SpaceLimits) -> LearnedPolicy:
-    """Reads what was learned for a role.
+    """Reads the policy of a role.
 
     Args:
         path: folder of a role that `train-rl selfplay` has written, or `model.json` in it.
-        role: whom it is to play.
+        role: the role to play.
         limits: sizes of the spaces.
 
     Raises:

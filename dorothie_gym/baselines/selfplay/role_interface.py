@@ -1,4 +1,4 @@
-"""A role's seat: what its network takes in, what it can do, and which of that it may do now."""
+"""Interface between a role and its network: input vector, discrete actions, action mask."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ Mask: TypeAlias = NDArray[np.bool_]
 Memory = TypeVar("Memory")
 
 FAR = 1000.0
-"""Quantities are squashed to -1..1 by their logarithm; this much is 1."""
+"""Quantity that the logarithmic squashing maps to 1."""
 
 _PLACES: Final = {"landmarks": 1, "objects": 1, "guesses": 1, "props": 1, "waypoints": 0}
 """Tables with places, and the column of x; that of y is the next."""
 
 
 class RoleInterface(ABC, Generic[Memory]):
-    """What a role perceives and can do in a town, as a vector in and a number out.
+    """Input vector and discrete actions of a role in a town.
 
     The vector has numbers of the role's observation (`FlatObservations`) with places in the car's own frame (ahead
     and to the right), squashed; then the last remarks that it heard; then what the role makes of it all. Seats are
     stateless: what a role remembers is handed over and back.
 
     Attributes:
-        role: whose seat it is.
+        role: the role.
         actions: how many there are; 0 does nothing.
         size: numbers of the vector.
     """
 
     role: ClassVar[Role]
     speakers: ClassVar[tuple[Role, ...]]
-    """Whom the role hears."""
+    """Roles that the role hears."""
 
     fields: ClassVar[tuple[str, ...]]
     """Fields of the observation whose numbers are taken in as they are."""
@@ -70,38 +70,38 @@ class RoleInterface(ABC, Generic[Memory]):
 
     @abstractmethod
     def begin(self) -> Memory:
-        """What the role remembers before the first decision."""
+        """Returns the memory before the first decision."""
 
     @abstractmethod
     def notice(self, observation: Mapping[str, Any], memory: Memory) -> Memory:
-        """What the role remembers when it has perceived an observation."""
+        """Returns the memory after an observation."""
 
     @abstractmethod
     def remarks(self, memory: Memory) -> tuple[HeardRemark | None, ...]:
-        """The last remark of each of `speakers`."""
+        """Returns the last utterance of each of `speakers`."""
 
     @abstractmethod
     def own(self, observation: Mapping[str, Any], memory: Memory) -> list[float]:
-        """What the role makes of it (own_size,), each in -1..1."""
+        """Returns the role's own features (own_size,), each in -1..1."""
 
     @abstractmethod
     def mask(self, observation: Mapping[str, Any], memory: Memory) -> Mask:
-        """Which actions make sense, as far as the role can tell from what it perceives (actions,)."""
+        """Returns the actions that the role's own observation suggests to be possible (actions,)."""
 
     @abstractmethod
     def allowed(self, observation: Mapping[str, Any], masks: Mapping[str, Any]) -> Mask:
-        """Which actions `info["action_mask"]` allows (actions,)."""
+        """Returns the actions that `info["action_mask"]` allows (actions,)."""
 
     @abstractmethod
     def act(self, choice: int, observation: Mapping[str, Any], memory: Memory) -> tuple[RoleAction, Memory]:
-        """The action of a number, and what the role remembers when it has acted."""
+        """Returns the action of a number, and the memory after it."""
 
     @abstractmethod
     def choice_of(self, action: Any, observation: Mapping[str, Any], memory: Memory) -> int:
-        """The number that comes closest to what somebody did there, an action of the role; 0 where none is like it."""
+        """Returns the number of the most similar action to a recorded one of the role; 0 for none."""
 
     def vector(self, observation: Mapping[str, Any], memory: Memory) -> Vector:
-        """What the network takes in (size,), each in -1..1; `memory` is that of `notice`."""
+        """Returns the input vector (size,), each in -1..1; `memory` is that of `notice`."""
         now = scalar(observation, "time")
         flat = self._flat.vector(in_own_frame(observation, self.fields))
         heard = [
@@ -130,10 +130,10 @@ def in_own_frame(observation: Mapping[str, Any], fields: Iterable[str]) -> dict[
 
 
 def squashed(values: Vector) -> Vector:
-    """Each number x as sign(x) log(1 + |x|), so that metres, shares and seconds are all of about the same size."""
+    """Returns sign(x) log(1 + |x|) of each number x, which brings metres, shares and seconds to similar sizes."""
     return np.asarray(np.sign(values) * np.log1p(np.abs(values)) / math.log1p(FAR), dtype=np.float32)
 
 
 def one_hot(at: int | None, size: int) -> list[float]:
-    """A row of zeros with a 1 at a place; None for zeros alone."""
+    """Returns zeros with a 1 at a place; None for zeros alone."""
     return [float(k == at) for k in range(size)]

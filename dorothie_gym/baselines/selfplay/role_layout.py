@@ -1,4 +1,4 @@
-"""The three seats, and how what is at them lies in one row."""
+"""Interfaces of the three roles, and the layout of their vectors and masks in one row."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SEATS: dict[Role, type[RoleInterface[Any]]] = {
 
 
 def make_interface(role: Role, town: Town, limits: SpaceLimits) -> RoleInterface[Any]:
-    """The seat of a role."""
+    """Returns the interface of a role."""
     return _SEATS[role](town, limits)
 
 
@@ -39,7 +39,7 @@ class RoleLayout:
 
     @classmethod
     def of(cls, limits: SpaceLimits) -> RoleLayout:
-        """The table for sizes of spaces."""
+        """Returns the layout for sizes of spaces."""
         seats = [_SEATS[role] for role in AGENT_ROLES]
         return cls(tuple(seat.size_for(limits) for seat in seats), tuple(seat.actions for seat in seats))
 
@@ -59,7 +59,7 @@ class RoleLayout:
         return max(self.actions)
 
     def vectors(self, rows: Vector, role: int, *, padded: bool) -> Vector:
-        """The vectors of a role, given by its place in `AGENT_ROLES`, in rows (n, width)."""
+        """Returns the vectors of a role, given by its place in `AGENT_ROLES`, in rows (n, width)."""
         begin = sum(self.sizes[:role])
         own = rows[:, begin : begin + self.sizes[role]]
         if not padded:
@@ -67,14 +67,14 @@ class RoleLayout:
         return pad_vectors(own, role, self.padded_size)
 
     def masks(self, rows: Vector, role: int, *, padded: bool) -> Mask:
-        """The masks of a role in rows (n, width)."""
+        """Returns the masks of a role in rows (n, width)."""
         begin = sum(self.sizes) + sum(self.actions[:role])
         own = rows[:, begin : begin + self.actions[role]] > 0.0
         return pad_masks(own, self.padded_actions) if padded else own
 
 
 def pad_vectors(vectors: Vector, role: int, size: int) -> Vector:
-    """Vectors (n, m) of a role filled up to (n, size); the last numbers tell the role."""
+    """Returns vectors (n, m) of a role padded to (n, size); the last numbers encode the role."""
     padded = np.zeros((len(vectors), size), dtype=np.float32)
     padded[:, : vectors.shape[1]] = vectors
     padded[:, size - len(AGENT_ROLES) + role] = 1.0
@@ -82,7 +82,7 @@ def pad_vectors(vectors: Vector, role: int, size: int) -> Vector:
 
 
 def pad_masks(masks: Mask, actions: int) -> Mask:
-    """Masks (n, m) filled up to (n, actions)."""
+    """Returns masks (n, m) padded to (n, actions)."""
     padded: NDArray[np.bool_] = np.zeros((len(masks), actions), dtype=np.bool_)
     padded[:, : masks.shape[1]] = masks
     return padded

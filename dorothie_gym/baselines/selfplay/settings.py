@@ -19,7 +19,7 @@ ARGUMENTS: Final = ("town", "storyboard", "traffic", "max_seconds", "progress")
 """Fields that are arguments of `SelfPlayEnv`."""
 
 PARTS: Final = ("past_environments", "coached_environments")
-"""Fields that say in how many environments not all roles learn."""
+"""Fields with numbers of environments in which not all roles learn."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +80,7 @@ class SelfPlaySettings:
         return {name: getattr(self, name) for name in ARGUMENTS}
 
     def learner(self, seed: int = 0) -> TrainingSettings:
-        """What a learner needs of them; `seed` is that of its network."""
+        """Returns the settings of a learner; `seed` is that of its network."""
         return TrainingSettings(
             algorithm="maskable_ppo", env=SELFPLAY, seed=seed, network=self.network, parameters=self.parameters,
             steps=self.steps, environments=self.environments, workers=self.workers, episodes=self.episodes,
@@ -93,7 +93,7 @@ class SelfPlaySettings:
 
 
 def selfplay_settings(given: Mapping[str, Any] | None = None, **changes: Any) -> SelfPlaySettings:
-    """The defaults, with changes.
+    """Returns the default settings with changes.
 
     Args:
         given: what a user sets: `shared`, `PARTS` and arguments of `SelfPlayEnv`.

@@ -1,4 +1,4 @@
-"""A run of self-play in a folder: it evaluates, saves and draws as it goes, and goes on where it was stopped."""
+"""Resumable self-play training in a folder, with evaluations, checkpoints and a learning curve."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.recording import Fold
 
 OPPONENTS = ("scripted", "learned")
-"""Ad-Wizards that the team is evaluated against."""
+"""Ad-Wizards of the team's evaluations."""
 
 STRETCH = 16
-"""After so many rollouts all is saved, and sessions begin anew; what follows depends on nothing but what was saved."""
+"""Rollouts between checkpoints. Sessions restart at a checkpoint, so that a resumed training is exact."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SelfPlayEvaluation:
-    """How things stood after some training.
+    """Evaluation of self-play after some training.
 
     Attributes:
         steps: done.
@@ -54,18 +54,18 @@ class SelfPlayEvaluation:
     returns: Mapping[str, float | None]
 
     def as_json(self) -> dict[str, Any]:
-        """In JSON types."""
+        """Returns the evaluation in JSON types."""
         return asdict(self)
 
     @classmethod
     def from_json(cls, found: Mapping[str, Any]) -> SelfPlayEvaluation:
-        """What `as_json` made."""
+        """Reads the output of `as_json`."""
         outcomes = {name: EpisodeStatistics(**found[name]) for name in OPPONENTS}
         return cls(steps=found["steps"], seconds=found["seconds"], returns=found["returns"], **outcomes)
 
 
 class SelfPlayTraining:
-    """A run; `go` trains until all steps are done or Ctrl-C is pressed.
+    """Training; `go` trains until all steps are done or Ctrl-C is pressed.
 
     Attributes:
         settings: what is trained.
@@ -82,14 +82,14 @@ class SelfPlayTraining:
         ray: str | None = None,
         tell: ReportProgress = silent,
     ) -> None:
-        """Prepares a run, or takes up one that is in the folder.
+        """Prepares a training, or resumes the one in the folder.
 
         Args:
             settings: what is trained.
             folder: where all is written.
-            watch: is told how far it is.
+            watch: callback for the progress.
             ray: address of a Ray cluster that steps the environments; None: this machine does.
-            tell: is told how far a warm start is.
+            tell: callback for the progress of a warm start.
 
         Raises:
             SettingsError: the folder has a run with other settings, or nothing can be trained with these.
@@ -123,7 +123,7 @@ class SelfPlayTraining:
         """Trains.
 
         Returns:
-            What came of it. Where Ctrl-C came between, that is what the last stretch left in the folder.
+            The result; after Ctrl-C that of the last checkpoint.
         """
         finished = False
         try:
@@ -194,7 +194,7 @@ class SelfPlayTraining:
         return evaluate_policy(maker, self.act_with(SEEDS_FROM), self.settings.episodes, SEEDS_FROM)
 
     def act_with(self, seed: int) -> Act:
-        """How all roles act now, in rows of the table; they draw from what they take for good, with a seed."""
+        """Returns the present policy of all roles on rows of the layout; it samples with a seed."""
         game, rng = self.game, np.random.default_rng(seed)
 
         def act(rows: NDArray[Any], masks: NDArray[np.bool_] | None) -> Sequence[Any]:
@@ -233,7 +233,9 @@ class SelfPlayTraining:
         found = {role: read_description(self.folder / role) for role in AGENT_ROLES}
         steps = {int(description["steps"]) for description in found.values()}
         if len(steps) > 1:
-            raise ModelFileError(f"{self.folder}: the models are of different steps ({sorted(steps)}); begin anew")
+            raise ModelFileError(
+                f"{self.folder}: the models are of different steps ({sorted(steps)}); start a new training"
+            )
         for learner in self.game.learners:
             restore(learner.model, self.folder / AGENT_ROLES[learner.roles[0]])
         self.game.past.load(self.folder)
@@ -247,7 +249,7 @@ class SelfPlayTraining:
 
 
 def _tally(returns: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """How many sessions there were, and the sums of their rewards by role (4,)."""
+    """Returns the number of sessions and the sums of their rewards by role (4,)."""
     sums: NDArray[np.float64] = np.sum(np.reshape(returns, (-1, len(AGENT_ROLES))), axis=0)
     return np.concatenate(([float(len(returns))], sums))
 

@@ -1,4 +1,4 @@
-"""What was said last: observed for one decision, remembered until something else is said."""
+"""Memory of the last heard utterance, which is observed for one decision only."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from dorothie_gym.policies.observation_parser import scalar
 from dorothie_gym.policies.utterance_input import heard_utterance
 
 RECENT = 20.0
-"""The age of what was said is a share of this [s]."""
+"""Scale of the age of an utterance [s]."""
 
 HEARD_SIZE = len(DialogueMove) + len(LABELS) + len(Direction) + 1
-"""Numbers of one remark: one-hot move, slots, one-hot direction, age."""
+"""Size of the features: one-hot move, slots, one-hot direction, age."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class HeardRemark:
-    """The last act of what somebody said, the direction that its words have, and when it was heard [s]."""
+    """Last act of an utterance, the direction of its words, and the time at which it was heard [s]."""
 
     act: DialogueAct
     direction: Direction | None
@@ -32,31 +32,31 @@ class HeardRemark:
 
     @property
     def landmark(self) -> LandmarkName | None:
-        """The place that it names."""
+        """Landmark that the utterance names."""
         found = (value for value in self.act.ordered if isinstance(value, LandmarkName))
         return next((name for name in found if name not in (LandmarkName.UNKNOWN, LandmarkName.QUERIED)), None)
 
     def vector(self, now: float) -> NDArray[np.float32]:
-        """The remark as numbers (HEARD_SIZE,) in 0..1, at a time [s]."""
+        """Returns the features of the utterance (HEARD_SIZE,) in 0..1, at a time [s]."""
         values = self._content.copy()
         values[-1] = min((now - self.time) / RECENT, 1.0)
         return values
 
     @cached_property
     def _content(self) -> NDArray[np.float32]:
-        """All but the age."""
+        """Features without the age."""
         move = [float(int(self.act.move) == k) for k in range(len(DialogueMove))]
         direction = [float(self.direction is known) for known in Direction]
         return np.array([*move, *self.act.vector, *direction, 0.0], dtype=np.float32)
 
 
 def listen(observation: Mapping[str, Any], speaker: Role, before: HeardRemark | None) -> HeardRemark | None:
-    """What a listener has in mind of a speaker: what it has just heard, else what it heard before.
+    """Returns the last utterance of a speaker: the one just heard, or the one before.
 
     Args:
         observation: of the listener.
-        speaker: who may have spoken.
-        before: what was heard before.
+        speaker: the speaker.
+        before: the utterance heard before.
     """
     said = heard_utterance(observation, speaker)
     if said is None or not said.acts:

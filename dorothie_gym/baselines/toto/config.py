@@ -55,7 +55,7 @@ Clock = Literal["point", "session"]
 
 @dataclass(frozen=True, kw_only=True)
 class LossWeights:
-    """What each part of the loss counts (paper, appendix C, Loss coefficients).
+    """Weights of the parts of the loss (paper, appendix C, Loss coefficients).
 
     Attributes:
         move, slot_types, slot_values: of UfN and of RfN; cross entropy, and binary cross entropies.
@@ -84,9 +84,9 @@ class TOTOConfig(HistorySizes):
         attention_dropout: share of the attention's weights that are dropped.
         channels: what the model is given.
         current_text: whether the words of the current utterance are among the transcript.
-        belief: whether the model also learns to tell where the car will be, and where it is to go.
-        clock: from where the time of a token is told: since the "session" began, as published, or back from the
-            "point". What is known from the beginning then has the session's time: neither tells more than the other.
+        belief: whether the model also predicts the car's next position and its goal.
+        clock: origin of a token's time: the start of the "session", as published, or back from the
+            "point". Tokens known from the start then have the session's time: both carry the same information.
         text: "frozen" vectors of a text encoder, or a "trained" one, which learns with the rest.
         text_width, text_layers, text_tokens, vocabulary: of the trained text encoder, where it is not a BERT's.
         pretrained_text: whether the trained text encoder is MiniLM, where its weights are installed.
@@ -159,12 +159,12 @@ class TOTOConfig(HistorySizes):
 
     @classmethod
     def paper(cls) -> Self:
-        """The published sizes (paper, appendix C); 770 numbers are BERT's 768 and two for the role."""
+        """Returns the published sizes (paper, appendix C); 770 numbers are BERT's 768 and two for the role."""
         return cls(width=770, layers=2, heads=11, feed_forward=770, text_width=384, pretrained_text=True)
 
     @classmethod
     def published(cls) -> Self:
-        """The published sizes with the published pictures, sounds and detector queries as well: for measuring speed."""
+        """Returns the published sizes with image, sound and detector inputs, for measurements of speed."""
         return replace(cls.paper(), image_width=1000, sound_width=1024, detector=(300, 256))
 
     @classmethod
@@ -178,7 +178,7 @@ class TOTOConfig(HistorySizes):
 
     @property
     def spec(self) -> BatchSpec:
-        """How much of each thing the model is given."""
+        """Sizes of the model's batches."""
         return BatchSpec(**{name: getattr(self, name) for name in HISTORY})
 
     def without(self, *channels: Channel) -> Self:

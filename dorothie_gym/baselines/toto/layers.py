@@ -169,5 +169,5 @@ def segment_softmax(scores: Tensor, segment: Tensor, count: int) -> Tensor:
 
 
 def _split(tokens: Tensor, heads: int) -> Tensor:
-    """(B, T, width) as (B, heads, T, width/heads)."""
+    """Reshapes (B, T, width) to (B, heads, T, width/heads)."""
     return tokens.view(*tokens.shape[:2], heads, -1).transpose(1, 2)

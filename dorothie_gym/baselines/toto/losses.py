@@ -26,8 +26,8 @@ def point_losses(outputs: Outputs, labels: Labels, config: TOTOConfig) -> Tensor
     next to -179.
 
     Args:
-        outputs: what the model says at B points.
-        labels: what is true there.
+        outputs: outputs of the model at B points.
+        labels: the labels.
         config: weights of the parts, and whether the belief counts.
     """
     weights = config.loss
@@ -39,7 +39,7 @@ def point_losses(outputs: Outputs, labels: Labels, config: TOTOConfig) -> Tensor
 
 
 def _act(outputs: Outputs, labels: Labels, weights: LossWeights) -> Tensor:
-    """Of UfN and RfN: the move, the slots, their values."""
+    """Returns the loss of UfN and RfN: the move, the slots, their values."""
     role = (labels.task == RFN).long()
     points = torch.arange(len(role), device=role.device)
     move = F.cross_entropy(outputs.move[points, role], labels.move.clamp(min=0), reduction="none")
@@ -51,7 +51,7 @@ def _act(outputs: Outputs, labels: Labels, weights: LossWeights) -> Tensor:
 
 
 def _decision(outputs: Outputs, labels: Labels, weights: LossWeights) -> Tensor:
-    """Of NfD: the action and its angle."""
+    """Returns the loss of NfD: the action and its angle."""
     action = F.cross_entropy(outputs.action, labels.action.clamp(min=0), reduction="none")
     return weights.action * action + weights.angle * angle_error(outputs.angle, labels.angle)
 
@@ -66,7 +66,7 @@ def angle_error(direction: Tensor, degrees: Tensor) -> Tensor:
 
 
 def _belief(outputs: Outputs, labels: Labels) -> Tensor:
-    """Error of the belief (B,) over what is known of it, on the circle where it is an angle."""
+    """Returns the error of the known parts of the belief (B,), on the circle for the angle."""
     known = ~labels.belief.isnan()
     error = outputs.belief - torch.where(known, labels.belief, outputs.belief.detach())
     turned = (error[:, 2] + 180.0) % 360.0 - 180.0

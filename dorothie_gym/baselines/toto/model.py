@@ -28,7 +28,7 @@ Tokens: TypeAlias = tuple[Tensor, Tensor, Tensor]
 """Tokens (B, n, d), their mask (B, n), their times (B, n) [s]."""
 
 ROLES: Final = 2
-"""Bits that tell who spoke."""
+"""Number of bits that encode the speaker."""
 
 OBJECT_KINDS: Final = 32
 """Rows of the table of kinds of objects; there are fewer."""
@@ -46,7 +46,7 @@ _OBJECT_UNITS: Final = (30.0, DEGREES, 30.0, 30.0, DEGREES, 10.0, 5.0, 5.0)
 
 
 class TOTO(Model):
-    """One encoder over everything that may be seen at a point, and a head for each thing that is to be told.
+    """Transformer encoder over everything visible at a point, with a head for each prediction.
 
     Args:
         config: sizes and inputs.
@@ -77,7 +77,7 @@ class TOTO(Model):
         nn.init.normal_(self.now, std=0.02)
 
     def _make_knowledge(self, config: TOTOConfig, words: int) -> None:
-        """What reads the map, landmarks and streets."""
+        """Creates the layers of map, landmarks and streets."""
         given, width, ids = set(config.channels), config.width, 2 * config.id_width
         if given & {Channel.MAP, Channel.TRAJECTORY}:
             self.road = nn.Embedding(config.roads, config.id_width)
@@ -91,7 +91,7 @@ class TOTO(Model):
             self.street = nn.Linear(lane + words, width)
 
     def _make_history(self, config: TOTOConfig, words: int) -> None:
-        """What reads actions, moves and words."""
+        """Creates the layers of actions, moves and words."""
         given, width = set(config.channels), config.width
         if Channel.ACTIONS in given:
             self.action = nn.Embedding(len(PhysicalAction) * _UPS, width - 1)
@@ -103,7 +103,7 @@ class TOTO(Model):
                 self.current = nn.Linear(words, width)
 
     def _make_senses(self, config: TOTOConfig, words: int) -> None:
-        """What reads the window, the current utterance's sound, and objects."""
+        """Creates the layers of the window, the current utterance's sound, and objects."""
         given, width, ids = set(config.channels), config.width, 2 * config.id_width
         if given & {Channel.TRAJECTORY, Channel.VISION}:
             self.window = nn.Linear(4 + ids if Channel.TRAJECTORY in given else 1, width)
@@ -122,7 +122,7 @@ class TOTO(Model):
     slot_of_value: Tensor
 
     def forward(self, inputs: Inputs) -> Outputs:
-        """Returns what the model says at B points; see `Batch` for the fields of the inputs."""
+        """Returns the outputs at B points; see `Batch` for the fields of the inputs."""
         return self.heads(self.read(inputs))
 
     def read(self, inputs: Inputs) -> Tensor:
@@ -134,7 +134,7 @@ class TOTO(Model):
         return last[:, 0]
 
     def _timed(self, channels: list[Tokens], now: Tensor) -> tuple[Tensor, Tensor]:
-        """All tokens (B, T, d) with their times in all channels, and their mask (B, T)."""
+        """Returns all tokens (B, T, d) with time encodings, and their mask (B, T)."""
         tokens, times, mask = gather_tokens(channels)
         if self.config.clock == "point":
             times = (now[:, None] - times).clamp(min=0.0)
@@ -145,7 +145,7 @@ class TOTO(Model):
         return int(torch.cat([mask for _, mask, _ in self._channels(inputs)], dim=1).sum(1).max())
 
     def heads(self, last: Tensor) -> Outputs:
-        """Returns what is read off the last token (B, d)."""
+        """Returns the outputs of the heads on the readout token (B, d)."""
         moves, types, values = len(DialogueMove), len(VECTOR_SLOTS), len(LABELS)
         spoken = self.head(last).float().view(len(last), 2, -1)  # (B, 2, 15 + 5 + 69)
         move, slot_types, slot_values = spoken.split((moves, types, values), dim=-1)
@@ -160,17 +160,17 @@ class TOTO(Model):
         return point_losses(self(inputs), labels, self.config).mean()
 
     def predict(self, inputs: Inputs, task: Tensor, allowed: Tensor | None = None) -> Predicted:
-        """Returns what the model takes for true at B points.
+        """Returns the predictions at B points.
 
         Args:
             inputs: fields of the points.
             task: (B,) number of each point's task.
-            allowed: (B, 6) which navigation actions it may be; all of them where None.
+            allowed: (B, 6) navigation actions that may be predicted; all if None.
         """
         return decode(self(inputs), task, allowed)
 
     def _channels(self, inputs: Inputs) -> list[Tokens]:
-        """The channels that the model is given; first the token that everything is read off."""
+        """Returns the channels of the model; first the readout token."""
         given = set(self.config.channels)
         time = inputs["time"]
         batch = len(time)
@@ -193,7 +193,7 @@ class TOTO(Model):
         return channels
 
     def _knowledge(self, inputs: Inputs) -> list[Tokens]:
-        """The map, landmarks and streets: known from the beginning, so their time is 0."""
+        """Returns the map, landmarks and streets: known from the start, so their time is 0."""
         town = inputs["town"]  # (B,)
         towns = self.towns
         ids = self._ids(torch.arange(len(towns.lanes), device=town.device))  # (L, 2 id)
@@ -228,7 +228,7 @@ class TOTO(Model):
         )
 
     def _ids(self, row: Tensor) -> Tensor:
-        """What is looked up for lanes (..., 2 id): of road and junction; zeros for a lane that is not known, -1."""
+        """Returns embeddings of the road and junction of lanes (..., 2 id); zeros for an unknown lane, -1."""
         if not len(self.towns.lanes):
             return torch.zeros(*row.shape, 2 * self.config.id_width, device=row.device)
         lane = row.clamp(min=0)
@@ -237,19 +237,19 @@ class TOTO(Model):
         return torch.cat((road, junction), dim=-1) * (row >= 0).unsqueeze(-1)
 
     def _of_lane(self, row: Tensor, column: int) -> Tensor:
-        """A number of lanes (...); 0 for a lane that is not known, -1."""
+        """Returns a column of lanes (...); 0 for an unknown lane, -1."""
         if not len(self.towns.lanes):
             return torch.zeros(row.shape, device=row.device)
         return self.towns.lanes[row.clamp(min=0), column] * (row >= 0)
 
     def _actions(self, inputs: Inputs) -> Tokens:
-        """A physical action and its argument."""
+        """Returns tokens of physical actions and their arguments."""
         action = self.action(inputs["action"] * _UPS + inputs["action_up"] + 1)  # (B, A, d - 1)
         tokens = torch.cat((action, inputs["action_angle"].unsqueeze(-1) / DEGREES), dim=-1)
         return tokens, inputs["action_mask"], inputs["action_time"]
 
     def _transcript(self, inputs: Inputs) -> list[Tokens]:
-        """What was said, and what is being said (UfN)."""
+        """Returns tokens of past utterances and of the current one (UfN)."""
         said = torch.cat((self.texts(inputs["utterance_text"]), roles(inputs["utterance_speaker"])), dim=-1)
         tokens = [(self.utterance(said), inputs["utterance_mask"], inputs["utterance_time"])]  # (B, U, d)
         if self.config.current_text:
@@ -258,14 +258,14 @@ class TOTO(Model):
         return tokens
 
     def _moves(self, inputs: Inputs) -> Tokens:
-        """A dialogue move: who, which, and its slots."""
+        """Returns tokens of dialogue moves: speaker, move and slots."""
         values = inputs["move_slots"].float()  # (B, M, 69)
         types = (values @ self.slot_of_value).clamp(max=1.0)  # (B, M, 5)
         parts = (roles(inputs["move_speaker"]), self.move(inputs["move"]), types, values)
         return torch.cat(parts, dim=-1), inputs["move_mask"], inputs["move_time"]
 
     def _window(self, inputs: Inputs) -> Tokens:
-        """Where the car was, and what was around it, at moments of the last ten seconds."""
+        """Returns tokens of the car's poses and surroundings over the last ten seconds."""
         mask = inputs["window_mask"]
         if Channel.TRAJECTORY in self.config.channels:
             row = self.towns.lane_rows(inputs["town"], inputs["window_lane"])  # (B, W)
@@ -279,7 +279,7 @@ class TOTO(Model):
         return tokens, mask, inputs["window_time"]
 
     def _pictures(self, inputs: Inputs) -> Tensor:
-        """What was seen at each token of the window (B, W, d or image): a picture, or else the objects of the world."""
+        """Returns the view at each token of the window (B, W, d or image): image features, or pooled objects."""
         if self.config.image_width:
             return inputs["window_image"]
         seen = inputs["window_objects_mask"].unsqueeze(-1)  # (B, W, V, 1)
@@ -287,7 +287,7 @@ class TOTO(Model):
         return (objects * seen).sum(2) / seen.sum(2).clamp(min=1)
 
     def _speech(self, inputs: Inputs) -> Tokens:
-        """The current utterance as it is heard (UfN)."""
+        """Returns the token of the current utterance as heard (UfN)."""
         heard, said = inputs["current_recognised"], inputs["current_text"]
         if self.config.sound_width:
             return self.speech(inputs["current_sound"])[:, None], (said >= 0)[:, None], inputs["time"][:, None]
@@ -295,7 +295,7 @@ class TOTO(Model):
         return self.speech(self.texts(text)), text >= 0, inputs["time"][:, None]
 
     def _objects(self, inputs: Inputs) -> Tokens:
-        """What is around the car now: a token for each object, or one for all queries of a detector."""
+        """Returns a token for each object around the car, or one for all queries of a detector."""
         time = inputs["time"][:, None]
         if self.config.detector is not None:
             token = self.queries(inputs["detector"].flatten(1))[:, None]  # (B, 1, d)
@@ -326,12 +326,12 @@ def gather_tokens(channels: list[Tokens]) -> tuple[Tensor, Tensor, Tensor]:
 
 
 def roles(speaker: Tensor) -> Tensor:
-    """Returns two bits for who spoke (..., 2)."""
+    """Returns the speaker, one-hot (..., 2)."""
     return nn.functional.one_hot(speaker.clamp(0, ROLES - 1), ROLES).float()
 
 
 def _slot_of_value() -> Tensor:
-    """(69, 5) which slot each value belongs to."""
+    """Returns the slot of each value, one-hot (69, 5)."""
     table = torch.zeros(len(LABELS), len(VECTOR_SLOTS))
     for column, slot in enumerate(VECTOR_SLOTS):
         table[SLOT_SPANS[slot], column] = 1.0

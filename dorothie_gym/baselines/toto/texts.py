@@ -1,4 +1,4 @@
-"""How a model reads texts: as vectors that stay as they are, or with an encoder that learns with the rest."""
+"""Text embeddings: frozen vectors, or an encoder trained with the rest of the model."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Texts(nn.Module, ABC):
 
     @abstractmethod
     def take(self, table: Tensor) -> None:
-        """Puts other texts in the place of those that there are: rows as the class was made with."""
+        """Replaces the texts: rows of the same form as at construction."""
 
 
 class FrozenTexts(Texts):
@@ -40,7 +40,7 @@ class FrozenTexts(Texts):
 
     Args:
         table: (n, width) float32, a row for each text of the corpus.
-        spread: what they are divided by, to be numbers of about 1; what does so for this table where None.
+        spread: divisor that scales them to about 1; computed from this table if None.
 
     Attributes:
         spread: see above.
@@ -56,7 +56,7 @@ class FrozenTexts(Texts):
         self.take(table)
 
     def take(self, table: Tensor) -> None:
-        """Puts other texts in the place of those that there are: vectors (n, width)."""
+        """Replaces the texts: vectors (n, width)."""
         self.table = torch.cat((table / self.spread, table.new_zeros(1, self.width)))
 
     def forward(self, index: Tensor) -> Tensor:
@@ -65,11 +65,11 @@ class FrozenTexts(Texts):
 
 
 class TrainedTexts(Texts):
-    """A text encoder that learns. Each text of a batch is encoded once, however often it occurs.
+    """Trained text encoder. Each distinct text of a batch is encoded once.
 
     Args:
         tokens: (n, length) int64 pieces of each text of the corpus, padding at the end.
-        reader: what turns (u, length) pieces into (u, width) vectors.
+        reader: module from pieces (u, length) to vectors (u, width).
         width: of the reader's vectors.
     """
 
@@ -83,7 +83,7 @@ class TrainedTexts(Texts):
         self.take(tokens)
 
     def take(self, table: Tensor) -> None:
-        """Puts other texts in the place of those that there are: pieces (n, length)."""
+        """Replaces the texts: pieces (n, length)."""
         self.tokens = torch.cat((table, table.new_full((1, table.shape[1]), PAD)))
 
     def forward(self, index: Tensor) -> Tensor:

@@ -93,7 +93,7 @@ class Towns(nn.Module):
 
 
 def _scale() -> np.ndarray:
-    """What each column of the lanes is divided by (14,)."""
+    """Returns the divisors of the columns of lanes (14,)."""
     units = {"length": _LENGTHS, "lane_id": _LANE_IDS}
     angles = ("pitch", "yaw", "roll")
     return np.array([units.get(name, DEGREES if name.endswith(angles) else METRES) for name in FEATURES])

@@ -31,7 +31,7 @@ _BUCKET: Final = 8
 
 
 class Schedule(Protocol):
-    """What a config tells of learning; see `TOTOConfig`."""
+    """Settings of the optimisation in a config; see `TOTOConfig`."""
 
     @property
     def learning_rate(self) -> float: ...  # noqa: D102
@@ -53,13 +53,13 @@ class Schedule(Protocol):
 
 
 class Model(nn.Module, ABC):
-    """What can be trained and asked."""
+    """Model that can be trained and queried."""
 
     config: Schedule
 
     @property
     def spec(self) -> BatchSpec:
-        """How much of each thing the model is given."""
+        """Sizes of the model's batches."""
         return self.config.spec
 
     @abstractmethod
@@ -95,7 +95,7 @@ OnEpoch = Callable[[Epoch], None]
 
 @dataclass(frozen=True, kw_only=True)
 class TrainingSummary:
-    """What came of a training.
+    """Result of a training.
 
     Attributes:
         epochs: all of them.
@@ -129,11 +129,11 @@ def train(
     Args:
         model: drawn anew from the same seed.
         training: points to learn from.
-        validation: points that tell when to stop.
+        validation: points of early stopping.
         folder: of this training alone.
         seed: of the order of the points and of dropout.
         about: name of the model, encoder, hash of the corpus, in JSON types: what makes this training this one.
-        on_epoch: is told of each epoch when it is over.
+        on_epoch: called after each epoch.
 
     Raises:
         CheckpointError: in the folder lies another training.
@@ -205,7 +205,7 @@ class _Run:
         self.autocast = torch.autocast(self.device.type, torch.bfloat16, enabled=on_gpu)
 
     def resume(self) -> list[Epoch]:
-        """What was done before; the model and its optimiser are as they were then."""
+        """Restores model and optimiser, and returns the epochs done before."""
         path = self.folder / LAST_FILE
         if not path.exists():
             return []
@@ -264,7 +264,7 @@ def _finished(epochs: list[Epoch], config: Schedule) -> bool:
 
 
 def _mixed(seed: int, number: int) -> int:
-    """A seed of an epoch of a training, unlike those of its neighbours."""
+    """Returns the seed of an epoch, uncorrelated with those of other epochs."""
     return int.from_bytes(hashlib.sha256(f"{seed}/{number}".encode()).digest()[:7], "little")
 
 

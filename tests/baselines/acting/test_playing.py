@@ -75,7 +75,7 @@ def test_the_hash_covers_the_weights_and_the_cost_is_told(folders: dict[str, Pat
     other = shutil.copytree(folders["toto"], tmp_path / "other")
     with (other / "best.safetensors").open("ab") as file:
         file.write(b"more")
-    with pytest.raises(ValueError, match=r"best\.safetensors: is missing or not what was trained"):
+    with pytest.raises(ValueError, match=r"best\.safetensors: is missing, or differs from the trained weights"):
         find_player(str(other), Role.CO_WIZARD).make(Role.CO_WIZARD, SpaceLimits())
 
 
