@@ -1,16 +1,16 @@
 """Columns of a session in progress.
 
-Each new utterance, action and look is encoded once. What no batch of a later point can show is dropped, so that the
-cost of a decision does not grow with the session. The columns give the same batches as those that `extract` makes of
-the whole session (tests/baselines/acting/test_parity.py).
+What no batch of a later point can show is dropped, so that the cost of a decision does not grow with the session. Looks
+are perceived when columns are requested, each look once. The columns give the same batches as those that `extract`
+makes of the whole session (tests/baselines/acting/test_parity.py).
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.recording import (
     TRAJECTORY_DTYPE,
     ActionRecord,
+    SceneTable,
     SessionHeader,
     Surroundings,
     Trajectory,
@@ -42,14 +43,21 @@ from dorothie_gym.recording.recorded_perception import perceived
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 
 
-class _Look(NamedTuple):
-    """Surroundings that were recorded at a frame, the car's row then (1,), and what was perceived from there."""
+@dataclass(eq=False)
+class _Look:
+    """Surroundings that were recorded at a frame.
+
+    Attributes:
+        frame: the frame.
+        scene: one record in each table.
+        row: row of the trajectory at the frame (1,).
+        objects: kinds (k,) and values (k, 8) of the perceived objects; None until columns are requested.
+    """
 
     frame: int
     scene: Surroundings
     row: Trajectory
-    kinds: NDArray[np.int64]
-    values: NDArray[np.float64]
+    objects: tuple[NDArray[np.int64], NDArray[np.float64]] | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -88,12 +96,12 @@ class IncrementalColumns:
 
         Args:
             rows: (n,) the next rows, at frames that are whole tenths of a second.
-            scene: surroundings that were recorded at the last of these rows; None for none.
+            scene: surroundings that were recorded at the last of these rows, one record in each table; None for none.
         """
         trajectory = np.concatenate((self.trajectory, rows))
         looks = self.looks
         if scene is not None:
-            looks = (*looks, self._look(scene, rows[-1:]))
+            looks = (*looks, _Look(int(rows["frame"][-1]), scene, rows[-1:]))
         # Points are at the newest row at the earliest, which is then not visible itself.
         trajectory = trajectory[-(max(self.sizes.window, 1) * self.sizes.window_step + 1) :]
         if len(trajectory):
@@ -123,9 +131,8 @@ class IncrementalColumns:
         if action.action is not PhysicalAction.LIGHT_CHANGE:
             return found
         frame = action.frame - action.frame % FRAMES_PER_TENTH
-        switched = replace(found, switches=(*self.switches, (frame, bool(action.up))))
-        looks = (switched._look(look.scene, look.row) if look.frame >= frame else look for look in self.looks)
-        return replace(switched, looks=tuple(looks))
+        looks = (_Look(look.frame, look.scene, look.row) if look.frame >= frame else look for look in self.looks)
+        return replace(found, switches=(*self.switches, (frame, bool(action.up))), looks=tuple(looks))
 
     def columns(self, graph: TownGraph) -> Columns:
         """Returns the columns as those of a corpus of one session.
@@ -135,7 +142,8 @@ class IncrementalColumns:
         """
         texts, unlabelled = TextPool(), defaultdict[int, int](int)
         rows = self.trajectory
-        looks = [(look.frame, look.kinds, look.values) for look in self.looks]
+        self._perceive()
+        looks = [(look.frame, *look.objects) for look in self.looks if look.objects is not None]
         arrays = {
             **place_columns(self.header, texts),
             **utterance_columns(self.utterances, texts, unlabelled),
@@ -149,10 +157,20 @@ class IncrementalColumns:
         )  # fmt: skip
         return join(part.signature, ["live"], [""], [part], [graph], [])
 
-    def _look(self, scene: Surroundings, row: Trajectory) -> _Look:
-        """Returns what is perceived of a scene from the car at a row of the trajectory (1,)."""
-        ((frame, kinds, values),) = perceived(scene, poses(row), row["frame"], self.switches, self.town)
-        return _Look(frame, scene, row, kinds, values)
+    def _perceive(self) -> None:
+        """Fills in the objects of the looks that have none yet."""
+        looks = [look for look in self.looks if look.objects is None]
+        if not looks:
+            return
+        scene = Surroundings(
+            actors=_joined([look.scene.actors for look in looks]),
+            lights=_joined([look.scene.lights for look in looks]),
+            weather=_joined([look.scene.weather for look in looks]),
+        )
+        rows = np.concatenate([look.row for look in looks])
+        found = perceived(scene, poses(rows), rows["frame"], self.switches, self.town)
+        for look, (_, kinds, values) in zip(looks, found, strict=True):
+            look.objects = kinds, values
 
     def _visible_utterances(self, utterances: tuple[UtteranceRecord, ...]) -> tuple[UtteranceRecord, ...]:
         """Drops utterances that no point at the last one's tenth or later can show."""
@@ -169,3 +187,13 @@ class IncrementalColumns:
 def _first_relevant(frames: Iterable[int], frame: int) -> int:
     """Returns the place of the last of some rising frames that is at a frame or before it; 0 where there is none."""
     return max(sum(each <= frame for each in frames) - 1, 0)
+
+
+def _joined(tables: Sequence[SceneTable]) -> SceneTable:
+    """Returns a table of the records of some tables (at least one), whose frames rise."""
+    sizes = np.concatenate([np.diff(table.offsets) for table in tables])
+    return SceneTable(
+        frames=np.concatenate([table.frames for table in tables]),
+        offsets=np.concatenate(([0], np.cumsum(sizes))),
+        rows=np.concatenate([table.rows for table in tables]),
+    )
