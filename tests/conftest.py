@@ -19,8 +19,22 @@ from dorothie_gym.spaces import noop
 from dorothie_gym.user_cache import CACHE_VARIABLE
 
 SIMULATED = frozenset(
-    "baselines bench benchmark engine envs policies recording rollout sim testing wrappers"
-    " test_docs.py test_environment_pages.py test_readme.py".split()
+    [
+        "baselines",
+        "bench",
+        "benchmark",
+        "engine",
+        "envs",
+        "policies",
+        "recording",
+        "rollout",
+        "sim",
+        "testing",
+        "wrappers",
+        "test_docs.py",
+        "test_environment_pages.py",
+        "test_readme.py",
+    ]
 )
 """Folders and files whose tests step the simulation."""
 

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 
-from dorothie_gym.cli.app import app  # noqa: E402
+from dorothie_gym.cli.app import app
 
 SHORT = ["--set", "max_seconds=5", "--set", "traffic=none", "--episodes", "1", "--environments", "1", "--workers", "0"]
 

@@ -79,7 +79,7 @@ def test_the_world_page_tells_the_sight_that_the_weather_leaves() -> None:
 
 def test_the_talk_of_its_page_is_worded_misheard_and_read() -> None:
     names: dict[str, object] = {}
-    exec(compile(example("talk.md", "python"), "talk.md", "exec"), names)  # noqa: S102 (our own page)
+    exec(compile(example("talk.md", "python"), "talk.md", "exec"), names)
     assert "left" in str(names["text"])
     assert names["understood"]
 
@@ -112,7 +112,7 @@ def test_the_examples_of_the_tasks_page_run(tmp_path: Path, monkeypatch: pytest.
     names: dict[str, Any] = {}
     examples = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
     for number, code in enumerate(examples):
-        exec(compile(code, f"tasks.md, example {number}", "exec"), names)  # noqa: S102 (our own page)
+        exec(compile(code, f"tasks.md, example {number}", "exec"), names)
     assert len(examples) == 3
     assert names["batch"].move.shape == (4, 8)
     assert set(names["info"]["reward_terms"]) <= {"action", "joint"}
@@ -168,8 +168,7 @@ def test_the_diagram_of_the_architecture_has_the_order_of_the_import_contract() 
     for layer in layers[:-2]:  # the last two hold modules, not packages
         names = [name.strip().removeprefix("dorothie_gym.") for name in layer.split("|")]
         found = {
-            next((k for k, line in enumerate(diagram) if re.search(rf"(^|\s){name}\s\s", line)), None)
-            for name in names
+            next((k for k, line in enumerate(diagram) if re.search(rf"(^|\s){name}\s\s", line)), None) for name in names
         }
         assert len(found) == 1, f"{layer} is not one line of the diagram"
         lines += found

@@ -18,7 +18,7 @@ def test_file_is_replaced_and_no_part_is_left(tmp_path: Path, shared: bool) -> N
 @pytest.mark.parametrize("shared", [False, True])
 def test_failed_write_keeps_the_old_file(tmp_path: Path, shared: bool) -> None:
     (tmp_path / "a").write_text("old")
-    with pytest.raises(KeyboardInterrupt), replacing(tmp_path / "a", shared=shared) as part:
+    with pytest.raises(KeyboardInterrupt), replacing(tmp_path / "a", shared=shared) as part:  # noqa: PT012
         part.write_text("half")
         raise KeyboardInterrupt
     assert (tmp_path / "a").read_text() == "old"

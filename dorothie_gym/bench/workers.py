@@ -31,7 +31,7 @@ class Worker:
 
     def __init__(self, job: str, **settings: Any) -> None:
         self._job = job
-        self._noise = tempfile.TemporaryFile(mode="w+", encoding="utf-8", errors="replace")
+        self._noise = tempfile.TemporaryFile(mode="w+", encoding="utf-8", errors="replace")  # noqa: SIM115
         command = [sys.executable, "-m", __name__, job, json.dumps(settings)]
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._noise, text=True

@@ -120,7 +120,7 @@ def joined_actions(pieces: Sequence[ActionPredictions]) -> ActionPredictions:
 
 
 def _check_classes(name: str, classes: NDArray[np.int64], count: int) -> None:
-    if classes.ndim != 1 or (len(classes) and not (0 <= classes.min() and classes.max() < count)):
+    if classes.ndim != 1 or (len(classes) and not (classes.min() >= 0 and classes.max() < count)):
         raise ValueError(f"{name} must be one row of classes in 0..{count - 1}, got shape {classes.shape}")
 
 

@@ -7,10 +7,10 @@ import pytest
 pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
-from dorothie_gym.baselines import loaders, model_card  # noqa: E402
-from dorothie_gym.baselines.rl import checkpoint  # noqa: E402
-from dorothie_gym.baselines.selfplay import settings  # noqa: E402
-from dorothie_gym.policies.policy_loader import MODEL_LOADERS  # noqa: E402
+from dorothie_gym.baselines import loaders, model_card
+from dorothie_gym.baselines.rl import checkpoint
+from dorothie_gym.baselines.selfplay import settings
+from dorothie_gym.policies.policy_loader import MODEL_LOADERS
 
 
 def test_each_kind_of_model_has_a_loader() -> None:

@@ -26,8 +26,8 @@ PERIOD = 15  # frames a decision
 class TalkingEnv(ParallelEnv[str, int, int]):
     """Environment that replays the test dialogue, 15 frames per step, without access to the recorder."""
 
-    metadata: dict[str, Any] = {"name": "talking_v0", "render_modes": []}
-    possible_agents = ["participant", "co_wizard"]
+    metadata: dict[str, Any] = {"name": "talking_v0", "render_modes": []}  # noqa: RUF012
+    possible_agents = ["participant", "co_wizard"]  # noqa: RUF012
 
     def __init__(self, steps: int = 20) -> None:
         self.agents: list[str] = []

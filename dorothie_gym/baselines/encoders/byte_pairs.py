@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -52,7 +53,7 @@ class BytePairs:
         while len(merges) < vocabulary - _BYTES - 1:
             pairs: Counter[tuple[int, int]] = Counter()
             for word, ids in pieces.items():
-                for pair in zip(ids, ids[1:], strict=False):
+                for pair in itertools.pairwise(ids):
                     pairs[pair] += counts[word]
             if not pairs:
                 break
@@ -89,7 +90,7 @@ class BytePairs:
         if word not in self._kept:
             ids = _bytes(word)
             while len(ids) > 1:
-                pair = min(zip(ids, ids[1:], strict=False), key=lambda pair: self._ranks.get(pair, len(self.merges)))
+                pair = min(itertools.pairwise(ids), key=lambda pair: self._ranks.get(pair, len(self.merges)))
                 if pair not in self._ranks:
                     break
                 ids = _merged(ids, pair, 1 + _BYTES + self._ranks[pair])

@@ -9,11 +9,11 @@ from dorothie_gym.errors import ModelFileError, SettingsError
 __all__ = [
     "ALGORITHMS",
     "EpisodeStatistics",
-    "TrainingResult",
+    "ModelFileError",
     "SettingsError",
     "Training",
+    "TrainingResult",
     "TrainingSettings",
-    "ModelFileError",
     "evaluate_policy",
     "load_model",
     "tuned_settings",

@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-import dorothie_gym  # noqa: F401  (its import registers the environments)
+import dorothie_gym
 from dorothie_gym.baselines.rl.settings import TrainingSettings
 from dorothie_gym.errors import SettingsError
 from dorothie_gym.spaces.limits import REACH

@@ -85,16 +85,19 @@ def _run(settings: TrainingSettings, steps: int) -> dict[str, float]:
     torch.set_num_threads(1)
     vector = make_vector(settings)
     try:
-        with _timed(vector, "step_wait") as step, _timed(Instructor, "instruct") as told:
-            with _timed(DrivingSession, "interfere") as played:
-                model = make_model(settings, vector)
-                model.learn(1, log_interval=None)  # the first rollout compiles and warms up
-                for seconds in (step, told, played):
-                    seconds[0] = 0.0
-                clock = _Clock()
-                begun, done = time.perf_counter(), model.num_timesteps
-                model.learn(steps, callback=clock, reset_num_timesteps=False, log_interval=None)
-                spent, more = time.perf_counter() - begun, model.num_timesteps - done
+        with (
+            _timed(vector, "step_wait") as step,
+            _timed(Instructor, "instruct") as told,
+            _timed(DrivingSession, "interfere") as played,
+        ):
+            model = make_model(settings, vector)
+            model.learn(1, log_interval=None)  # the first rollout compiles and warms up
+            for seconds in (step, told, played):
+                seconds[0] = 0.0
+            clock = _Clock()
+            begun, done = time.perf_counter(), model.num_timesteps
+            model.learn(steps, callback=clock, reset_num_timesteps=False, log_interval=None)
+            spent, more = time.perf_counter() - begun, model.num_timesteps - done
     finally:
         vector.close()
     scale = steps / more  # whole rollouts are played, so that there are a few more steps

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import signal
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
@@ -134,7 +135,7 @@ class SharedVecEnv(VecEnv, ABC):
 def share_of(environments: int, workers: int) -> list[range]:
     """Numbers of the environments that each worker has."""
     bounds = [environments * k // workers for k in range(workers + 1)]
-    return [range(begin, end) for begin, end in zip(bounds[:-1], bounds[1:], strict=True)]
+    return [range(begin, end) for begin, end in itertools.pairwise(bounds)]
 
 
 def carry_out(vector: DummyVecEnv, command: str, arguments: tuple[Any, ...]) -> tuple[bool, Any]:

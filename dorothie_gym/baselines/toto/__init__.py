@@ -9,12 +9,12 @@ from dorothie_gym.baselines.toto.towns import Towns
 __all__ = [
     "ABLATIONS",
     "ALL_CHANNELS",
+    "TOTO",
     "Channel",
     "FrozenTexts",
     "LossWeights",
     "PretrainedBert",
     "SmallBert",
-    "TOTO",
     "TOTOConfig",
     "Texts",
     "Towns",

@@ -16,9 +16,9 @@ from dorothie_gym.errors import CheckpointError
 
 __all__ = [
     "BEST_FILE",
+    "LAST_FILE",
     "CheckpointError",
     "Epoch",
-    "LAST_FILE",
     "Model",
     "Schedule",
     "TrainingSummary",

@@ -140,7 +140,7 @@ def train(
         OSError: the folder cannot be written.
     """
     run = _Run(model, folder, seed, about)
-    with _deterministic(run.device):
+    with _DeterministicAlgorithms(run.device):
         epochs = run.resume()
         while not _finished(epochs, model.config):
             number = len(epochs) + 1
@@ -268,8 +268,8 @@ def _mixed(seed: int, number: int) -> int:
     return int.from_bytes(hashlib.sha256(f"{seed}/{number}".encode()).digest()[:7], "little")
 
 
-class _deterministic:
-    """While this is on, torch does nothing whose result hangs on the order in which threads come to the end."""
+class _DeterministicAlgorithms:
+    """Context in which torch uses deterministic algorithms, so that results do not depend on thread timing."""
 
     def __init__(self, where: torch.device):
         self._on = where.type == "cpu"

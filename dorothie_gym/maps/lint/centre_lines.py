@@ -122,7 +122,7 @@ def _tight_curves(lane: Lane, turns: Array, length: Array) -> Iterator[Fault]:
     share = _share(length[:-1], length[1:])
     side = np.where(np.abs(turns) > share / SMALLEST_RADIUS, np.sign(turns), 0.0)
     edges = np.flatnonzero(np.diff(np.concatenate(([0.0], side, [0.0]))))
-    for begin, end in itertools.pairwise(edges):
+    for begin, end in itertools.pairwise(edges.tolist()):
         if side[begin] == 0.0:
             continue
         turn = float(np.sum(np.abs(turns[begin:end])))

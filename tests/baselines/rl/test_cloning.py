@@ -11,15 +11,15 @@ pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
 from dorothie_gym.baselines.rl import Training, TrainingSettings, tuned_settings
-from dorothie_gym.baselines.rl.behaviour_cloning import clone, read_lessons  # noqa: E402
-from dorothie_gym.baselines.rl.checkpoint import make_model  # noqa: E402
-from dorothie_gym.baselines.rl.environments import make_env  # noqa: E402
-from dorothie_gym.engine.config import EnvConfig  # noqa: E402
-from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv  # noqa: E402
+from dorothie_gym.baselines.rl.behaviour_cloning import clone, read_lessons
+from dorothie_gym.baselines.rl.checkpoint import make_model
+from dorothie_gym.baselines.rl.environments import make_env
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.errors import SessionError, SettingsError
-from dorothie_gym.ontology import AGENT_ROLES  # noqa: E402
-from dorothie_gym.policies import make_policy  # noqa: E402
-from dorothie_gym.rollout import play_session  # noqa: E402
+from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.policies import make_policy
+from dorothie_gym.rollout import play_session
 
 NAVIGATION = "dorothie_gym/Navigation-v0"
 SMALL = {"n_steps": 16, "batch_size": 32, "n_epochs": 1}
@@ -34,7 +34,7 @@ def corpus(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     for seed in range(14):
         fold = "train" if seed < 12 else "val/seen"
         play_session(env, policies, seed=seed, folder=root / fold / f"{seed:04}")
-    yield root
+    return root
 
 
 def test_what_co_wizards_did_is_learned_and_holds_for_other_sessions(corpus: Path) -> None:

@@ -6,10 +6,10 @@ import pytest
 
 pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 
-from dorothie_gym.baselines.rl import evaluate_policy  # noqa: E402
-from dorothie_gym.baselines.rl.evaluation import wilson  # noqa: E402
-from dorothie_gym.envs.navigation_v0 import NavigationEnv  # noqa: E402
-from tests.envs.navigation_drivers import follow_lane, obey  # noqa: E402
+from dorothie_gym.baselines.rl import evaluate_policy
+from dorothie_gym.baselines.rl.evaluation import wilson
+from dorothie_gym.envs.navigation_v0 import NavigationEnv
+from tests.envs.navigation_drivers import follow_lane, obey
 
 
 def test_wilson_s_interval_is_that_of_the_textbook() -> None:

@@ -12,13 +12,13 @@ pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
 from dorothie_gym.baselines.rl import Training, TrainingSettings
-from dorothie_gym.engine.config import EnvConfig  # noqa: E402
-from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv  # noqa: E402
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.errors import ModelFileError, SettingsError
-from dorothie_gym.ontology import Role  # noqa: E402
-from dorothie_gym.policies import ALL_SCRIPTED, find_player  # noqa: E402
-from dorothie_gym.recording import Session  # noqa: E402
-from dorothie_gym.rollout.closed_loop import RolloutSettings, parse_towns, roll_out  # noqa: E402
+from dorothie_gym.ontology import Role
+from dorothie_gym.policies import ALL_SCRIPTED, find_player
+from dorothie_gym.recording import Session
+from dorothie_gym.rollout.closed_loop import RolloutSettings, parse_towns, roll_out
 
 
 def train(folder: Path, algorithm: str = "ppo", **changes: Any) -> None:

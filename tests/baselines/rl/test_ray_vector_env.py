@@ -12,9 +12,9 @@ import pytest
 
 pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 
-from dorothie_gym.baselines.rl import Training, tuned_settings  # noqa: E402
-from dorothie_gym.baselines.rl.ray_vector_env import RayVecEnv  # noqa: E402
-from dorothie_gym.baselines.rl.vector_env import WorkerVecEnv  # noqa: E402
+from dorothie_gym.baselines.rl import Training, tuned_settings
+from dorothie_gym.baselines.rl.ray_vector_env import RayVecEnv
+from dorothie_gym.baselines.rl.vector_env import WorkerVecEnv
 from dorothie_gym.errors import ProcessError
 
 pytestmark = [pytest.mark.integrations, pytest.mark.timeout(900), pytest.mark.filterwarnings("ignore")]

@@ -7,11 +7,11 @@ from typer.testing import CliRunner
 
 pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 
-from dorothie_gym.baselines.rl.throughput import SHARES, measure  # noqa: E402
-from dorothie_gym.bench.report import rl_report  # noqa: E402
-from dorothie_gym.cli.app import app  # noqa: E402
+from dorothie_gym.baselines.rl.throughput import SHARES, measure
+from dorothie_gym.bench.report import rl_report
+from dorothie_gym.cli.app import app
 from dorothie_gym.errors import SettingsError
-from dorothie_gym.policies.navigation.instructor import Instructor  # noqa: E402
+from dorothie_gym.policies.navigation.instructor import Instructor
 
 
 def test_shares_of_the_time_add_up() -> None:

@@ -12,8 +12,8 @@ pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
 from dorothie_gym.baselines.rl import ALGORITHMS, Training, TrainingSettings, load_model, tuned_settings
-from dorothie_gym.baselines.rl import training as training_module  # noqa: E402
-from dorothie_gym.baselines.rl.environments import make_vector  # noqa: E402
+from dorothie_gym.baselines.rl import training as training_module
+from dorothie_gym.baselines.rl.environments import make_vector
 from dorothie_gym.errors import ModelFileError, SettingsError
 
 DISCRETE = "dorothie_gym/Navigation-v0"

@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 
-from dorothie_gym.baselines.rl.vector_env import WorkerVecEnv  # noqa: E402
+from dorothie_gym.baselines.rl.vector_env import WorkerVecEnv
 
 
 @pytest.fixture(scope="module")

@@ -8,19 +8,19 @@ import pytest
 
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
-from dorothie_gym.baselines.selfplay.demonstrations import lessons_of, read_lessons  # noqa: E402
-from dorothie_gym.baselines.selfplay.participant import ParticipantPhrase  # noqa: E402
-from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings  # noqa: E402
-from dorothie_gym.baselines.selfplay.training import SelfPlayTraining  # noqa: E402
-from dorothie_gym.engine.config import EnvConfig  # noqa: E402
-from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv  # noqa: E402
+from dorothie_gym.baselines.selfplay.demonstrations import lessons_of, read_lessons
+from dorothie_gym.baselines.selfplay.participant import ParticipantPhrase
+from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings
+from dorothie_gym.baselines.selfplay.training import SelfPlayTraining
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.errors import SessionError
-from dorothie_gym.maps import load_town  # noqa: E402
-from dorothie_gym.ontology import AGENT_ROLES  # noqa: E402
-from dorothie_gym.policies import make_policy  # noqa: E402
-from dorothie_gym.policies.navigation import NavigationAction  # noqa: E402
+from dorothie_gym.maps import load_town
+from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.policies import make_policy
+from dorothie_gym.policies.navigation import NavigationAction
 from dorothie_gym.recording import Corpus
-from dorothie_gym.rollout import play_session  # noqa: E402
+from dorothie_gym.rollout import play_session
 
 PARTICIPANT, CO_WIZARD, AD_WIZARD = range(3)
 

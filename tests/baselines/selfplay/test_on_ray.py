@@ -9,9 +9,9 @@ import pytest
 
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
-from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings  # noqa: E402
-from dorothie_gym.baselines.selfplay.training import SelfPlayTraining  # noqa: E402
-from dorothie_gym.ontology import AGENT_ROLES  # noqa: E402
+from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings
+from dorothie_gym.baselines.selfplay.training import SelfPlayTraining
+from dorothie_gym.ontology import AGENT_ROLES
 
 pytestmark = [pytest.mark.integrations, pytest.mark.timeout(900), pytest.mark.filterwarnings("ignore")]
 

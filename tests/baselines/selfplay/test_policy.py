@@ -7,14 +7,14 @@ import pytest
 
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
-from dorothie_gym import DuoWizardEnv  # noqa: E402
-from dorothie_gym.baselines.selfplay.env import SelfPlayEnv  # noqa: E402
-from dorothie_gym.baselines.selfplay.policy import read_policy  # noqa: E402
-from dorothie_gym.baselines.selfplay.training import SelfPlayTraining  # noqa: E402
-from dorothie_gym.ontology import AGENT_ROLES, Role  # noqa: E402
-from dorothie_gym.policies import find_player  # noqa: E402
-from dorothie_gym.rollout.play import play_session  # noqa: E402
-from tests.baselines.selfplay.test_training import settings_for  # noqa: E402
+from dorothie_gym import DuoWizardEnv
+from dorothie_gym.baselines.selfplay.env import SelfPlayEnv
+from dorothie_gym.baselines.selfplay.policy import read_policy
+from dorothie_gym.baselines.selfplay.training import SelfPlayTraining
+from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.policies import find_player
+from dorothie_gym.rollout.play import play_session
+from tests.baselines.selfplay.test_training import settings_for
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["independent", "shared"])

@@ -5,16 +5,16 @@ import pytest
 
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
-from dorothie_gym import DuoWizardEnv  # noqa: E402
-from dorothie_gym.baselines.selfplay.ad_wizard import AdWizardInterface, AdWizardTrick  # noqa: E402
-from dorothie_gym.baselines.selfplay.co_wizard import CoWizardInterface, ExtraAction  # noqa: E402
-from dorothie_gym.baselines.selfplay.env import SelfPlayEnv  # noqa: E402
-from dorothie_gym.baselines.selfplay.participant import ParticipantInterface, ParticipantMemory, ParticipantPhrase  # noqa: E402
-from dorothie_gym.dialogue import Direction  # noqa: E402
+from dorothie_gym import DuoWizardEnv
+from dorothie_gym.baselines.selfplay.ad_wizard import AdWizardInterface, AdWizardTrick
+from dorothie_gym.baselines.selfplay.co_wizard import CoWizardInterface, ExtraAction
+from dorothie_gym.baselines.selfplay.env import SelfPlayEnv
+from dorothie_gym.baselines.selfplay.participant import ParticipantInterface, ParticipantMemory, ParticipantPhrase
+from dorothie_gym.dialogue import Direction
 from dorothie_gym.errors import SettingsError
-from dorothie_gym.ontology import AGENT_ROLES, ActionValue, DialogueAct, DialogueMove, Role  # noqa: E402
-from dorothie_gym.policies.navigation import NavigationAction  # noqa: E402
-from dorothie_gym.spaces import ParticipantAction, Speech  # noqa: E402
+from dorothie_gym.ontology import AGENT_ROLES, ActionValue, DialogueAct, DialogueMove, Role
+from dorothie_gym.policies.navigation import NavigationAction
+from dorothie_gym.spaces import ParticipantAction, Speech
 
 NOTHING = np.zeros(3, dtype=np.int64)
 

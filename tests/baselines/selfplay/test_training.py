@@ -9,15 +9,15 @@ import pytest
 
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
-import torch  # noqa: E402
-from safetensors.torch import load_file  # noqa: E402
+import torch
+from safetensors.torch import load_file
 
-from dorothie_gym.baselines.selfplay import training as training_module  # noqa: E402
-from dorothie_gym.baselines.selfplay.env import SelfPlayEnv  # noqa: E402
-from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings, selfplay_settings  # noqa: E402
-from dorothie_gym.baselines.selfplay.training import SelfPlayTraining  # noqa: E402
+from dorothie_gym.baselines.selfplay import training as training_module
+from dorothie_gym.baselines.selfplay.env import SelfPlayEnv
+from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings, selfplay_settings
+from dorothie_gym.baselines.selfplay.training import SelfPlayTraining
 from dorothie_gym.errors import ModelFileError, SettingsError
-from dorothie_gym.ontology import AGENT_ROLES, Role  # noqa: E402
+from dorothie_gym.ontology import AGENT_ROLES, Role
 
 SMALL: dict[str, Any] = {
     "steps": 128, "environments": 2, "past_environments": 1, "evaluate_every": 128, "episodes": 1, "network": (8,),
