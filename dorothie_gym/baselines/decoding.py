@@ -52,10 +52,10 @@ class Predicted:
 
 
 TAKES_ANGLE: Final = tuple(action.argument is ArgumentKind.ANGLE for action in NAVIGATION_ACTIONS)
-"""Whether a class of NfD takes any angle."""
+"""Flags of the NfD classes that take any angle."""
 
 TAKES_SIDE: Final = tuple(action.argument is ArgumentKind.SIDE for action in NAVIGATION_ACTIONS)
-"""Whether a class of NfD takes a side, left or right."""
+"""Flags of the NfD classes that take a side, left or right."""
 
 
 def decode(outputs: Outputs, task: Tensor, allowed: Tensor | None = None) -> Predicted:

@@ -163,7 +163,7 @@ def _stock_seconds(stock: StockIntersection, steps: int) -> float:
 def _two_processes(
     town: str, vehicles: int, pedestrians: int, seed: int, decisions: int, repeats: int, progress: Progress
 ) -> float | None:  # fmt: skip
-    """How many times as much two processes do as one; None where there is one core only."""
+    """Returns the throughput of two processes relative to one; None on a single core."""
     if cores() < 2:
         return None
     progress("two processes", 0.7)

@@ -1,4 +1,4 @@
-"""How soon the package and a first environment are there, against importing highway-env, each in a fresh process."""
+"""Import time of the package and of a first environment against highway-env's, each in a fresh process."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def measure(*, repeats: int = 7, progress: Progress = quiet) -> dict[str, Any]:
 
 
 def _seconds(code: str) -> float:
-    """What a fresh interpreter takes for a piece of code [s]."""
+    """Returns the time that a fresh interpreter takes to run some code [s]."""
     environment = {**os.environ, "PYGAME_HIDE_SUPPORT_PROMPT": "1"}
     done = subprocess.run(
         [sys.executable, "-c", _CLOCK + code + _TELL], env=environment, capture_output=True, check=True, text=True

@@ -1,4 +1,4 @@
-"""What measurements say, in words and rows: tables and charts are made of it."""
+"""Summaries of measurements, as text and as the rows of tables and charts."""
 
 from __future__ import annotations
 
@@ -243,7 +243,7 @@ def train_report(figures: Mapping[str, Any]) -> Report:
 
 
 def machine_line(machine: Mapping[str, Any]) -> str:
-    """What a measurement was made on, in a line."""
+    """Returns the machine and versions of a measurement in one line."""
     return (
         f"{machine['processor']}, {_count(machine['cores'], 'core')}, {machine['system']}; Python {machine['python']}, "
         f"numba {machine['numba']}, numpy {machine['numpy']}, highway-env {machine['highway_env']}"

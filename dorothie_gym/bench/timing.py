@@ -1,4 +1,4 @@
-"""How long pieces of work take: repeated in turns, with median, best and spread."""
+"""Timing of functions: alternating repetitions with median, best and spread."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def quiet(doing: str, share: float) -> None:
 
 @dataclass(frozen=True)
 class Timing:
-    """What repeats of one piece of work took.
+    """Durations of the repetitions of one function.
 
     Attributes:
         seconds: for one unit of the work, by repeat [s].
@@ -92,7 +92,7 @@ def cores() -> int:
 
 
 def machine() -> dict[str, str | int]:
-    """What a measurement was made on: processor, cores, system, and versions."""
+    """Returns the environment of a measurement: processor, cores, system and versions."""
     return {
         "processor": _processor(),
         "cores": cores(),

@@ -1,4 +1,4 @@
-"""How stepping many worlds grows faster with threads, and how fast `Town-v0` is in each of Gymnasium's ways."""
+"""Throughput of many worlds by number of threads, and of `Town-v0` in each of Gymnasium's vector modes."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ class Worker:
 
 
 def _work(job: str, settings: str) -> None:
-    """What a worker does; its standard output is for answers alone."""
+    """Main loop of a worker; standard output carries answers only."""
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     work: Callable[[], float] = import_module(f"dorothie_gym.bench.{job}").prepare(**json.loads(settings))

@@ -290,7 +290,7 @@ def shown_title(key: str) -> str:
 
 
 def has_paper_figure(key: str) -> bool:
-    """Whether a column of our table is computed as the paper's figures are."""
+    """Returns whether a column of our table is computed as the paper's figures are."""
     return key in SHOWN and key + PAPER_SUFFIX not in SHOWN
 
 

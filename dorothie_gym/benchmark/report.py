@@ -281,7 +281,7 @@ def _has_paper(table: ResultsTable) -> bool:
 # --- The table and the confusion matrices as pictures ----------------------------------------------------------------
 
 PANELS: Final = tuple(key + PAPER_SUFFIX if key + PAPER_SUFFIX in SHOWN else key for key in COLUMNS)
-"""What is drawn: the paper's six columns, by the paper's protocol, so that its figures can stand beside ours."""
+"""Columns of the picture: the paper's six, by the paper's protocol, so that its figures are comparable with ours."""
 
 _ROW, _TOP, _BOTTOM = 0.46, 1.75, 0.75
 _OURS: Final = {"seen": "#2f62c4", "unseen": "#cf7f1d", ALL: "#2f62c4"}

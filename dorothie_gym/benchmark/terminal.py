@@ -41,10 +41,10 @@ from dorothie_gym.benchmark.table import ResultsTable
 from dorothie_gym.recording import Task
 
 WIDE: Final = 110
-"""From this width on the tasks stand side by side."""
+"""Terminal width from which the tasks stand side by side [characters]."""
 
 NOTES: Final = 8
-"""So many notes are shown; the JSON has all."""
+"""Number of notes shown; the JSON has all."""
 
 _VERDICTS: Final = {
     ModelVerdict.HOLDS: "green",
@@ -150,7 +150,7 @@ def _metrics(table: ResultsTable, model: str, tasks: Sequence[Task]) -> Table:
 
 
 def _is_own(name: str) -> bool:
-    """Whether a metric is worth a row of its own: the paper's protocol takes moves and actions as we do."""
+    """Returns whether a metric is worth a row of its own: the paper's protocol takes moves and actions as we do."""
     return name.removesuffix(PAPER_SUFFIX) not in ("move_accuracy", "action_accuracy") or PAPER_SUFFIX not in name
 
 

@@ -26,7 +26,7 @@ SPEAKERS: Mapping[Role, tuple[str, str]] = {
     Role.AD_WIZARD: ("Ad-Wizard", "bold magenta"),
     Role.AGENT: ("Car", "bold yellow"),
 }
-"""What each role is called, and the style of its name."""
+"""Displayed name of each role and its style."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -224,7 +224,7 @@ def tasks(task: TaskState, console: Console) -> RenderableType:
 
 
 def summary(facts: dict[str, Any], files: dict[str, str], console: Console) -> RenderableType:
-    """How a session ended.
+    """Outcome of a session.
 
     Args:
         facts: what `dorothie-gym run --json` writes.

@@ -178,7 +178,7 @@ def _long(value: Any, idle: np.ndarray[Any, Any], flags: bool, where: str) -> np
 
 @lru_cache(maxsize=256)
 def _is_flags(role: Role, name: str, limits: SpaceLimits) -> bool:
-    """Whether the field is an array of 0 and 1."""
+    """Returns whether the field is an array of 0 and 1."""
     return isinstance(action_space(role, limits)[name], spaces.MultiBinary)
 
 

@@ -45,7 +45,7 @@ def overlap(
     other_length: float,
     other_width: float,
 ) -> bool:
-    """Whether two rectangles touch: no axis of either separates them (Gottschalk, Lin and Manocha 1996).
+    """Returns whether two rectangles touch: no axis of either separates them (Gottschalk, Lin and Manocha 1996).
 
     Args:
         dx: from the middle of the first to that of the second [m], `dy` likewise.

@@ -85,7 +85,7 @@ class TownRoad(Road):
         return float(thing.lane.height_at(thing.lane.local_coordinates(thing.position)[0]))
 
     def at_one_level(self, one: RoadObject, other: RoadObject) -> bool:
-        """Whether two things can meet: no more than `ahead.LEVEL` apart in height, as far as that is known."""
+        """Returns whether two things can meet: no more than `ahead.LEVEL` apart in height, as far as that is known."""
         low, high = self.network.height_range
         own_heights = getattr(one, "height", None) is not None or getattr(other, "height", None) is not None
         if high - low <= LEVEL and not own_heights:

@@ -1,4 +1,4 @@
-"""Whether a town remains passable with roadblocks in it.
+"""Check that a town remains passable with roadblocks in it.
 
 The cells of the router are closed that a car cannot drive or turn round in because of a prop. What is left has to hold
 for good, not only from where the car is now: wherever it may still come to, and wherever it may have to stop before a
@@ -52,7 +52,7 @@ def crowds(town: Town, place: Place, others: Iterable[Place]) -> bool:
 
 
 def cuts_off(town: Town, car: Place, standing: Sequence[Place], added: Place) -> bool:
-    """Whether one more prop would cut a way that the car needs, now or later.
+    """Returns whether one more prop would cut a way that the car needs, now or later.
 
     Args:
         town: the map.

@@ -178,7 +178,7 @@ def _at_lines(arrays: WatchArrays, poses: Array, k: int, length: float, near: in
 
 @inlined
 def _is_on(line: StopLineRecord, x: float, y: float, cos: float, sin: float, height: float) -> bool:
-    """Whether a place is on the lane of a line, before or behind it, and heads its way."""
+    """Returns whether a place is on the lane of a line, before or behind it, and heads its way."""
     across = (y - line.y) * line.cos - (x - line.x) * line.sin
     facing = cos * line.cos + sin * line.sin
     return bool(facing > 0.5 and abs(across) <= line.half_width and abs(height - line.height) <= LEVEL)
@@ -231,7 +231,7 @@ def _tell(arrays: WatchArrays, poses: Array, k: int, frame: int, kind: int, coun
 
 @inlined
 def _state(arrays: WatchArrays, poses: Array, k: int, wide: bool) -> tuple[bool, bool]:
-    """Whether the car is off the road, and whether it is against the traffic.
+    """Returns whether the car is off the road, and whether it is against the traffic.
 
     A place that is no farther than `OFF_ROAD` outside of a lane is no farther from its middle than half its width and
     twice `OFF_ROAD`. Cells list all lanes as near as that, save very wide ones.
@@ -272,7 +272,7 @@ def _outside(
 
 @inlined
 def _is_with(points: Array, lane: LaneRecord, at: int, station: float, heading: float) -> bool:
-    """Whether a heading on a lane is not against it; in junctions none is."""
+    """Returns whether a heading on a lane is not against it; in junctions none is."""
     return bool(lane.junction >= 0 or math.cos(heading - value_near(points, lane, at, 3, station)) > AGAINST)
 
 

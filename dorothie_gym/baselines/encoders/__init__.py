@@ -26,7 +26,7 @@ from dorothie_gym.errors import EncoderError
 TEXT_ENCODERS: Mapping[str, Callable[[], TextEncoder]] = MappingProxyType(
     {"hashing": HashingEncoder, "minilm": MiniLMEncoder, "bert": BertEncoder}
 )
-"""What makes each encoder of texts, by name."""
+"""Factories of the text encoders, by name."""
 
 
 def text_encoder(name: str = "auto") -> TextEncoder:

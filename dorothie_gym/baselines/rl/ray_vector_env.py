@@ -13,7 +13,7 @@ Sent = tuple[str, tuple[Any, ...]]
 """A command and its arguments."""
 
 _QUESTIONS: Final = ("spaces", "has_attr", "get_attr", "env_is_wrapped", "action_masks")
-"""What changes no environment."""
+"""Commands that change no environment."""
 
 
 class RayVecEnv(SharedVecEnv):

@@ -18,7 +18,7 @@ class Channel(enum.StrEnum):
     MAP = "map"
     """The lane graph, known landmarks and streets."""
     TRAJECTORY = "trajectory"
-    """Where the car was in the last ten seconds."""
+    """Poses of the ego in the last ten seconds."""
     ACTIONS = "actions"
     """Physical actions so far."""
     MOVES = "moves"
@@ -26,11 +26,11 @@ class Channel(enum.StrEnum):
     TRANSCRIPT = "transcript"
     """The words that were spoken, those of the current utterance among them."""
     VISION = "vision"
-    """What was around the car in the last ten seconds."""
+    """Objects around the ego in the last ten seconds."""
     SPEECH = "speech"
     """The current utterance as it is heard: its sound, or what a recogniser made of it where there is no sound."""
     OBJECTS = "objects"
-    """What is around the car now."""
+    """Objects around the ego at the point."""
 
 
 ALL_CHANNELS: Final = tuple(Channel)
@@ -45,7 +45,7 @@ ABLATIONS: Final[Mapping[str, tuple[Channel, ...]]] = MappingProxyType(
         "Map Knowledge": (Channel.MAP, Channel.TRAJECTORY),
     }
 )
-"""What the paper's table takes away from TOTO, by the name it has there. Without Current Speech the words of the
+"""Ablations of TOTO, by their names in the paper's table. Without Current Speech the words of the
 current utterance go too where there is no sound (`TOTOConfig.current_text`)."""
 
 TextTraining = Literal["frozen", "trained"]

@@ -42,7 +42,7 @@ YAW: Final = FEATURES.index("start_yaw")
 _UPS: Final = 3
 _BELIEF_UNITS: Final = (1.0, 1.0, DEGREES, METRES, METRES)
 _OBJECT_UNITS: Final = (30.0, DEGREES, 30.0, 30.0, DEGREES, 10.0, 5.0, 5.0)
-"""What the columns of `OBJECT_VALUES` are divided by, each to be about 1."""
+"""Divisors of the columns of `OBJECT_VALUES`, which scale each to about 1."""
 
 
 class TOTO(Model):

@@ -1,4 +1,4 @@
-"""What is measured of a session that was driven: the numbers from which every closed-loop metric follows."""
+"""Measurements of a driven session: the numbers from which every closed-loop metric is computed."""
 
 from __future__ import annotations
 
@@ -169,7 +169,7 @@ def _seconds_to_recovery(session: Session, town: Town, index: int, met: float) -
 
 
 def _on_road(session: Session, events: int) -> tuple[Place, ...]:
-    """What stands on the road after so many events; props are told by their number among those that stand."""
+    """Returns the props on the road after a number of events, by their number among those placed."""
     props: list[Place] = []
     for event in session.events[:events]:
         kind, item = kind_of(event), event.data.get("item")

@@ -47,7 +47,7 @@ class TaskRecord:
         return bool(self.live) and not self.left
 
     def may_be_next(self, goal: int, reached: frozenset[int]) -> bool:
-        """Whether the rules allow to reach a live subgoal when some have been reached (as `tasks.TaskState`).
+        """Returns whether the rules allow to reach a live subgoal when some have been reached (as `tasks.TaskState`).
 
         The destination comes after all others; what a subgoal comes after binds only where it is live.
         """
@@ -93,7 +93,7 @@ def without_reached(task: TaskRecord) -> TaskRecord:
 
 
 def is_arrival(event: Event) -> bool:
-    """Whether an event tells that a subgoal was reached."""
+    """Returns whether an event tells that a subgoal was reached."""
     return event.type is EventType.SUBGOAL and event.data.get("status") == GoalStatus.COMPLETE.label
 
 
@@ -168,7 +168,7 @@ class TaskWay:
         return min((self._cost(place, goal) + self._after(goal) for goal in goals), default=math.inf)
 
     def _after(self, goal: int) -> float:
-        """What is left when a subgoal has been reached, too."""
+        """Returns the remaining subgoals after a further one has been reached."""
         reached = self._task.reached | {goal}
         if (goal, reached) not in self._rest:
             place = self._task.places[goal]

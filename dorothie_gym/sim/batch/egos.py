@@ -106,7 +106,7 @@ def decide(
 
 @compiled
 def is_reachable(town: TownArrays, lane: int, vehicle: VehicleRecord) -> bool:
-    """Whether a vehicle may change to a lane: `AbstractLane.is_reachable_from`."""
+    """Returns whether a vehicle may change to a lane: `AbstractLane.is_reachable_from`."""
     station, lateral, segment = project(town, lane, vehicle.x, vehicle.y)
     if not 0.0 <= station < town.lanes[lane].length + CAR_LENGTH:
         return False

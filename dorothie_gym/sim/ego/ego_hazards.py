@@ -217,7 +217,7 @@ def _gap_to_others(town: TownArrays, world: WorldArrays, seen: int, blocked: boo
 
 @compiled
 def _leads_to(town: TownArrays, world: WorldArrays, start: int, meeting: float, prop: SeenRecord) -> bool:
-    """Whether a lane switch would lead the ego too close to a prop on the new lane to get away from it again.
+    """Returns whether a lane switch would lead the ego too close to a prop on the new lane to get away from it again.
 
     Args:
         town: arrays of the town.

@@ -55,17 +55,17 @@ class FeasibleManoeuvres(NamedTuple):
 
 
 def may_change_cruise(cruise: float, up: bool) -> bool:
-    """Whether one step more or less leaves the cruise speed [km/h] in its range."""
+    """Returns whether one step more or less leaves the cruise speed [km/h] in its range."""
     return MIN_CRUISE <= cruise + (SPEED_STEP if up else -SPEED_STEP) <= MAX_CRUISE
 
 
 def is_past_stopping(speed: float, room: float) -> bool:
-    """Whether a moving ego cannot stop within some room [m] any more, at a speed [m/s]."""
+    """Returns whether a moving ego cannot stop within some room [m] any more, at a speed [m/s]."""
     return speed > EGO_MOVING and speed**2 / (2 * HARD_STOP) > room
 
 
 def has_room_to_switch(room: float) -> bool:
-    """Whether a lane that is left to its end for so long [m] has room for a lane switch."""
+    """Returns whether a lane that is left to its end for so long [m] has room for a lane switch."""
     return room >= MIN_SWITCH + LEAD
 
 
@@ -85,7 +85,7 @@ def u_turn_start(station: float, speed: float) -> float:
 
 
 def switch_is_blocked(props: PropPlaces, lane: Lane, station: float, speed: float) -> bool:
-    """Whether a prop is too close on the lane to switch to.
+    """Returns whether a prop is too close on the lane to switch to.
 
     Args:
         props: props that the ego sees.
@@ -98,7 +98,7 @@ def switch_is_blocked(props: PropPlaces, lane: Lane, station: float, speed: floa
 
 
 def landing_is_blocked(props: PropPlaces, lane: Lane, station: float) -> bool:
-    """Whether a prop is too close on an oncoming lane for a U-turn that ends at a station [m]."""
+    """Returns whether a prop is too close on an oncoming lane for a U-turn that ends at a station [m]."""
     return _is_blocked(props, lane, station - U_TURN_REACH, station + LANDING + FROM_PROP)
 
 

@@ -58,7 +58,7 @@ class LaneChooser:
         self._choices: dict[int, bool] = {}
 
     def is_choice(self, lane: int) -> bool:
-        """Whether a turn has to be chosen at the end of a lane."""
+        """Returns whether a turn has to be chosen at the end of a lane."""
         exits = self._town.exits(lane)
         return len(exits) > 1 and any(way.junction_id >= 0 for way in exits)
 

@@ -258,7 +258,7 @@ class LocalPlanner:
         return None if begun else self._manoeuvre_angle
 
     def is_committed(self, speed: float) -> bool:
-        """Whether the ego cannot stop any more before the junction of the planned turn, at a speed [m/s]."""
+        """Returns whether the ego cannot stop any more before the junction of the planned turn, at a speed [m/s]."""
         if self.turn_ahead is None:
             return False
         k = self.path.index_at(self.s)
@@ -269,7 +269,7 @@ class LocalPlanner:
         return is_past_stopping(speed, room)
 
     def may_turn_round(self, speed: float) -> bool:
-        """Whether a U-turn would be carried out at this speed [m/s]."""
+        """Returns whether a U-turn would be carried out at this speed [m/s]."""
         return not isinstance(self._plan_u_turn(speed), str)
 
     def _turn_round(self, angle: int, speed: float) -> str | None:

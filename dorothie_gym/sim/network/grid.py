@@ -120,7 +120,7 @@ def _list_lanes(points: Array, offsets: IntArray, x0: float, y0: float, cursors:
 
 @allocating
 def _out_of_question(boxes: Array, lane: int, x: float, y: float, best: float) -> bool:
-    """Whether the bounding box of a lane alone is farther away than the best lane."""
+    """Returns whether the bounding box of a lane alone is farther away than the best lane."""
     dx = max(boxes[lane, 0] - x, x - boxes[lane, 2], 0.0)
     dy = max(boxes[lane, 1] - y, y - boxes[lane, 3], 0.0)
     return math.sqrt(dx * dx + dy * dy) * (1.0 - 1e-9) - SLACK > best

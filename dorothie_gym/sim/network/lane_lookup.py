@@ -247,7 +247,7 @@ def cost(points: Array, lane: LaneRecord, at: int, station: float, lateral: floa
 
 @inlined
 def is_level(town: TownArrays, lane: LaneRecord, at: int, station: float, height: float) -> bool:
-    """Whether a lane is at about a height where it is closest."""
+    """Returns whether a lane is at about a height where it is closest."""
     if town.flat or math.isnan(height):
         return True
     return abs(value_near(town.points, lane, at, 4, station) - height) <= SAME_LEVEL
@@ -305,7 +305,7 @@ def closest_lane(
 
 @inlined
 def _is_out_of_question(entry: CellEntryRecord, x: float, y: float, cos: float, sin: float, best: float) -> bool:
-    """Whether a lane runs another way than a body, or lies farther away, than the best lane is off."""
+    """Returns whether a lane runs another way than a body, or lies farther away, than the best lane is off."""
     if best <= TURNED and entry.cos * cos + entry.sin * sin < entry.limit:
         return True
     across = y * entry.cos - x * entry.sin

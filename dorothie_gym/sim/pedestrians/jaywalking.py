@@ -60,7 +60,7 @@ def steps_out(town: TownArrays, world: WorldArrays, walker: PedestrianRecord, ti
 
 @compiled
 def _is_clear(world: WorldArrays, walker: PedestrianRecord) -> bool:
-    """Whether no vehicle is close."""
+    """Returns whether no vehicle is close."""
     for i in range(len(world.vehicles)):
         vehicle = world.vehicles[i]
         if vehicle.kind == Kind.EMPTY or abs(vehicle.height - walker.height) > LEVEL:

@@ -182,7 +182,7 @@ def _push(dx: float, dy: float, radius: float, cos: float, sin: float) -> float:
 
 @inlined
 def _bumps(world: WorldArrays, p: int, cos: float, sin: float, step: float, time: float) -> bool:
-    """Whether a step leads too close to another pedestrian, where it is or goes, or to a prop."""
+    """Returns whether a step leads too close to another pedestrian, where it is or goes, or to a prop."""
     walker = world.pedestrians[p]
     x, y = walker.x + step * cos, walker.y + step * sin
     for q in range(len(world.pedestrians)):
@@ -211,7 +211,7 @@ def _bumps(world: WorldArrays, p: int, cos: float, sin: float, step: float, time
 
 @inlined
 def _touches_vehicle(world: WorldArrays, walker: PedestrianRecord, x: float, y: float) -> bool:
-    """Whether a step leads closer to a vehicle that is close."""
+    """Returns whether a step leads closer to a vehicle that is close."""
     for i in range(len(world.vehicles)):
         vehicle = world.vehicles[i]
         if abs(walker.x - vehicle.x) > 6.0 or abs(walker.y - vehicle.y) > 6.0 or vehicle.kind == Kind.EMPTY:

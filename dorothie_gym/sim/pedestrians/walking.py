@@ -152,7 +152,7 @@ def _leave(town: TownArrays, walker: PedestrianRecord) -> None:
 
 @compiled
 def _may_step(town: TownArrays, world: WorldArrays, crossing: CrossingRecord, time: float) -> bool:
-    """Whether a pedestrian may step onto a crosswalk that takes some time to cross [s].
+    """Returns whether a pedestrian may step onto a crosswalk that takes some time to cross [s].
 
     All lights before it must be red until the pedestrian is across, and no vehicle may stand on it or come towards it
     too fast to stop with ease.
@@ -172,7 +172,7 @@ def _may_step(town: TownArrays, world: WorldArrays, crossing: CrossingRecord, ti
 
 @inlined
 def _is_danger(vehicle: VehicleRecord, crossing: CrossingRecord) -> bool:
-    """Whether a vehicle is on a crosswalk, or comes towards it too fast to stop with ease."""
+    """Returns whether a vehicle is on a crosswalk, or comes towards it too fast to stop with ease."""
     dx, dy = vehicle.x - crossing.x[0], vehicle.y - crossing.y[0]
     along = min(max(dx * crossing.cos + dy * crossing.sin, 0.0), crossing.length)
     dx, dy = crossing.x[0] + along * crossing.cos - vehicle.x, crossing.y[0] + along * crossing.sin - vehicle.y

@@ -175,5 +175,5 @@ class Visibility:
 
     @functools.cached_property
     def is_clear(self) -> bool:
-        """Whether nothing is lost anywhere within sight of a clear noon."""
+        """Returns whether nothing is lost anywhere within sight of a clear noon."""
         return self.gain(CLEAR_SIGHT) >= 1.0

@@ -37,7 +37,7 @@ SIDE_BY_SIDE = 2.5
 """Two vehicles whose middles are this far apart across their lanes pass one another [m]: they are 2 m wide."""
 
 CAR_REAR = CAR_LENGTH / 2
-"""From the middle of a car to its rear [m]."""
+"""Distance from the centre of a car to its rear [m]."""
 
 LEVEL_TOWN = 2.0
 """In a town whose lanes are no further apart in height than this, heights decide nothing [m]."""

@@ -255,7 +255,7 @@ def _give_way_to_walkers(
 
 @compiled
 def _is_walked(world: WorldArrays, passage: PassageRecord) -> bool:
-    """Whether a pedestrian on a crosswalk is about to pass a lane, or has just passed it."""
+    """Returns whether a pedestrian on a crosswalk is about to pass a lane, or has just passed it."""
     for p in range(len(world.pedestrians)):
         walker = world.pedestrians[p]
         if walker.state == Walk.CROSSING and walker.crossing == passage.crossing:

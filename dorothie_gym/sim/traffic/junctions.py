@@ -163,7 +163,7 @@ def _reason_to_wait(town: TownArrays, world: WorldArrays, i: int, k: int, now: f
 
 @inlined
 def _is_closed(town: TownArrays, world: WorldArrays, i: int, now: float) -> bool:
-    """Whether the ego turns round in the junction that a vehicle other than the ego approaches."""
+    """Returns whether the ego turns round in the junction that a vehicle other than the ego approaches."""
     if world.vehicles[i].kind == Kind.DRIVEN:
         return False
     car, junction = world.car[0], town.lanes[world.vehicles[i].approach].junction
@@ -234,7 +234,7 @@ def relation(town: TownArrays, connector: LaneRecord, other: int) -> int:
 
 @compiled
 def _light_stops(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord, now: float, let_in: bool) -> bool:
-    """Whether a vehicle has to stop for its light, and can; `let_in` if it was about to enter."""
+    """Returns whether a vehicle has to stop for its light, and can; `let_in` if it was about to enter."""
     if town.lanes[vehicle.approach_lane].programme < 0 or vehicle.distance < -OVER_LINE:
         return False
     colour = light(town, world, vehicle.approach_lane, now)
@@ -248,7 +248,7 @@ def _light_stops(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord, n
 
 @compiled
 def _may_sneak(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord, now: float, let_in: bool) -> bool:
-    """Whether a vehicle that gave way during green may use the yellow, of which enough must be left."""
+    """Returns whether a vehicle that gave way during green may use the yellow, of which enough must be left."""
     if now - vehicle.since <= SNEAKING or vehicle.distance >= AT_LINE:
         return False
     if let_in:
@@ -265,7 +265,7 @@ def _has_to_stop(town: TownArrays, vehicle: VehicleRecord) -> bool:
 
 @compiled
 def _comes_first(town: TownArrays, other: VehicleRecord, own: VehicleRecord, meeting: int, now: float) -> bool:
-    """Whether a waiting vehicle goes before another one by its waiting time, priority aside."""
+    """Returns whether a waiting vehicle goes before another one by its waiting time, priority aside."""
     if other.since >= own.since or now - other.asked >= LAPSE:
         return False
     if other.wait == Wait.LIGHT or other.wait == Wait.STOP_SIGN:
@@ -281,14 +281,14 @@ def _comes_first(town: TownArrays, other: VehicleRecord, own: VehicleRecord, mee
 
 @inlined
 def _have_one_exit(town: TownArrays, one: VehicleRecord, other: VehicleRecord) -> bool:
-    """Whether two announced vehicles leave the junction on the same lane."""
+    """Returns whether two announced vehicles leave the junction on the same lane."""
     exit = town.lanes[one.approach].exit
     return bool(exit >= 0 and exit == town.lanes[other.approach].exit)
 
 
 @compiled
 def _is_coming(town: TownArrays, world: WorldArrays, j: int, now: float) -> bool:
-    """Whether a vehicle with priority would be in the junction within the critical gap."""
+    """Returns whether a vehicle with priority would be in the junction within the critical gap."""
     other = world.vehicles[j]
     if _light_stops(town, world, other, now, False) or _has_to_stop(town, other):
         return False
@@ -314,7 +314,7 @@ def _is_occupied(town: TownArrays, world: WorldArrays, i: int) -> bool:
 
 @compiled
 def has_room(town: TownArrays, world: WorldArrays, i: int, k: int) -> bool:
-    """Whether there is room behind a junction for a vehicle and all others that are on their way there.
+    """Returns whether there is room behind a junction for a vehicle and all others that are on their way there.
 
     They have to fit behind the first slow vehicle, and before the next junction.
 
@@ -354,7 +354,7 @@ def has_room(town: TownArrays, world: WorldArrays, i: int, k: int) -> bool:
 
 @inlined
 def _is_listed(world: WorldArrays, j: int, lane: int) -> bool:
-    """Whether `has_room` finds a vehicle in the list of a lane, which was made before this substep."""
+    """Returns whether `has_room` finds a vehicle in the list of a lane, which was made before this substep."""
     one, other = world.nodes[2 * j], world.nodes[2 * j + 1]
     if one.lane == lane and one.station > -AFTER_END:
         return True

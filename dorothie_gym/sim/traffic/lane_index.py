@@ -59,7 +59,7 @@ def rebuild(town: TownArrays, world: WorldArrays) -> None:
 
 @inlined
 def _is_on_followed(town: TownArrays, vehicle: VehicleRecord) -> bool:
-    """Whether a vehicle is on the lane that it follows, which is not the closest one."""
+    """Returns whether a vehicle is on the lane that it follows, which is not the closest one."""
     lane = town.lanes[vehicle.lane]
     beside = lane.left == vehicle.plan[0] or lane.right == vehicle.plan[0]
     if not beside and vehicle.kind != Kind.DRIVEN:  # which may turn round, across both

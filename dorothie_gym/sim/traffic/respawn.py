@@ -105,7 +105,7 @@ def _tow_away(town: TownArrays, world: WorldArrays, i: int, turning: bool) -> No
 
 @compiled
 def faces_turning_car(world: WorldArrays, vehicle: VehicleRecord, turning: bool) -> bool:
-    """Whether a vehicle and the ego, which stands in a U-turn, block each other.
+    """Returns whether a vehicle and the ego, which stands in a U-turn, block each other.
 
     Args:
         world: arrays of the world; the ego is the first of its vehicles.
@@ -182,7 +182,7 @@ def is_clear_of_car(world: WorldArrays, x: float, y: float, distance: float) -> 
 
 @compiled
 def is_clear_of_people(world: WorldArrays, x: float, y: float, body: int, distance: float) -> bool:
-    """Whether no pedestrian but one is close to a place, and the ego is at a distance [m]."""
+    """Returns whether no pedestrian but one is close to a place, and the ego is at a distance [m]."""
     for p in range(len(world.pedestrians)):
         other = world.pedestrians[p]
         dx, dy = other.x - x, other.y - y
@@ -195,7 +195,7 @@ def is_clear_of_people(world: WorldArrays, x: float, y: float, body: int, distan
 def is_free(
     town: TownArrays, world: WorldArrays, number: int, station: float, body: int, distance: float
 ) -> bool:  # fmt: skip
-    """Whether there is room on a lane: no vehicle and no prop close before, behind or beside.
+    """Returns whether there is room on a lane: no vehicle and no prop close before, behind or beside.
 
     Args:
         town: arrays of the town.

@@ -226,7 +226,7 @@ def _move_over(town: TownArrays, world: WorldArrays, i: int, lane: LaneRecord) -
 
 @compiled
 def mobil(town: TownArrays, world: WorldArrays, i: int, side: int, station: float, must: bool) -> bool:
-    """Whether to change to a lane beside: it brings acceleration, and makes no other vehicle brake hard.
+    """Returns whether to change to a lane beside: it brings acceleration, and makes no other vehicle brake hard.
 
     Args:
         town: arrays of the town.
@@ -264,7 +264,7 @@ def _held_up(world: WorldArrays, vehicle: VehicleRecord, front: int, gap: float)
 
 @compiled
 def _is_taken(world: WorldArrays, i: int) -> bool:
-    """Whether a vehicle close in front changes into the same lane."""
+    """Returns whether a vehicle close in front changes into the same lane."""
     vehicle = world.vehicles[i]
     for j in range(len(world.vehicles)):
         other = world.vehicles[j]
