@@ -67,7 +67,7 @@ def restore(path: Path, model: nn.Module, optimiser: torch.optim.Optimizer | Non
     """
     try:
         with safe_open(path, framework="pt") as file:
-            tensors = {name: file.get_tensor(name) for name in file}
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118  # a handle, not a dict
     except SafetensorError as error:
         raise CheckpointError(f"{path}: is damaged ({error}); delete it") from None
     weights = {name.removeprefix(_MODEL): value for name, value in tensors.items() if name.startswith(_MODEL)}
