@@ -179,7 +179,7 @@ def _sessions(corpus: Corpus | Path | str | Sequence[Session], split: str) -> Se
     """Sessions, or entries that load them."""
     if isinstance(corpus, str) and corpus == DEFAULT:
         # Imported here: the simulation is slow to import, and only the default corpus needs it.
-        from dorothie_gym.rollout.default_corpus import default_corpus
+        from dorothie_gym.rollout.corpus_cache import default_corpus
 
         corpus = default_corpus()
     if isinstance(corpus, Path | str):

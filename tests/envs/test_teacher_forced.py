@@ -244,9 +244,9 @@ def test_wrong_arguments_are_named() -> None:
 
 def test_the_default_corpus_is_the_cached_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write(tmp_path / "cached", talk())
-    corpus = types.ModuleType("dorothie_gym.rollout.default_corpus")
+    corpus = types.ModuleType("dorothie_gym.rollout.corpus_cache")
     corpus.default_corpus = lambda: tmp_path  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "dorothie_gym.rollout.default_corpus", corpus)
+    monkeypatch.setitem(sys.modules, "dorothie_gym.rollout.corpus_cache", corpus)
     assert UfNEnv().reset(seed=0)[1]["session"] == "cached"
     assert gym.make("dorothie_gym/UfN-v0", corpus="default").reset(seed=0)[1]["session"] == "cached"
 

@@ -7,8 +7,8 @@ import pytest
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import CacheError
 from dorothie_gym.recording import Corpus, load_sessions
+from dorothie_gym.rollout import corpus_cache as corpus
 from dorothie_gym.rollout import default_corpus
-from dorothie_gym.rollout import default_corpus as corpus
 
 SHORT = EnvConfig(max_seconds=3.0)
 
