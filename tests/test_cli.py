@@ -139,7 +139,7 @@ class TestRun:
         monkeypatch.setattr(SessionEngine, "step", interrupted)
         result = call("run", "--seed", 3, "--out", "cut", "--json")
         assert result.exit_code == 130 and result.stdout == ""
-        assert "Interrupted after 3.0 simulated seconds; what happened until then is kept in cut" in result.stderr
+        assert "Interrupted after 3.0 simulated seconds; the recording until then is in cut" in result.stderr
         session = Session.load("cut")
         assert not session.complete and session.duration == pytest.approx(3.0)
 

@@ -52,7 +52,7 @@ def test_tables_tell_seeds_and_where_sessions_are_kept(tmp_path: Path) -> None:
         (("--towns", ","), "give seen, unseen, all"),
         (("--co-wizard", "weights.json"), "which cannot be played"),
         (("--co-wizard", "hollow"), "co_wizard: hollow/model."),
-        (("--participant", "hollow"), "it can play the co_wizard, and no participant"),
+        (("--participant", "hollow"), "navigation models play the co_wizard, not the participant"),
     ],
 )
 def test_mistakes_are_told(

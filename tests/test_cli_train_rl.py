@@ -63,14 +63,14 @@ def test_three_roles_learn_and_play(tmp_path: Path) -> None:
     assert json.loads(played.stdout)["errored"] == 0
 
 
-@pytest.mark.parametrize(("algorithm", "package"), [("ppo", "rl"), ("selfplay", "selfplay")])
+@pytest.mark.parametrize(("algorithm", "module"), [("ppo", "rl.behaviour_cloning"), ("selfplay", "selfplay.demonstrations")])
 def test_ctrl_c_while_a_corpus_is_read_is_told(
-    algorithm: str, package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    algorithm: str, module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupted(*arguments: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(f"dorothie_gym.baselines.{package}.cloning.sessions_of", interrupted)
+    monkeypatch.setattr(f"dorothie_gym.baselines.{module}.sessions_of", interrupted)
     result = CliRunner().invoke(
         app, ["train-rl", algorithm, "--out", str(tmp_path), "--warm-start", str(tmp_path), "--workers", "0"]
     )
@@ -89,7 +89,7 @@ def test_ctrl_c_while_a_corpus_is_read_is_told(
         (["sac"], "sac on dorothie_gym/Navigation-v0"),
         (["selfplay", "--set", "colour=red"], "selfplay has no 'colour'"),
         (["selfplay", "--set", "town=atlantis"], "atlantis"),
-        (["selfplay", "--env", "dorothie_gym/CoWizard-v0"], "leave it out"),
+        (["selfplay", "--env", "dorothie_gym/CoWizard-v0"], "omit the option"),
         (["ppo", "--environments", "1", "--workers", "2"], "workers is 2"),
         (["dqn", "--warm-start", "corpus"], "warm_start: dqn"),
         (["ppo", "--warm-start", "no-such-corpus"], "no-such-corpus"),

@@ -124,8 +124,9 @@ def test_the_tasks_page_names_every_field_of_a_batch() -> None:
     assert missing == []
 
 
-def pages() -> ModuleType:
-    """The script that writes pages, which is in no package."""
+def pages(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """Returns the script that writes pages, which is in no package."""
+    monkeypatch.syspath_prepend(str(DOCS))  # it imports a module beside it
     spec = importlib.util.spec_from_file_location("pages", DOCS / "pages.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -141,7 +142,7 @@ def test_the_figures_of_the_data_sheet_are_those_of_a_corpus(tmp_path: Path, mon
     (tmp_path / "corpus" / "generation.json").write_text(json.dumps(made), encoding="utf-8")
     sheet = tmp_path / "data-sheet.md"
     sheet.write_text((DOCS / "data-sheet.md").read_text(encoding="utf-8"), encoding="utf-8")
-    script = pages()
+    script = pages(monkeypatch)
     monkeypatch.setattr(script, "DATA_SHEET", sheet)
     for _ in range(2):  # written anew, the old figures are gone
         script.main(["figures", str(tmp_path / "corpus")])
