@@ -63,7 +63,9 @@ def test_three_roles_learn_and_play(tmp_path: Path) -> None:
     assert json.loads(played.stdout)["errored"] == 0
 
 
-@pytest.mark.parametrize(("algorithm", "module"), [("ppo", "rl.behaviour_cloning"), ("selfplay", "selfplay.demonstrations")])
+@pytest.mark.parametrize(
+    ("algorithm", "module"), [("ppo", "rl.behaviour_cloning"), ("selfplay", "selfplay.demonstrations")]
+)
 def test_ctrl_c_while_a_corpus_is_read_is_told(
     algorithm: str, module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
