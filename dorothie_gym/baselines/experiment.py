@@ -201,7 +201,7 @@ def _told(job: Experiment, model: torch.nn.Module, trained: TrainingSummary) -> 
     }
 
 
-# --- Trainings side by side: each process has one thread, so that what comes out is the same however many ------------
+# --- Parallel training, one thread per process ------------------------------------------------------------------------
 
 OnExperimentEpoch: TypeAlias = Callable[[Experiment, Epoch], None]
 """Callback after each epoch of each training in the calling process."""
@@ -264,7 +264,7 @@ def _is_large(job: Experiment) -> bool:
     return torch.cuda.is_available() or SIZES[job.size]().width > SIZES["small"]().width
 
 
-# --- The whole table: every model trained with every seed on a corpus, tested, and scored ----------------------------
+# --- Results table over models and seeds ------------------------------------------------------------------------------
 
 PREDICTIONS: Final = PREDICTIONS_FILE
 """Name of the file with the predictions of all models and seeds."""

@@ -64,7 +64,7 @@ class Report:
 
 
 def world_report(figures: Mapping[str, Any]) -> Report:
-    """Words for `world.measure`."""
+    """Returns the summary of `bench.world.measure`."""
     people = f"{_count(figures['vehicles'], 'vehicle')} ({_count(figures['cyclists'], 'cyclist')} among them)"
     there = f"{_count(figures['pedestrians'], 'pedestrian')}, {_count(figures['props'], 'prop')}"
     stock = figures["stock_substeps_per_second"]

@@ -137,7 +137,7 @@ _DESCRIBED: Mapping[EventType, Callable[[Mapping[str, Any]], tuple[str, str]]] =
 }
 
 
-# --- A session on the terminal while it is played: the talk scrolls, tasks and clock stand below it ------------------
+# --- Live view on the terminal ----------------------------------------------------------------------------------------
 
 _WIDEST = 100
 _MARKS: dict[GoalStatus, tuple[str, str, str]] = {

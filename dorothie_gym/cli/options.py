@@ -76,7 +76,7 @@ def env_config(max_seconds: float | None, word_errors: float) -> EnvConfig:
     return EnvConfig(max_seconds=max_seconds, word_error_rate=word_errors)
 
 
-# --- An option whose value may be left out, which typer does not know ------------------------------------------------
+# --- Options with an optional value -----------------------------------------------------------------------------------
 
 OWN_NAME = "<own name>"
 """Value of `--picture` without a file name: the command chooses the name."""

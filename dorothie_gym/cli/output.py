@@ -111,7 +111,7 @@ def check_file(path: Path) -> None:
         path.unlink()
 
 
-# --- Films as files: whether one can be written, and what writes it --------------------------------------------------
+# --- Video files ------------------------------------------------------------------------------------------------------
 
 _SUFFIXES = (".mp4", ".mkv", ".mov")
 
@@ -132,7 +132,7 @@ def video_writer(path: Path, frames_per_second: float) -> Any:  # imageio.v2 has
     return imageio.get_writer(path, fps=frames_per_second, macro_block_size=16, ffmpeg_params=["-preset", "veryfast"])
 
 
-# --- How far a command that plays many sessions has come, and how many processes play --------------------------------
+# --- Progress and processes -------------------------------------------------------------------------------------------
 
 
 def processors() -> int:

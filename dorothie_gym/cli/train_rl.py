@@ -253,7 +253,7 @@ def _command(settings: TrainingSettings, out: Path, ray: str | None) -> str:
     return shlex.join([*words, *options_of(settings, ray)])
 
 
-# --- `dorothie-gym train-rl selfplay`: all three roles at once -------------------------------------------------------
+# --- Self-play --------------------------------------------------------------------------------------------------------
 
 
 def train_selfplay(

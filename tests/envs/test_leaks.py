@@ -13,13 +13,9 @@ from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import Role
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.spaces import SubgoalColumn, noop
-from tests.envs.sessions_played import (
-    play_at_random,
-    play_by_script,
-    replay,
-    with_hidden_landmarks_moved,
-    with_other_errands,
-)
+from dorothie_gym.testing.leaks import with_hidden_landmarks_moved, with_other_errands
+from dorothie_gym.testing.playing import play_again
+from tests.envs.sessions_played import play_at_random, play_by_script
 
 
 @pytest.fixture(scope="module")
@@ -32,8 +28,8 @@ def check_that_hidden_places_do_not_show(env: DuoWizardEnv, play: Any, seed: int
     while not any(landmark.hidden for landmark in draw_scenario(env.town, None, seed).storyboard.landmarks):
         seed += 1000
     played = list(play(env, seed=seed, decisions=decisions))
-    moved = with_hidden_landmarks_moved(env.scenario, env, np.random.default_rng(seed))
-    again = list(replay(env, moved, [actions for _, _, actions in played if actions]))
+    moved = with_hidden_landmarks_moved(env.scenario, env.town, np.random.default_rng(seed))
+    again = list(play_again(env, moved, [actions for _, _, actions in played if actions]))
     assert min(len(played), len(again)) > 1
     for k, ((observations, infos, _), (others, other_infos)) in enumerate(zip(played, again, strict=False)):
         role = str(Role.CO_WIZARD)
@@ -75,7 +71,7 @@ def check_that_errands_do_not_show(env: DuoWizardEnv, play: Any, seed: int, deci
     runs = []
     for scenario in (env.scenario, with_other_errands(env.scenario)):
         run = []
-        for observations, infos in replay(env, scenario, actions):
+        for observations, infos in play_again(env, scenario, actions):
             run.append((observations, infos))
             if any(event.type == "Subgoal" for event in env.last_events):
                 break

@@ -99,7 +99,7 @@ def _write(path: Path, table: Vectors) -> None:
         np.save(file, table, allow_pickle=False)
 
 
-# --- Texts as hashed n-grams: no weights, no download, no training ---------------------------------------------------
+# --- Hashed n-grams ---------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -57,7 +57,7 @@ def _spellings() -> tuple[tuple[str, str], ...]:
     return tuple((name, name.replace(" ", "")) for name in names)
 
 
-# --- What happened last, in numbers: the moves, how long ago they were, and what the car did since -------------------
+# --- Recent moves and motion ------------------------------------------------------------------------------------------
 
 MOVES: Final = 3
 """Number of last moves with features of their own."""

@@ -71,7 +71,7 @@ def talk_of(session: Session) -> TalkRecord:
     )
 
 
-# --- Exceptions that a session met, and how long it took until things went forward again -----------------------------
+# --- Exceptions and recovery ------------------------------------------------------------------------------------------
 
 FORWARD: Final = 10.0
 """The car has come forward when so much less is left [m at 40 km/h]: a cell of the router's, its accuracy."""
@@ -185,7 +185,7 @@ def _on_road(session: Session, events: int) -> tuple[Place, ...]:
     return tuple(props)
 
 
-# --- What is measured of a session that was driven: the numbers from which every closed-loop metric follo ------------
+# --- Record of a driven session ---------------------------------------------------------------------------------------
 
 TIMEOUT: Final = "timeout"
 HIT_BY_OTHERS: Final = "hit_by_others"

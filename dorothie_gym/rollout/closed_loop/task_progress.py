@@ -132,7 +132,7 @@ def _arrives(event: Event, change: Event) -> bool:
     return is_arrival(event) and event.data.get("subgoal") == change.data.get("subgoal")
 
 
-# --- How far it is to the end of a task: through the subgoals that are left, in the best order that is al ------------
+# --- Remaining distance through the subgoals --------------------------------------------------------------------------
 
 
 class TaskWay:
