@@ -47,6 +47,8 @@ def compare(
 def _in_words(difference: Difference | None) -> str:
     if difference is None:
         return "equal"
+    if difference.field == "session":  # one of the two folders has no such session
+        return f"first: {difference.recorded}, second: {difference.replayed}"
     when = "before it begins" if difference.frame < 0 else f"at frame {difference.frame}"
     return f"differs first {when}, {difference.field}: {difference.recorded} and {difference.replayed}"
 
