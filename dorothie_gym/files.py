@@ -1,4 +1,4 @@
-"""Files and folders that appear whole or not at all."""
+"""Files and folders that appear whole or not at all, and the type of the JSON values in them."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ import os
 import secrets
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeAlias
 
 PART: Final = ".part"
 """Ending of the name of a file or folder that is being written."""
+
+JsonValue: TypeAlias = "str | int | float | bool | Sequence[JsonValue] | Mapping[str, JsonValue] | None"
+"""Value of JSON types: text, number, true or false, list, object with text keys, or null."""
 
 
 @contextmanager
