@@ -22,9 +22,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import dorothie_gym
-from dorothie_gym.envs.continuous_observation import CONTINUOUS_FIELD_SPECS
 from dorothie_gym.envs.history_space import SPEAKERS, act_fields, decision_fields, history_fields
-from dorothie_gym.envs.navigation_continuous_v0 import CONTROL_SPECS
+from dorothie_gym.envs.navigation_continuous_v0 import CONTINUOUS_FIELD_SPECS, CONTROL_SPECS
 from dorothie_gym.ontology import (
     AGENT_ROLES,
     LABELS,

@@ -11,9 +11,9 @@ An exchange handles an exception if it begins within `WINDOW` after it, and one 
   for an action;
 - a task exception: to the landmark of the task, or to an abandoned or postponed goal.
 
-A question within `PATIENCE` after an exchange that handles an object on the road belongs to it if it names no landmark;
-after an exchange that handles a task exception, a question for status or destination does. If several exceptions fit,
-the latest counts.
+A question within `ANSWER_TIMEOUT` after an exchange that handles an object on the road belongs to it if it names no
+landmark; after an exchange that handles a task exception, a question for status or destination does. If several
+exceptions fit, the latest counts.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from typing import Final
 import numpy as np
 
 from dorothie_gym.analysis.units import SaidUnit, Units
-from dorothie_gym.dialogue.exchanges import PATIENCE
+from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT
 from dorothie_gym.ontology import (
     ActionValue,
     ExceptionKind,
@@ -158,7 +158,7 @@ def handled_by(units: Units) -> dict[int, Event]:
         if (
             cause is None
             and last is not None
-            and exchange.start - last[0] <= PATIENCE
+            and exchange.start - last[0] <= ANSWER_TIMEOUT
             and last[1].is_asked_on(exchange)
         ):
             cause = last[1]
@@ -184,7 +184,7 @@ def handling_of_events(units: Units) -> dict[int, Handled]:
     """Returns the kind of exception that each dialogue move and physical action handles, by number of its event.
 
     A move counts as its exchange does. A physical action belongs to the exchange of the last move that ended before it,
-    if that was at most `PATIENCE` ago, the time for which an exchange stays open.
+    if that was at most `ANSWER_TIMEOUT` ago, the time for which an exchange stays open.
     """
     kinds = handling(units)
     found = {
@@ -195,7 +195,7 @@ def handling_of_events(units: Units) -> dict[int, Handled]:
     frames = [move.frame for move in said]
     for action in units.session.physical_actions:
         last = bisect.bisect_left(frames, action.frame) - 1
-        recent = last >= 0 and action.frame - frames[last] <= PATIENCE * FRAME_RATE
+        recent = last >= 0 and action.frame - frames[last] <= ANSWER_TIMEOUT * FRAME_RATE
         found[action.index] = found[said[last].index] if recent else Handled.NONE
     return found
 

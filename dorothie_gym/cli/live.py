@@ -14,8 +14,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from dorothie_gym.engine.live_session import LiveSession
-from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.engine.session_engine import LiveSession, SessionEngine
 from dorothie_gym.ontology import GoalStatus, Role, parse_act
 from dorothie_gym.recording import Event, EventType
 from dorothie_gym.tasks import TaskState

@@ -26,8 +26,8 @@ from dorothie_gym.cli.output import (
 from dorothie_gym.cli.players import find_cast
 
 if TYPE_CHECKING:
-    from dorothie_gym.engine.live_session import SessionSummary
     from dorothie_gym.engine.session_engine import SessionEngine
+    from dorothie_gym.engine.session_log import SessionSummary
 
 PICTURE = Path("dorothie.png")
 """Picture that is written where none is asked for."""

@@ -11,7 +11,7 @@ from dorothie_gym.dialogue.conversation import (
 )
 from dorothie_gym.dialogue.dialogue_act_classifier import act_of, guess_act, guess_spans
 from dorothie_gym.dialogue.directions import RouteTurn
-from dorothie_gym.dialogue.exchanges import EXPECTATIONS, PATIENCE, Exchange, ExchangeState, ExchangeTracker
+from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT, EXPECTATIONS, Exchange, ExchangeState, ExchangeTracker
 from dorothie_gym.dialogue.lexicon import Lexicon, load_lexicon
 from dorothie_gym.dialogue.nlg import MAX_CHARACTERS, word_act, word_acts
 from dorothie_gym.dialogue.nlu import ParsedText, understand
@@ -22,9 +22,9 @@ from dorothie_gym.dialogue.transactions import Annotator
 from dorothie_gym.errors import PhraseFileError
 
 __all__ = [
+    "ANSWER_TIMEOUT",
     "EXPECTATIONS",
     "MAX_CHARACTERS",
-    "PATIENCE",
     "SHORTEST_SPAN",
     "WORDS_PER_SECOND",
     "Annotator",

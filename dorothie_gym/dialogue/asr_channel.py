@@ -16,9 +16,9 @@ from rapidfuzz.distance import Levenshtein
 
 from dorothie_gym.dialogue.conversation import Span, Utterance
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
-from dorothie_gym.dialogue.exchanges import PATIENCE
+from dorothie_gym.dialogue.entity_recognition import sound_of
+from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT
 from dorothie_gym.dialogue.lexicon import load_lexicon, read_data, split_words, strings
-from dorothie_gym.dialogue.phonetics import sound_of
 from dorothie_gym.dialogue.talk_files import read_talk_files
 from dorothie_gym.ontology import DialogueMove, Role, Slot
 
@@ -242,4 +242,4 @@ class Recogniser:
         waiting = [(end, move) for role, (move, end) in self._open.items() if role is not utterance.speaker]
         self._open = {role: opened for role, opened in self._open.items() if role is utterance.speaker}
         end, move = max(waiting, default=(-np.inf, None))
-        return move if utterance.start - end < PATIENCE else None
+        return move if utterance.start - end < ANSWER_TIMEOUT else None

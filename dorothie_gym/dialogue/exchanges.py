@@ -11,11 +11,11 @@ from types import MappingProxyType
 from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, SlotValue
 
-PATIENCE = 10.0
+ANSWER_TIMEOUT = 10.0
 """Time without an answer after which an exchange is abandoned [s] (dialogue spec, phenomenon 21)."""
 
-RECENT = 50
-"""Number of latest exchanges that are searched for a match; far more than can start within `PATIENCE`."""
+SEARCHED_EXCHANGES = 50
+"""Number of latest exchanges that are searched for a match; far more than can start within `ANSWER_TIMEOUT`."""
 
 EXPECTATIONS: Mapping[DialogueMove, frozenset[DialogueMove]] = MappingProxyType(
     {
@@ -146,7 +146,7 @@ class ExchangeTracker:
         - Exchanges may overlap: an initiative during speech of the other side opens a new exchange.
     """
 
-    def __init__(self, patience: float = PATIENCE) -> None:
+    def __init__(self, patience: float = ANSWER_TIMEOUT) -> None:
         """Creates a tracker without exchanges.
 
         Args:
@@ -205,7 +205,7 @@ class ExchangeTracker:
 
     def _recent(self) -> Iterator[Exchange]:
         """Yields the exchanges that are candidates for new acts, latest first."""
-        return itertools.islice(reversed(self.exchanges), RECENT)
+        return itertools.islice(reversed(self.exchanges), SEARCHED_EXCHANGES)
 
     def _initiate(self, utterance: Utterance, act: DialogueAct, opened: Exchange | None) -> Exchange:
         move = act.move

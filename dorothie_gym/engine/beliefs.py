@@ -9,11 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from dorothie_gym.engine.scenario import Scenario
+from dorothie_gym.engine.session_log import Outcome
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import Array
-from dorothie_gym.ontology import DialogueAct, DialogueMove, LandmarkName, Role, Slot, StreetName
+from dorothie_gym.ontology import DialogueAct, DialogueMove, LandmarkName, MentalAction, Role, Slot, StreetName
 from dorothie_gym.sim.ego.ego_controller import GoalAhead
+from dorothie_gym.sim.sensing.localizer import Localizer
 from dorothie_gym.sim.sensing.seeing import RANGE_SCALE
+from dorothie_gym.spaces import Mental
 
 GATE = 13.82
 """Squared Mahalanobis distance that one in a thousand true statements exceeds (chi-square, 2 degrees of freedom)."""
@@ -110,7 +113,7 @@ def about(before: PlaceEstimate | None, points: Array, sigma: float) -> PlaceEst
 
 # --- Names on the map -------------------------------------------------------------------------------------------------
 
-SPACING = 10.0
+STREET_POINT_SPACING = 10.0
 """Distance between the sampled points of a street [m]."""
 
 
@@ -135,7 +138,7 @@ class MapNames:
             lane.position(float(station))
             for lane in self._town.lanes
             if lane.street in self._streets(name) and not lane.in_junction
-            for station in np.arange(min(SPACING, lane.length) / 2, lane.length, SPACING)
+            for station in np.arange(min(STREET_POINT_SPACING, lane.length) / 2, lane.length, STREET_POINT_SPACING)
         ]
         return np.array(points).reshape(-1, 2)
 
@@ -179,7 +182,7 @@ SIGHTING = 5.0
 STREET_OFFSET = 15.0
 """Standard deviation of a place from the centre line of its street [m]: a building behind the pavement."""
 
-BESIDE = 30.0
+BESIDE_LANDMARK = 30.0
 """Standard deviation of a place beside a landmark, along each axis [m]: the width of one or two houses."""
 
 AT_CORNER = 20.0
@@ -232,6 +235,38 @@ class BeliefTracker:
                 place = GoalAhead(lane=landmark.lane, station=landmark.station)
                 self._map_places.setdefault(landmark.name, []).append(place)
 
+    def update(self, mental: Mental, localizer: Localizer, sight: float) -> Outcome:
+        """Applies a belief update of the Co-Wizard.
+
+        Args:
+            mental: the update.
+            localizer: pose estimate of the ego.
+            sight: range of sight [m]; a mark within it is as exact as the perception.
+
+        Returns:
+            Event data of the update, or the reason of a refusal.
+        """
+        if mental.action is MentalAction.PLAN_UPDATE:
+            junctions = self._town.junctions
+            unknown = [k for k in mental.plan if k >= len(junctions)]
+            if unknown:
+                return f"the town has no junction number {unknown[0]}"
+            return {"junctions": [junctions[k].id for k in mental.plan]}
+        if mental.action is MentalAction.GOAL_UPDATE:
+            self.goals = mental.goals
+            return {"landmarks": [name.label for name in mental.goals]}
+        if mental.action is MentalAction.STATUS_UPDATE:
+            return {"landmark": mental.landmark.label, "status": mental.status.label}
+        if mental.action is MentalAction.KNOWLEDGE_UPDATE:
+            lane, metres = mental.place.lane, float(mental.place.metres)
+            if lane >= len(self._town.lanes) or metres > self._town.lanes[lane].length + 1.0:
+                return "the guessed place is not on a lane of the town"
+            pose, covariance = localizer.pose, localizer.covariance
+            self.guess(mental.landmark, lane, metres, pose=pose, covariance=covariance, sight=sight)
+            x, y = self._town.lanes[lane].position(metres)
+            return {"landmark": mental.landmark.label, "x": round(float(x), 3), "y": round(float(y), 3)}
+        return {}
+
     def guess(
         self, name: LandmarkName, lane: int, station: float, *, pose: Array, covariance: Array, sight: float
     ) -> None:  # fmt: skip
@@ -281,7 +316,7 @@ class BeliefTracker:
         statements = [(self._names.street(street), STREET_OFFSET) for street in streets]
         if len(corners):
             statements = [(corners, AT_CORNER)]
-        statements += [(self._names.landmarks[name], BESIDE) for name in known]
+        statements += [(self._names.landmarks[name], BESIDE_LANDMARK) for name in known]
         for points, sigma in statements:
             if len(points):
                 estimate = about(estimate, points, sigma)

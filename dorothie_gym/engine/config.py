@@ -1,11 +1,20 @@
-"""Settings of a session."""
+"""Settings of a session, and the reward terms that its weights give."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 from dorothie_gym.dialogue import WORDS_PER_SECOND
+from dorothie_gym.ontology import Role
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
+
+RewardTerms: TypeAlias = dict[str, float]
+"""Terms of a role's reward, by name."""
+
+_SIGNS = ((Role.PARTICIPANT, 1.0), (Role.CO_WIZARD, 1.0), (Role.AD_WIZARD, -1.0))
+"""Roles and the sign of the shared reward terms: the Ad-Wizard plays against the others."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,6 +36,40 @@ class RewardWeights:
     time: float = -0.005
     talk: float = -0.01
     refusal: float = -0.02
+
+    def terms(
+        self,
+        *,
+        reached: int,
+        success: bool,
+        collisions: int,
+        decision_frequency: float,
+        refusals: Mapping[Role, int],
+        spoken: Mapping[Role, bool],
+    ) -> dict[Role, RewardTerms]:
+        """Returns the reward terms of one decision, by role.
+
+        Args:
+            reached: number of subgoals reached.
+            success: whether the session has ended with every live subgoal reached and no collision.
+            collisions: number of collisions caused by the ego.
+            decision_frequency: decisions per second [Hz].
+            refusals: number of refused actions, by role.
+            spoken: whether an utterance span began, for the roles that speak.
+        """
+        shared = {
+            "subgoal": self.subgoal * reached,
+            "success": self.success * success,
+            "collision": self.collision * collisions,
+            "time": self.time / decision_frequency,
+        }
+        terms: dict[Role, RewardTerms] = {}
+        for role, sign in _SIGNS:
+            terms[role] = {name: sign * value for name, value in shared.items()}
+            terms[role]["refusal"] = self.refusal * refusals[role]
+            if role in spoken:
+                terms[role]["talk"] = self.talk * spoken[role]
+        return terms
 
 
 @dataclass(frozen=True, kw_only=True)

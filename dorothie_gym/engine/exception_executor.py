@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TypeAlias
 
 import numpy as np
 
+from dorothie_gym.engine.session_log import Outcome
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.maps.model import Array, LinkType
 from dorothie_gym.ontology import ExceptionKind, GoalStatus, PropKind
@@ -19,10 +19,10 @@ from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import AdWizardAction
 from dorothie_gym.tasks import TaskState
 
-FROM_START = 30.0
+PROP_FROM_START = 30.0
 """Least distance of a prop from the start of its lane [m]; it leaves room for a U-turn in front of the prop."""
 
-FROM_END = 8.0
+PROP_FROM_END = 8.0
 """Least distance of a prop from the end of its lane [m]."""
 
 FROM_SITE = 25.0
@@ -34,7 +34,7 @@ FROM_CAR = 25.0
 FROM_VEHICLE = 6.0
 """Least distance of a new prop from the centre of a vehicle [m]."""
 
-FROM_PROP = 0.5
+PROP_GAP = 0.5
 """Least gap between two props [m]."""
 
 FROM_WAYPOINT = 8.0
@@ -43,12 +43,8 @@ FROM_WAYPOINT = 8.0
 SPAWN_STEP = 3.5
 """Distance between the candidate places of new actors along a lane [m]."""
 
-MAX_SPAWNED = 30
+MAX_POPULATION = 30
 """Largest number of vehicles, and of pedestrians, up to which spawning fills a town."""
-
-EventData: TypeAlias = dict[str, object]
-Outcome: TypeAlias = str | EventData
-"""Reason of a refusal, or the event data of an executed exception."""
 
 
 class ExceptionExecutor:
@@ -98,8 +94,8 @@ class ExceptionExecutor:
             return "nobody was to come: count is 0"
         crowd = world.actors.vehicles if action.exception is ExceptionKind.SPAWN_VEHICLES else world.actors.pedestrians
         there = len(crowd)
-        if there >= MAX_SPAWNED:
-            return f"there are {MAX_SPAWNED} of them in the town already"
+        if there >= MAX_POPULATION:
+            return f"there are {MAX_POPULATION} of them in the town already"
         middle = world.town.lanes[action.place.lane].position(action.place.metres)
         half = max(float(action.extent), 5.0)
         driving = action.exception is ExceptionKind.SPAWN_VEHICLES
@@ -109,7 +105,7 @@ class ExceptionExecutor:
         )
         done = 0
         for k in order:
-            if done == action.count or there + done >= MAX_SPAWNED:
+            if done == action.count or there + done >= MAX_POPULATION:
                 break
             lane, station = candidates[int(k)]
             if driving:
@@ -225,8 +221,10 @@ class ExceptionExecutor:
         station = float(action.place.metres)
         if lane.in_junction:
             return "a prop in a junction would leave no room to turn round"
-        if not FROM_START <= station <= lane.length - FROM_END:
-            return f"a prop stands at least {FROM_START:.0f} m into its lane and {FROM_END:.0f} m before its end"
+        if not PROP_FROM_START <= station <= lane.length - PROP_FROM_END:
+            return (
+                f"a prop stands at least {PROP_FROM_START:.0f} m into its lane and {PROP_FROM_END:.0f} m before its end"
+            )
         place = lane.position(station)
         if math.hypot(*(place - world.car.position)) < FROM_CAR + self._stopping_distance():
             return "it would appear inside the car's stopping distance"
@@ -235,7 +233,7 @@ class ExceptionExecutor:
                 return "it would stand where a landmark is reached"
         props = [prop for prop in world.actors.props if prop is not without]
         box = OrientedBox(
-            float(place[0]), float(place[1]), lane.heading_at(station), kind.length + FROM_PROP, kind.width + FROM_PROP
+            float(place[0]), float(place[1]), lane.heading_at(station), kind.length + PROP_GAP, kind.width + PROP_GAP
         )
         if any(math.hypot(*(place - other.position)) < FROM_VEHICLE for other in world.actors.vehicles) or any(
             boxes_touch(box, OrientedBox.of(prop)) for prop in props

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from dorothie_gym.engine.observation_buffers import ObservationBuffer, Shape
-from dorothie_gym.engine.upcoming_junction import UpcomingJunction
+from dorothie_gym.engine.path_measurements import UpcomingJunction
 from dorothie_gym.ontology import ExceptionKind, PhysicalAction, Role
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
 from dorothie_gym.sim.world import World
-from dorothie_gym.spaces import SpaceLimits, action_space
+from dorothie_gym.spaces import AnySpace, SpaceLimits, action_space
+from dorothie_gym.spaces.fields import FieldBuffer, Shape
 from dorothie_gym.tasks import TaskState
 
-Mask = NDArray[np.int8]
+Mask: TypeAlias = NDArray[np.int8]
+"""Mask of one field: 1 for values that would be accepted."""
+
+RoleMask: TypeAlias = dict[str, Mask | tuple[Mask, ...] | None]
+"""Mask of a role's action space, by field; None for fields without a mask."""
 
 ALWAYS_FEASIBLE = (
     ExceptionKind.NONE,
@@ -41,13 +45,13 @@ class ActionMasks:
         self._world, self._task, self._limits = world, task, limits
         self._junction = junction
         self._unmasked: dict[Role, dict[str, None]] = {}
-        self._buffers: dict[Role, ObservationBuffer] = {}
+        self._buffers: dict[Role, FieldBuffer] = {}
         town = world.town
         longest = max(lane.length for lane in town.lanes)
         for role in (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD):
             fields = {name: _shape(space) for name, space in action_space(role, limits).spaces.items()}
             self._unmasked[role] = {name: None for name, shape in fields.items() if shape is None}
-            buffer = ObservationBuffer({name: (np.int8, shape) for name, shape in fields.items() if shape is not None})
+            buffer = FieldBuffer({name: (np.int8, shape) for name, shape in fields.items() if shape is not None})
             for array in buffer.template.values():
                 array[...] = 1
             if "lane" in buffer.template:
@@ -58,19 +62,19 @@ class ActionMasks:
             self._buffers[role] = buffer
         self._buffers[Role.AD_WIZARD].template["exception"][:] = 0
         self._buffers[Role.AD_WIZARD].template["exception"][[int(kind) for kind in ALWAYS_FEASIBLE]] = 1
-        self._state: tuple[Any, ...] = ()  # state of the ego that the template belongs to
+        self._state: tuple[object, ...] = ()  # state of the ego that the template belongs to
         self._task_state = (-1, -1)
 
-    def mask(self, role: Role) -> dict[str, Any]:
+    def mask(self, role: Role) -> RoleMask:
         """Returns the mask of a role's action space at the present decision; the caller owns it."""
         if role is Role.CO_WIZARD:
             self._update_physical()
         elif role is Role.AD_WIZARD:
             self._update_exceptions()
-        fields = self._buffers[role].copy()
-        fields.update(self._unmasked[role])
+        arrays = self._buffers[role].copy()
+        fields: RoleMask = {**arrays, **self._unmasked[role]}
         if role is Role.CO_WIZARD:
-            fields["plan"] = tuple(fields["plan"])
+            fields["plan"] = tuple(arrays["plan"])
         return fields
 
     def _update_physical(self) -> None:
@@ -115,7 +119,7 @@ class ActionMasks:
         form[ExceptionKind.TASK_CHANGE] = bool(task.possible_changes())
 
 
-def _shape(space: spaces.Space[Any]) -> Shape | None:
+def _shape(space: AnySpace) -> Shape | None:
     """Returns the shape of a field's mask; all entries of a multi-discrete field have the same number of choices."""
     if isinstance(space, spaces.Discrete):
         return (int(space.n),)

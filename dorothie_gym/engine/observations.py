@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.dialogue import Utterance
 from dorothie_gym.engine.beliefs import BeliefTracker
-from dorothie_gym.engine.observation_buffers import ObservationBuffer
-from dorothie_gym.engine.path_measurements import EgoMeasurements
+from dorothie_gym.engine.path_measurements import EgoMeasurements, UpcomingJunction
 from dorothie_gym.engine.scenario import Scenario
-from dorothie_gym.engine.upcoming_junction import UpcomingJunction
 from dorothie_gym.ontology import AGENT_ROLES, LABELS, GoalStatus, PropKind, Role, Sensor, encode_slots
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import (
@@ -27,6 +26,7 @@ from dorothie_gym.spaces import (
     plain_text,
 )
 from dorothie_gym.spaces.actions import NO_MOVE
+from dorothie_gym.spaces.fields import FieldBuffer
 from dorothie_gym.spaces.limits import MESSAGE_LENGTH, STORY_LENGTH
 from dorothie_gym.spaces.observations import MAX_UTTERANCE
 from dorothie_gym.tasks import Landmark, TaskState
@@ -78,7 +78,7 @@ class ObservationBuilder:
         self._limits, self._observe_acts = limits, observe_acts
         self._junction = junction
         self._buffers = {
-            role: ObservationBuffer.of_space(observation_space(role, limits, observe_acts)) for role in AGENT_ROLES
+            role: FieldBuffer.of_space(observation_space(role, limits, observe_acts)) for role in AGENT_ROLES
         }
         # Taken for the tables of a role that is not asked for.
         self._unread = {role: buffer.copy() for role, buffer in self._buffers.items()}
@@ -289,3 +289,47 @@ def write_subgoals(table: Table, task: TaskState, *, permissions: bool) -> None:
             row[SubgoalColumn.CAN_TRIGGER] = i in triggers
             row[SubgoalColumn.CAN_DELETE] = i in deletions
             row[SubgoalColumn.CAN_CHANGE] = i in changes
+
+
+# --- observations on demand -------------------------------------------------------------------------------------------
+
+_AGENTS = {str(role): role for role in AGENT_ROLES}
+
+
+class Observable(Protocol):
+    """Session whose roles can be observed; `decisions` is the number of decisions played so far."""
+
+    decisions: int
+
+    def observations(self, roles: Sequence[Role]) -> dict[str, Observation]:
+        """Builds the observations of some roles at the present decision, by agent."""
+
+
+class LazyObservations(Mapping[str, Observation]):
+    """Observations of the roles at one decision, each built when it is first read.
+
+    A mapping is valid until the session takes its next step: it raises `RuntimeError` when an observation that was not
+    read in time is asked for afterwards.
+    """
+
+    def __init__(self, session: Observable) -> None:
+        self._session, self._decision = session, session.decisions
+        self._built: dict[str, Observation] = {}
+
+    def __getitem__(self, agent: str) -> Observation:
+        return self.of((_AGENTS[agent],))[agent]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_AGENTS)
+
+    def __len__(self) -> int:
+        return len(_AGENTS)
+
+    def of(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
+        """Returns the observations of some roles by agent; those that are missing are built together."""
+        missing = [role for role in roles if role not in self._built]
+        if missing:
+            if self._session.decisions != self._decision:
+                raise RuntimeError(f"the session has taken a step since; the observation of {missing[0]} was not read")
+            self._built.update(self._session.observations(missing))
+        return {str(role): self._built[role] for role in roles}

@@ -1,57 +1,265 @@
-"""Engine that plays sessions in one town: draws the scenario, decodes actions, steps the session, ends it in time."""
+"""Sessions in progress: order of the roles' actions in a decision, their consequences, and the end of the session."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.live_session import LiveSession, RewardTerms, SessionSummary
-from dorothie_gym.engine.masks import Mask
-from dorothie_gym.engine.scenario import Scenario, draw_scenario
+from dorothie_gym.dialogue import Utterance
+from dorothie_gym.engine.beliefs import BeliefTracker
+from dorothie_gym.engine.config import EnvConfig, RewardTerms
+from dorothie_gym.engine.dialogue_channel import DialogueChannel
+from dorothie_gym.engine.exception_executor import ExceptionExecutor
+from dorothie_gym.engine.masks import ActionMasks, RoleMask
+from dorothie_gym.engine.observations import DeliveredMessages, LazyObservations, ObservationBuilder
+from dorothie_gym.engine.path_measurements import UpcomingJunction
+from dorothie_gym.engine.scenario import Scenario, draw_scenario, header_of
+from dorothie_gym.engine.session_log import EventLog, SessionSummary, SubgoalCounts, SubgoalTracker
 from dorothie_gym.maps import Town, load_town
-from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.recording import Event, SessionHeader
+from dorothie_gym.ontology import AGENT_ROLES, NAVIGATION_ACTIONS, ExceptionKind, PhysicalAction, Role
+from dorothie_gym.recording import Event, EventType, SessionHeader
+from dorothie_gym.sim.ego.limits import EGO_STANDING
+from dorothie_gym.sim.infractions import INFRACTION_KINDS
 from dorothie_gym.sim.network.network import TownNetwork
-from dorothie_gym.spaces import ActionDecoder, Observation, SpaceLimits
-from dorothie_gym.tasks import StoryboardTemplate, load_template
+from dorothie_gym.sim.world import World
+from dorothie_gym.spaces import (
+    ActionDecoder,
+    ActionMapping,
+    AdWizardAction,
+    CoWizardAction,
+    Mental,
+    Observation,
+    ParticipantAction,
+    Physical,
+    RoleAction,
+    SpaceLimits,
+    StepInfo,
+)
+from dorothie_gym.tasks import StoryboardTemplate, TaskState, load_template
 
 _AGENTS = {str(role): role for role in AGENT_ROLES}
+_INFRACTIONS = tuple((kind.value, kind) for kind in INFRACTION_KINDS)
 
 
-class LazyObservations(Mapping[str, Observation]):
-    """Observations of the roles at one decision, each built when it is first read.
+class LiveSession:
+    """One session in progress, with decoded actions.
 
-    A mapping is valid until the session takes its next step: it raises `RuntimeError` when an observation that was not
-    read in time is asked for afterwards.
+    Attributes:
+        scenario: storyboard, street names and departure.
+        config: settings.
+        limits: sizes of the spaces.
+        world: simulated world.
+        task: progress in the storyboard.
+        beliefs: goals and places of hidden landmarks as the Co-Wizard has stated them.
+        masks: masks of the actions that would be carried out now.
+        messages: messages of the Ad-Wizard so far, with their times [s].
+        trail: positions of the ego [m], one for each decision.
+        decisions: decisions played so far.
     """
 
-    def __init__(self, session: LiveSession) -> None:
-        self._session, self._decision = session, session.decisions
-        self._built: dict[str, Observation] = {}
+    def __init__(
+        self, town: Town, network: TownNetwork, scenario: Scenario, config: EnvConfig, limits: SpaceLimits
+    ) -> None:
+        self.scenario, self.config, self.limits = scenario, config, limits
+        # A new subsystem takes a further child at the end: the seeds of the others stay as they are.
+        world_seed, word_seed, ear_seed, style_seed = np.random.SeedSequence([scenario.seed, 1]).spawn(4)
+        self.world = World(town, config.world, seed=world_seed, departure=scenario.departure, network=network)
+        self.task = TaskState(scenario.storyboard)
+        self.beliefs = BeliefTracker(town, scenario)
+        self._exceptions = ExceptionExecutor(self.world, self.task, limits.props)
+        self._dialogue = DialogueChannel(
+            scenario, config, limits.spans, words=word_seed, ears=ear_seed, styles=style_seed
+        )
+        junction = UpcomingJunction(self.world)
+        self._observations = ObservationBuilder(
+            self.world, scenario, self.task, self.beliefs, limits, config.observe_acts, junction
+        )
+        self.masks = ActionMasks(self.world, self.task, limits, junction)
+        self._log = EventLog(self.world)
+        self._subgoals = SubgoalTracker(scenario, self.task, self._dialogue, self._log)
+        self.decisions = 0
+        self.messages: list[tuple[float, str]] = []
+        self.trail: list[tuple[float, float]] = [self._ego_position()]
+        self._end_reason: str | None = None
+        self._delivered = self._deliver("")
 
-    def __getitem__(self, agent: str) -> Observation:
-        return self.of((_AGENTS[agent],))[agent]
+    # --- one decision -----------------------------------------------------------------------------------------------
 
-    def __iter__(self) -> Iterator[str]:
-        return iter(_AGENTS)
+    def step(self, actions: Mapping[Role, RoleAction]) -> dict[Role, RewardTerms]:
+        """Carries out one action of each role, runs the physics until the next decision, returns the reward terms."""
+        self.decisions += 1
+        self._log.clear()
+        collisions, reached = self.world.collisions, self._subgoals.reached
+        message = self._play_ad_wizard(actions[Role.AD_WIZARD])
+        spoken = {role: self._speak(role, actions[role]) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
+        self._play_co_wizard(actions[Role.CO_WIZARD])
+        self._log.add_world_events(self.world.step(self.config.frames))
+        position = self._ego_position()
+        if self.world.car.speed <= EGO_STANDING:
+            self._subgoals.note_arrivals(*position)
+        self._delivered = self._deliver(message)
+        self.trail.append(position)
+        return self.config.rewards.terms(
+            reached=self._subgoals.reached - reached,
+            success=self.success,
+            collisions=self.world.collisions - collisions,
+            decision_frequency=self.config.decision_frequency,
+            refusals={role: len(reasons) for role, reasons in self._log.refused.items()},
+            spoken=spoken,
+        )
 
-    def __len__(self) -> int:
-        return len(_AGENTS)
+    def observations(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
+        """Builds the observations of some roles, by agent; what several of them need is computed once."""
+        return {str(role): found for role, found in self._observations.build(self._delivered, roles).items()}
 
-    def of(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
-        """Returns the observations of some roles by agent; those that are missing are built together."""
-        missing = [role for role in roles if role not in self._built]
-        if missing:
-            if self._session.decisions != self._decision:
-                raise RuntimeError(f"the session has taken a step since; the observation of {missing[0]} was not read")
-            self._built.update(self._session.observations(missing))
-        return {str(role): self._built[role] for role in roles}
+    def end(self, reason: str) -> None:
+        """Closes the session."""
+        self._log.add(EventType.END, Role.AGENT, {"success": self.success, "reason": reason})
+        self._end_reason = reason
+
+    @property
+    def over(self) -> bool:
+        """Whether the session is closed."""
+        return self._end_reason is not None
+
+    @property
+    def success(self) -> bool:
+        """Whether every live subgoal was reached, the destination last, without a collision that the ego caused."""
+        return self.world.collisions == 0 and self.task.done and self.task.success
+
+    @property
+    def events(self) -> list[Event]:
+        """Events of the last decision."""
+        return self._log.events
+
+    @property
+    def refused(self) -> Mapping[Role, list[str]]:
+        """Reasons for the refusals of the last decision, by role."""
+        return self._log.refused
+
+    @property
+    def said(self) -> Sequence[Utterance]:
+        """All utterances that are over."""
+        return self._dialogue.said
+
+    @property
+    def infractions(self) -> dict[str, int]:
+        """Number of infractions so far by kind, collisions of any cause included."""
+        counts = self.world.reports.infractions
+        return {name: counts.get(kind, 0) for name, kind in _INFRACTIONS}
+
+    # --- actions of the roles ---------------------------------------------------------------------------------------
+
+    def _play_ad_wizard(self, action: RoleAction) -> str:
+        assert isinstance(action, AdWizardAction)
+        if action.exception is ExceptionKind.NONE:
+            return ""
+        outcome = self._exceptions.execute(action)
+        name = action.exception.name.lower()
+        if isinstance(outcome, str):
+            self._log.refuse(Role.AD_WIZARD, name, outcome)
+            return ""
+        if action.exception is not ExceptionKind.MESSAGE:
+            self._log.counts["exceptions"] += 1
+            self._log.add(EventType.EXCEPTION, Role.AD_WIZARD, {"kind": name, **outcome})
+        if action.exception.is_task:
+            self._subgoals.note_changes(name)
+        if action.message:
+            self.messages.append((self.world.time, action.message))
+            self._log.add(EventType.MESSAGE, Role.AD_WIZARD, {"text": action.message})
+        return action.message
+
+    def _speak(self, role: Role, action: RoleAction) -> bool:
+        assert isinstance(action, ParticipantAction | CoWizardAction)
+        if action.speech is None:
+            return False
+        reason = self._dialogue.say(role, action.speech, self.world.time)
+        if reason is not None:
+            self._log.refuse(role, "speech", reason)
+        return reason is None
+
+    def _play_co_wizard(self, action: RoleAction) -> None:
+        assert isinstance(action, CoWizardAction)
+        if action.mental is not None:
+            self._update_beliefs(action.mental)
+        if action.physical is not None:
+            self._drive(action.physical)
+
+    def _drive(self, physical: Physical) -> None:
+        action = physical.action
+        reason = self.world.ego.apply(action, angle=physical.angle, up=physical.up)
+        if reason is not None:
+            self._log.refuse(Role.CO_WIZARD, action.label, reason)
+            return
+        self._log.counts["physical_actions"] += 1
+        angle = physical.angle if action in (PhysicalAction.J_TURN, PhysicalAction.LANE_SWITCH) else None
+        up = physical.up if action in (PhysicalAction.SPEED_CHANGE, PhysicalAction.LIGHT_CHANGE) else None
+        data = {"action": action.label, "angle": angle, "up": up}
+        self._log.add(EventType.PHYSICAL_ACTION, Role.CO_WIZARD, data, flagged=action in NAVIGATION_ACTIONS)
+
+    def _update_beliefs(self, mental: Mental) -> None:
+        outcome = self.beliefs.update(mental, self.world.localizer, self.world.sight)
+        if isinstance(outcome, str):
+            self._log.refuse(Role.CO_WIZARD, mental.action.label, outcome)
+            return
+        self.world.ego.set_goals(self.beliefs.goal_places())
+        self._log.add(EventType.BELIEF_UPDATE, Role.CO_WIZARD, {"action": mental.action.label, **outcome})
+
+    # --- consequences -----------------------------------------------------------------------------------------------
+
+    def _deliver(self, message: str) -> DeliveredMessages:
+        """Delivers the utterances that are over and logs their acts; `message` is that of the Ad-Wizard."""
+        said: dict[Role, Utterance] = {}
+        heard: dict[Role, Utterance] = {}
+        now = self.world.time
+        for utterance in self._dialogue.deliver(now):
+            speaker = utterance.said.speaker
+            said[speaker], heard[speaker] = utterance.said, utterance.heard
+            self.beliefs.hear(speaker, utterance.understood)
+            self._log.counts["utterances"] += 1
+            self._log.counts["acts"] += len(utterance.records)
+            for data in utterance.records:
+                self._log.add(EventType.DIALOGUE_MOVE, speaker, data, flagged=True)
+        return DeliveredMessages(said=said, heard=heard, message=message, speaking=self._dialogue.speaking(now))
+
+    def _ego_position(self) -> tuple[float, float]:
+        x, y = self.world.car.position.tolist()
+        return x, y
+
+    # --- record -----------------------------------------------------------------------------------------------------
+
+    def header(self) -> SessionHeader:
+        """Returns the header of the session's record."""
+        return header_of(self.scenario, self.world.town.name, self.config)
+
+    def summary(self) -> SessionSummary:
+        """Returns the state of the session in JSON types: success, subgoals, counts."""
+        counts = self._log.counts
+        summary = SessionSummary(
+            success=self.success,
+            arrived=self.task.done,
+            subgoals=SubgoalCounts(live=len(self.task.live), reached=self._subgoals.reached),
+            collisions=self.world.collisions,
+            infractions=self.infractions,
+            seconds=round(self.world.time, 3),
+            utterances=counts["utterances"],
+            acts=counts["acts"],
+            physical_actions=counts["physical_actions"],
+            exceptions=counts["exceptions"],
+            refusals=counts["refusals"],
+            exchanges=self._dialogue.exchanges,
+            transactions=self._dialogue.transactions,
+        )
+        if self._end_reason is not None:
+            summary["reason"] = self._end_reason
+        return summary
+
+
+# --- sessions of a town -----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +344,7 @@ class SessionEngine:
         self._observations = None
         return self.observations
 
-    def step(self, actions: Mapping[str, Mapping[str, Any]]) -> StepOutcome:
+    def step(self, actions: Mapping[str, ActionMapping]) -> StepOutcome:
         """Plays one decision: the actions of all roles, then the physics until the next decision.
 
         Args:
@@ -188,11 +396,11 @@ class SessionEngine:
             self._observations = LazyObservations(self.session)
         return self._observations
 
-    def mask(self, role: Role) -> dict[str, Mask | tuple[Mask, ...] | None]:
+    def mask(self, role: Role) -> RoleMask:
         """Returns the mask of a role's action space at the present decision."""
         return self.session.masks.mask(role)
 
-    def info(self, role: Role, terms: RewardTerms | None = None) -> dict[str, Any]:
+    def info(self, role: Role, terms: RewardTerms | None = None) -> StepInfo:
         """Returns the info dictionary of a role; the caller owns everything in it.
 
         Args:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.engine.live_session import LiveSession
+from dorothie_gym.engine.session_engine import LiveSession
 from dorothie_gym.ontology import GoalStatus, Role
 from dorothie_gym.rendering.frames import HumanWindow, SceneRenderer
 from dorothie_gym.rendering.scene import Actor, CarView, Pin, Scene, SpokenLine, SubgoalState

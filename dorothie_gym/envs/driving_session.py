@@ -12,9 +12,9 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.engine.live_session import STANDING, LiveSession
+from dorothie_gym.engine.path_measurements import UpcomingJunction
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
-from dorothie_gym.engine.upcoming_junction import UpcomingJunction
+from dorothie_gym.engine.session_engine import LiveSession
 from dorothie_gym.envs.navigation_config import NavigationConfig
 from dorothie_gym.envs.session_view import RENDER_MODES, SessionView
 from dorothie_gym.maps import Town, load_town
@@ -28,6 +28,7 @@ from dorothie_gym.policies.navigation.observation_vector import HeardInstruction
 from dorothie_gym.policies.observation_parser import read_landmarks
 from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
+from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.infractions import INFRACTION_KINDS, WorldEventKind
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.world import World
@@ -47,7 +48,7 @@ from dorothie_gym.tasks import StoryboardTemplate, load_template
 NEARER = 1.0
 """Decrease of the cost to go that counts as progress for `patience` [m]."""
 
-OFF_ROAD = 15.0
+LEFT_ROAD_DISTANCE = 15.0
 """Distance from the path beyond which the car has left the road for good [m]."""
 
 _RULES = tuple(kind.value for kind in INFRACTION_KINDS if kind is not WorldEventKind.COLLISION)
@@ -167,7 +168,7 @@ class DrivingSession:
     def _listen(self) -> None:
         """Lets the instructor speak, and updates the goal."""
         planner = self.session.world.planner
-        waits = planner.held and float(self.session.world.car.speed) <= STANDING
+        waits = planner.held and float(self.session.world.car.speed) <= EGO_STANDING
         turning = max(planner.manoeuvre_end - planner.s, 0.1) if planner.in_manoeuvre else 0.0
         goal = self.instructor.goal
         said = self.instructor.instruct(self.seen[Role.PARTICIPANT], self._known, waits=waits, turning=turning)
@@ -216,7 +217,7 @@ class DrivingSession:
     def _end(self) -> None:
         session, now = self.session, self.session.world.time
         arrived = session.task.done
-        left_road = abs(session.world.planner.offset) > OFF_ROAD
+        left_road = abs(session.world.planner.offset) > LEFT_ROAD_DISTANCE
         gave_up = now - self._nearest_at >= self._config.patience - 1e-9
         self.terminated = arrived or left_road or gave_up
         self.truncated = not self.terminated and now >= self._config.max_seconds - 1e-9

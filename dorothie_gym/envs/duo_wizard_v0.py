@@ -14,9 +14,9 @@ from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.live_session import LiveSession, SessionSummary
 from dorothie_gym.engine.scenario import Scenario
-from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.engine.session_engine import LiveSession, SessionEngine
+from dorothie_gym.engine.session_log import SessionSummary
 from dorothie_gym.envs.session_view import RENDER_MODES, SessionView
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES

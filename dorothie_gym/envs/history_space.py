@@ -37,7 +37,7 @@ from dorothie_gym.spaces.fields import Column, FieldSpec, choice, choices, dict_
 from dorothie_gym.spaces.limits import TEXT_CHARACTERS
 from dorothie_gym.spaces.observations import MAX_UTTERANCE
 
-HISTORY: Final = 16
+HISTORY_LENGTH: Final = 16
 """Number of latest moves and physical actions in an observation."""
 
 SPEAKERS: Final = (Role.PARTICIPANT, Role.CO_WIZARD)
@@ -72,24 +72,29 @@ def history_fields(task: Task, limits: SpaceLimits) -> tuple[FieldSpec, ...]:
     return (
         *(utterance if task is Task.UFN else ()),
         real("time", 1, low=0.0, unit="s", meaning="time of the point since the start of the session"),
-        choices("moves", NO_MOVE + 1, HISTORY, meaning=f"ids of the last dialogue moves; {NO_MOVE} for none"),
+        choices("moves", NO_MOVE + 1, HISTORY_LENGTH, meaning=f"ids of the last dialogue moves; {NO_MOVE} for none"),
         choices(
-            "move_speakers", len(SPEAKERS) + 1, HISTORY, meaning="1 + index of each speaker in `SPEAKERS`; 0 for none"
+            "move_speakers",
+            len(SPEAKERS) + 1,
+            HISTORY_LENGTH,
+            meaning="1 + index of each speaker in `SPEAKERS`; 0 for none",
         ),
-        flags("move_slots", HISTORY, len(LABELS), meaning="label vector of each move, in the order of `LABELS`"),
-        real("move_times", HISTORY, low=0.0, unit="s", meaning="end of the utterance of each move"),
+        flags("move_slots", HISTORY_LENGTH, len(LABELS), meaning="label vector of each move, in the order of `LABELS`"),
+        real("move_times", HISTORY_LENGTH, low=0.0, unit="s", meaning="end of the utterance of each move"),
         text("participant_text", MAX_UTTERANCE, meaning="last utterance of the participant"),
         text("co_wizard_text", MAX_UTTERANCE, meaning="last utterance of the Co-Wizard"),
-        choices("actions", len(PhysicalAction) + 1, HISTORY, meaning="ids of the last physical actions; 0 for none"),
+        choices(
+            "actions", len(PhysicalAction) + 1, HISTORY_LENGTH, meaning="ids of the last physical actions; 0 for none"
+        ),
         real(
             "action_angles",
-            HISTORY,
+            HISTORY_LENGTH,
             low=U_TURN_ANGLE,
             high=180.0,
             unit="deg",
             meaning="angle of each action, positive left",
         ),
-        real("action_times", HISTORY, low=0.0, unit="s", meaning="time of each action"),
+        real("action_times", HISTORY_LENGTH, low=0.0, unit="s", meaning="time of each action"),
         real("pose", 3, unit="m, m, rad", meaning="x, y and heading (clockwise) of the car"),
         real("speed", 1, unit="m/s", meaning="speed of the car"),
         real("way", WAY_LENGTH, columns=TrackColumn, unit="mixed", meaning="recent trajectory of the car, every 0.4 s"),
@@ -125,7 +130,7 @@ def history_space(task: Task, limits: SpaceLimits) -> spaces.Dict:
 
 def encode_view(view: PointView, limits: SpaceLimits) -> Observation:
     """Returns the observation of a view in `history_space` of its task, without the fields of `encode_objects`."""
-    moves, actions = view.moves[: -HISTORY - 1 : -1], view.actions[: -HISTORY - 1 : -1]  # newest first
+    moves, actions = view.moves[: -HISTORY_LENGTH - 1 : -1], view.actions[: -HISTORY_LENGTH - 1 : -1]  # newest first
     car = view.car
     observation: Observation = {
         "time": np.array([view.time]),
@@ -223,7 +228,7 @@ def _way(view: PointView) -> NDArray[np.float64]:
 
 def _padded(values: Sequence[float], filler: float) -> NDArray[np.float64] | NDArray[np.int64]:
     dtype = np.float64 if isinstance(filler, float) else np.int64
-    row = np.full(HISTORY, filler, dtype=dtype)
+    row = np.full(HISTORY_LENGTH, filler, dtype=dtype)
     row[: len(values)] = values
     return row
 
@@ -233,7 +238,7 @@ def _speaker(move: MoveRecord) -> int:
 
 
 def _slots(moves: Sequence[MoveRecord]) -> NDArray[np.int8]:
-    table = np.zeros((HISTORY, len(LABELS)), dtype=np.int8)
+    table = np.zeros((HISTORY_LENGTH, len(LABELS)), dtype=np.int8)
     for row, move in enumerate(moves):
         table[row] = move.act.vector
     return table

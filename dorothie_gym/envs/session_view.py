@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.engine.live_session import LiveSession
+from dorothie_gym.engine.session_engine import LiveSession
 
 if TYPE_CHECKING:
     from dorothie_gym.engine.session_scene import SessionRenderer

@@ -43,7 +43,7 @@ ALL: Final = "all"
 SPLITS: Final[Mapping[str, str]] = {fold.value.replace("/", "_"): fold.value for fold in Fold}
 """Names of splits, and the folds that they are: `val` and `test` are those of seen and unseen towns together."""
 
-KEPT: Final = 16
+CACHED_SESSIONS: Final = 16
 """Sessions that an environment keeps in memory, those used last."""
 
 
@@ -158,7 +158,7 @@ class _Library:
         found = _sessions(corpus, split)
         self.names = [one.name for one in found]
         self._found = found
-        self.read = lru_cache(maxsize=KEPT)(self._read)
+        self.read = lru_cache(maxsize=CACHED_SESSIONS)(self._read)
 
     def __len__(self) -> int:
         return len(self.names)

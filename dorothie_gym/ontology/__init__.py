@@ -17,31 +17,29 @@ from dorothie_gym.ontology.actions import (
     MentalAction,
     PhysicalAction,
 )
-from dorothie_gym.ontology.decision_tree import (
+from dorothie_gym.ontology.dialogue_acts import (
     DECISION_TREE,
+    LABEL_INDEX,
+    LABELS,
     MOVE_GROUPS,
+    SLOT_SPANS,
+    VECTOR_SLOTS,
     Answer,
+    DialogueAct,
+    DialogueMove,
+    DialogueUnit,
     MoveGroup,
     Node,
     Question,
     TreePath,
-    groups_of,
-    path_to,
-    paths,
-    walk,
-)
-from dorothie_gym.ontology.dialogue_acts import (
-    LABEL_INDEX,
-    LABELS,
-    SLOT_SPANS,
-    VECTOR_SLOTS,
-    DialogueAct,
-    DialogueMove,
-    DialogueUnit,
     UnitEnd,
     decode_slots,
     encode_slots,
+    groups_of,
     in_label_order,
+    path_to,
+    paths,
+    walk,
 )
 from dorothie_gym.ontology.roles import (
     AGENT_ROLES,

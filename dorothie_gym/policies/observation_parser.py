@@ -1,4 +1,4 @@
-"""Observations read into typed records."""
+"""Observations and heard utterances read into typed records."""
 
 from __future__ import annotations
 
@@ -10,10 +10,20 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dorothie_gym.dialogue import ParsedText, guess_spans, understand
 from dorothie_gym.maps import Town
-from dorothie_gym.ontology import GoalStatus, LandmarkName, ObjectClass, StreetName, WeatherParameter
+from dorothie_gym.ontology import (
+    DialogueAct,
+    DialogueMove,
+    GoalStatus,
+    LandmarkName,
+    ObjectClass,
+    Role,
+    StreetName,
+    WeatherParameter,
+)
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
-from dorothie_gym.spaces import LandmarkColumn, ObjectColumn, ObservationMapping, SubgoalColumn
+from dorothie_gym.spaces import LandmarkColumn, ObjectColumn, ObservationMapping, SubgoalColumn, heard_acts
 
 PARAMETERS = tuple(WeatherParameter)
 
@@ -229,3 +239,33 @@ def place_on_path(town: Town, observation: ObservationMapping, ahead: float) -> 
             return lane, left
         left -= town.lanes[lane].length
     return None
+
+
+# --- heard utterances -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeardUtterance:
+    """Completed utterance: its acts in order, and its parsed words."""
+
+    acts: tuple[DialogueAct, ...]
+    words: ParsedText
+
+
+def heard_utterance(
+    observation: ObservationMapping, speaker: Role, after: DialogueMove | None = None
+) -> HeardUtterance | None:
+    """Returns the utterance completed since the last decision, or None; acts that are not observed are classified.
+
+    Args:
+        observation: observation of the listener.
+        speaker: role of the speaker.
+        after: last move of the listener, as context of the classification.
+    """
+    text = str(observation[f"{speaker}_text"])
+    acts = heard_acts(observation, speaker)
+    if not text and not acts:
+        return None
+    if acts is None:
+        acts = tuple(span.act for span in guess_spans(text, after))
+    return HeardUtterance(acts=acts, words=understand(text))

@@ -36,7 +36,7 @@ SAME_WAY = 25.0
 RIGHT_BEHIND = 70.0
 """Distance from a junction to a goal within which there may be no room to change lanes [m]."""
 
-LATE = 18.0
+MANOEUVRE_OVERDUE_DISTANCE = 18.0
 """Distance behind its planned place from which on a lane change or U-turn is given up [m]."""
 
 U_TURN_SPEED_SQUARED = 12.0
@@ -265,8 +265,8 @@ class RouteProgress:
             return False
         room = town.lanes[legs[0].lane].length - station
         if legs[1].entry is LaneEntry.U_TURN:
-            return station > legs[0].end + (LATE if room > END_ROOM else 0.0)
-        return room < SWITCH_ROOM or station > legs[0].end + LATE
+            return station > legs[0].end + (MANOEUVRE_OVERDUE_DISTANCE if room > END_ROOM else 0.0)
+        return room < SWITCH_ROOM or station > legs[0].end + MANOEUVRE_OVERDUE_DISTANCE
 
     def left(self, station: float) -> float:
         """Returns the distance to the goal along the route [m]; negative just behind the goal."""

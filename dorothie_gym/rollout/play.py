@@ -7,9 +7,9 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Protocol
 
-from dorothie_gym.engine.live_session import SessionSummary
 from dorothie_gym.engine.recorder import SessionRecorder
 from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.engine.session_log import SessionSummary
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy
 from dorothie_gym.policies.policy import policy_seed

@@ -33,8 +33,8 @@ from dorothie_gym.ontology import (
 from dorothie_gym.spaces.action_reader import ActionFieldTable, ActionReader
 from dorothie_gym.spaces.fields import FieldSpec, choice, choices, dict_space, flags, text
 from dorothie_gym.spaces.limits import (
+    LANE_METRES,
     MESSAGE_LENGTH,
-    METRES,
     PERCENT,
     UTTERANCE_LENGTH,
     SpaceLimits,
@@ -374,7 +374,7 @@ def _ad_wizard_fields(limits: SpaceLimits) -> tuple[FieldSpec, ...]:
 def _position_fields(limits: SpaceLimits) -> tuple[FieldSpec, ...]:
     return (
         choice("lane", limits.lanes, meaning="id of the lane of a position"),
-        choice("metres", METRES, unit="m", meaning="distance of the position along the lane"),
+        choice("metres", LANE_METRES, unit="m", meaning="distance of the position along the lane"),
     )
 
 

@@ -1,4 +1,4 @@
-"""Field specifications: one machine-readable table per space, from which spaces and documentation are built."""
+"""Field specifications, from which spaces and documentation are built, and buffers for the arrays of a space."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from typing import Any, Self, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
-from dorothie_gym.spaces.limits import REACH, TEXT_CHARACTERS
+from dorothie_gym.spaces.limits import TEXT_CHARACTERS, UNBOUNDED
 
 AnySpace: TypeAlias = spaces.Space[Any]
 """Space whose kind of values is not known statically."""
@@ -109,8 +110,8 @@ def real(
     *shape: int,
     meaning: str,
     unit: str = "1",
-    low: float = -REACH,
-    high: float = REACH,
+    low: float = -UNBOUNDED,
+    high: float = UNBOUNDED,
     columns: type[Column] | None = None,
 ) -> FieldSpec:
     """Returns the specification of a float64 array; the number of columns is appended to the shape of a table."""
@@ -158,3 +159,45 @@ def sizes(fields: Iterable[FieldSpec]) -> Mapping[str, int]:
 def dict_space(fields: Iterable[FieldSpec]) -> spaces.Dict:
     """Builds the `Dict` space of several fields."""
     return spaces.Dict({field.name: field.space() for field in fields})
+
+
+# --- buffers ----------------------------------------------------------------------------------------------------------
+
+Shape: TypeAlias = tuple[int, ...]
+"""Shape of an array."""
+
+
+class FieldBuffer:
+    """Arrays of fixed types and shapes in one block of memory.
+
+    A copy of the block costs as much as the copy of one array. The caller owns the copy; later changes of the template
+    do not reach it.
+
+    Attributes:
+        template: arrays that the next copies are made of, by name.
+    """
+
+    def __init__(self, fields: Mapping[str, tuple[Any, Shape]]) -> None:
+        """Allocates arrays of zeros.
+
+        Args:
+            fields: type and shape of each array, by name.
+        """
+        self._layout = np.dtype([(name, kind, shape) for name, (kind, shape) in fields.items()], align=True)
+        self._block: NDArray[np.uint8] = np.zeros(self._layout.itemsize, dtype=np.uint8)
+        self._names = tuple(fields)
+        self.template: dict[str, NDArray[Any]] = self._arrays(self._block)
+
+    @classmethod
+    def of_space(cls, space: spaces.Dict) -> Self:
+        """Returns a buffer for all fields of a space that are arrays."""
+        arrays = spaces.Box | spaces.MultiDiscrete | spaces.MultiBinary
+        return cls({name: (f.dtype, f.shape) for name, f in space.spaces.items() if isinstance(f, arrays)})
+
+    def copy(self) -> dict[str, Any]:
+        """Returns a copy of the template: arrays by name."""
+        return self._arrays(self._block.copy())
+
+    def _arrays(self, block: NDArray[np.uint8]) -> dict[str, NDArray[Any]]:
+        record = np.ndarray((), self._layout, block)
+        return {name: record[name] for name in self._names}

@@ -20,10 +20,10 @@ MESSAGE_LENGTH = 240
 STORY_LENGTH = 2400
 """Greatest length of a story [characters]."""
 
-METRES = 1024
+LANE_METRES = 1024
 """Number of positions on a lane, in whole metres; no lane of a known town is longer [m]."""
 
-REACH = 1e6
+UNBOUNDED = 1e6
 """Bound of quantities without a natural bound; far beyond all positions [m], speeds [m/s] and times [s]."""
 
 PERCENT = 101

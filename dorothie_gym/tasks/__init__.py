@@ -5,8 +5,16 @@ from dorothie_gym.tasks.binding import bind
 from dorothie_gym.tasks.catalogue import LandmarkKind, catalogue
 from dorothie_gym.tasks.parsing import load_template, parse_template, template_names
 from dorothie_gym.tasks.state import TaskState
-from dorothie_gym.tasks.storyboard import Landmark, LandmarkSite, Storyboard, Subgoal
-from dorothie_gym.tasks.templates import Dependent, StoryboardTemplate, SubgoalTemplate, Variable
+from dorothie_gym.tasks.storyboard import (
+    Dependent,
+    Landmark,
+    LandmarkSite,
+    Storyboard,
+    StoryboardTemplate,
+    Subgoal,
+    SubgoalTemplate,
+    Variable,
+)
 
 __all__ = [
     "Dependent",

@@ -11,8 +11,17 @@ import numpy as np
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.ontology import LandmarkName
 from dorothie_gym.tasks.catalogue import LandmarkKind, catalogue, categories, find_kind, kinds_in
-from dorothie_gym.tasks.storyboard import Landmark, LandmarkSite, Storyboard, Subgoal
-from dorothie_gym.tasks.templates import StoryboardTemplate, SubgoalTemplate, Variable, fill, variable_of
+from dorothie_gym.tasks.storyboard import (
+    Landmark,
+    LandmarkSite,
+    Storyboard,
+    StoryboardTemplate,
+    Subgoal,
+    SubgoalTemplate,
+    Variable,
+    fill,
+    variable_of,
+)
 
 
 def cast(template: StoryboardTemplate, rng: np.random.Generator | None = None) -> dict[str, LandmarkName]:
@@ -94,12 +103,12 @@ def _shortage(template: StoryboardTemplate, fixed: Mapping[str, LandmarkName]) -
 
 
 # A stop counts within 2 m of a waypoint (paper, appendix "Interface Components"); the spacing also allows queues.
-SPACING = 15.0
+SITE_SPACING = 15.0
 """Preferred minimum distance between two landmarks [m]."""
 
 
 def spread_places(places: Sequence[LandmarkSite], count: int, rng: np.random.Generator) -> list[LandmarkSite]:
-    """Samples sites: first on unused lanes at a distance of `SPACING`, then on any lane, then the farthest ones.
+    """Samples sites: first on unused lanes at a distance of `SITE_SPACING`, then on any lane, then the farthest ones.
 
     Args:
         places: candidate sites; at least `count`.
@@ -114,7 +123,7 @@ def spread_places(places: Sequence[LandmarkSite], count: int, rng: np.random.Gen
     for fresh_lane in (True, False):
         for place in tuple(shuffled):
             lane_is_taken = fresh_lane and any(place.lane == other.lane for other in chosen)
-            if len(chosen) < count and not lane_is_taken and _gap(place, chosen) >= SPACING:
+            if len(chosen) < count and not lane_is_taken and _gap(place, chosen) >= SITE_SPACING:
                 chosen.append(place)
                 shuffled.remove(place)
     while len(chosen) < count:

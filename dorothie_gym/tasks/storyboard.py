@@ -1,11 +1,111 @@
-"""Storyboard bound to a town."""
+"""Storyboards: templates with `$NAME` references, and the storyboard bound to a town."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
 from dorothie_gym.ontology import LandmarkName
+
+_REFERENCE = re.compile(r"\$([A-Za-z_]\w*)")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variable:
+    """Name that is bound to a landmark whose category starts with `category`."""
+
+    name: str
+    category: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dependent:
+    """Name that is bound to one attribute value of the landmark of a variable."""
+
+    name: str
+    variable: str
+    attribute: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class SubgoalTemplate:
+    """Subgoal of a template.
+
+    Attributes:
+        destination: "$VARIABLE", or the ontology label of a landmark.
+        description: text with `$NAME` references.
+        after: indices of the subgoals that must be reached before.
+        trigger: whether the subgoal is inactive until the Ad-Wizard triggers it.
+        delete: whether the Ad-Wizard may delete the subgoal.
+        change: description after a change by the Ad-Wizard; None if the subgoal cannot change.
+        change_destination: destination after the change; None if it stays the same.
+        delete_after_subgoal: index of the subgoal that must be reached before a deletion; None for no condition.
+        leaves: whether the person at the destination disappears once the subgoal is reached.
+    """
+
+    destination: str
+    description: str
+    after: tuple[int, ...] = ()
+    trigger: bool = False
+    delete: bool = False
+    change: str | None = None
+    change_destination: str | None = None
+    delete_after_subgoal: int | None = None
+    leaves: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoryboardTemplate:
+    """Storyboard template (paper, appendix "Task Configuration"); `parse_template` creates and validates it.
+
+    Attributes:
+        name: name in error messages and listings.
+        story: text with `$NAME` references.
+        subgoals: subgoals in order; the last live one is the final destination.
+        variables: names bound to landmarks.
+        dependents: names bound to attribute values.
+        hidden: variables whose positions are hidden from the Co-Wizard, in the order of the file.
+    """
+
+    name: str
+    story: str
+    subgoals: tuple[SubgoalTemplate, ...]
+    variables: tuple[Variable, ...] = ()
+    dependents: tuple[Dependent, ...] = ()
+    hidden: tuple[str, ...] = ()
+
+    def destinations(self) -> tuple[str, ...]:
+        """Returns the distinct destinations of all subgoals, including those after changes."""
+        both = ((subgoal.destination, subgoal.change_destination) for subgoal in self.subgoals)
+        return tuple(dict.fromkeys(ref for pair in both for ref in pair if ref is not None))
+
+    def texts(self) -> Iterator[tuple[str, str]]:
+        """Yields (field, text) for all texts that may contain references."""
+        yield "story", self.story
+        for index, subgoal in enumerate(self.subgoals):
+            yield f"subgoals[{index}].description", subgoal.description
+            if subgoal.change is not None:
+                yield f"subgoals[{index}].change", subgoal.change
+
+
+def variable_of(destination: str) -> str | None:
+    """Returns the variable of a destination; None if the destination names a landmark."""
+    return destination[1:] if destination.startswith("$") else None
+
+
+def references(text: str) -> tuple[str, ...]:
+    """Returns the names of the `$NAME` references in a text, in order."""
+    return tuple(_REFERENCE.findall(text))
+
+
+def fill(text: str, values: Mapping[str, str]) -> str:
+    """Returns the text with each `$NAME` replaced by its value."""
+    return _REFERENCE.sub(lambda match: values[match[1]], text)
+
+
+# --- storyboards bound to a town --------------------------------------------------------------------------------------
 
 
 class LandmarkSite(Protocol):

@@ -11,9 +11,7 @@ def test_my_policy() -> None:
 ```
 """
 
+from dorothie_gym.testing.checks import check_policy, check_session, check_town
 from dorothie_gym.testing.leaks import check_observations_do_not_leak
-from dorothie_gym.testing.policies import check_policy
-from dorothie_gym.testing.sessions import check_session
-from dorothie_gym.testing.towns import check_town
 
 __all__ = ["check_observations_do_not_leak", "check_policy", "check_session", "check_town"]

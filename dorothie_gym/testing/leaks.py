@@ -11,8 +11,15 @@ from dorothie_gym.engine.scenario import Scenario, draw_scenario
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import Role
 from dorothie_gym.spaces import noop
-from dorothie_gym.testing.comparison import first_unequal
-from dorothie_gym.testing.playing import ByAgent, Decision, ParallelSession, play_again, play_random, play_scripted
+from dorothie_gym.testing.playing import (
+    ByAgent,
+    Decision,
+    ParallelSession,
+    first_unequal,
+    play_again,
+    play_random,
+    play_scripted,
+)
 
 CO_WIZARD = str(Role.CO_WIZARD)
 AD_WIZARD = str(Role.AD_WIZARD)

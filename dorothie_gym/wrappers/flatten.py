@@ -12,7 +12,7 @@ from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
 from dorothie_gym.spaces import AnySpace, Observation, StepInfo
-from dorothie_gym.spaces.limits import REACH
+from dorothie_gym.spaces.limits import UNBOUNDED
 
 Flat: TypeAlias = NDArray[np.int64]
 FlatMask: TypeAlias = NDArray[np.bool_]
@@ -154,7 +154,9 @@ def _bounds(name: str, part: AnySpace) -> tuple[NDArray[np.float32], NDArray[np.
         low, high = np.zeros(count), np.ones(count)
     else:
         raise ValueError(f"the observation space's field {name!r} is {part}, which holds no numbers")
-    return np.clip(low, -REACH, REACH).astype(np.float32), np.clip(high, -REACH, REACH).astype(np.float32)
+    return np.clip(low, -UNBOUNDED, UNBOUNDED).astype(np.float32), np.clip(high, -UNBOUNDED, UNBOUNDED).astype(
+        np.float32
+    )
 
 
 AnyEnv: TypeAlias = gym.Env[Any, Any]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dorothie_gym.dialogue import PATIENCE, AsrChannel, Recogniser, Span, Utterance, guess_act, word_error_rate
+from dorothie_gym.dialogue import ANSWER_TIMEOUT, AsrChannel, Recogniser, Span, Utterance, guess_act, word_error_rate
 from dorothie_gym.dialogue.asr_channel import misheard
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role
 from tests.dialogue.talk_corpus import session
@@ -124,7 +124,7 @@ def heard_after_a_question(pause: float, between: Utterance | None = None) -> se
 
 def test_misheard_words_are_classified_by_open_question() -> None:
     assert DialogueMove.REPLY_W in heard_after_a_question(1.0)
-    assert DialogueMove.REPLY_W not in heard_after_a_question(PATIENCE + 1.0), "the exchange is abandoned"
+    assert DialogueMove.REPLY_W not in heard_after_a_question(ANSWER_TIMEOUT + 1.0), "the exchange is abandoned"
     other = said(Role.PARTICIPANT, 2.0, ("well", DialogueAct(DialogueMove.IRRELEVANT)))
     assert DialogueMove.REPLY_W not in heard_after_a_question(1.0, other), "it has been answered"
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dorothie_gym.engine.masks import ActionMasks
+from dorothie_gym.engine.path_measurements import UpcomingJunction
 from dorothie_gym.engine.scenario import draw_scenario
-from dorothie_gym.engine.upcoming_junction import UpcomingJunction
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, ExceptionKind, PhysicalAction, PropKind, Role
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.world import World

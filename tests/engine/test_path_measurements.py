@@ -34,15 +34,15 @@ def drifted_env(shift: tuple[float, float, float] = (0.0, 0.0, 0.0), vehicles: i
 
 
 def seen(env: DuoWizardEnv) -> dict[str, Any]:
-    return env.session.observe(Role.CO_WIZARD)
+    return env.session.observations((Role.CO_WIZARD,))[Role.CO_WIZARD]
 
 
 def test_with_an_exact_estimate_everything_is_where_it_is() -> None:
     env = drifted_env()
-    view, truth = seen(env), env.session.observe(Role.AD_WIZARD)
+    view, truth = seen(env), env.session.observations((Role.AD_WIZARD,))[Role.AD_WIZARD]
     # the planner's own place is that of a frame ago
     np.testing.assert_allclose(view["waypoints"], truth["waypoints"], atol=0.35)
-    watched = env.session.observe(Role.PARTICIPANT)
+    watched = env.session.observations((Role.PARTICIPANT,))[Role.PARTICIPANT]
     np.testing.assert_allclose(view["objects"], watched["objects"], atol=1e-6)
     _, distance = env.session.world.planner.exits()
     assert view["exits"][0, ExitColumn.DISTANCE] == pytest.approx(distance, abs=0.35)
@@ -81,7 +81,7 @@ def test_objects_are_seen_around_the_estimated_pose() -> None:
 def test_nothing_in_the_observation_is_at_its_true_place(shift: tuple[float, float, float]) -> None:
     """No point shown lies where the true pose would put it."""
     env = drifted_env(shift)
-    view, truth = seen(env), env.session.observe(Role.AD_WIZARD)
+    view, truth = seen(env), env.session.observations((Role.AD_WIZARD,))[Role.AD_WIZARD]
     assert np.hypot(*(view["waypoints"] - truth["waypoints"]).T).max() > 1.0
     assert np.hypot(*(view["waypoints"][:5] - truth["waypoints"][:5]).T).min() > 1.0
     assert abs(view["station"][0] - truth["station"][0]) > 1.0

@@ -3,8 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dorothie_gym.engine.path_measurements import EgoMeasurements
-from dorothie_gym.engine.upcoming_junction import UpcomingJunction
+from dorothie_gym.engine.path_measurements import EgoMeasurements, UpcomingJunction
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.spaces import ExitColumn
 from tests.sim.driving import network, world_at

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dorothie_gym.envs.continuous_observation import AHEAD, CONTINUOUS_FIELDS
+from dorothie_gym.envs.navigation_continuous_v0 import AHEAD, CONTINUOUS_FIELDS
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.ontology import ActionValue
 from dorothie_gym.policies.navigation import NavigationAction, layout

@@ -3,8 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dorothie_gym.envs.continuous_observation import CONTINUOUS_FIELD_SPECS, CONTINUOUS_FIELDS
-from dorothie_gym.envs.navigation_continuous_v0 import NavigationContinuousEnv
+from dorothie_gym.envs.navigation_continuous_v0 import (
+    CONTINUOUS_FIELD_SPECS,
+    CONTINUOUS_FIELDS,
+    NavigationContinuousEnv,
+)
 from dorothie_gym.policies.navigation import layout
 from tests.envs.navigation_drivers import pursue
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.ontology import LandmarkName
 from dorothie_gym.tasks import bind, catalogue, load_template, template_names
-from dorothie_gym.tasks.binding import SPACING, cast, spread_places
+from dorothie_gym.tasks.binding import SITE_SPACING, cast, spread_places
 
 from .builders import FakePlace, bound, grid_places, parse, plain, templates
 
@@ -96,7 +96,7 @@ def closest_pair(places):
 def test_sites_are_spaced_although_many_are_close(seed):
     chosen = spread_places(grid_places(400, spacing=6.0, lanes=20), 12, np.random.default_rng(seed))
     assert len({place.id for place in chosen}) == 12
-    assert closest_pair(chosen) >= SPACING
+    assert closest_pair(chosen) >= SITE_SPACING
 
 
 @pytest.mark.parametrize("seed", range(20))

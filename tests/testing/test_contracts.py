@@ -19,7 +19,7 @@ from dorothie_gym.rollout import play_session
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.spaces import ActionDict, noop
 from dorothie_gym.testing import check_observations_do_not_leak, check_policy, check_session, check_town
-from dorothie_gym.testing.comparison import first_unequal
+from dorothie_gym.testing.playing import first_unequal
 from tests.maps.damaged_towns import with_lane
 
 QUIET = EnvConfig(world=WorldConfig(vehicles=2, pedestrians=1))

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from dorothie_gym.analysis.diversity import plain, words_of
 from dorothie_gym.analysis.phenomena.dialogue_view import CAR, HUMAN, DialogueView, Occurrence, Turn
 from dorothie_gym.analysis.phenomena.ways import asks_why
-from dorothie_gym.dialogue.exchanges import EXPECTATIONS, PATIENCE
+from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT, EXPECTATIONS
 from dorothie_gym.ontology import DialogueMove, PhysicalAction, Slot, SlotValue
 from dorothie_gym.recording.events import EventType
 
@@ -121,9 +121,9 @@ def abandoned(talk: DialogueView) -> Iterator[Occurrence]:
     for turn in talk.turns:
         asked = [k for act, k in zip(turn.acts, turn.exchanges, strict=True) if act.move in QUESTIONS]
         unanswered = any(k is not None and len(said_by_both[k]) == 1 for k in asked)
-        if not unanswered or talk.session.duration - turn.end < PATIENCE:
+        if not unanswered or talk.session.duration - turn.end < ANSWER_TIMEOUT:
             continue
-        answered = talk.answers(turn, *(set(M) - {M.IRRELEVANT, M.ALIGN}), within=PATIENCE)
+        answered = talk.answers(turn, *(set(M) - {M.IRRELEVANT, M.ALIGN}), within=ANSWER_TIMEOUT)
         if any(not other.does(*EXPECTATIONS) for other in answered):
             continue
         yield Occurrence(turn, "asked again" if _asked_again(talk, turn) else "dropped")

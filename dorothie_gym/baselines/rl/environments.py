@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import dorothie_gym
 from dorothie_gym.baselines.rl.settings import TrainingSettings
 from dorothie_gym.errors import SettingsError
-from dorothie_gym.spaces.limits import REACH
+from dorothie_gym.spaces.limits import UNBOUNDED
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.rl.vector_env import MakeEnv
@@ -59,7 +59,7 @@ class Squashed(gym.ObservationWrapper[NDArray[np.float32], Any, Any]):
     def observation(self, observation: Any) -> NDArray[np.float32]:
         """Returns the squashed vector."""
         values = np.asarray(observation["observation"], dtype=np.float64)
-        squashed = np.sign(values) * np.log1p(np.abs(values)) / math.log1p(REACH)
+        squashed = np.sign(values) * np.log1p(np.abs(values)) / math.log1p(UNBOUNDED)
         return np.clip(squashed, -1.0, 1.0).astype(np.float32)
 
     def action_masks(self) -> NDArray[np.bool_]:

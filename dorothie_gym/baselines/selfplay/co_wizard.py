@@ -25,8 +25,13 @@ from dorothie_gym.ontology import (
     PhysicalAction,
     Role,
 )
-from dorothie_gym.policies.navigation.action_mask import EstimatedActionMask
-from dorothie_gym.policies.navigation.actions import ACTIONS, NavigationAction, physical_of, prepares
+from dorothie_gym.policies.navigation.actions import (
+    ACTIONS,
+    EstimatedActionMask,
+    NavigationAction,
+    physical_of,
+    prepares,
+)
 from dorothie_gym.policies.navigation.demonstrations import action_of
 from dorothie_gym.policies.navigation.instructor import NavigationInstruction
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits, nearest_sector

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.ontology import LABELS, DialogueAct, DialogueMove, LandmarkName, Role
-from dorothie_gym.policies.observation_parser import scalar
-from dorothie_gym.policies.utterance_input import heard_utterance
+from dorothie_gym.policies.observation_parser import heard_utterance, scalar
 
 RECENT = 20.0
 """Scale of the age of an utterance [s]."""

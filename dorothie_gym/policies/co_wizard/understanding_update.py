@@ -37,9 +37,8 @@ from dorothie_gym.policies.co_wizard.goals import (
 from dorothie_gym.policies.co_wizard.obstacles import take_detour
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.observation_parser import street_of
+from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utterance, street_of
 from dorothie_gym.policies.speech import remark
-from dorothie_gym.policies.utterance_input import HeardUtterance, heard_utterance
 
 STRAIGHT_ON_DISTANCE = 60.0
 """Distance to a junction within which "go on" means straight across it [m]."""

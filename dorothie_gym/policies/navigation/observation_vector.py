@@ -46,22 +46,22 @@ OBJECTS = 6
 KINDS = (ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC)
 """Classes of objects that the vector distinguishes; all others count as the first."""
 
-FAST = 25.0
+SPEED_UNIT = 25.0
 """Unit of speeds: 90 km/h [m/s]."""
 
-FAR = 100.0
+DISTANCE_UNIT = 100.0
 """Unit of distances to junctions, instructions and hazards [m]."""
 
-CLOSE = 10.0
+CLOSE_UNIT = 10.0
 """Second, finer unit of distances that have to be met to the metre [m]."""
 
-DETOUR = 200.0
+DETOUR_UNIT = 200.0
 """Unit of differences between routes [m]."""
 
-ACROSS = 500.0
+TOWN_UNIT = 500.0
 """Unit of positions on the map [m]."""
 
-RECENT = 10.0
+AGE_UNIT = 10.0
 """Unit of the age of an instruction [s]."""
 
 _WEATHER = tuple((parameter.low, parameter.high - parameter.low) for parameter in WeatherParameter)
@@ -217,17 +217,17 @@ class NavigationEncoder:
         manoeuvre, covariance = int(seen["manoeuvre"]), seen["pose_covariance"]
         hazard = bool(seen["hazard"])
         return [
-            float(seen["speed"][0]) / FAST,
+            float(seen["speed"][0]) / SPEED_UNIT,
             float(seen["cruise_speed"][0]) / MAX_CRUISE,
             *_one_hot(int(seen["motion"]), len(Motion)),
             *(float(manoeuvre == action.value) for action in _MANOEUVRES),
             float(hazard),
-            float(seen["hazard_distance"][0]) / FAR if hazard else 0.0,
+            float(seen["hazard_distance"][0]) / DISTANCE_UNIT if hazard else 0.0,
             float(seen["lights"]),
             float(town.lanes[lane].in_junction),
             float(town.neighbour(lane, LinkType.LANE_CHANGE_LEFT) is not None),
             float(town.neighbour(lane, LinkType.LANE_CHANGE_RIGHT) is not None),
-            town.lanes[lane].speed_limit / FAST,
+            town.lanes[lane].speed_limit / SPEED_UNIT,
             math.sqrt(float(covariance[0, 0] + covariance[1, 1])) / 10.0,
             math.sqrt(float(covariance[2, 2])) / 0.1,
         ]
@@ -241,7 +241,7 @@ class NavigationEncoder:
         turning = int(seen["manoeuvre"]) == PhysicalAction.J_TURN
         angle = int(seen["manoeuvre_angle"][0])
         street = heard.instruction.street if heard.instruction is not None else None
-        values = [1.0, distance / FAR]
+        values = [1.0, distance / DISTANCE_UNIT]
         for way in ways:
             if way is None:
                 values += (0.0, 0.0, 0.0)
@@ -255,7 +255,7 @@ class NavigationEncoder:
         if colour is None:
             return [0.0] * (1 + len(_COLOURS))
         left = self._town.lanes[lane].length - station
-        return [left / FAR, *_one_hot(_COLOURS.index(colour), len(_COLOURS))]
+        return [left / DISTANCE_UNIT, *_one_hot(_COLOURS.index(colour), len(_COLOURS))]
 
     def _goal(self, seen: ObservationMapping, heard: HeardInstruction, lane: int, station: float) -> list[float]:
         if heard.goal is None:
@@ -268,11 +268,11 @@ class NavigationEncoder:
         ahead = heard.goal[1] - station if lane == heard.goal[0] else math.inf
         return [
             1.0,
-            (dx * cosine + dy * sine) / ACROSS,
-            (dy * cosine - dx * sine) / ACROSS,
-            min(left / ACROSS, 1.0),
-            min(ahead / FAR, 1.0),
-            min(ahead / CLOSE, 1.0),
+            (dx * cosine + dy * sine) / TOWN_UNIT,
+            (dy * cosine - dx * sine) / TOWN_UNIT,
+            min(left / TOWN_UNIT, 1.0),
+            min(ahead / DISTANCE_UNIT, 1.0),
+            min(ahead / CLOSE_UNIT, 1.0),
         ]
 
     def _detours(
@@ -295,10 +295,10 @@ class NavigationEncoder:
 
 
 def _added_cost(cost: float, than: float) -> float:
-    """Returns by how much a cost exceeds another, of `DETOUR`, from -1 to 1; 1 for an infinite cost."""
+    """Returns by how much a cost exceeds another, of `DETOUR_UNIT`, from -1 to 1; 1 for an infinite cost."""
     if not math.isfinite(cost):
         return 1.0
-    return max(min((cost - than) / DETOUR, 1.0), -1.0) if math.isfinite(than) else -1.0
+    return max(min((cost - than) / DETOUR_UNIT, 1.0), -1.0) if math.isfinite(than) else -1.0
 
 
 def _instruction(heard: HeardInstruction, time: float) -> list[float]:
@@ -313,9 +313,9 @@ def _instruction(heard: HeardInstruction, time: float) -> list[float]:
         *_one_hot(-1 if given.action is None else given.action.value, len(ActionValue)),
         *_one_hot(-1 if given.sector is None else given.sector, len(SECTORS)),
         *_one_hot(-1 if given.landmark is None else given.landmark.value, len(LandmarkName)),
-        left / FAR,
-        left / CLOSE,
-        (time - given.time) / RECENT,
+        left / DISTANCE_UNIT,
+        left / CLOSE_UNIT,
+        (time - given.time) / AGE_UNIT,
     ]
 
 

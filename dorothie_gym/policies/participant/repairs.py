@@ -6,10 +6,10 @@ import numpy as np
 
 from dorothie_gym.dialogue import ParsedText, speech_seconds
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, Slot, SlotValue
+from dorothie_gym.policies.observation_parser import HeardUtterance
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.speech import Remark, remark
-from dorothie_gym.policies.utterance_input import HeardUtterance
 
 _WORTH_REPEATING = frozenset({DialogueMove.EXPLAIN, DialogueMove.QUERY_YN, DialogueMove.CHECK, DialogueMove.QUERY_W})
 """Moves that the participant asks to have repeated."""

@@ -20,7 +20,7 @@ from dorothie_gym.ontology import (
     Slot,
     SlotValue,
 )
-from dorothie_gym.policies.observation_parser import SeenSubgoal
+from dorothie_gym.policies.observation_parser import SeenSubgoal, heard_utterance
 from dorothie_gym.policies.participant.arriving import about_to_arrive, creep_instruction
 from dorothie_gym.policies.participant.goals import announcement, describe, reason_topic, route_length, switch_target
 from dorothie_gym.policies.participant.guidance import next_step, note_step
@@ -30,7 +30,6 @@ from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.route_progress import first_new_street
 from dorothie_gym.policies.speech import LONGEST_BREATH, Remark, remark
-from dorothie_gym.policies.utterance_input import heard_utterance
 
 _FREE = frozenset({ActionValue.LIGHT_CHANGE, ActionValue.SPEED_CHANGE, ActionValue.START})
 """Actions that are left to the car."""

@@ -13,12 +13,11 @@ from typing import TypeAlias
 
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import DialogueAct, Role
-from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
+from dorothie_gym.policies.observation_parser import HeardUtterance, SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
 from dorothie_gym.policies.policy import DecisionClock
 from dorothie_gym.policies.route_progress import RouteState
 from dorothie_gym.policies.speech import Remark, SpeechState
-from dorothie_gym.policies.utterance_input import HeardUtterance
 
 StepKey: TypeAlias = tuple[str, int, int]
 """Identity of a guidance step: "turn", "lane", "round" or "on", and the lanes concerned."""

@@ -11,7 +11,7 @@ from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.ontology import AGENT_ROLES, ActionValue, DialogueAct, DialogueMove, Role
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.navigation import NavigationAction, NavigationPolicy, layout
-from dorothie_gym.policies.navigation.action_mask import EstimatedActionMask
+from dorothie_gym.policies.navigation.actions import EstimatedActionMask
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits
 from dorothie_gym.policies.navigation.observation_vector import NavigationEncoder
 from dorothie_gym.policies.observation_parser import read_landmarks

@@ -1,18 +1,23 @@
-"""Check that a policy keeps the contract of `dorothie_gym.Policy`."""
+"""Checks that a policy, a recorded session or a town keeps its contract."""
 
 from __future__ import annotations
 
 import copy
+import tempfile
 from pathlib import Path
 from typing import Any, TypeVar
 
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.maps import Town
+from dorothie_gym.maps import Town, load_town
+from dorothie_gym.maps.lint import check_town as town_faults
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.policies import Policy, make_policy
+from dorothie_gym.recording import Session, first_difference
+from dorothie_gym.rollout import resimulate
 from dorothie_gym.spaces import ActionDict
-from dorothie_gym.testing.comparison import first_unequal
+from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.testing.playing import first_unequal, play_scripted
 
 State = TypeVar("State")
 
@@ -105,3 +110,74 @@ class _Run:
         outside += [name for name in action if name not in space.spaces]
         assert not outside, f"decision {k}: the action's {outside[0]} is not in the action space of {policy.role}"
         return dict(action), after
+
+
+# --- recorded sessions ------------------------------------------------------------------------------------------------
+
+
+def check_session(
+    session: Session | Path | str,
+    *,
+    town: Town | str | Path | None = None,
+    storyboard: StoryboardTemplate | None = None,
+    replay: bool = True,
+) -> None:
+    """Checks a recorded session.
+
+    `Session.check` must find no fault; saving and loading must keep the content (`Session.digest`); playing it again
+    from its seed and actions must give the same frames and events to the bit.
+
+    Args:
+        session: a session, or its folder.
+        town: the town that it was played in, where that is not shipped with the package.
+        storyboard: its storyboard's template, where that is not shipped.
+        replay: whether to play it again; sessions whose actions were not recorded cannot be.
+
+    Raises:
+        AssertionError: the session is not sound; the message names the first fault, field or frame.
+        SessionError: the session cannot be read or replayed.
+    """
+    if not isinstance(session, Session):
+        session = Session.load(session)
+    faults = session.check()
+    assert not faults, f"{session.name}: {len(faults)} faults, the first: {faults[0]}"
+    with tempfile.TemporaryDirectory(prefix="dorothie_gym-") as folder:
+        saved = Session.load(session.save(Path(folder) / session.name))
+    assert saved.digest == session.digest, f"{session.name}: saving and loading changed its content"
+    if replay:
+        place = town if isinstance(town, Town) else load_town(session.header.town if town is None else town)
+        difference = first_difference(session, resimulate(session, place, storyboard=storyboard))
+        assert difference is None, f"{session.name}: replay differs at {difference}"
+
+
+# --- towns ------------------------------------------------------------------------------------------------------------
+
+
+def check_town(town: str | Path | Town, *, sessions: int = 3, decisions: int = 40, seed: int = 0) -> None:
+    """Checks that a town has no fault that a driver would meet, and that sessions can be played in it.
+
+    Args:
+        town: name, file (YAML or OpenDRIVE) or `Town`.
+        sessions: scenarios drawn and played with the scripted policies.
+        decisions: decisions played in each session.
+        seed: of the first session.
+
+    Raises:
+        AssertionError: the linter found faults (ten are listed), or the lane graph does not match the lanes.
+        TownError: the file cannot be read.
+        StoryboardError: no storyboard fits, for example for want of sites.
+    """
+    if not isinstance(town, Town):
+        town = load_town(town)
+    faults = town_faults(town)
+    listed = "\n".join(
+        f"  {fault.kind} at ({fault.position[0]:.1f}, {fault.position[1]:.1f}): {fault.message}"
+        for fault in faults[:10]
+    )
+    assert not faults, f"{town.name}: {len(faults)} faults\n{listed}"
+    graph = town.to_graph()
+    assert len(graph.features) == len(town.lanes), f"{town.name}: the lane graph must have a node for each lane"
+    env = DuoWizardEnv(town, config=EnvConfig())
+    for k in range(sessions):
+        played = list(play_scripted(env, seed=seed + k, decisions=decisions))
+        assert len(played) > 1, f"{town.name}, seed {seed + k}: the session ended at its first decision"
