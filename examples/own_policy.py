@@ -1,8 +1,10 @@
 """Defines a Co-Wizard policy of our own and compares it with two policies of the package in closed loop.
 
 A policy is stateless: `initial_state(seed, town)` and `step(observation, state) -> (action, state)`. The example policy
-delegates everything to the scripted Co-Wizard but never changes the cruise speed. Sessions are recorded and measured
-with the metrics of `docs/closed-loop.md`. Three policies with two sessions each take about 20 seconds.
+delegates everything to the scripted Co-Wizard but never changes the cruise speed, and leaves out physical actions that
+the car would refuse; for this it reads the action mask, which its observation contains because of `reads_mask`.
+Sessions are recorded and measured with the metrics of `docs/closed-loop.md`. Three policies with two sessions each take
+about 20 seconds.
 
     python examples/own_policy.py --sessions 2 --town brookside
 """
@@ -23,7 +25,9 @@ from dorothie_gym.spaces import SpaceLimits
 
 
 class SteadySpeed(Policy[Any]):
-    """Scripted Co-Wizard that keeps its cruise speed."""
+    """Scripted Co-Wizard that keeps its cruise speed and commands nothing that the car would refuse."""
+
+    reads_mask = True
 
     def __init__(self, limits: SpaceLimits | None = None) -> None:
         super().__init__(Role.CO_WIZARD, limits)
@@ -34,9 +38,10 @@ class SteadySpeed(Policy[Any]):
         return self._scripted.initial_state(seed, town)
 
     def step(self, observation: Mapping[str, Any], state: Any) -> tuple[dict[str, Any], Any]:
-        """Returns the scripted action without changes of speed."""
+        """Returns the scripted action without changes of speed and without infeasible physical actions."""
         action, state = self._scripted.step(observation, state)
-        if action["physical"] == PhysicalAction.SPEED_CHANGE:
+        physical = action["physical"]
+        if physical == PhysicalAction.SPEED_CHANGE or not observation["action_mask"]["physical"][physical]:
             action["physical"] = 0
         return action, state
 

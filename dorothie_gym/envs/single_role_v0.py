@@ -17,8 +17,8 @@ from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.envs.session_view import RENDER_MODES, SessionView
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.policies import Policy, make_policy
-from dorothie_gym.policies.policy import policy_seed
+from dorothie_gym.policies import make_policy
+from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.spaces import ActionDict, Observation, action_space, noop, observation_space
 from dorothie_gym.tasks import StoryboardTemplate
 
@@ -73,7 +73,7 @@ class SingleRole(gym.Env[Observation, ActionDict]):
         town: str | Path | Town = "brookside",
         storyboard: str | Path | StoryboardTemplate | None = None,
         config: EnvConfig | None = None,
-        partners: Mapping[str, str | Policy[Any]] | None = None,
+        partners: Mapping[str, str | AnyPolicy] | None = None,
         render_mode: str | None = None,
         max_cycles: int | None = None,
     ) -> None:
@@ -123,10 +123,9 @@ class SingleRole(gym.Env[Observation, ActionDict]):
         """
         if not self._states or self.engine.over:
             raise ResetNeeded("no session is being played: call reset() first")
-        observations = self.engine.observations.of(self._observing)
-        actions: dict[str, Mapping[str, Any]] = {self.role: action}
+        inputs, actions = policy_inputs(self.engine, self.partners), {str(self.role): action}
         for role, policy in self.partners.items():
-            actions[role], self._states[role] = policy.step(observations.get(role, {}), self._states[role])
+            actions[role], self._states[role] = policy.step(inputs[role], self._states[role])
         outcome = self.engine.step(actions)
         terms = outcome.reward_terms[self.role]
         info = self.engine.info(self.role, terms)
@@ -149,12 +148,12 @@ class SingleRole(gym.Env[Observation, ActionDict]):
         """Closes the window, if there is one."""
         self._view.close()
 
-    def _cast(self, wanted: Mapping[str, str | Policy[Any]]) -> dict[Role, Policy[Any]]:
+    def _cast(self, wanted: Mapping[str, str | AnyPolicy]) -> dict[Role, AnyPolicy]:
         others = [role for role in AGENT_ROLES if role is not self.role]
         for name in wanted:
             if name not in others:
                 raise ValueError(f"partners has {str(name)!r}; the others are {' and '.join(others)}")
-        cast: dict[Role, Policy[Any]] = {}
+        cast: dict[Role, AnyPolicy] = {}
         for role in others:
             policy = wanted.get(role, "scripted")
             cast[role] = make_policy(policy, role, self.engine.limits) if isinstance(policy, str) else policy

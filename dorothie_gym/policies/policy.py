@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final, Generic, TypeAlias, TypeVar
+from typing import Any, ClassVar, Final, Generic, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -26,11 +27,14 @@ class Policy(ABC, Generic[State]):
 
     Attributes:
         observes: whether `step` reads the observation; a policy that does not is given an empty one.
+        reads_mask: whether `step` reads the action mask of the engine. The observation then has the further field
+            `action_mask`, with the content of `info["action_mask"]`.
         role: role that the policy acts for.
         limits: sizes of the role's spaces.
     """
 
     observes: ClassVar[bool] = True
+    reads_mask: ClassVar[bool] = False
 
     def __init__(self, role: Role, limits: SpaceLimits | None = None) -> None:
         """Prepares a policy for `role`; the sizes of the spaces default to those of `SpaceLimits`."""
@@ -51,7 +55,7 @@ class Policy(ABC, Generic[State]):
         """Chooses an action.
 
         Args:
-            observation: observation of the role, see `observation_space`.
+            observation: observation of the role, see `observation_space`; with `action_mask` if `reads_mask` is set.
             state: state that `initial_state` or the previous step returned; it is not changed.
 
         Returns:
@@ -85,3 +89,41 @@ def policy_seed(seed: int, role: Role) -> int:
     """Returns the seed of a role's policy in the session of a seed: 32 bits, different for each role."""
     branch = np.random.SeedSequence([seed, _SEED_BRANCH, AGENT_ROLES.index(role)])
     return int(branch.generate_state(1)[0])
+
+
+# --- inputs of the policies of a session ------------------------------------------------------------------------------
+
+
+class RoleObservations(Protocol):
+    """Observations of the roles at one decision."""
+
+    def of(self, roles: Sequence[Role]) -> Mapping[str, ObservationMapping]:
+        """Returns the observations of some roles by agent."""
+
+
+class ObservedSession(Protocol):
+    """Session whose roles observe and are given action masks, such as a `SessionEngine`."""
+
+    @property
+    def observations(self) -> RoleObservations:
+        """Observations at the present decision."""
+
+    def mask(self, role: Role) -> Mapping[str, object]:
+        """Returns the mask of a role's action space at the present decision."""
+
+
+def policy_inputs(session: ObservedSession, policies: Mapping[Role, AnyPolicy]) -> dict[Role, ObservationMapping]:
+    """Returns the inputs of policies at the present decision: the observation of each role, and its mask if it is read.
+
+    Observations and masks that no policy reads are not computed.
+
+    Args:
+        session: session in progress.
+        policies: policies by role.
+    """
+    seen = session.observations.of([role for role, policy in policies.items() if policy.observes])
+    inputs: dict[Role, ObservationMapping] = {}
+    for role, policy in policies.items():
+        observation = seen.get(role, {})
+        inputs[role] = {**observation, "action_mask": session.mask(role)} if policy.reads_mask else observation
+    return inputs

@@ -12,7 +12,7 @@ from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.engine.session_log import SessionSummary
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy
-from dorothie_gym.policies.policy import policy_seed
+from dorothie_gym.policies.policy import policy_inputs, policy_seed
 from dorothie_gym.recording import SessionWriter
 
 
@@ -62,17 +62,15 @@ def play_session(
     engine = host.engine
     host.reset(seed=seed)
     states = {role: policies[role].initial_state(policy_seed(seed, role), engine.town) for role in AGENT_ROLES}
-    observing = [role for role in AGENT_ROLES if policies[role].observes]
     with ExitStack() as stack:
         writer = None if folder is None else stack.enter_context(SessionWriter(folder, engine.session_header()))
         recorder = None if writer is None else SessionRecorder(engine, writer)
         if on_step is not None:
             on_step(engine)
         while not engine.over:
-            observations = engine.observations.of(observing)
-            actions = {}
+            inputs, actions = policy_inputs(engine, policies), {}
             for role in AGENT_ROLES:
-                actions[str(role)], states[role] = policies[role].step(observations.get(role, {}), states[role])
+                actions[str(role)], states[role] = policies[role].step(inputs[role], states[role])
             host.step(actions)
             if recorder is not None:
                 recorder.record(actions)

@@ -5,17 +5,18 @@ from __future__ import annotations
 import copy
 import tempfile
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps.lint import check_town as town_faults
-from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
+from dorothie_gym.policies.policy import AnyPolicy, policy_inputs
 from dorothie_gym.recording import Session, first_difference
 from dorothie_gym.rollout import resimulate
-from dorothie_gym.spaces import ActionDict
+from dorothie_gym.spaces import ActionDict, ObservationMapping
 from dorothie_gym.tasks import StoryboardTemplate
 from dorothie_gym.testing.playing import first_unequal, play_scripted
 
@@ -23,7 +24,7 @@ State = TypeVar("State")
 
 
 def check_policy(
-    policy: Policy[Any],
+    policy: AnyPolicy,
     *,
     town: str | Path | Town = "brookside",
     seed: int = 0,
@@ -33,9 +34,9 @@ def check_policy(
     """Checks that a policy is stateless, deterministic and acts within its action space.
 
     The policy plays its role against the scripted policies of the others. At each decision its action must lie in the
-    role's action space and be decodable; `step` must change neither the observation nor the state that it is given, and
-    must return the same action when it is called again with them. The same session played again, interleaved with a
-    second one by the same policy object, must give the same actions.
+    role's action space and be decodable; `step` must change neither the observation (with the action mask, if the
+    policy reads it) nor the state that it is given, and must return the same action when it is called again with them.
+    The same session played again, interleaved with a second one by the same policy object, must give the same actions.
 
     Args:
         policy: of any role.
@@ -68,12 +69,12 @@ def check_policy(
 class _Run:
     """A session in which the policy plays its role and scripts play the others."""
 
-    def __init__(self, policy: Policy[Any], env: DuoWizardEnv, seed: int, *, strict: bool = False) -> None:
+    def __init__(self, policy: AnyPolicy, env: DuoWizardEnv, seed: int, *, strict: bool = False) -> None:
         self._env, self._strict, self._role = env, strict, policy.role
         self._policies = {role: make_policy("scripted", role, env.limits) for role in AGENT_ROLES}
         self._policies[policy.role] = policy
-        self._observations, _ = env.reset(seed=seed)
-        self._states: dict[Any, Any] = {
+        env.reset(seed=seed)
+        self._states: dict[Role, object] = {
             role: played.initial_state(seed, env.town) for role, played in self._policies.items()
         }
 
@@ -83,21 +84,21 @@ class _Run:
         for _ in range(decisions):
             if not self._env.agents:
                 break
-            actions = {}
+            inputs, actions = policy_inputs(self._env.engine, self._policies), {}
             for role, policy in self._policies.items():
-                observation, state = self._observations[str(role)], self._states[role]
+                observation, state = inputs[role], self._states[role]
                 if role is self._role and self._strict:
                     action, self._states[role] = self._checked(policy, observation, state, len(actions_of_policy))
                 else:
                     action, self._states[role] = policy.step(observation, state)
                 actions[str(role)] = action
             actions_of_policy.append(actions[str(self._role)])
-            self._observations, *_ = self._env.step(actions)
+            self._env.step(actions)
         return actions_of_policy
 
     def _checked(
-        self, policy: Policy[State], observation: dict[str, Any], state: State, k: int
-    ) -> tuple[dict[str, Any], State]:
+        self, policy: Policy[State], observation: ObservationMapping, state: State, k: int
+    ) -> tuple[ActionDict, State]:
         before = copy.deepcopy(observation)
         action, after = policy.step(observation, state)
         field = first_unequal(before, observation)

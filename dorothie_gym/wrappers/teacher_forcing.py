@@ -17,7 +17,7 @@ from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
-from dorothie_gym.policies.policy import AnyPolicy, policy_seed
+from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.recording import Event, Point, SceneTable, Session, Surroundings, Task, task_points, trajectory_of
 from dorothie_gym.recording.surroundings import Rows, light_rows, weather_rows
 from dorothie_gym.spaces import SpaceLimits, StepInfo
@@ -102,7 +102,7 @@ class TeacherForcing(PointEnv):
 
     def _play(self, seed: int, options: Mapping[str, object]) -> Iterator[Point]:
         """Plays a session and yields each point at its time."""
-        observations, _ = self.duo.reset(seed=seed, options=dict(options))
+        self.duo.reset(seed=seed, options=dict(options))
         session_seed = self.duo.scenario.seed
         states = {
             role: policy.initial_state(policy_seed(session_seed, role), self.duo.town)
@@ -117,10 +117,10 @@ class TeacherForcing(PointEnv):
                     yield point
             if not self.duo.agents:
                 return
-            actions = {}
+            inputs, actions = policy_inputs(self.duo.engine, self.policies), {}
             for role, policy in self.policies.items():
-                actions[str(role)], states[role] = policy.step(observations[str(role)], states[role])
-            observations, *_ = self.duo.step(actions)
+                actions[str(role)], states[role] = policy.step(inputs[role], states[role])
+            self.duo.step(actions)
 
     def _now(self) -> tuple[Session, Town | None]:
         return self._record.session(), self.duo.town

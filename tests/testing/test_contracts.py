@@ -7,13 +7,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.maps import Town, load_town
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
+from dorothie_gym.policies.policy import policy_inputs
 from dorothie_gym.recording import Session
 from dorothie_gym.rollout import play_session
 from dorothie_gym.sim.config import WorldConfig
@@ -37,6 +39,41 @@ QUIET = EnvConfig(world=WorldConfig(vehicles=2, pedestrians=1))
 )
 def test_shipped_policies_keep_the_contract(name: str, role: Role) -> None:
     check_policy(make_policy(name, role), decisions=25, config=QUIET)
+
+
+class Obedient(Policy[None]):
+    """Takes the first physical action that the mask allows, and notes the masks."""
+
+    reads_mask = True
+
+    def __init__(self) -> None:
+        super().__init__(Role.CO_WIZARD)
+        self.masks: list[Mapping[str, Any]] = []
+
+    def initial_state(self, seed: int, town: Town) -> None:
+        return None
+
+    def step(self, observation: Mapping[str, Any], state: None) -> tuple[ActionDict, None]:
+        self.masks.append(observation["action_mask"])
+        allowed = np.flatnonzero(observation["action_mask"]["physical"])
+        return {**noop(Role.CO_WIZARD, self.limits), "physical": int(allowed[-1])}, None
+
+
+def test_policy_that_reads_the_mask_keeps_the_contract() -> None:
+    check_policy(Obedient(), decisions=10, config=QUIET)
+
+
+def test_policy_gets_the_mask_of_its_role_only_if_it_reads_it() -> None:
+    env = DuoWizardEnv("brookside", config=QUIET, max_cycles=3)
+    policies = {role: make_policy("scripted", role, env.limits) for role in AGENT_ROLES}
+    _, infos = env.reset(seed=4)
+    inputs = policy_inputs(env.engine, {**policies, Role.CO_WIZARD: Obedient()})
+    assert first_unequal(inputs[Role.CO_WIZARD]["action_mask"], infos["co_wizard"]["action_mask"]) is None
+    assert "action_mask" not in inputs[Role.PARTICIPANT]
+    obedient = Obedient()
+    play_session(env, {**policies, Role.CO_WIZARD: obedient}, seed=4)
+    assert len(obedient.masks) == 3
+    assert first_unequal(obedient.masks[0], infos["co_wizard"]["action_mask"]) is None
 
 
 class Forgetful(Policy[int]):

@@ -36,7 +36,7 @@ class LearnedPolicyState:
 class LearnedPolicy(Policy[LearnedPolicyState]):
     """Plays a role with a trained network, whose input is computed as in training.
 
-    Policies do not receive `info["action_mask"]`: the mask contains what the role itself can infer. The
+    The policy does not read the engine's mask: its own mask contains what the role can infer from its observation. The
     few actions that the environment refuses nevertheless have no effect.
     """
 
