@@ -1,16 +1,20 @@
-"""Speech of an agent: remarks queued and said, and the time when it may speak."""
+"""Speech of a scripted agent: remarks queued and said, the time when it may speak, and the base of its state."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
+from typing import Generic, Self, TypeVar
 
 import numpy as np
 
 from dorothie_gym.dialogue import SpeakerStyle, Wording, WordingContext, speech_seconds, word_acts
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, SlotValue
+from dorothie_gym.policies.policy import DecisionClock
 from dorothie_gym.spaces import Speech
 
 PAUSE = 0.8
@@ -199,3 +203,46 @@ def _alive(queue: tuple[Remark, ...], now: float) -> tuple[Remark, ...]:
         if not dropped:
             kept.append(item)
     return tuple(kept)
+
+
+# --- state of a speaking agent ----------------------------------------------------------------------------------------
+
+StyleT = TypeVar("StyleT")
+ConfigT = TypeVar("ConfigT")
+
+
+@dataclass(kw_only=True)
+class SpeakingState(Generic[StyleT, ConfigT]):
+    """State that the scripted participant and Co-Wizard have in common; a step works on a shallow copy.
+
+    Attributes:
+        seed: seed of all random draws.
+        town: the map.
+        style: traits drawn for the session.
+        config: tunable numbers.
+        speech: remarks queued and said.
+        count: number of decisions taken.
+        clock: time between decisions.
+    """
+
+    seed: int
+    town: Town
+    style: StyleT
+    config: ConfigT
+    speech: SpeechState
+    count: int = 0
+    clock: DecisionClock = field(default_factory=DecisionClock)
+
+    def next_decision(self) -> tuple[Self, np.random.Generator]:
+        """Returns a copy of the state that counts another decision, and the random generator of that decision."""
+        updated = copy(self)
+        updated.count += 1
+        return updated, np.random.default_rng((updated.seed, updated.count))
+
+    def say(self, *remarks: Remark) -> None:
+        """Queues remarks at the end."""
+        self.speech = self.speech.plan(*remarks)
+
+    def say_first(self, *remarks: Remark) -> None:
+        """Queues remarks in front."""
+        self.speech = self.speech.plan_first(*remarks)

@@ -6,9 +6,10 @@ from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import ActionValue, DialogueMove, Role
 from dorothie_gym.policies import ScriptedCoWizard, ScriptedParticipant
 from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, plan_remark
-from dorothie_gym.policies.co_wizard.config import CoWizardStyle
+from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Intentions
 from dorothie_gym.policies.policy import policy_seed
+from dorothie_gym.policies.speech import SpeechState
 
 
 def state_of(**style: float) -> CoWizardState:
@@ -16,7 +17,12 @@ def state_of(**style: float) -> CoWizardState:
     env = DuoWizardEnv(town="brookside")
     env.reset(seed=0)
     return CoWizardState(
-        seed=0, town=env.town, style=CoWizardStyle(**traits), intentions=Intentions(speed=40, usual=40)
+        seed=0,
+        town=env.town,
+        style=CoWizardStyle(**traits),
+        config=CoWizardConfig(),
+        speech=SpeechState(role=Role.CO_WIZARD),
+        intentions=Intentions(speed=40, usual=40),
     )
 
 

@@ -168,7 +168,7 @@ def _ask_goal(state: CoWizardState, view: CoWizardView, rng: np.random.Generator
         return
     if view.time - dialogue.idle_since < (config.next_delay if intentions.halted else config.start_delay):
         return
-    silent = view.time - max(dialogue.asked_at, dialogue.speech.last_end)
+    silent = view.time - max(dialogue.asked_at, state.speech.last_end)
     unanswered = silent < config.goal_interval and dialogue.asked_at > dialogue.heard_at
     if unanswered or not (intentions.halted or view.standing):
         return

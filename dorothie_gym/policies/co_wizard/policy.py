@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -16,7 +15,7 @@ from dorothie_gym.policies.co_wizard.driving import creep, drive, end_red_light_
 from dorothie_gym.policies.co_wizard.goals import note_plan, search_on
 from dorothie_gym.policies.co_wizard.initiative import announce_action, scene_of, take_initiative
 from dorothie_gym.policies.co_wizard.obstacles import watch_road
-from dorothie_gym.policies.co_wizard.state import CoWizardState, DialogueState, Intentions
+from dorothie_gym.policies.co_wizard.state import CoWizardState, Intentions
 from dorothie_gym.policies.co_wizard.understanding_update import listen
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import Policy
@@ -57,7 +56,7 @@ class ScriptedCoWizard(Policy[CoWizardState]):
             town=town,
             style=style,
             config=self._config,
-            dialogue=DialogueState(speech=speech),
+            speech=speech,
             intentions=Intentions(speed=style.pace, usual=style.pace),
         )
 
@@ -85,9 +84,7 @@ def attend(observation: ObservationMapping, state: CoWizardState) -> PendingDeci
         observation: observation of the Co-Wizard.
         state: state of the previous decision; it is not changed.
     """
-    updated = copy(state)
-    updated.count += 1
-    rng = np.random.default_rng((updated.seed, updated.count))
+    updated, rng = state.next_decision()
     view = CoWizardView.read(observation, updated.town)
     updated.clock = updated.clock.ticked(view.time)
     _update_route(updated, view)

@@ -8,25 +8,20 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from dorothie_gym.dialogue import Direction
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import (
-    DialogueAct,
     GoalStatus,
     LandmarkName,
     MentalAction,
     ObjectClass,
-    Role,
     StreetName,
 )
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
-from dorothie_gym.policies.policy import DecisionClock
 from dorothie_gym.policies.route_progress import RouteState
-from dorothie_gym.policies.speech import Remark, SpeechState
+from dorothie_gym.policies.speech import SpeakingState
 from dorothie_gym.spaces import LanePosition, Mental
 
 
@@ -57,10 +52,9 @@ class Directive:
 
 @dataclass(frozen=True, kw_only=True)
 class DialogueState:
-    """Course of the dialogue: queued remarks, questions asked, and topics mentioned.
+    """Course of the dialogue: questions asked, and topics mentioned.
 
     Attributes:
-        speech: remarks queued and said.
         heard_at: time of the last utterance of the participant [s].
         asked_at: time of the last question of the Co-Wizard [s].
         asked_lane: lane before the junction that the last question about the way referred to, -1 for none.
@@ -77,7 +71,6 @@ class DialogueState:
         lost_mentioned: whether the present loss of localization has been mentioned.
     """
 
-    speech: SpeechState = field(default_factory=lambda: SpeechState(role=Role.CO_WIZARD))
     heard_at: float = -math.inf
     asked_at: float = -math.inf
     asked_lane: int = -1
@@ -93,13 +86,9 @@ class DialogueState:
     weather_mentioned: bool = False
     lost_mentioned: bool = False
 
-    def with_speech(self, speech: SpeechState) -> DialogueState:
-        """Replaces the queued and said remarks."""
-        return replace(self, speech=speech)
-
-    def after_hearing(self, now: float, acts: Sequence[DialogueAct]) -> DialogueState:
+    def after_hearing(self, now: float) -> DialogueState:
         """Records an utterance of the participant at `now` [s]."""
-        return replace(self, heard_at=now, idle_since=now, speech=self.speech.heard_other(now, acts))
+        return replace(self, heard_at=now, idle_since=now)
 
     def after_asking(self, now: float) -> DialogueState:
         """Records a question of the Co-Wizard at `now` [s]."""
@@ -444,16 +433,10 @@ class CommandState:
 
 
 @dataclass(kw_only=True)
-class CoWizardState:
+class CoWizardState(SpeakingState[CoWizardStyle, CoWizardConfig]):
     """State of the scripted Co-Wizard; a step works on a shallow copy.
 
     Attributes:
-        seed: seed of all random draws.
-        town: the map.
-        style: traits drawn for the session.
-        config: tunable numbers.
-        count: number of decisions taken.
-        clock: time between decisions.
         dialogue: course of the dialogue.
         beliefs: beliefs about destinations.
         route: route to the goal.
@@ -461,34 +444,11 @@ class CoWizardState:
         commands: commands given to the car.
     """
 
-    seed: int
-    town: Town
-    style: CoWizardStyle
-    config: CoWizardConfig = field(default_factory=CoWizardConfig)
-    count: int = 0
-    clock: DecisionClock = field(default_factory=DecisionClock)
     dialogue: DialogueState = field(default_factory=DialogueState)
     beliefs: BeliefState = field(default_factory=BeliefState)
     route: RouteState = field(default_factory=RouteState)
     intentions: Intentions
     commands: CommandState = field(default_factory=CommandState)
-
-    @property
-    def speech(self) -> SpeechState:
-        """Remarks queued and said."""
-        return self.dialogue.speech
-
-    @speech.setter
-    def speech(self, speech: SpeechState) -> None:
-        self.dialogue = self.dialogue.with_speech(speech)
-
-    def say(self, *remarks: Remark) -> None:
-        """Queues remarks at the end."""
-        self.speech = self.speech.plan(*remarks)
-
-    def say_first(self, *remarks: Remark) -> None:
-        """Queues remarks in front."""
-        self.speech = self.speech.plan_first(*remarks)
 
     def leave_goal(self) -> None:
         """Removes the goal, its route and all that was intended for it."""

@@ -67,7 +67,8 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     heard = heard_utterance(view.raw, Role.PARTICIPANT, last.act.move if last is not None else None)
     if heard is None:
         return
-    state.dialogue = state.dialogue.after_hearing(view.time, heard.acts)
+    state.dialogue = state.dialogue.after_hearing(view.time)
+    state.speech = state.speech.heard_other(view.time, heard.acts)
     before = state.speech.queue
     if _mishears(state, heard, rng):
         state.say_first(remark(DialogueMove.CONFUSE))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -56,14 +55,18 @@ class ScriptedParticipant(Policy[ParticipantState]):
         style = ParticipantStyle.draw(rng) if self._style is None else self._style
         chat_at = float(rng.uniform(25.0, style.chat + 25.0))
         speech = SpeechState(role=Role.PARTICIPANT, style=draw_style(Role.PARTICIPANT, rng))
-        conversation = ConversationState(speech=speech, chat_at=chat_at)
-        return ParticipantState(seed=seed, town=town, style=style, config=self._config, conversation=conversation)
+        return ParticipantState(
+            seed=seed,
+            town=town,
+            style=style,
+            config=self._config,
+            speech=speech,
+            conversation=ConversationState(chat_at=chat_at),
+        )
 
     def step(self, observation: ObservationMapping, state: ParticipantState) -> tuple[ActionDict, ParticipantState]:
         """Processes utterances, observes the car, and chooses a remark or silence."""
-        updated = copy(state)
-        updated.count += 1
-        rng = np.random.default_rng((updated.seed, updated.count))
+        updated, rng = state.next_decision()
         view = ParticipantView.read(observation, updated.town)
         updated.clock = updated.clock.ticked(view.time)
         if view.turning and updated.motion.standstill(view.time) > TURN_TIME:

@@ -50,7 +50,8 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
     heard = heard_utterance(view.raw, Role.CO_WIZARD)
     if heard is None:
         return
-    state.conversation = state.conversation.after_hearing(view.time, heard.acts)
+    state.conversation = state.conversation.after_hearing(view.time)
+    state.speech = state.speech.heard_other(view.time, heard.acts)
     if heard.acts and has_missed(state, view, heard, rng):
         return
     puzzled_by = state.conversation.puzzled_by

@@ -7,17 +7,13 @@ works on a shallow copy of `ParticipantState` and replaces whole groups in it; t
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import DialogueAct, Role
 from dorothie_gym.policies.observation_parser import HeardUtterance, SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
-from dorothie_gym.policies.policy import DecisionClock
 from dorothie_gym.policies.route_progress import RouteState
-from dorothie_gym.policies.speech import Remark, SpeechState
+from dorothie_gym.policies.speech import Remark, SpeakingState
 
 StepKey: TypeAlias = tuple[str, int, int]
 """Identity of a guidance step: "turn", "lane", "round" or "on", and the lanes concerned."""
@@ -28,7 +24,6 @@ class ConversationState:
     """Course of the conversation beside the guidance.
 
     Attributes:
-        speech: queued and spoken remarks.
         heard_at: time of the last utterance of the car [s].
         puzzled_by: utterance of the car that was not understood and has to be repeated.
         asked_at: time of the last question why the car stands [s].
@@ -40,7 +35,6 @@ class ConversationState:
         hurried: whether the car has been asked to go faster.
     """
 
-    speech: SpeechState = field(default_factory=lambda: SpeechState(role=Role.PARTICIPANT))
     heard_at: float = 0.0
     puzzled_by: HeardUtterance | None = None
     asked_at: float = -math.inf
@@ -51,13 +45,9 @@ class ConversationState:
     bad_weather_since: float = math.inf
     hurried: bool = False
 
-    def with_speech(self, speech: SpeechState) -> ConversationState:
-        """Replaces the queued and spoken remarks."""
-        return replace(self, speech=speech)
-
-    def after_hearing(self, now: float, acts: Sequence[DialogueAct]) -> ConversationState:
+    def after_hearing(self, now: float) -> ConversationState:
         """Records an utterance of the car at `now` [s]."""
-        return replace(self, heard_at=now, speech=self.speech.heard_other(now, acts))
+        return replace(self, heard_at=now)
 
     def with_puzzle(self, heard: HeardUtterance | None) -> ConversationState:
         """Sets the utterance that has to be repeated; None once it has been clarified."""
@@ -320,16 +310,10 @@ class MotionState:
 
 
 @dataclass(kw_only=True)
-class ParticipantState:
+class ParticipantState(SpeakingState[ParticipantStyle, ParticipantConfig]):
     """State of the scripted participant; a step works on a shallow copy.
 
     Attributes:
-        seed: seed of all random draws.
-        town: the map.
-        style: traits drawn for the session.
-        config: tunable numbers.
-        count: number of decisions taken.
-        clock: time between decisions.
         conversation: course of the conversation.
         task: subgoals and target.
         guidance: turn-by-turn guidance to the target.
@@ -337,34 +321,11 @@ class ParticipantState:
         motion: observed motion of the car.
     """
 
-    seed: int
-    town: Town
-    style: ParticipantStyle
-    config: ParticipantConfig = field(default_factory=ParticipantConfig)
-    count: int = 0
-    clock: DecisionClock = field(default_factory=DecisionClock)
     conversation: ConversationState = field(default_factory=ConversationState)
     task: TaskProgress = field(default_factory=TaskProgress)
     guidance: GuidanceState = field(default_factory=GuidanceState)
     route: RouteState = field(default_factory=RouteState)
     motion: MotionState = field(default_factory=MotionState)
-
-    @property
-    def speech(self) -> SpeechState:
-        """Remarks queued and spoken."""
-        return self.conversation.speech
-
-    @speech.setter
-    def speech(self, speech: SpeechState) -> None:
-        self.conversation = self.conversation.with_speech(speech)
-
-    def say(self, *remarks: Remark) -> None:
-        """Queues remarks at the end."""
-        self.speech = self.speech.plan(*remarks)
-
-    def say_first(self, *remarks: Remark) -> None:
-        """Queues remarks in front."""
-        self.speech = self.speech.plan_first(*remarks)
 
     def say_only(self, *remarks: Remark) -> None:
         """Replaces the queued remarks."""
