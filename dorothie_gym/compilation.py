@@ -1,8 +1,8 @@
 """Compilation of the world's inner loops with numba.
 
 With ``NUMBA_DISABLE_JIT=1`` all functions stay plain Python. Compiled ones keep IEEE arithmetic (no fastmath), and
-their machine code is cached on disk. Where numba finds no folder to cache in, they are compiled anew in every process,
-and one ``RuntimeWarning`` says how to avoid it.
+their machine code is cached on disk. Where numba finds no folder to cache in, every process compiles them again,
+and one ``RuntimeWarning`` explains how to avoid it.
 
 numba recompiles a function when its own file changes, not when a compiled function that it calls does: after an edit of
 one delete the ``*.nbi`` files beside its callers (an installation renews all files at once).
@@ -12,54 +12,56 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numba
 
-F = TypeVar("F", bound=Callable[..., Any])
+F = TypeVar("F", bound=Callable[..., object])
 
 WITHOUT_COUNTS: dict[str, bool] = {"_nrt": False}
-"""Numba's option that leaves out the counting of references."""
+"""numba's option that turns reference counting off."""
 
 _warned = False
 
 
 def allocating(function: F) -> F:
-    """Compile a function that may make arrays: numba counts references to all of them."""
+    """Compiles a function that may create arrays, with numba's reference counting."""
     return _compile(function)
 
 
 def compiled(function: F) -> F:
-    """Compile a function that makes no arrays, works on those that it is given, and counts no references.
+    """Compiles a function that creates no arrays, without reference counting.
 
-    numba counts a reference for every array that is taken from a tuple or handed to another function. Loops that hand
-    on tuples of thirty arrays spent seven eighths of their time with it. Counting keeps memory alive; here the caller's
-    arrays do so. A function that makes arrays is refused by numba with a `TypingError`.
+    numba counts a reference for every array that is taken from a tuple or passed to another function. Loops that pass
+    tuples of thirty arrays spent seven eighths of their time on it. Counting keeps memory alive; here the caller's
+    arrays do so. For a function that creates arrays numba raises a `TypingError`.
     """
     return _compile(function, **WITHOUT_COUNTS)
 
 
 def concurrent(function: F) -> F:
-    """As `compiled`, and other threads of Python go on meanwhile (the function holds no global interpreter lock)."""
+    """As `compiled`, without the global interpreter lock: other Python threads run meanwhile."""
     return _compile(function, **WITHOUT_COUNTS, nogil=True)
 
 
 def inlined(function: F) -> F:
-    """As `compiled`, and woven into its callers: for what is called for every vehicle in every substep.
+    """As `compiled`, and inlined into its callers: for functions that run for every vehicle in every substep.
 
-    A call hands on a tuple of thirty arrays as two hundred numbers, which takes longer than many a function.
+    A call passes a tuple of thirty arrays as two hundred numbers, which takes longer than many small functions.
     """
     return _compile(function, **WITHOUT_COUNTS, forceinline=True)
 
 
 def _compile(function: F, **options: bool) -> F:
     try:
-        return numba.njit(cache=True, fastmath=False, **options)(function)  # type: ignore[no-any-return]
+        cached: F = numba.njit(cache=True, fastmath=False, **options)(function)
+        return cached
     except RuntimeError as error:
         if "no locator available" not in str(error):
             raise
     _warn_once()
-    return numba.njit(cache=False, fastmath=False, **options)(function)  # type: ignore[no-any-return]
+    uncached: F = numba.njit(cache=False, fastmath=False, **options)(function)
+    return uncached
 
 
 def _warn_once() -> None:
@@ -68,7 +70,7 @@ def _warn_once() -> None:
         _warned = True
         warnings.warn(
             "numba can write its cache neither beside the installed package nor in the home folder: the world is "
-            "compiled anew in every process. Set NUMBA_CACHE_DIR to a writable folder.",
+            "compiled again in every process. Set NUMBA_CACHE_DIR to a writable folder.",
             RuntimeWarning,
             stacklevel=4,
         )

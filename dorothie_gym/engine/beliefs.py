@@ -15,7 +15,7 @@ from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import DialogueAct, DialogueMove, LandmarkName, MentalAction, Role, Slot, StreetName
 from dorothie_gym.sim.ego.ego_controller import GoalAhead
 from dorothie_gym.sim.sensing.localizer import Localizer
-from dorothie_gym.sim.sensing.seeing import RANGE_SCALE
+from dorothie_gym.sim.sensing.perception import RANGE_SCALE
 from dorothie_gym.spaces import Mental
 
 GATE = 13.82

@@ -13,7 +13,7 @@ from dorothie_gym.maps import Exit
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.ego.path import Path
 from dorothie_gym.sim.network.lane_lookup import wrap_radians
-from dorothie_gym.sim.sensing.seeing import see
+from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.world import SensorArrays, World
 from dorothie_gym.spaces import ExitColumn
 

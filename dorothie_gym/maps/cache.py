@@ -39,7 +39,7 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_lights import LightPhase, LightProgramme
 from dorothie_gym.user_cache import cache_folder
 
-FORMAT = 1
+ARCHIVE_FORMAT = 1
 """Version of the archive format; raise it when the same town would be written differently."""
 
 PARTS: dict[str, type] = {
@@ -73,7 +73,7 @@ def pack(town: Town, key: str) -> bytes:
         key: key of the archive, checked by `unpack`.
     """
     arrays: list[Array] = []
-    document: dict[str, object] = {"format": FORMAT, "key": key, "name": town.name}
+    document: dict[str, object] = {"format": ARCHIVE_FORMAT, "key": key, "name": town.name}
     for part, kind in PARTS.items():
         elements = getattr(town, part)
         document[part] = {
@@ -102,7 +102,7 @@ def unpack(data: bytes, key: str) -> Town:
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
             document = json.loads(archive["document"].tobytes())
             floats: Array = archive["floats"]
-        if (document["format"], document["key"]) != (FORMAT, key):
+        if (document["format"], document["key"]) != (ARCHIVE_FORMAT, key):
             raise TownArchiveError("it is of another format or another town")
         return _town(document, floats)
     except TownArchiveError:
@@ -229,7 +229,7 @@ def compiler_digest() -> str | None:
     It covers the sources of this package, `dorothie_gym.angles`, and the versions of numpy and scipy, which may round
     differently. None if the sources cannot be read.
     """
-    digest = hashlib.sha256(f"format {FORMAT}, numpy {np.__version__}".encode())
+    digest = hashlib.sha256(f"format {ARCHIVE_FORMAT}, numpy {np.__version__}".encode())
     digest.update(f"scipy {importlib.metadata.version('scipy')}".encode())
     sources = sorted(_sources(files("dorothie_gym.maps"), ""))
     if sources:

@@ -27,7 +27,7 @@ from dorothie_gym.maps.polyline import (
 )
 from dorothie_gym.maps.town import Town
 
-MAX_GAP = 13.0
+WIDEST_MEDIAN = 13.0
 """Largest distance between the centre lines [m]: across a median, but not across a park."""
 
 MAX_HEIGHT = 1.0
@@ -90,7 +90,7 @@ class OncomingLanes:
         lane = self._town.lanes[lane_id]
         if lane.in_junction or self._town.neighbour(lane_id, LinkType.LANE_CHANGE_LEFT) is not None:
             return np.empty(0, dtype=np.int64)
-        reach = math.hypot(MAX_GAP, MAX_OFFSET) + 2 * SAMPLING  # points are at most two samplings apart
+        reach = math.hypot(WIDEST_MEDIAN, MAX_OFFSET) + 2 * SAMPLING  # points are at most two samplings apart
         own = self._points[self._owners == lane_id]
         around = ((self._points >= own.min(axis=0) - reach) & (self._points <= own.max(axis=0) + reach)).all(axis=1)
         gaps = self._points[around][:, None] - own[None, :]
@@ -117,7 +117,7 @@ def _across(
         dx = value_at(points, offsets, other, X, there) - x
         dy = value_at(points, offsets, other, Y, there) - y
         across, along = dy * c - dx * n, dx * c + dy * n  # positive right
-        if not -MAX_GAP <= across < -MIN_GAP or abs(along) > MAX_OFFSET:
+        if not -WIDEST_MEDIAN <= across < -MIN_GAP or abs(along) > MAX_OFFSET:
             continue
         if abs(value_at(points, offsets, other, HEIGHT, there) - height) > MAX_HEIGHT:
             continue

@@ -25,6 +25,10 @@ NO_STREET = -1
 STRAIGHT_RATIO = 3.0
 """A segment this many times longer than its neighbour is a straight beside a curve."""
 
+LEVEL_HEIGHT = 2.5
+"""Difference of height from which on lanes and bodies are on different levels and do not meet [m]: a bridge leaves
+more."""
+
 
 class LinkType(enum.StrEnum):
     """Type of a link between two lanes: a turn, or a change to the parallel lane."""

@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from dorothie_gym.maps.model import Array, Lane, LaneLink, LinkType, SignalKind
+from dorothie_gym.maps.model import LEVEL_HEIGHT, Array, Lane, LaneLink, LinkType, SignalKind
 from dorothie_gym.maps.town import Town
 
 CIRCLE_OFFSET = 1.7
@@ -27,9 +27,6 @@ TURNING_CLEARANCE = 3.9
 
 TURN = np.radians(20.0)
 """Smallest change of direction of a turn [rad]."""
-
-HEIGHT = 2.5
-"""Largest difference of height of conflicting connectors [m]."""
 
 FACING = np.radians(45.0)
 """Largest deviation from opposite directions of lanes that face each other [rad]."""
@@ -161,7 +158,7 @@ def _meetings(lanes: Sequence[Lane]) -> Iterator[tuple[int, int, bool]]:
         gaps = _gaps(circles[first[k + 1] :], swept[k])
         nearest = np.minimum.reduceat(gaps, first[rest] - first[k + 1])
         clearance = np.where(turning[rest] | turning[k], TURNING_CLEARANCE, CLEARANCE)
-        meets = (nearest < clearance) & (np.abs(heights[rest] - heights[k]) <= HEIGHT)
+        meets = (nearest < clearance) & (np.abs(heights[rest] - heights[k]) <= LEVEL_HEIGHT)
         for other in np.flatnonzero(meets) + k + 1:
             yield lanes[k].id, lanes[int(other)].id, bool(nearest[other - k - 1] < CLEARANCE)
 

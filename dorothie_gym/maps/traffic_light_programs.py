@@ -28,7 +28,8 @@ YELLOW, LONGEST_YELLOW = 3.0, 6.0
 """Shortest and longest yellow [s] (MUTCD 2009, section 4D.26)."""
 
 YELLOW_REACTION, YELLOW_BRAKING = 1.0, 3.0
-"""Reaction time [s] and braking [m/s^2] assumed for the yellow time."""
+"""Reaction time [s] and braking [m/s^2] (ITE: 10 ft/s^2) assumed for the yellow time; traffic that would have to brake
+harder passes the light."""
 
 ALL_RED = 2.0
 """Clearance interval with red for all directions [s], at most 6 s (MUTCD 2009, section 4D.26)."""

@@ -25,7 +25,7 @@ _TOUCH = 1.0  # [m] between the edges of lanes side by side, at most
 _SAME_LEVEL = 1.5  # [m]
 _THIN = 1.6  # [m] a narrower lane is still opening: the line beside it would form a wedge
 _INSIDE = 0.4  # [m] an edge this far inside another lane is no edge
-_SHORTEST = 4.0  # [m] length of a line
+_SHORTEST_BORDER = 4.0  # [m] length of a line
 _JOIN = 0.8  # [m] between the ends of two lines that are joined
 
 _Run: TypeAlias = tuple[int, int, int]  # first sample, the one after the last, kind
@@ -265,7 +265,7 @@ def _border(
     # the common point of successive lanes is kept once
     index = np.concatenate([np.arange(a + (k > 0), b) for k, (a, b, _) in enumerate(chain)])
     line = edge[index]
-    if len(line) < 2 or np.hypot(*np.diff(line[:, :2], axis=0).T).sum() < _SHORTEST:
+    if len(line) < 2 or np.hypot(*np.diff(line[:, :2], axis=0).T).sum() < _SHORTEST_BORDER:
         return
     lanes = tuple(dict.fromkeys(samples.lane[index].tolist()))
     yield Border(

@@ -191,7 +191,7 @@ def longer(path: Array, more: float) -> Array:
 
 # --- Samples of all lanes --------------------------------------------------------------------------------------------
 
-STEP = 2.0  # [m] between samples, at most
+SAMPLE_STEP = 2.0  # [m] between samples, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,7 +220,7 @@ class TownSamples:
         columns: list[list[Array]] = [[], [], [], []]
         owners, bounds, count = [], [], 0
         for lane in town.lanes:
-            s = sample(lane, 0.0, lane.length, STEP)
+            s = sample(lane, 0.0, lane.length, SAMPLE_STEP)
             xyz = np.column_stack((side_line(lane, s, 0.0), np.interp(s, lane.stations, lane.points[:, 2])))
             heading = np.interp(s, lane.stations, lane.headings)
             for column, value in zip(columns, (s, heading, widths_at(lane, s) / 2.0, xyz), strict=True):

@@ -137,10 +137,10 @@ ROW_HEIGHT = 1.0
 
 _HALF = 0.62  # of the height of a label kept free on both sides of its line
 _LONGER = 1.08  # of the length of a label reserved on the road
-_POINTS = 24
+_NAME_POINTS = 24
 _SHARES = (1.0, 0.85, 0.72, 0.6, 0.5, 0.42)  # of the largest font size
 _REPEATED = 0.8  # of the font size for repetitions with less room
-_TINY = 0.8  # of the smallest font size, instead of no label
+_TINY_FONT = 0.8  # of the smallest font size, instead of no label
 _ASIDE = 3.0  # [m] between the edge of the road and a label beside it: the pavement
 
 
@@ -252,7 +252,7 @@ class LabelPlacer:
 
     def _set_first(self, street: int) -> bool:
         large, small = self.sizes
-        tiny = round(_TINY * small)
+        tiny = round(_TINY_FONT * small)
         sizes = list(dict.fromkeys(max(small, round(share * large)) for share in _SHARES))
         # broad streets have large labels; each size is tried on free road first, then over arrows
         manners = [
@@ -290,7 +290,7 @@ class LabelPlacer:
         small = self.sizes[1]
         for size, level in (
             (small, LabelClearance.OFF_ROAD),
-            (round(_TINY * small), LabelClearance.OFF_ROAD),
+            (round(_TINY_FONT * small), LabelClearance.OFF_ROAD),
             (small, LabelClearance.FIXED_ALONE),
         ):
             more = font(size, bold=True).size(self.names[street])[0] * _LONGER / 2.0
@@ -375,7 +375,7 @@ class LabelPlacer:
         centred = np.abs(starts - _middle_of_run(starts)) * axis.step
         cost = np.where(good, centred / self.spacing + 1.2 * bent, np.inf)
         first = int(starts[int(np.argmin(cost))])
-        return axis.along(first * axis.step + 0.5 * (width - width / _LONGER), width / _LONGER, _POINTS)
+        return axis.along(first * axis.step + 0.5 * (width - width / _LONGER), width / _LONGER, _NAME_POINTS)
 
 
 def _half(size: int, rows: int) -> float:

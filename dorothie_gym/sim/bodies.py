@@ -4,8 +4,8 @@ A view keeps its holder, which has the arrays, and its row. Attributes of highwa
 arrays: `vehicle.speed` is `holder.arrays.vehicles[row].speed`. So highway-env's observations, viewer and planners
 see the state of the compiled loops, and no state is copied.
 
-By itself a `TrafficVehicle` is highway-env's `IDMVehicle` in full: `act` and `step` are stock, on the arrays. A road
-that is stepped by the compiled loops does not call them; prediction with a copy of a vehicle does. Parameters that
+On its own a `TrafficVehicle` is a complete `IDMVehicle` of highway-env, whose `act` and `step` work on the arrays. A
+road that is stepped by the compiled loops does not call them; prediction with a copy of a vehicle does. Parameters that
 highway-env keeps in the vehicle (`DELTA`, `POLITENESS`, ...) do not reach the compiled loops.
 """
 
@@ -22,9 +22,9 @@ from highway_env.vehicle.objects import Obstacle, RoadObject
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import PropKind
-from dorothie_gym.sim.collisions import WALKER_SIZE
 from dorothie_gym.sim.network.lane import PolylineLane
 from dorothie_gym.sim.network.network import LaneIndex, Route
+from dorothie_gym.sim.pedestrians.pacing import WALKER_SIZE
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.record_views import ArrayHolder, BodyView, field, field_offset, heading_field
 from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord, record_dtype
@@ -41,7 +41,7 @@ VEHICLE, PEDESTRIAN, PROP = (record_dtype(kind) for kind in (VehicleRecord, Pede
 
 _KIND_OF_SIZE = {(kind.length, kind.width): kind for kind in PropKind}
 if len(_KIND_OF_SIZE) != len(PropKind):
-    raise ImportError("two kinds of props have the same size, by which their views tell them apart")
+    raise ImportError("two kinds of props have the same size, which distinguish their views")
 
 
 class TrafficVehicle(BodyView, IDMVehicle):
@@ -80,7 +80,7 @@ class TrafficVehicle(BodyView, IDMVehicle):
     _followed, _planned = field(VEHICLE, "plan"), field(VEHICLE, "planned")
 
     def __init__(self, road: TownRoad, holder: ArrayHolder, row: int) -> None:
-        """Looks at a row of `holder.arrays.vehicles`; `road` is a `TownRoad` of the same town."""
+        """Shows a row of `holder.arrays.vehicles`; `road` is a `TownRoad` of the same town."""
         super().__init__(road, holder, row)
         self.log: list[object] = []
         self.history: deque[IDMVehicle] = deque(maxlen=self.HISTORY_SIZE)
@@ -116,7 +116,7 @@ class TrafficVehicle(BodyView, IDMVehicle):
 
     @property
     def target_lane_index(self) -> LaneIndex:
-        """The lane that it follows; another one than the next of its route makes it plan anew."""
+        """The lane that it follows; setting another one than the next of its route draws a new plan."""
         index: LaneIndex = self.road.network.index_of(self._followed)
         return index
 
@@ -264,7 +264,7 @@ class Pedestrian(_Thing, RoadObject):
     state = field(PEDESTRIAN, "state", Walk)
 
     def __init__(self, road: TownRoad, holder: ArrayHolder, row: int) -> None:
-        """Looks at a row of `holder.arrays.pedestrians`; `road` is a `TownRoad` of the same town."""
+        """Shows a row of `holder.arrays.pedestrians`; `road` is a `TownRoad` of the same town."""
         super().__init__(road, holder, row)
 
     @property
@@ -302,7 +302,7 @@ class Prop(_Thing, Obstacle):
     lane_id, station = field(PROP, "lane"), field(PROP, "station")
 
     def __init__(self, road: TownRoad, holder: ArrayHolder, row: int) -> None:
-        """Looks at a row of `holder.arrays.props`; `road` is a `TownRoad` of the same town."""
+        """Shows a row of `holder.arrays.props`; `road` is a `TownRoad` of the same town."""
         super().__init__(road, holder, row)
 
     @property

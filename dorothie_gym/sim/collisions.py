@@ -1,8 +1,8 @@
 """Collision detection: sort and sweep along one axis, then separating axes of the outlines.
 
-The bodies stay sorted from substep to substep, so that sorting them again takes hardly more than a look at each
-(Cohen, Lin, Manocha and Ponamgi 1995, "I-COLLIDE"). The axis runs askew to the usual streets, along which many bodies
-share a coordinate.
+The bodies stay sorted from substep to substep, so that sorting them again takes about one comparison for each (Cohen,
+Lin, Manocha and Ponamgi 1995, "I-COLLIDE"). The axis is oblique to the usual streets, along which many bodies share a
+coordinate.
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.sim.network.ahead import LEVEL
+from dorothie_gym.maps.model import LEVEL_HEIGHT
+from dorothie_gym.sim.pedestrians.pacing import WALKER_RADIUS, WALKER_SIZE
 from dorothie_gym.sim.state.codes import PEDESTRIAN_CLASS, STATIC, VEHICLES, EventCode, Kind, Walk
-from dorothie_gym.sim.state.event_log import log
 from dorothie_gym.sim.state.records import PlacedBody, VehicleRecord
+from dorothie_gym.sim.state.world_arrays import log
 
 if TYPE_CHECKING:
     from highway_env.vehicle.objects import RoadObject
@@ -25,11 +26,8 @@ if TYPE_CHECKING:
 AXIS_X, AXIS_Y = 0.8, 0.6
 """Direction along which bodies are sorted."""
 
-MOVES = 0.5
+OWN_FAULT_SPEED = 0.5
 """Speed below which the ego is not at fault for a collision [m/s]."""
-
-WALKER_RADIUS, WALKER_SIZE = 0.354, 0.5
-"""Half the diagonal and the side of a pedestrian's outline [m], `Pedestrian.LENGTH`."""
 
 
 @compiled
@@ -193,7 +191,9 @@ def _book(world: WorldArrays, kind: int, key: int, body: int, x: float, y: float
     car, vehicle, clock = world.car[0], world.vehicles[0], world.clock[0]
     event = world.events[log(world, EventCode.COLLISION, kind, key, car.before)]
     event.frame, event.body = clock.frame + 1, body
-    event.own = bool(car.before > MOVES and (x - vehicle.x) * vehicle.cos + (y - vehicle.y) * vehicle.sin > 0.0)
+    event.own = bool(
+        car.before > OWN_FAULT_SPEED and (x - vehicle.x) * vehicle.cos + (y - vehicle.y) * vehicle.sin > 0.0
+    )
     if event.own:
         car.collisions += 1
     vehicle.speed = 0.0
@@ -204,7 +204,7 @@ def _book(world: WorldArrays, kind: int, key: int, body: int, x: float, y: float
 def _touch(vehicle: VehicleRecord, other: PlacedBody, radius: float, length: float, width: float) -> bool:
     dx, dy = other.x - vehicle.x, other.y - vehicle.y
     reach = vehicle.radius + radius
-    if dx * dx + dy * dy > reach * reach or abs(other.height - vehicle.height) > LEVEL:
+    if dx * dx + dy * dy > reach * reach or abs(other.height - vehicle.height) > LEVEL_HEIGHT:
         return False
     return overlap(dx, dy, vehicle.cos, vehicle.sin, vehicle.length, vehicle.width, other.cos, other.sin, length, width)
 

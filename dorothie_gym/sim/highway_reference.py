@@ -1,4 +1,4 @@
-"""highway-env as it comes, as the yardstick of speed: its own road in one of our towns, and one of its environments."""
+"""Unmodified highway-env as the reference of speed: its own road in one of our towns, and one of its environments."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class StockIntersection:
         return len(self._env.unwrapped.road.vehicles)
 
     def prepare(self) -> None:
-        """Begins anew where an episode has ended."""
+        """Resets the environment where an episode has ended."""
         if self._ended:
             self._env.reset()
             self._ended = False

@@ -24,7 +24,7 @@ from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.state.records import FindingRecord, LineMarkRecord, RecordArray, StopLineRecord, empty_records
 from dorothie_gym.sim.state.town_arrays import town_arrays
-from dorothie_gym.sim.traffic_rules import HEIGHT, WIDE, FindingKind, WatchArrays, X, Y, watch
+from dorothie_gym.sim.traffic_rules import HEIGHT, WIDE_LANE, FindingKind, WatchArrays, X, Y, watch
 
 LONG_AGO = -(1 << 40)
 """A frame before all others."""
@@ -38,7 +38,7 @@ class Infraction(enum.StrEnum):
     STOP_SIGN = "stop_sign"
     """It passes the end of a lane with a stop sign and has not stood there with its front within `AT_LINE`."""
     OFF_ROAD = "off_road"
-    """Its middle is farther than `OFF_ROAD` outside of every lane's area, and it is not turning round."""
+    """Its middle is farther than `OFF_ROAD_MARGIN` outside of every lane's area, and it is not turning round."""
     WRONG_WAY = "wrong_way"
     """Its middle is on lanes that all run against it, outside junctions, and it is not turning round."""
 
@@ -75,7 +75,7 @@ class InfractionWatch:
         self._network, self._town, self._length = network, network.town, length
         self._lines = _lines(network)
         town = town_arrays(network)
-        self._wide = bool(network.table.points[:, WIDTH].max() > WIDE)
+        self._wide = bool(network.table.points[:, WIDTH].max() > WIDE_LANE)
         self._arrays = WatchArrays(
             town.points, town.lanes, town.origin, town.cells, town.entries, self._lines.records,
             empty_records(LineMarkRecord, len(self._lines.lanes)), np.full(2, LONG_AGO),
@@ -104,7 +104,7 @@ class InfractionWatch:
         return found
 
     def wait(self, first: int, last: int) -> None:
-        """Lets the car stand between two frames: what it has been doing wrong until then it goes on doing."""
+        """Lets the car stand between two frames; a breach in progress continues."""
         for k, frame in enumerate(self._arrays.last.tolist()):
             if frame == first:
                 self._arrays.last[k] = last

@@ -30,7 +30,7 @@ from dorothie_gym.sim.traffic.parameters import (
 )
 from dorothie_gym.sim.traffic.respawn import is_clear_of_people, is_free, new_key, put_on_lane
 
-BESIDE = 1.0
+STREET_WAY_REACH = 1.0
 """Distance to the way beside a street within which a pedestrian is placed on it [m]."""
 
 PROP_LEVEL = 2.0
@@ -143,7 +143,7 @@ def add_street_walker(
     beside = network.town.lanes[rightmost(network.town, lane)]
     station = min(station, beside.length)
     x, y = (float(value) for value in beside.position(station, beside.width_at(station) / 2 + KERB))
-    walk, at, _ = closest_walk(town, Footway.STREET, x, y, BESIDE)
+    walk, at, _ = closest_walk(town, Footway.STREET, x, y, STREET_WAY_REACH)
     if walk < 0 or town.walks[walk].lane != beside.id or not is_clear_of_people(world, x, y, NOBODY, CLEAR_OF_WALKER):
         return None
     if (world.pedestrians["state"] != Walk.EMPTY).all():
@@ -205,7 +205,7 @@ def move_prop(
     prop.x, prop.y = town_lane.position(station)
     prop.heading, prop.height = town_lane.heading_at(station), town_lane.height_at(station)
     prop.cos, prop.sin = math.cos(prop.heading), math.sin(prop.heading)
-    prop.lane = NOBODY
+    prop.lane[:] = NOBODY
     prop.lane[0], prop.station[0] = lane, station
     others = [place for place in _reached(network, town, prop) if place[0] != lane]
     for k, (reached, at) in enumerate(others[: len(prop.lane) - 1], start=1):

@@ -14,10 +14,10 @@ from highway_env.vehicle.kinematics import Vehicle
 from highway_env.vehicle.objects import Landmark, RoadObject
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.model import LEVEL_HEIGHT, Array
 from dorothie_gym.sim.bodies import Bodies, TrafficVehicle
 from dorothie_gym.sim.collisions import OrientedBox, boxes_touch
-from dorothie_gym.sim.network.ahead import LEVEL, LaneChains, Neighbours, lane_zones, neighbours_on
+from dorothie_gym.sim.network.ahead import LaneChains, Neighbours, lane_zones, neighbours_on
 from dorothie_gym.sim.network.network import LaneIndex, Route, TownNetwork
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.record_views import BodyView
@@ -85,12 +85,12 @@ class TownRoad(Road):
         return float(thing.lane.height_at(thing.lane.local_coordinates(thing.position)[0]))
 
     def at_one_level(self, one: RoadObject, other: RoadObject) -> bool:
-        """Returns whether two things can meet: no more than `ahead.LEVEL` apart in height, as far as that is known."""
+        """Returns whether two things can meet: at most `LEVEL_HEIGHT` apart in height, as far as that is known."""
         low, high = self.network.height_range
         own_heights = getattr(one, "height", None) is not None or getattr(other, "height", None) is not None
-        if high - low <= LEVEL and not own_heights:
+        if high - low <= LEVEL_HEIGHT and not own_heights:
             return True
-        return not abs(self.height_of(one) - self.height_of(other)) > LEVEL
+        return not abs(self.height_of(one) - self.height_of(other)) > LEVEL_HEIGHT
 
     def step(self, dt: float) -> None:
         """Move everything by `dt` [s] and check for collisions.
@@ -173,19 +173,19 @@ class TownRoad(Road):
 
         Looks on the whole lane as highway-env does, then up to `ahead.HORIZON` along the lanes ahead (those of the
         vehicle's route or target lane if there is one, else all) and along all lanes behind. Objects more than
-        `ahead.LEVEL` above or below the lane do not count.
+        `LEVEL_HEIGHT` above or below the lane do not count.
         """
-        nobody = (None, math.inf), (None, math.inf)
+        none = (None, math.inf), (None, math.inf)
         index = lane_index or vehicle.lane_index
         if not index:
-            return nobody
+            return none
         others = [
             t
             for t in itertools.chain(self.vehicles, self.objects)
             if t is not vehicle and not _is_landmark(t.__class__)
         ]
         if not others:
-            return nobody
+            return none
         places = np.empty((len(others), 2))
         heights, rows = np.empty(len(others)), np.empty(len(others), dtype=np.int64)
         for k, other in enumerate(others):

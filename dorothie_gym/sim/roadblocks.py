@@ -22,7 +22,7 @@ TURNS_BEHIND = 16.0
 """Least distance behind a prop at which a U-turn onto its lane ends: `limits.U_TURN_REACH`, by which the car swings
 ahead first, and half the length of a prop [m]."""
 
-SIDE_BY_SIDE = 3.0
+ONE_ROADBLOCK = 3.0
 """Largest distance along the road of props on lanes beside one another that form one roadblock [m]."""
 
 APART = 22.0
@@ -45,7 +45,7 @@ def crowds(town: Town, place: Place, others: Iterable[Place]) -> bool:
         if (near := town.neighbour(lane, side)) is not None
     }
     return any(
-        SIDE_BY_SIDE < abs(town.lanes[other].project(position)[0] - at) < APART
+        ONE_ROADBLOCK < abs(town.lanes[other].project(position)[0] - at) < APART
         for other, at in others
         if other in beside
     )

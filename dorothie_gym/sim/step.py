@@ -15,11 +15,11 @@ from dorothie_gym.sim.ego.motion_control import guide
 from dorothie_gym.sim.network.lane_lookup import closest_lane, value_near
 from dorothie_gym.sim.pedestrians.walking import walk
 from dorothie_gym.sim.state.codes import Kind, Wait
-from dorothie_gym.sim.state.event_log import note_pose, trace
 from dorothie_gym.sim.state.records import VehicleRecord
+from dorothie_gym.sim.state.world_arrays import note_pose, trace
 from dorothie_gym.sim.traffic.idm_traffic import drive
 from dorothie_gym.sim.traffic.lane_index import rebuild
-from dorothie_gym.sim.traffic.parameters import STANDING
+from dorothie_gym.sim.traffic.parameters import TRAFFIC_STANDING
 from dorothie_gym.sim.traffic.respawn import tow
 from dorothie_gym.sim.traffic.route import locate
 from dorothie_gym.sim.traffic.vehicle_models import move, slip_of
@@ -87,7 +87,7 @@ def _move(town: TownArrays, world: WorldArrays, dt: float, egos: bool) -> None:
 
 @compiled
 def _meet(town: TownArrays, world: WorldArrays, dt: float, tows: bool) -> None:
-    """Detects collisions, respawns with `tows`, makes the lane index anew, and ends the substep."""
+    """Detects collisions, respawns with `tows`, rebuilds the lane index, and ends the substep."""
     collide(world)
     if tows:
         tow(town, world, dt, bool(world.car[0].sweeping))
@@ -99,7 +99,7 @@ def _meet(town: TownArrays, world: WorldArrays, dt: float, tows: bool) -> None:
 def _go_on(town: TownArrays, vehicle: VehicleRecord, dt: float) -> None:
     """Moves a vehicle and updates its lane."""
     vehicle.timer += dt
-    if vehicle.speed < STANDING:
+    if vehicle.speed < TRAFFIC_STANDING:
         vehicle.standing += dt if vehicle.wait != Wait.LIGHT else 0.0
     else:
         vehicle.standing = 0.0

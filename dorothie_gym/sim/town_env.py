@@ -25,9 +25,7 @@ from dorothie_gym.sim.state.records import plain
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.traffic.lane_index import rebuild
-
-CLEAR_OF_EGO = 25.0
-"""Least distance of others to the vehicle at the start [m]."""
+from dorothie_gym.sim.traffic.parameters import CLEAR_OF_CAR
 
 ROUNDS = 8
 """Most rounds in which vehicles and pedestrians that are too close are replaced."""
@@ -61,7 +59,7 @@ def populate_around(
         if (_counts(world) == there).all():
             break  # the town is full
         for bodies, state, empty in others:
-            close = np.hypot(bodies["x"] - ego.x, bodies["y"] - ego.y) < CLEAR_OF_EGO
+            close = np.hypot(bodies["x"] - ego.x, bodies["y"] - ego.y) < CLEAR_OF_CAR
             bodies[state][close] = empty
     rebuild(town, world)
 

@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import enum
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.model import LEVEL_HEIGHT, Array
 from dorothie_gym.sim.config import FRAME_RATE
-from dorothie_gym.sim.network.lane_lookup import CELL, REACH, SLACK, closest_segment, coordinates, value_near
+from dorothie_gym.sim.network.grid import CELL_REACH, SLACK
+from dorothie_gym.sim.network.lane_lookup import LOOKUP_CELL, closest_segment, coordinates, value_near
 from dorothie_gym.sim.state.codes import NOBODY
 from dorothie_gym.sim.state.records import (
     POSE,
@@ -27,28 +29,25 @@ from dorothie_gym.sim.state.records import (
     RecordArray,
     StopLineRecord,
 )
-from dorothie_gym.sim.traffic.parameters import AT_LINE, STANDING
+from dorothie_gym.sim.traffic.parameters import AT_LINE, TRAFFIC_STANDING
 
-OFF_ROAD = 0.5
+OFF_ROAD_MARGIN = 0.5
 """Distance of the car's middle outside of all lanes, connectors included, from which on it is off the road [m]."""
 
 AGAINST = math.cos(math.radians(120.0))
 """Cosine of the angle to a lane from which on the car drives against it (CARLA's scenario runner, WrongLaneTest)."""
 
-LEVEL = 2.5
-"""Difference of height from which on lanes and lines belong to another road [m]."""
-
 NEARBY = 10.0
 """Range around the car for the nearest lane [m]: more than half of any lane's width."""
 
-OVER = FRAME_RATE
-"""Time without being off the road, or against the traffic, after which it counts anew [frames]."""
+BREACH_PAUSE = FRAME_RATE
+"""Time without being off the road, or against the traffic, after which it counts as a new breach [frames]."""
 
 FORGET = 12.0
 """Distance from a stop line at which a stand there is forgotten [m]."""
 
-WIDE = 2.0 * (REACH - 2.0 * OFF_ROAD - SLACK)
-"""Width up to which cells list all lanes that a place is within `OFF_ROAD` of [m]."""
+WIDE_LANE = 2.0 * (CELL_REACH - 2.0 * OFF_ROAD_MARGIN - SLACK)
+"""Width up to which cells list all lanes that a place is within `OFF_ROAD_MARGIN` of [m]."""
 
 X, Y, HEADING, SPEED, HEIGHT, TURNING = range(len(POSE))
 """Columns of poses."""
@@ -82,11 +81,11 @@ class WatchArrays(NamedTuple):
     points: Array
     lanes: RecordArray[LaneRecord]
     origin: Array
-    cells: NDArray[Any]
+    cells: NDArray[np.int32]
     entries: RecordArray[CellEntryRecord]
     lines: RecordArray[StopLineRecord]
     marks: RecordArray[LineMarkRecord]
-    last: NDArray[Any]
+    last: NDArray[np.int64]
     found: RecordArray[FindingRecord]
 
 
@@ -99,7 +98,7 @@ def watch(arrays: WatchArrays, poses: Array, frame: int, length: float, wide: bo
         poses: at successive frames, the first being the last one of the stretch before (n + 1, 6).
         frame: of the first pose.
         length: of the car [m].
-        wide: whether some lane of the town is wider than `WIDE`.
+        wide: whether some lane of the town is wider than `WIDE_LANE`.
 
     Returns:
         Number of findings, in the order in which they happened.
@@ -148,7 +147,7 @@ def _at_lines(arrays: WatchArrays, poses: Array, k: int, length: float, near: in
     before_x, before_y = poses[k - 1, X] + 0.5 * length * c, poses[k - 1, Y] + 0.5 * length * s
     cos, sin = math.cos(poses[k, HEADING]), math.sin(poses[k, HEADING])
     x, y = poses[k, X] + 0.5 * length * cos, poses[k, Y] + 0.5 * length * sin
-    stands, turning = poses[k - 1, SPEED] < STANDING, poses[k, TURNING] != 0.0
+    stands, turning = poses[k - 1, SPEED] < TRAFFIC_STANDING, poses[k, TURNING] != 0.0
     passed, best = NOBODY, math.inf
     for n in range(near):
         j = arrays.marks[n].near
@@ -181,7 +180,7 @@ def _is_on(line: StopLineRecord, x: float, y: float, cos: float, sin: float, hei
     """Returns whether a place is on the lane of a line, before or behind it, and heads its way."""
     across = (y - line.y) * line.cos - (x - line.x) * line.sin
     facing = cos * line.cos + sin * line.sin
-    return bool(facing > 0.5 and abs(across) <= line.half_width and abs(height - line.height) <= LEVEL)
+    return bool(facing > 0.5 and abs(across) <= line.half_width and abs(height - line.height) <= LEVEL_HEIGHT)
 
 
 @inlined
@@ -210,19 +209,19 @@ def _beside_lanes(arrays: WatchArrays, poses: Array, k: int, frame: int, wide: b
     """Notes a car off the road or against the traffic; returns the number of findings."""
     off_road, against = _state(arrays, poses, k, wide)
     if off_road:
-        count = _tell(arrays, poses, k, frame, FindingKind.OFF_ROAD, count)
+        count = _log_breach(arrays, poses, k, frame, FindingKind.OFF_ROAD, count)
     if against:
-        count = _tell(arrays, poses, k, frame, FindingKind.WRONG_WAY, count)
+        count = _log_breach(arrays, poses, k, frame, FindingKind.WRONG_WAY, count)
     return count
 
 
 @compiled
-def _tell(arrays: WatchArrays, poses: Array, k: int, frame: int, kind: int, count: int) -> int:
-    """Notes a breach if it has been over for long enough to count anew."""
+def _log_breach(arrays: WatchArrays, poses: Array, k: int, frame: int, kind: int, count: int) -> int:
+    """Logs a breach unless the previous one of its kind ended only a moment ago."""
     which = kind - FindingKind.OFF_ROAD
     last = arrays.last[which]
     arrays.last[which] = frame
-    if frame - last <= OVER:
+    if frame - last <= BREACH_PAUSE:
         return count
     _, _, lane, station = _survey(arrays, poses, k)
     _note(arrays.found[count], k, kind, lane, station)
@@ -233,14 +232,14 @@ def _tell(arrays: WatchArrays, poses: Array, k: int, frame: int, kind: int, coun
 def _state(arrays: WatchArrays, poses: Array, k: int, wide: bool) -> tuple[bool, bool]:
     """Returns whether the car is off the road, and whether it is against the traffic.
 
-    A place that is no farther than `OFF_ROAD` outside of a lane is no farther from its middle than half its width and
-    twice `OFF_ROAD`. Cells list all lanes as near as that, save very wide ones.
+    A place that is at most `OFF_ROAD_MARGIN` outside of a lane is no farther from its middle than half its width and
+    twice `OFF_ROAD_MARGIN`. Cells list all lanes that close, except very wide ones.
     """
     if wide:
         outside, against, _, _ = _survey(arrays, poses, k)
-        return outside > OFF_ROAD, against
+        return outside > OFF_ROAD_MARGIN, against
     x, y = poses[k, X], poses[k, Y]
-    column, row = (x - arrays.origin[0]) / CELL, (y - arrays.origin[1]) / CELL
+    column, row = (x - arrays.origin[0]) / LOOKUP_CELL, (y - arrays.origin[1]) / LOOKUP_CELL
     if not (0.0 <= column < arrays.cells.shape[1] and 0.0 <= row < arrays.cells.shape[0]):
         return True, False
     i, j = int(row), int(column)
@@ -250,7 +249,7 @@ def _state(arrays: WatchArrays, poses: Array, k: int, wide: bool) -> tuple[bool,
         lane = arrays.lanes[entry.lane]
         at, share, gap = closest_segment(arrays.points, entry.first, entry.last, x, y)
         out, station, _ = _outside(arrays.points, lane, at, share, gap, poses, k)
-        off_road = off_road and out > OFF_ROAD
+        off_road = off_road and out > OFF_ROAD_MARGIN
         if out <= 0.0:
             if _is_with(arrays.points, lane, at, station, poses[k, HEADING]):
                 return False, False
@@ -264,7 +263,7 @@ def _outside(
 ) -> tuple[float, float, bool]:
     """Returns a pose's distance outside of a lane (negative inside, inf at another height), and its station [m]."""
     station, lateral = coordinates(points, lane, at, share, gap, poses[k, X], poses[k, Y])
-    if abs(value_near(points, lane, at, 4, station) - poses[k, HEIGHT]) > LEVEL:
+    if abs(value_near(points, lane, at, 4, station) - poses[k, HEIGHT]) > LEVEL_HEIGHT:
         return math.inf, station, False
     side = abs(lateral) - 0.5 * value_near(points, lane, at, 5, station)
     return max(side, -station, station - points[lane.last, 2]), station, True

@@ -20,8 +20,7 @@ from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_car
 from dorothie_gym.sim.road import TownRoad
 from dorothie_gym.sim.sensing.localizer import Localizer
-from dorothie_gym.sim.sensing.perception import BODY, Perception
-from dorothie_gym.sim.sensing.seeing import look_around
+from dorothie_gym.sim.sensing.perception import BODY, Perception, look_around
 from dorothie_gym.sim.sensing.visibility import Visibility
 from dorothie_gym.sim.state.codes import EventCode
 from dorothie_gym.sim.state.records import (
@@ -208,7 +207,7 @@ class World:
         return int(collisions)
 
     def find_path(self) -> None:
-        """Lays the path anew from the ego's lane, after an outside driver has left it."""
+        """Lays a new path from the ego's lane, after an outside driver has left the old one."""
         vehicle = plain(self.actors.arrays.vehicles)[0]
         lane, station, offset = (vehicle[name].item() for name in ("lane", "own_station", "own_lateral"))
         self.planner.restart(lane, min(max(station, 0.0), self.town.lanes[lane].length), offset)

@@ -100,7 +100,7 @@ def test_the_archive_of_another_town_is_refused() -> None:
 
 
 def test_another_format_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(archive_module, "FORMAT", archive_module.FORMAT + 1)
+    monkeypatch.setattr(archive_module, "ARCHIVE_FORMAT", archive_module.ARCHIVE_FORMAT + 1)
     with pytest.raises(TownArchiveError, match="another format"):
         unpack(PACKED, "key")
 

@@ -14,10 +14,11 @@ from dorothie_gym.errors import TownError
 from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.yaml import arms as ramps
-from dorothie_gym.maps.yaml import clearance, layout, read_yaml_town, schema, streets
-from dorothie_gym.maps.yaml import courses as heights
+from dorothie_gym.maps.yaml import centrelines as heights
+from dorothie_gym.maps.yaml import clearance, layout, read_yaml_town, schema
 from dorothie_gym.maps.yaml import furniture as site_places
 from dorothie_gym.maps.yaml import schema as signs
+from dorothie_gym.maps.yaml import street_schema as streets
 
 PAGE = (Path(__file__).parents[2] / "docs" / "towns.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```yaml\n(.*?)```", PAGE, flags=re.DOTALL)
@@ -107,18 +108,18 @@ DEFAULTS = streets.StreetDefaults()
 @pytest.mark.parametrize(
     ("heading", "key", "limits", "default"),
     [
-        ("Of the town", "speed", streets.SPEED, f"{DEFAULTS.speed:g}"),
-        ("Of the town", "width", streets.WIDTH, f"{DEFAULTS.width:g}"),
-        ("Of the town", "sidewalk", streets.SIDEWALK, f"{DEFAULTS.sidewalk:g}"),
+        ("Of the town", "speed", streets.SPEED_RANGE, f"{DEFAULTS.speed:g}"),
+        ("Of the town", "width", streets.WIDTH_RANGE, f"{DEFAULTS.width:g}"),
+        ("Of the town", "sidewalk", streets.SIDEWALK_RANGE, f"{DEFAULTS.sidewalk:g}"),
         ("Of a junction", "roundabout", schema.ROUNDABOUT_RADIUS, "a plain junction"),
         ("Of a junction", "lanes", schema.ROUNDABOUT_LANES, "1"),
-        ("Of a junction", "speed", streets.SPEED, f"{schema.ROUNDABOUT_SPEED:g}, or the town's"),
-        ("Of a street", "lanes", streets.LANES, "1"),
-        ("Of a street", "median", streets.MEDIAN, "0"),
-        ("Of a street", "speed", streets.SPEED, "the town's"),
-        ("Of a street", "width", streets.WIDTH, "the town's"),
-        ("Of a street", "sidewalk", streets.SIDEWALK, "the town's"),
-        ("Of a street", "radius", streets.RADIUS, "the largest"),
+        ("Of a junction", "speed", streets.SPEED_RANGE, f"{schema.ROUNDABOUT_SPEED:g}, or the town's"),
+        ("Of a street", "lanes", streets.LANES_RANGE, "1"),
+        ("Of a street", "median", streets.MEDIAN_RANGE, "0"),
+        ("Of a street", "speed", streets.SPEED_RANGE, "the town's"),
+        ("Of a street", "width", streets.WIDTH_RANGE, "the town's"),
+        ("Of a street", "sidewalk", streets.SIDEWALK_RANGE, "the town's"),
+        ("Of a street", "radius", streets.RADIUS_RANGE, "the largest"),
         ("Of lights and their phases", "offset", signs.OFFSET, "0"),
         ("Of lights and their phases", "seconds", signs.SECONDS, "required"),
     ],

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.maps import LinkType
-from dorothie_gym.maps.lane_neighbours import MAX_GAP, oncoming_lanes
+from dorothie_gym.maps.lane_neighbours import WIDEST_MEDIAN, oncoming_lanes
 from tests.sim.driving import network
 
 
@@ -24,7 +24,7 @@ def test_oncoming_lane_runs_the_other_way_on_the_left(name: str) -> None:
             assert np.cos(other.heading_at(oncoming.station) - lane.heading_at(float(station))) < -0.8
             there = other.position(oncoming.station)
             _, lateral = lane.project(there)
-            assert -MAX_GAP - 0.5 < lateral < 0.0
+            assert -WIDEST_MEDIAN - 0.5 < lateral < 0.0
             assert abs(abs(lateral) - oncoming.gap) < 0.5
     assert found > 50
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from dorothie_gym.maps.catalogue import load_town, town_names
 from dorothie_gym.maps.lint import FaultKind, check_town
-from dorothie_gym.maps.lint.fault import CAR_WIDTH, SMALLEST_RADIUS
+from dorothie_gym.maps.lint.fault import CAR_WIDTH, SMALLEST_TURN
 from dorothie_gym.maps.model import Array, LaneLink, LinkType, Signal, SignalKind
 from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.ego.limits import MAX_STEERING
@@ -157,7 +157,7 @@ class TestCentreLines:
 
     def test_the_smallest_radius_is_the_cars(self) -> None:
         slip = math.atan(0.5 * math.tan(MAX_STEERING))
-        assert pytest.approx(0.5 * Vehicle.LENGTH / math.sin(slip), abs=0.005) == SMALLEST_RADIUS
+        assert pytest.approx(0.5 * Vehicle.LENGTH / math.sin(slip), abs=0.005) == SMALLEST_TURN
         assert CAR_WIDTH == Vehicle.WIDTH
 
     def test_a_step_within_a_lane(self) -> None:

@@ -6,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from dorothie_gym.angles import wrap_radians
-from dorothie_gym.maps.yaml.courses import STEEPEST, height_profile
+from dorothie_gym.maps.yaml.centrelines import STEEPEST, height_profile
 from dorothie_gym.maps.yaml.geometry import (
     CHORD_ERROR,
     CLOSEST,

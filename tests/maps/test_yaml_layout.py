@@ -7,7 +7,7 @@ import pytest
 from dorothie_gym.errors import TownError
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.yaml.arms import POCKET
-from dorothie_gym.maps.yaml.courses import SMALLEST_RADIUS
+from dorothie_gym.maps.yaml.centrelines import SMALLEST_BEND
 from dorothie_gym.maps.yaml.movements import BEND_RADIUS, CORNER_RADIUS, SLIP_RADIUS, SMALLEST_TRIM, kinds_of
 from tests.maps.yaml_plans import AVENUES, CIRCUS, INTERCHANGE, PAIR, laid_out, star
 
@@ -187,7 +187,7 @@ def test_a_curve_may_be_as_tight_as_its_innermost_lane_allows(tmp_path: Path) ->
     def bent(radius: float) -> str:
         return AVENUES.replace("Loop: {", "Loop: {lanes: 3, median: 2, ").replace("radius: 60", f"radius: {radius}")
 
-    least = SMALLEST_RADIUS + 1.0 + 2.5 * 3.5
+    least = SMALLEST_BEND + 1.0 + 2.5 * 3.5
     assert laid_out(tmp_path, bent(least + 0.01))
     with pytest.raises(TownError, match=f"tighter than its lanes are wide: .* at least {least:.1f} m"):
         laid_out(tmp_path, bent(least - 0.5))

@@ -3,10 +3,10 @@ from pathlib import Path
 import pytest
 
 from dorothie_gym.errors import TownError
-from dorothie_gym.maps.yaml import nodes as source
+from dorothie_gym.maps.yaml import entries as source
 from dorothie_gym.maps.yaml.plan import Bend, GreenPlan, StreetPlan, TownPlan
 from dorothie_gym.maps.yaml.schema import read_plan
-from dorothie_gym.maps.yaml.streets import approaches
+from dorothie_gym.maps.yaml.street_schema import approaches
 from tests.maps.yaml_text import MIDTOWN, written
 
 TWO = "junctions: {a: [0, 0], b: [200, 0]}\n"

@@ -10,8 +10,7 @@ from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology import WeatherParameter
 from dorothie_gym.sim.ego.limits import MAX_BRAKING
 from dorothie_gym.sim.ego.obstacles import SIDE_MARGIN
-from dorothie_gym.sim.sensing.perception import detection_probability, position_error
-from dorothie_gym.sim.sensing.seeing import MOST_SIGMAS
+from dorothie_gym.sim.sensing.perception import MOST_SIGMAS, detection_probability, position_error
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT, DENSEST_FOG, SHORTEST_SIGHT, Visibility
 from dorothie_gym.sim.weather import WET_LOSS, Weather
 

@@ -9,11 +9,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.lint.fault import CAR_WIDTH, SMALLEST_RADIUS, Fault, FaultKind
+from dorothie_gym.maps.lint.fault import CAR_WIDTH, SMALLEST_TURN, Fault, FaultKind
 from dorothie_gym.maps.model import Array, Lane
 from dorothie_gym.maps.town import Town
 
-MAX_GAP = 0.05
+MAX_LINK_GAP = 0.05
 """Largest distance in the plane between the ends of linked lanes [m]; a requirement of all towns."""
 
 MAX_STEP = 0.05
@@ -36,7 +36,7 @@ def continuity_faults(town: Town) -> Iterator[Fault]:
         lanes, position = (source.id, target.id), (float(x), float(y))
         pair = f"lane {target.id} begins"
         gap = math.hypot(u - x, v - y)
-        if gap > MAX_GAP + _SLACK:
+        if gap > MAX_LINK_GAP + _SLACK:
             message = f"{pair} {gap:.2f} m from the end of lane {source.id}"
             yield Fault(kind=FaultKind.GAP, lanes=lanes, position=position, message=message)
         if abs(w - z) > MAX_STEP + _SLACK:
@@ -120,7 +120,7 @@ def _share(before: Array, after: Array) -> Array:
 def _tight_curves(lane: Lane, turns: Array, length: Array) -> Iterator[Fault]:
     """Yields curves on which a car at full lock would leave the centre line too far."""
     share = _share(length[:-1], length[1:])
-    side = np.where(np.abs(turns) > share / SMALLEST_RADIUS, np.sign(turns), 0.0)
+    side = np.where(np.abs(turns) > share / SMALLEST_TURN, np.sign(turns), 0.0)
     edges = np.flatnonzero(np.diff(np.concatenate(([0.0], side, [0.0]))))
     for begin, end in itertools.pairwise(edges.tolist()):
         if side[begin] == 0.0:
@@ -129,11 +129,11 @@ def _tight_curves(lane: Lane, turns: Array, length: Array) -> Iterator[Fault]:
         radius = float(np.sum(share[begin:end])) / turn
         # The car swings out and cuts the corner equally while its arc turns by the same angle: the best of the
         # arcs of its radius deviates by this distance.
-        apart = (SMALLEST_RADIUS - radius) * np.tan(0.25 * min(turn, 2.0 * np.pi - 0.1)) ** 2
+        apart = (SMALLEST_TURN - radius) * np.tan(0.25 * min(turn, 2.0 * np.pi - 0.1)) ** 2
         if apart > MAX_DEPARTURE:
             message = (
                 f"lane {lane.id} turns by {np.degrees(turn):.0f} degrees on a radius of {radius:.1f} m,"
-                f" tighter than the {SMALLEST_RADIUS:.1f} m of the car at full lock"
+                f" tighter than the {SMALLEST_TURN:.1f} m of the car at full lock"
             )
             yield _fault(lane, FaultKind.TIGHT_CURVE, (begin + end - 1) // 2 + 1, message)
 

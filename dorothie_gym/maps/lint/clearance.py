@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.lint.fault import HALF_WIDTH, Fault, FaultKind
-from dorothie_gym.maps.lint.samples import SAME_LEVEL, SPACING, LaneSamples
+from dorothie_gym.maps.lint.samples import SAME_GROUND, SAMPLE_SPACING, LaneSamples
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 
@@ -44,7 +44,7 @@ class _Pairs:
 def clearance_faults(town: Town, samples: LaneSamples) -> Iterator[Fault]:
     """Yields lanes on the same ground, connectors across unrelated lanes, and low bridges."""
     pairs = _pairs(town, samples)
-    level = pairs.rise < SAME_LEVEL
+    level = pairs.rise < SAME_GROUND
     for lane, other, rows in _by_lanes(samples, pairs.select(level)):
         if not _follow(town, lane, other) and not _fork_or_join(town, lane, other):
             yield from _overlap(town, samples, lane, other, rows)
@@ -57,10 +57,10 @@ def clearance_faults(town: Town, samples: LaneSamples) -> Iterator[Fault]:
 def _pairs(town: Town, samples: LaneSamples) -> _Pairs:
     """Returns the overlapping pairs of samples; connectors at the same height are only compared with other lanes."""
     junction = np.array([lane.in_junction for lane in town.lanes], dtype=np.bool_)[samples.owner]
-    pairs = samples.tree.query_pairs(float(samples.widths.max()) + SPACING, output_type="ndarray")
+    pairs = samples.tree.query_pairs(float(samples.widths.max()) + SAMPLE_SPACING, output_type="ndarray")
     a, b = pairs[:, 0], pairs[:, 1]
     rise = np.abs(samples.heights[a] - samples.heights[b])
-    keep = (samples.owner[a] != samples.owner[b]) & (~(junction[a] & junction[b]) | (rise >= SAME_LEVEL))
+    keep = (samples.owner[a] != samples.owner[b]) & (~(junction[a] & junction[b]) | (rise >= SAME_GROUND))
     a, b, rise = a[keep], b[keep], rise[keep]
     # Measured on the lane that is not a connector: the side of a car on the ground of that lane counts.
     a, b = np.where(junction[a], b, a), np.where(junction[a], a, b)
@@ -69,7 +69,7 @@ def _pairs(town: Town, samples: LaneSamples) -> _Pairs:
     across = np.abs(np.einsum("ij,ij->i", offset, samples.right[a]))
     half = np.where(junction[b], HALF_WIDTH, 0.5 * samples.widths[b])
     overlap = 0.5 * samples.widths[a] + half - across
-    near = (np.abs(along) <= 0.75 * SPACING) & (overlap > MAX_OVERLAP)
+    near = (np.abs(along) <= 0.75 * SAMPLE_SPACING) & (overlap > MAX_OVERLAP)
     return _Pairs(first=a[near], second=b[near], overlap=overlap[near], rise=rise[near])
 
 
@@ -98,13 +98,13 @@ def _at_ends(samples: LaneSamples, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Returns which samples lie less than `JOINT` from an end of their lane."""
     owner = samples.owner[rows]
     place = np.minimum(rows - samples.first[owner], samples.first[owner + 1] - 1 - rows)
-    at_ends: NDArray[np.bool_] = place * SPACING < JOINT
+    at_ends: NDArray[np.bool_] = place * SAMPLE_SPACING < JOINT
     return at_ends
 
 
 def _overlap(town: Town, samples: LaneSamples, lane: int, other: int, pairs: _Pairs) -> Iterator[Fault]:
     # Where lanes cross, only one of them has many samples inside the other.
-    if max(len(np.unique(rows)) for rows in (pairs.first, pairs.second)) * SPACING <= SHORTEST_OVERLAP:
+    if max(len(np.unique(rows)) for rows in (pairs.first, pairs.second)) * SAMPLE_SPACING <= SHORTEST_OVERLAP:
         return
     worst = int(np.argmax(pairs.overlap))
     x, y = samples.points[pairs.first[worst]]

@@ -64,5 +64,5 @@ CAR_WIDTH = 2.0
 HALF_WIDTH = 0.5 * CAR_WIDTH
 """Half the width of the car [m]."""
 
-SMALLEST_RADIUS = 3.82
+SMALLEST_TURN = 3.82
 """Radius of the smallest turning circle [m]: a kinematic bicycle of 5 m with the front wheel at 60 degrees."""

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from dorothie_gym.maps.lint.fault import HALF_WIDTH, Fault, FaultKind
-from dorothie_gym.maps.lint.samples import SAME_LEVEL, SPACING, LaneSamples
+from dorothie_gym.maps.lint.samples import SAME_GROUND, SAMPLE_SPACING, LaneSamples
 from dorothie_gym.maps.model import Array, Junction, Lane, Sidewalk
 from dorothie_gym.maps.town import Town
 
@@ -275,8 +275,8 @@ def _on_lanes(town: Town, samples: LaneSamples, places: Array, heights: Array) -
     offset = places - samples.points[row]
     along = np.abs(np.einsum("ij,ij->i", offset, samples.along[row]))
     across = np.abs(np.einsum("ij,ij->i", offset, samples.right[row]))
-    level = np.abs(np.repeat(heights, len(_SIDES)) - samples.heights[row]) < SAME_LEVEL
-    paved: Array = level & (along <= SPACING) & (across <= 0.5 * samples.widths[row])
+    level = np.abs(np.repeat(heights, len(_SIDES)) - samples.heights[row]) < SAME_GROUND
+    paved: Array = level & (along <= SAMPLE_SPACING) & (across <= 0.5 * samples.widths[row])
     return paved
 
 
@@ -286,24 +286,24 @@ def _pavement_faults(sidewalks: Sequence[Sidewalk], samples: LaneSamples) -> Ite
         return
     places = np.concatenate([_along(sidewalk) for sidewalk in sidewalks])  # (m, 6)
     sides = _car_sides(samples, slice(0, len(samples.points)))  # (n, 3, 2)
-    _, index = cKDTree(places[:, :2]).query(sides, distance_upper_bound=0.5 * places[:, 5].max() + SPACING)
+    _, index = cKDTree(places[:, :2]).query(sides, distance_upper_bound=0.5 * places[:, 5].max() + SAMPLE_SPACING)
     found = index < len(places)
     place = places[np.where(found, index, 0)]  # (n, 3, 6)
     offset = sides - place[..., :2]
     along = np.abs(offset[..., 0] * place[..., 3] + offset[..., 1] * place[..., 4])
     across = np.abs(offset[..., 1] * place[..., 3] - offset[..., 0] * place[..., 4])
-    level = np.abs(samples.heights[:, None] - place[..., 2]) < SAME_LEVEL
-    depth = np.where(found & level & (along <= 0.75 * SPACING), 0.5 * place[..., 5] - across, 0.0)
+    level = np.abs(samples.heights[:, None] - place[..., 2]) < SAME_GROUND
+    depth = np.where(found & level & (along <= 0.75 * SAMPLE_SPACING), 0.5 * place[..., 5] - across, 0.0)
     for lane in dict.fromkeys(samples.owner[np.max(depth, axis=1) > KERB_SLACK].tolist()):
         yield _fault(samples, samples.rows(lane), depth[samples.rows(lane)], "the edge of a pavement")
 
 
 def _along(sidewalk: Sidewalk) -> Array:
-    """Returns samples along a pavement, at most `SPACING` apart: rows of x, y, z, direction x, y, and width."""
+    """Returns samples along a pavement, at most `SAMPLE_SPACING` apart: rows of x, y, z, direction x, y, and width."""
     steps = np.diff(sidewalk.points[:, :2], axis=0)
     length = np.hypot(*steps.T)
     station = np.concatenate(([0.0], np.cumsum(length)))
-    s = np.linspace(0.0, station[-1], max(2, int(np.ceil(station[-1] / SPACING)) + 1))
+    s = np.linspace(0.0, station[-1], max(2, int(np.ceil(station[-1] / SAMPLE_SPACING)) + 1))
     segment = np.clip(np.searchsorted(station, s, side="right") - 1, 0, len(length) - 1)
     place = [np.interp(s, station, column) for column in sidewalk.points.T]
     return np.column_stack((*place, steps[segment] / length[segment, None], np.full(len(s), sidewalk.width)))

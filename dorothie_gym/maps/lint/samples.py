@@ -12,10 +12,10 @@ from scipy.spatial import cKDTree
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 
-SPACING = 1.0
+SAMPLE_SPACING = 1.0
 """Largest distance between samples of a lane [m]."""
 
-SAME_LEVEL = 0.5
+SAME_GROUND = 0.5
 """Largest difference of height of points on the same ground [m]: bridges are thicker than this."""
 
 
@@ -55,10 +55,10 @@ class LaneSamples:
 
 
 def sample_lanes(town: Town) -> LaneSamples:
-    """Samples every lane at both ends and at most `SPACING` apart in between."""
+    """Samples every lane at both ends and at most `SAMPLE_SPACING` apart in between."""
     rows = []
     for lane in town.lanes:
-        s = np.linspace(0.0, lane.length, max(2, int(np.ceil(lane.length / SPACING)) + 1))
+        s = np.linspace(0.0, lane.length, max(2, int(np.ceil(lane.length / SAMPLE_SPACING)) + 1))
         columns = (*lane.points.T, lane.headings, lane.widths)
         rows.append(np.column_stack([np.interp(s, lane.stations, column) for column in columns]))
     counts = [len(row) for row in rows]

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from dorothie_gym.maps.lint.fault import Fault, FaultKind
-from dorothie_gym.maps.lint.samples import SAME_LEVEL
+from dorothie_gym.maps.lint.samples import SAME_GROUND
 from dorothie_gym.maps.model import Lane, LaneLink, LinkType, SignalKind
 from dorothie_gym.maps.town import Town
 
@@ -127,7 +127,7 @@ def _why_not_beside(source: Lane, station: float, target: Lane, side: LinkType) 
     there, across = target.project(source.position(station))
     apart = abs(across) - 0.5 * (source.width_at(station) + target.width_at(there))
     turn = math.remainder(target.heading_at(there) - source.heading_at(station), math.tau)
-    if abs(source.height_at(station) - target.height_at(there)) > SAME_LEVEL:
+    if abs(source.height_at(station) - target.height_at(there)) > SAME_GROUND:
         return "which runs at another height"
     if abs(turn) > MAX_DIVERGENCE:
         return f"which runs at {math.degrees(abs(turn)):.0f} degrees to it"

@@ -10,7 +10,7 @@ from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import Lane
 from dorothie_gym.maps.yaml.geometry import CurveSegment, Pose
 from dorothie_gym.maps.yaml.plan import StreetPlan
-from dorothie_gym.maps.yaml.stretches import Crossing, Stretch
+from dorothie_gym.maps.yaml.segments import Crossing, Stretch
 
 POCKET = -1
 """Number of a left-turn lane in the median."""

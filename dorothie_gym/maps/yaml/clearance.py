@@ -13,9 +13,9 @@ from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.yaml.arms import Arm
-from dorothie_gym.maps.yaml.courses import Course
+from dorothie_gym.maps.yaml.centrelines import Course
 from dorothie_gym.maps.yaml.movements import SMALLEST_RING_TRIM, SMALLEST_TRIM, MovementPath
-from dorothie_gym.maps.yaml.stretches import Crossing, Stretch
+from dorothie_gym.maps.yaml.segments import Crossing, Stretch
 
 Indices: TypeAlias = NDArray[np.int64]
 

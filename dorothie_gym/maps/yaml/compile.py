@@ -18,7 +18,7 @@ from dorothie_gym.maps.yaml.furniture import crosswalks, place_signals, place_si
 from dorothie_gym.maps.yaml.layout import Layout, lay_out
 from dorothie_gym.maps.yaml.movements import MovementPath, kinds_of
 from dorothie_gym.maps.yaml.schema import read_plan
-from dorothie_gym.maps.yaml.stretches import Crossing
+from dorothie_gym.maps.yaml.segments import Crossing
 
 SITES = 24
 """Number of landmark sites of a town without explicit ones."""

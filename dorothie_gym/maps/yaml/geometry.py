@@ -28,7 +28,7 @@ LINE_GUARD = 1.0
 CLOSEST = 0.1
 """Smallest distance between samples [m]: rounding errors at joints must not change the direction of the last step."""
 _STRAIGHT = 1e-9  # [1/m] smaller curvatures are lines; at 1 km they deviate by 0.5 mm
-_TINY = 1e-6  # [m] shorter segments are omitted
+_SHORTEST_SEGMENT = 1e-6  # [m] shorter segments are omitted
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,7 @@ class Curve:
         pieces, begin = [], 0.0
         for piece in self.pieces:
             low, high = max(start - begin, 0.0), min(end - begin, piece.length)
-            if high - low > _TINY:
+            if high - low > _SHORTEST_SEGMENT:
                 pieces.append(CurveSegment(*piece.at(low), high - low, piece.curvature))
             begin += piece.length
         return Curve(tuple(pieces))
@@ -192,7 +192,7 @@ def rounded(points: Sequence[Point], radii: Sequence[float]) -> Curve:
         pieces.append(CurveSegment(x, y, heading, radius * abs(turn), math.copysign(1.0 / radius, turn)))
         here = pieces[-1].at(pieces[-1].length)[:2]
     pieces.append(line(here, points[-1]))
-    return Curve(tuple(piece for piece in pieces if piece.length > _TINY))
+    return Curve(tuple(piece for piece in pieces if piece.length > _SHORTEST_SEGMENT))
 
 
 def bend_stations(points: Sequence[Point], radii: Sequence[float]) -> list[float]:
@@ -225,7 +225,7 @@ def _fillet(entry: Pose, exit_: Pose) -> Curve | None:
     dx, dy = exit_[0] - entry[0], exit_[1] - entry[1]
     before = (dx * math.sin(exit_[2]) - dy * math.cos(exit_[2])) / math.sin(turn)
     after = (dy * math.cos(entry[2]) - dx * math.sin(entry[2])) / math.sin(turn)
-    if min(before, after) < _TINY:
+    if min(before, after) < _SHORTEST_SEGMENT:
         return None
     corner = (entry[0] + before * math.cos(entry[2]), entry[1] + before * math.sin(entry[2]))
     radius = min(before, after) / math.tan(abs(turn) / 2.0)

@@ -19,7 +19,7 @@ from dorothie_gym.maps.yaml.arms import (
     turn_between,
 )
 from dorothie_gym.maps.yaml.geometry import Curve, connect
-from dorothie_gym.maps.yaml.stretches import Crossing, Stretch
+from dorothie_gym.maps.yaml.segments import Crossing, Stretch
 
 STRAIGHT_BELOW = math.radians(35.0)
 """Largest change of heading of a straight movement [rad]."""

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from dorothie_gym.maps.yaml.entries import YamlEntry
 from dorothie_gym.maps.yaml.geometry import Point
-from dorothie_gym.maps.yaml.nodes import YamlEntry
 
 
 @dataclass(frozen=True, kw_only=True)

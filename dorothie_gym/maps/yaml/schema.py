@@ -24,10 +24,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TypeAlias
 
+from dorothie_gym.maps.yaml.entries import YamlEntry, listed, read_nodes
 from dorothie_gym.maps.yaml.geometry import Point
-from dorothie_gym.maps.yaml.nodes import YamlEntry, listed, read_nodes
 from dorothie_gym.maps.yaml.plan import Bend, GreenPlan, JunctionPlan, LightsPlan, RoundaboutPlan, StreetPlan, TownPlan
-from dorothie_gym.maps.yaml.streets import (
+from dorothie_gym.maps.yaml.street_schema import (
     StreetDefaults,
     approaches,
     lane_width,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled, concurrent, inlined
 from dorothie_gym.maps.model import Array
-from dorothie_gym.sim.batch.work_queue import take
+from dorothie_gym.sim.batch.threads import take
 from dorothie_gym.sim.batch.worlds import world_of
 from dorothie_gym.sim.network.lane_lookup import project, value_near
 from dorothie_gym.sim.network.network import TownNetwork
@@ -141,7 +141,7 @@ def move(vehicle: VehicleRecord, helm: HelmRecord, pose: Array, dt: float) -> No
 
 @compiled
 def _follow_road(town: TownArrays, vehicle: VehicleRecord, helm: HelmRecord) -> tuple[float, float, int]:
-    """Goes on to a next lane at the end of the target lane; returns the place on the target lane, as `project`."""
+    """Moves on to a next lane at the end of the target lane; returns the place on the target lane, as `project`."""
     station, lateral, segment = project(town, helm.lane, vehicle.x, vehicle.y)
     lane = town.lanes[helm.lane]
     if station <= lane.length - AFTER_END or lane.successors == 0:
@@ -174,7 +174,7 @@ FEATURES = {
 PERCEIVED = 5.0 * MAX_SPEED
 """Range of the observation [m], `AbstractEnv.PERCEPTION_DISTANCE`."""
 
-BEHIND = 2.0 * CAR_LENGTH
+OBSERVED_BEHIND = 2.0 * CAR_LENGTH
 """Range of the observation behind without `see_behind` [m], `Road.close_objects_to`."""
 
 
@@ -247,12 +247,12 @@ def _find_nearest(
     for i in range(1, len(vehicles)):
         if vehicles[i].kind != Kind.EMPTY:
             ahead = _ahead(town, vehicles[0], vehicles[i])
-            if view.behind or ahead > -BEHIND:
+            if view.behind or ahead > -OBSERVED_BEHIND:
                 count = _list(view, i, ahead, nearest, distances, count, room)
     for p in range(len(walkers) if view.walkers else 0):
         if walkers[p].state != Walk.EMPTY:
             ahead = _ahead(town, vehicles[0], walkers[p])
-            if ahead > -BEHIND:
+            if ahead > -OBSERVED_BEHIND:
                 count = _list(view, len(vehicles) + p, ahead, nearest, distances, count, room)
     return count
 
@@ -367,7 +367,7 @@ def play_share(
     """Plays a decision in worlds, until all worlds of the batch have been taken.
 
     Args:
-        turns: numbers of the worlds, see `work_queue.take`; shared by all threads that work on them.
+        turns: numbers of the worlds, see `threads.take`; shared by all threads that work on them.
         home: number of the block that is this thread's own.
         town: arrays of the town.
         batch: arrays of all worlds.

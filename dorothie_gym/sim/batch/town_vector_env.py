@@ -177,7 +177,7 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
 
     ## Description
     Vehicles, rewards and episode ends are those of `TownEnv`; the ego is highway-env's `MDPVehicle` (or, with
-    `ContinuousAction`, its `Vehicle`), written anew for the arrays. An environment depends on its own seed and actions
+    `ContinuousAction`, its `Vehicle`), implemented on the arrays. An environment depends on its own seed and actions
     only: not on the others, its place among them, or the number of threads.
 
     ## Observation Space
@@ -408,7 +408,7 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         return found
 
     def _observe(self, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
-        """Returns the observations of all environments; those of the mask anew."""
+        """Returns the observations of all environments, after an update of those of the mask."""
         self._shown[mask] = self._egos.observations[mask]
         if self._kinematics.shuffled:
             for i in np.flatnonzero(mask):

@@ -4,34 +4,34 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from typing import Any
+from typing import Protocol
 
 import numpy as np
+from numba import types
 from numba.extending import overload
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import WITHOUT_COUNTS, concurrent
 from dorothie_gym.maps.model import Array
-from dorothie_gym.sim.batch.thread_pool import Crew
-from dorothie_gym.sim.batch.work_queue import take, turns_of
+from dorothie_gym.sim.batch.threads import ThreadPool, take, turns_of
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 from dorothie_gym.sim.step import step
 
-WOVEN_IN = {**WITHOUT_COUNTS, "forceinline": True}
+INLINED = {**WITHOUT_COUNTS, "forceinline": True}
 
 
 def stacked(world: WorldArrays, count: int) -> WorldArrays:
     """A batch of copies of a world; its arrays have the shapes (count, ...)."""
-    batch = WorldArrays(*(_room(np.asarray(array), count, isinstance(array, np.recarray)) for array in world))
+    batch = WorldArrays._make(_room(array, count) for array in world.plain())
     for number in range(count):
         put(batch, number, world)
     return batch
 
 
-def _room(array: NDArray[Any], count: int, records: bool) -> Any:
+def _room(array: NDArray[np.generic], count: int) -> NDArray[np.generic]:
     room = np.zeros((count, *array.shape), dtype=array.dtype)
-    return room.view(np.recarray) if records else room
+    return room.view(np.recarray) if array.dtype.names else room
 
 
 def put(batch: WorldArrays, number: int, world: WorldArrays) -> None:
@@ -49,28 +49,35 @@ def put(batch: WorldArrays, number: int, world: WorldArrays) -> None:
 
 def world_of(batch: WorldArrays, number: int) -> WorldArrays:
     """A world of a batch: views of its arrays, of the same types as those of a world that stands alone."""
-    return WorldArrays(*_rows(batch, number))
+    return WorldArrays._make(_rows(batch, number))
 
 
-def _rows(arrays: tuple[Any, ...], number: int) -> tuple[Any, ...]:
+class _Stack(Protocol):
+    """Arrays of one name, one above the other along the axis of worlds."""
+
+    def __getitem__(self, number: int, /) -> object: ...
+
+
+def _rows(arrays: tuple[_Stack, ...], number: int) -> tuple[object, ...]:
     return tuple(array[number] for array in arrays)
 
 
-@overload(world_of, jit_options=WOVEN_IN)
-def _compiled_world_of(batch: Any, number: int) -> Any:
-    def one(batch: Any, number: int) -> Any:
-        return WorldArrays(*_rows(batch, number))
+@overload(world_of, jit_options=INLINED)
+def _compiled_world_of(batch: types.Type, number: types.Type) -> Callable[..., WorldArrays]:
+    # numba requires the same annotations as above
+    def one(batch: types.Type, number: types.Type) -> WorldArrays:
+        return WorldArrays(*_rows(batch, number))  # type: ignore[arg-type]  # numba compiles no `_make`
 
     return one
 
 
-@overload(_rows, jit_options=WOVEN_IN)
-def _compiled_rows(arrays: Any, number: int) -> Any:
+@overload(_rows, jit_options=INLINED)
+def _compiled_rows(arrays: types.BaseTuple, number: types.Type) -> Callable[..., tuple[object, ...]]:
     # the items of a tuple are of several types: numba takes them one by one when it compiles
-    def last(arrays: Any, number: int) -> Any:
+    def last(arrays: types.BaseTuple, number: types.Type) -> tuple[object, ...]:
         return (arrays[0][number],)
 
-    def first_and_others(arrays: Any, number: int) -> Any:
+    def first_and_others(arrays: types.BaseTuple, number: types.Type) -> tuple[object, ...]:
         return (arrays[0][number], *_rows(arrays[1:], number))
 
     return last if len(arrays) == 1 else first_and_others
@@ -78,7 +85,7 @@ def _compiled_rows(arrays: Any, number: int) -> Any:
 
 @concurrent
 def step_share(
-    turns: NDArray[Any],
+    turns: NDArray[np.int64],
     home: int,
     town: TownArrays,
     batch: WorldArrays,
@@ -90,7 +97,7 @@ def step_share(
     """Steps worlds of a batch, until all of them have been taken.
 
     Args:
-        turns: numbers of the worlds, see `work_queue.take`; shared by all threads that work on the batch.
+        turns: numbers of the worlds, see `threads.take`; shared by all threads that work on the batch.
         home: number of the block that is this thread's own.
         town: arrays of the town.
         batch: arrays of all worlds.
@@ -141,7 +148,7 @@ class VectorWorld:
         self.town = town
         self.arrays = stacked(world, worlds)
         self.threads = min(threads or available_processors(), worlds)
-        self._crew = Crew(self.threads - 1)
+        self._pool = ThreadPool(self.threads - 1)
 
     def __len__(self) -> int:
         return len(self.arrays.clock)
@@ -175,19 +182,19 @@ class VectorWorld:
             raise ValueError(f"{name} must be one number or {len(self)} numbers, not of the shape {values.shape}")
         return np.array(np.broadcast_to(values, len(self)))
 
-    def share(self, work: Callable[..., None], *arguments: Any) -> None:
+    def share(self, work: Callable[..., None], *arguments: object) -> None:
         """Calls `work(turns, home, *arguments)` in every thread, and waits for all of them.
 
         Args:
-            work: takes numbers of worlds from the queue (`work_queue`) until there is none left.
+            work: takes numbers of worlds from the queue (`threads.take`) until there is none left.
             arguments: for it.
         """
         turns = turns_of(len(self), self.threads)
-        self._crew.do(work, lambda home: (turns, home, *arguments))
+        self._pool.do(work, lambda home: (turns, home, *arguments))
 
     def close(self) -> None:
-        """Lets the threads go; the worlds cannot be stepped any more."""
-        self._crew.close()
+        """Ends the threads; the worlds cannot be stepped any more."""
+        self._pool.close()
 
 
 def available_processors() -> int:

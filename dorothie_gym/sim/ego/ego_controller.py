@@ -20,8 +20,7 @@ from dorothie_gym.sim.ego.limits import (
     U_TURN_SPEED,
     VehicleControl,
 )
-from dorothie_gym.sim.ego.path import Path
-from dorothie_gym.sim.ego.path_tracking import find_sides
+from dorothie_gym.sim.ego.path import Path, find_sides
 from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.ego.vehicle import Car, CarRecord
 from dorothie_gym.sim.state.records import plain
@@ -40,7 +39,7 @@ class GoalAhead:
     station: float
 
 
-BEHIND, AHEAD = 12.0, 150.0
+PATH_BEHIND, PATH_AHEAD = 12.0, 150.0
 """Stretch of path behind and ahead of the ego that is written into the arrays at least [m]."""
 
 
@@ -78,7 +77,7 @@ def write_path(arrays: WorldArrays, path: Path, s: float, speeds: Array) -> floa
         Distance along the path at which the stretch ends [m].
     """
     car, table = plain(arrays.car)[0], plain(arrays.path)
-    first = path.index_at(s - BEHIND)
+    first = path.index_at(s - PATH_BEHIND)
     cut = slice(first, first + len(table))
     lanes, headings = path.lanes[cut], path.headings[cut]
     rows = table[: len(lanes)]
@@ -160,9 +159,9 @@ class EgoController:
         """
         planner = self.planner
         if planner.path is not self._written:
-            self._write(arrays, anew=True)
-        elif self._written_until < min(planner.s + AHEAD, planner.path.length):
-            self._write(arrays, anew=False)
+            self._write(arrays, new_path=True)
+        elif self._written_until < min(planner.s + PATH_AHEAD, planner.path.length):
+            self._write(arrays, new_path=False)
         action, _ = planner.manoeuvre
         number, manual = 0 if action is None else action.value, self.manual
         record.orders[()] = number, planner.manoeuvre_end, self.cruise * KMH, planner.held, manual is not None
@@ -181,10 +180,10 @@ class EgoController:
         path = self._written
         return float(np.interp(s, path.s, self._speeds)) if path is not None else self.cruise * KMH
 
-    def _write(self, arrays: WorldArrays, *, anew: bool) -> None:
+    def _write(self, arrays: WorldArrays, *, new_path: bool) -> None:
         """Writes the stretch of path around the ego, and for a new path its speeds, goals and end."""
         path, s, car = self.planner.path, self.planner.s, plain(arrays.car)[0]
-        if anew:
+        if new_path:
             stop_at = path.length - self._car.LENGTH / 2 - END_GAP if self.planner.waits_at_end else None
             self._speeds = speed_profile(path, stop_at)
             goals = self._goals_on(path)[: car["goal"].shape[0]]

@@ -6,10 +6,17 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.ontology import ObjectClass
-from dorothie_gym.sim.ego.limits import BEGUN, EGO_STANDING, FROM_PROP, HEIGHT_MARGIN, PLANNED_BRAKING, U_TURN_REACH
+from dorothie_gym.sim.ego.limits import (
+    BEGUN,
+    EGO_STANDING,
+    MANOEUVRE_PROP_GAP,
+    PLANNED_BRAKING,
+    U_TURN_REACH,
+)
 from dorothie_gym.sim.ego.obstacles import ROADBLOCK_GAP, STANDSTILL_GAP, bodies_ahead, offer
-from dorothie_gym.sim.ego.path_tracking import point_at
+from dorothie_gym.sim.ego.path import point_at
 from dorothie_gym.sim.network.lane_lookup import project, value_near
 from dorothie_gym.sim.state.codes import PEDESTRIAN_CLASS, STATIC, U_TURN, VEHICLES, TrafficControl, Wait, Walk
 from dorothie_gym.sim.state.records import PassageRecord, SeenRecord
@@ -24,7 +31,7 @@ if TYPE_CHECKING:
 TURN_ROUND_SPEED = 4.0
 """Least speed assumed for oncoming vehicles before a U-turn [m/s]."""
 
-ASKING = 11.5
+EGO_ASKING = 11.5
 """Distance before the beginning of braking at which the ego requests a junction [m]."""
 
 UPSTREAM = 50.0
@@ -36,16 +43,16 @@ BEFORE_MANOEUVRE = 15.0
 REACHED = 0.2
 """Overlap with the new lane from which on a switching ego is in the way there [m]."""
 
-BESIDE = 7.0
+BESIDE_EGO = 7.0
 """Distance ahead and behind within which vehicles are beside the ego [m]; those within a second behind, too."""
 
 BEFORE_IT = 0.5
 """Distance before the beginning of a manoeuvre at which the ego waits [m]."""
 
-SLOWEST = 1.0
+SLOWEST_APPROACH = 1.0
 """Least speed assumed for the ego's approach [m/s]."""
 
-IN_LINE, FACING = 2.0, 0.5
+IN_LINE, FACING_COSINE = 2.0, 0.5
 """Distance from a lane [m], and cosine of the heading to it, up to which a vehicle comes along it."""
 
 TRAFFIC_LIGHT, TRAFFIC_SIGN = int(ObjectClass.TRAFFIC_LIGHT.value), int(ObjectClass.TRAFFIC_SIGN.value)
@@ -80,7 +87,7 @@ def _crosswalk(town: TownArrays, world: WorldArrays, best: float) -> float:
     """Offers the next crosswalk on the path with visible pedestrians for which the ego can still stop."""
     car, vehicle, path = world.car[0], world.vehicles[0], world.path
     braking = vehicle.speed * vehicle.speed
-    reach = braking / (2.0 * PLANNED_BRAKING) + ASKING + 0.5 * vehicle.length
+    reach = braking / (2.0 * PLANNED_BRAKING) + EGO_ASKING + 0.5 * vehicle.length
     last = point_at(world, car.s + reach)
     for r in range(car.run, car.runs):
         k = max(int(car.run_first[r]), int(car.at))
@@ -122,7 +129,7 @@ def _junction(town: TownArrays, world: WorldArrays, best: float) -> float:
     car, vehicle, path = world.car[0], world.vehicles[0], world.path
     if car.held and vehicle.speed < EGO_STANDING:
         return best  # requests nothing that it does not use
-    asking = vehicle.speed * vehicle.speed / (2.0 * PLANNED_BRAKING) + ASKING
+    asking = vehicle.speed * vehicle.speed / (2.0 * PLANNED_BRAKING) + EGO_ASKING
     half = 0.5 * vehicle.length
     last = point_at(world, car.s + max(asking, CRITICAL_GAP * vehicle.speed) + half)
     for r in range(car.run + 1, car.runs):
@@ -206,7 +213,7 @@ def _gap_to_others(town: TownArrays, world: WorldArrays, seen: int, blocked: boo
             behind = 8.0 + 5.0 * max(body.speed, TURN_ROUND_SPEED)
         else:
             behind = 8.0 + 3.0 * max(body.speed - vehicle.speed, 0.0)
-            station += body.speed * ahead / max(vehicle.speed, SLOWEST)  # where it is when the car comes there
+            station += body.speed * ahead / max(vehicle.speed, SLOWEST_APPROACH)  # where it is when the car comes there
         if -behind < station - meeting < 9.0:
             return max(ahead, 0.0), int(body.key), VEHICLES
     # requested last: vehicles that wait before the junction go first
@@ -231,11 +238,11 @@ def _leads_to(town: TownArrays, world: WorldArrays, start: int, meeting: float, 
     while end + 1 < car.points and path[end].manoeuvre:
         end += 1
     station, lateral, segment = project(town, target, prop.x, prop.y)
-    until = path[end].s - path[start].s + vehicle.speed * vehicle.speed / (2.0 * PLANNED_BRAKING) + FROM_PROP
+    until = path[end].s - path[start].s + vehicle.speed * vehicle.speed / (2.0 * PLANNED_BRAKING) + MANOEUVRE_PROP_GAP
     if abs(lateral) > town.lanes[target].half_width or not -0.5 * vehicle.length < station - meeting < until:
         return False
     height = value_near(town.points, town.lanes[target], segment, 4, station)
-    return bool(abs(height - prop.height) <= HEIGHT_MARGIN)
+    return bool(abs(height - prop.height) <= LEVEL_HEIGHT)
 
 
 @compiled
@@ -251,10 +258,10 @@ def _gap_beside(town: TownArrays, world: WorldArrays, seen: int, target: int) ->
         return math.inf, 0
     for n in range(seen):
         body = world.seen[n]
-        if body.kind != VEHICLES or body.distance2 > BESIDE * BESIDE * 4.0:
+        if body.kind != VEHICLES or body.distance2 > BESIDE_EGO * BESIDE_EGO * 4.0:
             continue
         station, lateral, _ = project(town, target, body.x, body.y)
-        if abs(lateral) < half_width and abs(station - own) < BESIDE + max(body.speed - vehicle.speed, 0.0):
+        if abs(lateral) < half_width and abs(station - own) < BESIDE_EGO + max(body.speed - vehicle.speed, 0.0):
             return 0.0, int(body.key)
     return math.inf, 0
 
@@ -305,10 +312,10 @@ def _place_towards(town: TownArrays, world: WorldArrays, lanes: int, body: SeenR
         station, lateral, segment = project(town, number, body.x, body.y)
         if abs(lateral) > IN_LINE:
             continue
-        if abs(value_near(town.points, lane, segment, 4, station) - body.height) > HEIGHT_MARGIN:
+        if abs(value_near(town.points, lane, segment, 4, station) - body.height) > LEVEL_HEIGHT:
             continue
         heading = value_near(town.points, lane, segment, 3, station)
-        if math.cos(heading - body.heading) < FACING:
+        if math.cos(heading - body.heading) < FACING_COSINE:
             continue
         if lane.junction < 0 or other.claim == number or other.inside == number:
             return float(station + world.starts[k])

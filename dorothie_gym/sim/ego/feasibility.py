@@ -11,16 +11,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dorothie_gym.maps.model import Lane
+from dorothie_gym.maps.model import LEVEL_HEIGHT, Lane
 from dorothie_gym.ontology import SPEED_STEP
 from dorothie_gym.sim.ego.limits import (
     EGO_MOVING,
-    FROM_PROP,
     HALF_LENGTH,
     HARD_STOP,
-    HEIGHT_MARGIN,
     LANDING,
     LEAD,
+    MANOEUVRE_PROP_GAP,
     MAX_CRUISE,
     MIN_CRUISE,
     MIN_SWITCH,
@@ -94,18 +93,18 @@ def switch_is_blocked(props: PropPlaces, lane: Lane, station: float, speed: floa
         speed: of the ego [m/s].
     """
     way = LEAD + max(MIN_SWITCH, SWITCH_TIME * speed) + speed**2 / (2 * PLANNED_BRAKING)
-    return _is_blocked(props, lane, station - HALF_LENGTH, station + way + FROM_PROP)
+    return _is_blocked(props, lane, station - HALF_LENGTH, station + way + MANOEUVRE_PROP_GAP)
 
 
 def landing_is_blocked(props: PropPlaces, lane: Lane, station: float) -> bool:
     """Returns whether a prop is too close on an oncoming lane for a U-turn that ends at a station [m]."""
-    return _is_blocked(props, lane, station - U_TURN_REACH, station + LANDING + FROM_PROP)
+    return _is_blocked(props, lane, station - U_TURN_REACH, station + LANDING + MANOEUVRE_PROP_GAP)
 
 
 def _is_blocked(props: PropPlaces, lane: Lane, begin: float, end: float) -> bool:
     for x, y, height in props:
         station, lateral = lane.project(np.array((x, y)))
-        level = abs(lane.height_at(station) - height) < HEIGHT_MARGIN
+        level = abs(lane.height_at(station) - height) < LEVEL_HEIGHT
         if level and abs(lateral) < lane.width_at(station) / 2 and begin < station < end:
             return True
     return False

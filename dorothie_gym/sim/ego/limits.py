@@ -84,7 +84,7 @@ APPROACH_SPEED = 14.0 * KMH
 APPROACH_DISTANCE = 20.0
 """Distance to a goal from which on `APPROACH_SPEED` holds [m]."""
 
-WALKING_SPEED = 1.5
+BLIND_SPEED = 1.5
 """Speed with hardly any sight [m/s]."""
 
 # --- Accelerations ----------------------------------------------------------------------------------------------------
@@ -134,9 +134,6 @@ U_TURN_SAMPLES = 4
 LANDING = 6.0
 """Oncoming lane left after a U-turn [m], so that the ego stands straight before it waits at the lane's end."""
 
-HEIGHT_MARGIN = 2.5
-"""Difference of height from which on a body is on another road [m]."""
-
-FROM_PROP = 16.5
+MANOEUVRE_PROP_GAP = 16.5
 """Least distance of the ego's middle to that of a prop at the end of a lane switch or U-turn, less the way to stop [m]:
 `obstacles.ROADBLOCK_GAP`, half the ego and half the prop."""

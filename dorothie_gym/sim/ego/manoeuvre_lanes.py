@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.town import Town
-from dorothie_gym.sim.ego.limits import LEAD, MIN_SWITCH, SWITCH_TIME
+from dorothie_gym.sim.ego.limits import LEAD, MIN_SWITCH, PLANNED_BRAKING, SWITCH_TIME
 from dorothie_gym.sim.ego.path import PathPiece, follow, switch
 
-HORIZON = 120.0
+LEAST_PATH = 120.0
 """Least length of path ahead [m]."""
 
 LAID = 180.0
-"""Length of path that is laid ahead, so that it is laid anew only now and then [m]."""
+"""Length of path that is laid ahead [m]: more than `LEAST_PATH`, so that it is seldom laid again."""
 
 SWITCH_COST = 20.0
 """Misfit by which an exit of the own lane is preferred to that of a lane beside it [degrees]."""
@@ -29,9 +29,6 @@ EXACT = 5.0
 
 ANOTHER_WAY = 15.0
 """Difference of angle from which on exits are different turns [degrees]."""
-
-STOPPING = 3.0
-"""Deceleration with which the ego can stop before a lane switch if others are beside it [m/s^2]."""
 
 WAITING_ROOM = 4.5
 """Distance between the end of a lane switch and a lane's end at which the ego may have to wait [m]."""
@@ -204,7 +201,7 @@ class LaneChooser:
             spare = (lane.length - at) - changes * (distance + LEAD)
             if k == 0:  # begins late enough to stop before it if others are beside the ego
                 most = max(end - at - changes * (distance + LEAD), 0.0)
-                lead = LEAD + min(speed**2 / (2 * STOPPING), most)
+                lead = LEAD + min(speed**2 / (2 * PLANNED_BRAKING), most)
             else:
                 lead = min(max(spare, LEAD), SETTLE)
             begin = min(at + lead, lane.length - distance)

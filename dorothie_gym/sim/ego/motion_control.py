@@ -14,6 +14,7 @@ from dorothie_gym.sim.ego.limits import (
     APPROACH_DISTANCE,
     APPROACH_SPEED,
     BEGUN,
+    BLIND_SPEED,
     LATERAL,
     LONGITUDINAL,
     MAX_ACCELERATION,
@@ -24,15 +25,14 @@ from dorothie_gym.sim.ego.limits import (
     PROFILE_BRAKING,
     PROP_DEPTH,
     SURE_BRAKING,
-    WALKING_SPEED,
 )
-from dorothie_gym.sim.ego.obstacles import CLOSEST, room, safe_speed
-from dorothie_gym.sim.ego.path_tracking import advance, heading_at, point_at, take_lanes
+from dorothie_gym.sim.ego.obstacles import SHORTEST_STOP, room, safe_speed
+from dorothie_gym.sim.ego.path import advance, heading_at, point_at, take_lanes
 from dorothie_gym.sim.network.lane_lookup import wrap_radians
-from dorothie_gym.sim.sensing.seeing import see
+from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.state.codes import STATIC, U_TURN, EventCode
-from dorothie_gym.sim.state.event_log import log
 from dorothie_gym.sim.state.records import EgoRecord
+from dorothie_gym.sim.state.world_arrays import log
 from dorothie_gym.sim.traffic.junctions import note
 from dorothie_gym.sim.traffic.vehicle_models import slip_of
 from dorothie_gym.sim.weather import (
@@ -68,10 +68,10 @@ def drift(car: EgoRecord, time: float, heading: float, speed: float) -> float:
 HARD = 3.5
 """Deceleration for a body ahead from which on it is a hazard stop [m/s^2]."""
 
-SLOWLY = 1.0
+HAZARD_SPEED = 1.0
 """Speed of ego and body below which standing before the body is a hazard stop, too [m/s]."""
 
-OVER = 15
+HAZARD_PAUSE = 15
 """Time without anything in the way after which a hazard stop is over [substeps]."""
 
 LIMITING = 0.5
@@ -80,7 +80,7 @@ LIMITING = 0.5
 CREEPING = 0.3
 """Speed below which the distance from the path is not corrected [m/s]."""
 
-BACK = 1.4
+RETURN_GAIN = 1.4
 """Factor from the output of the lateral controller to a speed towards the path."""
 
 
@@ -141,7 +141,7 @@ def _free_speed(world: WorldArrays) -> float:
         speed = min(speed, math.sqrt(2.0 * PROFILE_BRAKING * left) if left > 0.0 else 0.0)
     # a roadblock may come in sight at any time
     left = room(STATIC, world.eye[0].sight - 0.5 * vehicle.length - PROP_DEPTH, 0.0, False, False)
-    speed = min(speed, max(safe_speed(0.0, left, car.friction), WALKING_SPEED))
+    speed = min(speed, max(safe_speed(0.0, left, car.friction), BLIND_SPEED))
     for g in range(car.goals):
         left = car.goal[g] - car.s
         if left >= -1.0:
@@ -166,7 +166,9 @@ def _control(world: WorldArrays, target: float, dt: float) -> None:
         slope = (error - car.lateral_last) / dt if car.lateral_last < math.inf else 0.0
         car.lateral_last = error
         back = LATERAL.proportional * error + LATERAL.integral * car.lateral_sum + LATERAL.derivative * slope
-    wanted = heading_at(world, car.s + 0.5 * vehicle.speed * dt) + math.atan2(back * BACK, max(vehicle.speed, 1.0))
+    wanted = heading_at(world, car.s + 0.5 * vehicle.speed * dt) + math.atan2(
+        back * RETURN_GAIN, max(vehicle.speed, 1.0)
+    )
     slip = min(max(wrap_radians(wanted - vehicle.heading), -MAX_SLIP), MAX_SLIP)
     error = target - vehicle.speed
     limit = LONGITUDINAL.integral_limit
@@ -186,11 +188,11 @@ def _brake_surely(world: WorldArrays) -> None:
     car, speed = world.car[0], world.vehicles[0].speed
     needed = 0.0
     if car.stop_at < math.inf:
-        needed = speed * speed / (2.0 * max(car.stop_at - car.s, CLOSEST))
+        needed = speed * speed / (2.0 * max(car.stop_at - car.s, SHORTEST_STOP))
     if car.kind > 0:
         left = room(int(car.kind), car.gap, car.ahead_speed, bool(car.tight), bool(car.line))
         closing = max(speed * speed - car.ahead_speed * car.ahead_speed, 0.0)
-        needed = max(needed, closing / (2.0 * max(left, CLOSEST)))
+        needed = max(needed, closing / (2.0 * max(left, SHORTEST_STOP)))
     if needed > SURE_BRAKING:
         car.throttle, car.brake = 0.0, max(car.brake, min(needed / MAX_BRAKING, 1.0))
 
@@ -216,7 +218,7 @@ def _note_hazard(world: WorldArrays, limiting: bool) -> None:
     """Logs beginning and end of a hazard stop."""
     car, speed, frame = world.car[0], world.vehicles[0].speed, world.clock[0].frame
     if car.hazard == 0:
-        stands = speed < SLOWLY and car.ahead_speed < SLOWLY
+        stands = speed < HAZARD_SPEED and car.ahead_speed < HAZARD_SPEED
         if limiting and not car.held:
             if stands or car.brake * MAX_BRAKING > HARD:
                 car.hazard, car.hazard_gap, car.hazard_key = car.kind, car.gap, car.other
@@ -225,6 +227,6 @@ def _note_hazard(world: WorldArrays, limiting: bool) -> None:
         return
     if limiting:
         car.hazard, car.hazard_gap, car.hazard_key, car.hazard_seen = car.kind, car.gap, car.other, frame
-    if frame - car.hazard_seen > OVER:
+    if frame - car.hazard_seen > HAZARD_PAUSE:
         log(world, EventCode.HAZARD_END, int(car.hazard), int(car.hazard_key), float(frame - car.hazard_since))
         car.hazard = 0

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.ontology import ObjectClass
-from dorothie_gym.sim.ego.limits import HEIGHT_MARGIN
-from dorothie_gym.sim.ego.path import SPACING
-from dorothie_gym.sim.ego.path_tracking import WIDEST, point_at
+from dorothie_gym.sim.ego.path import PATH_SPACING, WIDEST_SWEEP, point_at
 from dorothie_gym.sim.state.codes import STATIC
 from dorothie_gym.sim.state.records import EgoRecord, SeenRecord
 
@@ -27,7 +26,7 @@ SIDE_MARGIN = 0.35
 CROSSING = 0.35
 """Sine of the angle to the path from which on a moving body counts as crossing it."""
 
-REACTION = 0.4
+BRAKE_DELAY = 0.4
 """Time until the brakes act [s]."""
 
 STANDSTILL_GAP = 2.5
@@ -36,7 +35,7 @@ STANDSTILL_GAP = 2.5
 ROADBLOCK_GAP = 12.5
 """Gap left to a prop [m]: room for a U-turn (`limits.U_TURN_REACH` from the ego's middle)."""
 
-LINE_GAP = 1.5
+EGO_LINE_GAP = 1.5
 """Gap left to the line before a junction [m]."""
 
 TIGHT_GAP = 1.0
@@ -88,10 +87,10 @@ INSTANTS, INSTANT = 4, 0.5
 MOVING = 0.2
 """Speed below which a body counts as standing [m/s]."""
 
-SLOWLY = 0.5
+SLOW_BODY = 0.5
 """Speed of a body below which the ego comes close to it in a manoeuvre [m/s]."""
 
-CLOSEST = 0.05
+SHORTEST_STOP = 0.05
 """Least way to a stop that braking counts on [m]."""
 
 
@@ -99,8 +98,8 @@ CLOSEST = 0.05
 def room(kind: int, gap: float, speed: float, tight: bool, line: bool) -> float:
     """Returns the way to the place where the ego stops for a body or line [m]."""
     if line:
-        margin = LINE_GAP
-    elif tight and speed < SLOWLY:
+        margin = EGO_LINE_GAP
+    elif tight and speed < SLOW_BODY:
         margin = TIGHT_GAP
     else:
         margin = ROADBLOCK_GAP if kind == STATIC else STANDSTILL_GAP
@@ -116,7 +115,7 @@ def safe_speed(speed: float, left: float, friction: float) -> float:
         left: room to it [m].
         friction: share of the dry road's grip.
     """
-    slack = HARD_BRAKING * friction * REACTION
+    slack = HARD_BRAKING * friction * BRAKE_DELAY
     return -slack + math.sqrt(slack * slack + speed * speed + 2.0 * HARD_BRAKING * friction * left)
 
 
@@ -144,7 +143,7 @@ def bodies_ahead(world: WorldArrays, seen: int) -> float:
     car, vehicle = world.car[0], world.vehicles[0]
     tight = bool(world.path[car.at].manoeuvre)
     speed = vehicle.speed
-    reach = max(LOOKAHEAD, speed * REACTION + speed * speed / (2.0 * HARD_BRAKING) + ROADBLOCK_GAP)
+    reach = max(LOOKAHEAD, speed * BRAKE_DELAY + speed * speed / (2.0 * HARD_BRAKING) + ROADBLOCK_GAP)
     last, near = point_at(world, car.s + reach), point_at(world, car.s + LOOKAHEAD)
     car.roadblock = math.inf
     best = math.inf
@@ -175,8 +174,8 @@ def _meet(world: WorldArrays, body: SeenRecord, last: int) -> tuple[int, float, 
     """
     car, vehicle, path = world.car[0], world.vehicles[0], world.path
     radius = 0.5 * math.sqrt(body.length * body.length + body.width * body.width)
-    side = radius + WIDEST + SIDE_MARGIN
-    reach = math.sqrt(side * side + (radius + SPACING) * (radius + SPACING))
+    side = radius + WIDEST_SWEEP + SIDE_MARGIN
+    reach = math.sqrt(side * side + (radius + PATH_SPACING) * (radius + PATH_SPACING))
     for instant in range(INSTANTS if body.speed > MOVING else 1):
         way = instant * INSTANT * body.speed
         x, y = body.x + way * body.cos, body.y + way * body.sin
@@ -185,7 +184,7 @@ def _meet(world: WorldArrays, body: SeenRecord, last: int) -> tuple[int, float, 
             point = path[k]
             dx, dy = x - point.x, y - point.y
             away = math.sqrt(dx * dx + dy * dy) - reach
-            if away > SPACING:
+            if away > PATH_SPACING:
                 k = _skip(world, k, last, away)
                 continue
             parallel = abs(body.cos * point.cos + body.sin * point.sin)
@@ -195,9 +194,9 @@ def _meet(world: WorldArrays, body: SeenRecord, last: int) -> tuple[int, float, 
             along = dx * point.cos + dy * point.sin
             across = dy * point.cos - dx * point.sin
             swept = half_width + (point.right if across > 0.0 else point.left)
-            touches = abs(across) <= swept and abs(along) <= half_length + SPACING
+            touches = abs(across) <= swept and abs(along) <= half_length + PATH_SPACING
             # bodies that move along the path are checked where they are now
-            if touches and abs(point.height - body.height) <= HEIGHT_MARGIN and (instant == 0 or square >= CROSSING):
+            if touches and abs(point.height - body.height) <= LEVEL_HEIGHT and (instant == 0 or square >= CROSSING):
                 gap = point.s - car.s + along - half_length - 0.5 * vehicle.length
                 forward = body.speed * (body.cos * point.cos + body.sin * point.sin)
                 return k, gap, max(forward, 0.0) if instant == 0 else 0.0
@@ -210,7 +209,7 @@ def _skip(world: WorldArrays, k: int, last: int, away: float) -> int:
     """Returns the next point of the path that is at least `away` [m] further along it."""
     path = world.path
     target = path[k].s + away
-    step = int(away / SPACING)
+    step = int(away / PATH_SPACING)
     while k + step <= last and step > 1 and path[k + step].s > target:
         step -= 1
     return k + max(step, 1)

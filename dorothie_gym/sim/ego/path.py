@@ -1,4 +1,4 @@
-"""Path of the ego: lanes joined end to end, with lane switches and U-turns cut in."""
+"""Path of the ego: lanes joined end to end, with lane switches and U-turns cut in, and the place of the ego on it."""
 
 from __future__ import annotations
 
@@ -6,12 +6,22 @@ import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array, Lane
+from dorothie_gym.sim.state.records import PathPointRecord, RecordArray, VehicleRecord
+from dorothie_gym.sim.traffic.parameters import PLANNED
+from dorothie_gym.sim.traffic.route import locate
 
-SPACING = 1.0
+if TYPE_CHECKING:
+    from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.world_arrays import WorldArrays
+
+
+PATH_SPACING = 1.0
 """Distance between points of a path [m]."""
 
 TURNING_RADIUS = 4.5
@@ -42,7 +52,7 @@ class PathPiece:
 def follow(lane: Lane, start: float = 0.0, end: float | None = None) -> PathPiece:
     """Returns the stretch along the centre line of a lane."""
     end = lane.length if end is None else end
-    count = max(2, math.ceil((end - start) / SPACING) + 1)
+    count = max(2, math.ceil((end - start) / PATH_SPACING) + 1)
     s = np.linspace(start, end, count)
     return PathPiece(
         lane=lane.id, points=_sample(lane, s), heights=_heights(lane, s), stations=s, limit=lane.speed_limit
@@ -60,7 +70,7 @@ def switch(source: Lane, target: Lane, start: float, distance: float) -> PathPie
         start: distance along `source` at which it begins [m].
         distance: length of the switch along `source` [m].
     """
-    t = np.linspace(0.0, 1.0, max(3, math.ceil(distance / SPACING) + 1))
+    t = np.linspace(0.0, 1.0, max(3, math.ceil(distance / PATH_SPACING) + 1))
     begin, _ = target.project(source.position(start))
     end, _ = target.project(source.position(start + distance))
     weight = (t**3 * (10 - 15 * t + 6 * t**2))[:, None]
@@ -103,7 +113,7 @@ def u_turn(source: Lane, target: Lane, start: float, radius: float = TURNING_RAD
         if k == 1 and middle > 0:
             x, y = x + middle * math.cos(psi), y + middle * math.sin(psi)
             points.append((x, y))
-        steps = max(2, math.ceil(abs(r) * angle / (SPACING / 2)))
+        steps = max(2, math.ceil(abs(r) * angle / (PATH_SPACING / 2)))
         for _ in range(steps):
             turn = math.copysign(angle / steps, r)
             # chord of an arc of `turn` radians; positive radius turns right (headings are clockwise)
@@ -209,7 +219,7 @@ class Path:
             (ax, ay), (bx, by) = points[k], points[k + 1]
             dx, dy = bx - ax, by - ay
             t = ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)
-            # before the first and after the last point the path goes on straight
+            # before the first and after the last point the path continues straight
             if (t < 0.0 and first + k > 0) or (t > 1.0 and first + k < len(self.s) - 2):
                 t = 0.0 if t < 0.0 else 1.0
             ox, oy = x - ax - t * dx, y - ay - t * dy
@@ -244,3 +254,104 @@ def _sample(lane: Lane, stations: Array) -> Array:
 
 def _heights(lane: Lane, stations: Array) -> Array:
     return np.interp(stations, lane.stations, lane.points[:, 2])
+
+
+# --- Place of the ego on its path (compiled) --------------------------------------------------------------------------
+
+WIDEST_SWEEP = 2.5
+"""Largest distance of the ego's corners from its path [m]: in a U-turn it is 2.4 m."""
+
+SEARCH_RANGE = 6.0
+"""Range before and behind the last place in which the ego is searched [m]."""
+
+
+@inlined
+def point_at(world: WorldArrays, s: float) -> int:
+    """Returns the number of the point at or before a distance along the path [m]."""
+    path, car = world.path, world.car[0]
+    k, last = int(car.at), int(car.points) - 1
+    while k < last and path[k + 1].s <= s:
+        k += 1
+    while k > 0 and path[k].s > s:
+        k -= 1
+    return k
+
+
+@inlined
+def heading_at(world: WorldArrays, s: float) -> float:
+    """Returns the direction of the path at a distance along it [rad]."""
+    path = world.path
+    k = min(point_at(world, s), int(world.car[0].points) - 2)
+    t = (s - path[k].s) / (path[k + 1].s - path[k].s)
+    t = min(max(t, 0.0), 1.0)
+    return float(path[k].heading + t * (path[k + 1].heading - path[k].heading))
+
+
+@compiled
+def advance(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> None:
+    """Updates the ego's place on the path: distance along it, and from it (positive right)."""
+    path, car = world.path, world.car[0]
+    last = int(car.points) - 1
+    first = point_at(world, car.s - SEARCH_RANGE)
+    end = min(point_at(world, car.s + SEARCH_RANGE) + 1, last)
+    best, s, offset = math.inf, car.s, 0.0
+    for k in range(first, end):
+        one, two = path[k], path[k + 1]
+        dx, dy = two.x - one.x, two.y - one.y
+        t = ((vehicle.x - one.x) * dx + (vehicle.y - one.y) * dy) / (dx * dx + dy * dy)
+        # before the first and after the last point the path continues straight
+        if (t < 0.0 and k > 0) or (t > 1.0 and k < last - 1):
+            t = 0.0 if t < 0.0 else 1.0
+        ox, oy = vehicle.x - one.x - t * dx, vehicle.y - one.y - t * dy
+        gap = ox * ox + oy * oy
+        if gap < best:
+            best = gap
+            s = one.s + t * (two.s - one.s)
+            offset = math.sqrt(gap) if dx * oy - dy * ox >= 0.0 else -math.sqrt(gap)
+    car.s, car.offset = s, offset
+    car.at = point_at(world, s)
+    take_lanes(town, world, vehicle)
+
+
+@compiled
+def find_sides(path: RecordArray[PathPointRecord], count: int, length: float, width: float) -> None:
+    """Computes the reach of a car's corners to the left and to the right of the path of its middle.
+
+    highway-env's bicycle moves along its heading plus a slip angle, and turns by the sine of that over half its length:
+    where the path begins to bend its heading follows with a delay, and in a long bend its front points outwards.
+    A corner that is `along` before or behind the middle is off a path of curvature k by k / 2 along^2 more.
+
+    Args:
+        path: points, read and written; the car enters the path along its direction.
+        count: number of points.
+        length: of the car [m].
+        width: of the car [m].
+    """
+    off = 0.0  # heading of the car to the right of the path [rad]
+    for k in range(count):
+        bend = 0.0
+        if k > 0:
+            way, turn = path[k].s - path[k - 1].s, path[k].heading - path[k - 1].heading
+            off -= turn
+            off -= math.sin(off) * min(way / (0.5 * length), 1.0)
+            bend = turn / way
+        sine, cosine = abs(math.sin(off)), math.cos(off)
+        across, along = 0.5 * (length * sine + width * cosine), 0.5 * (length * cosine - width * sine)
+        more = 0.5 * bend * along * along
+        path[k].left = min(max(across + more, 0.5 * width), WIDEST_SWEEP)
+        path[k].right = min(max(across - more, 0.5 * width), WIDEST_SWEEP)
+
+
+@inlined
+def take_lanes(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> None:
+    """Makes the lanes of the path ahead the vehicle's plan, and updates its place on the first of them."""
+    car = world.car[0]
+    r = 0
+    while r + 1 < car.runs and car.run_first[r + 1] <= car.at:
+        r += 1
+    if r != car.run or vehicle.plan[0] != car.run_lane[r]:
+        car.run = r
+        vehicle.planned = min(int(car.runs) - r, PLANNED)
+        for k in range(vehicle.planned):
+            vehicle.plan[k] = car.run_lane[r + k]
+        locate(town, vehicle)

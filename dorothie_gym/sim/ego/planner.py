@@ -1,7 +1,7 @@
 """Local planner of the ego: turns navigation actions into a path (paper, section 3.1).
 
-By default the ego follows its lane, and goes on where only one way leads on. Where a lane ends at a junction with a
-choice and no turn is planned, the path ends there and the ego waits.
+By default the ego follows its lane, and continues where only one exit leads on. Where a lane ends at a junction with
+several exits and no turn is planned, the path ends and the ego waits.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from dorothie_gym.sim.ego.feasibility import (
     u_turn_start,
 )
 from dorothie_gym.sim.ego.limits import EGO_MOVING, HALF_LENGTH, LANDING, U_TURN_REACH
-from dorothie_gym.sim.ego.manoeuvre_lanes import HORIZON, LaneChooser, LaneStep
+from dorothie_gym.sim.ego.manoeuvre_lanes import LEAST_PATH, LaneChooser, LaneStep
 from dorothie_gym.sim.ego.path import TURNING_RADIUS, Path, PathPiece, follow, u_turn
 
 
@@ -31,7 +31,7 @@ class LocalPlanner:
     """Path of the ego, changed by navigation actions.
 
     Attributes:
-        path: the present path; every manoeuvre lays it anew, and `s` is measured on the present one.
+        path: the present path; every manoeuvre replaces it, and `s` is measured along the present one.
         s: place of the ego along the path [m].
         offset: its distance from the path, positive right [m].
         held: whether the ego stands by the action Stop.
@@ -78,17 +78,17 @@ class LocalPlanner:
 
     @property
     def waits_at_end(self) -> bool:
-        """Whether the path ends where a turn has to be chosen (or the map ends)."""
+        """Whether the path ends where a turn has to be chosen, or at the end of the map."""
         return self._open_end
 
     @property
     def room(self) -> float:
-        """Path left ahead of the ego's middle [m]."""
+        """Length of the path ahead of the ego's middle [m]."""
         return self.path.length - self.s
 
     @property
     def manoeuvre(self) -> tuple[PhysicalAction | None, int]:
-        """Manoeuvre being prepared or driven, and its angle [degrees]."""
+        """Planned or present manoeuvre, and its angle [degrees]."""
         return self._manoeuvre, self._manoeuvre_angle
 
     @property
@@ -109,18 +109,18 @@ class LocalPlanner:
         return self._manoeuvre_end
 
     def note(self, s: float, offset: float, roadblock: float) -> None:
-        """Takes over place along the path, offset to its right and distance of a roadblock [m]."""
+        """Updates the place along the path, the offset to its right and the distance of a roadblock [m]."""
         self.s, self.offset, self.roadblock = s, offset, roadblock
         if self._manoeuvre is not None and s >= self._manoeuvre_end:
             self._manoeuvre, self._manoeuvre_angle = None, 0
 
     def extend(self, speed: float) -> None:
-        """Lengthens the path ahead where only one way leads on; called once a decision, with the speed [m/s]."""
-        if self.room < HORIZON and not self._open_end:
+        """Lengthens the path where only one exit leads on; called once per decision, with the speed [m/s]."""
+        if self.room < LEAST_PATH and not self._open_end:
             self._lay_from_here(self._lanes.steps_along(self.lanes_ahead), speed)
 
     def restart(self, lane: int, station: float, offset: float) -> None:
-        """Lays the path anew for an ego that has left it, and drops the plan.
+        """Lays a new path for an ego that has left the present one, and drops the plan.
 
         Args:
             lane: lane of the ego.
@@ -289,7 +289,7 @@ class LocalPlanner:
         begin = u_turn_start(station, speed)
         oncoming = self._oncoming.at(lane.id, min(begin, lane.length))
         if oncoming is not None:
-            # right behind a junction: begin a little later, so that the turn ends before the oncoming lane does
+            # just behind a junction: begin later, so that the turn ends before the end of the oncoming lane
             short = LANDING - (self._town.lanes[oncoming.lane].length - oncoming.station)
             if short > 0.0:
                 begin += short
@@ -307,7 +307,7 @@ class LocalPlanner:
         return oncoming, min(begin, lane.length)
 
     def _turn(self, angle: int, speed: float) -> str | None:
-        _, free = self._under_way()  # lanes can be changed again from the end of a manoeuvre under way
+        _, free = self._under_way()  # after the end of a manoeuvre under way, lanes may be changed again
         found = self._lanes.find_turn(self._lanes.through_junction(self.lane), free, angle)
         if found is None:
             return "there is no junction with a choice ahead"
@@ -331,12 +331,12 @@ class LocalPlanner:
     def _lay(
         self, steps: list[LaneStep], station: float, speed: float = 0.0, head: list[PathPiece] | None = None
     ) -> None:
-        """Lays the path anew: `steps[0]` from `station` on, behind the pieces of `head`."""
+        """Replaces the path: the pieces of `head`, then `steps` from a station on the first one on."""
         pieces, self._open_end = self._lanes.lay(steps, station, speed)
         self._set_path([*(head or []), *pieces])
 
     def _lay_from_here(self, steps: list[LaneStep], speed: float = 0.0) -> None:
-        """Lays the path anew from the ego's place, and keeps the rest of a lane switch or U-turn under way."""
+        """Replaces the path from the ego's place on; the rest of a lane switch or U-turn under way is kept."""
         head, station = self._under_way()
         self._lay(steps, station, speed, head)
 
@@ -356,7 +356,7 @@ class LocalPlanner:
         )
         if len(piece.points) < 2:
             return [], self.station
-        # the lane continues where it did before: a little behind the end of a U-turn, or the path would turn back
+        # the lane continues where it did before, just behind the end of a U-turn; else the path would turn back
         landing = end if end < len(self.path.s) and int(self.path.lanes[end]) == self.lane else end - 1
         return [piece], float(self.path.stations[landing])
 

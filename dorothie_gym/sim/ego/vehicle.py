@@ -35,7 +35,7 @@ class Car(Vehicle):
         super().__init__(road, self.position, self.heading, self.speed)
 
     def refresh(self) -> None:
-        """Reads place, heading, speed and height anew."""
+        """Reads place, heading, speed and height from the arrays."""
         x, y, self._heading, self._speed, self._height = self._state.item()
         self._position = np.array((x, y))
 

@@ -12,15 +12,13 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from dorothie_gym.compilation import allocating
-from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.model import LEVEL_HEIGHT, Array
 from dorothie_gym.maps.polyline import WIDTH, IntArray, LaneTable, local_coordinates, value_at
 from dorothie_gym.sim.network.network import LaneIndex, TownNetwork
 
 HORIZON = 80.0
 """Range ahead and behind, beyond the own lane, in which neighbours are searched [m]."""
-LEVEL = 2.5
-"""Difference of height from which on bodies neither meet nor follow one another [m]; a bridge leaves more."""
-MARGIN = 1.0
+LANE_MARGIN = 1.0
 """Distance outside of a lane up to which a body counts as on it [m], as in highway-env."""
 OVERHANG = 5.0
 """Distance before the start and after the end of a lane up to which a body counts as on it [m], as in highway-env."""
@@ -125,7 +123,7 @@ class Neighbours(NamedTuple):
 def lane_zones(table: LaneTable) -> Array:
     """Least x, least y, greatest x, greatest y [m] that something on each lane can have: (n, 4)."""
     widest = np.maximum.reduceat(table.points[:, WIDTH], table.offsets[:-1])
-    reach = (0.5 * widest + MARGIN + OVERHANG)[:, None]
+    reach = (0.5 * widest + LANE_MARGIN + OVERHANG)[:, None]
     return np.hstack((table.boxes[:, :2] - reach, table.boxes[:, 2:] + reach))
 
 
@@ -170,13 +168,13 @@ def neighbours_on(
             at, lateral = local_coordinates(points, offsets, ends, row, x, y)
             if not -OVERHANG <= at < points[offsets[row + 1] - 1, 2] + OVERHANG:
                 continue
-            if abs(lateral) > 0.5 * value_at(points, offsets, row, 5, at) + MARGIN:
+            if abs(lateral) > 0.5 * value_at(points, offsets, row, 5, at) + LANE_MARGIN:
                 continue
             height = heights[i]
             if math.isnan(height) and lanes[i] >= 0:
                 below, _ = local_coordinates(points, offsets, ends, lanes[i], x, y)
                 height = value_at(points, offsets, lanes[i], 4, below)
-            if abs(value_at(points, offsets, row, 4, at) - height) > LEVEL:
+            if abs(value_at(points, offsets, row, 4, at) - height) > LEVEL_HEIGHT:
                 continue
             at += starts[j]
             if j > 0 and abs(at - s) > HORIZON:

@@ -18,9 +18,9 @@ from dorothie_gym.maps.polyline import (
     value_at,
 )
 
-CELL = 8.0
+GRID_CELL = 8.0
 """Side of a cell [m]."""
-REACH = 6.0
+CELL_REACH = 6.0
 """A cell lists the lanes whose centre line comes this close to it [m]: cars on a road are settled by their cell."""
 SAME_LEVEL = 3.0
 """Lanes within this height [m] of a body may carry it; overpasses leave more room than that."""
@@ -45,9 +45,9 @@ class GridIndex:
 
     def __init__(self, table: LaneTable) -> None:
         """List the lanes of a table; the rows of the table are the answers."""
-        low = table.boxes[:, :2].min(axis=0) - REACH
-        high = table.boxes[:, 2:].max(axis=0) + REACH
-        columns, rows = (int(n) for n in np.ceil((high - low) / CELL))
+        low = table.boxes[:, :2].min(axis=0) - CELL_REACH
+        high = table.boxes[:, 2:].max(axis=0) + CELL_REACH
+        columns, rows = (int(n) for n in np.ceil((high - low) / GRID_CELL))
         self.origin = float(low[0]), float(low[1])
         counts = np.zeros((rows, columns), dtype=np.int64)
         nothing = np.empty(0, dtype=np.int64)
@@ -96,20 +96,20 @@ def _list_lanes(points: Array, offsets: IntArray, x0: float, y0: float, cursors:
     """Count the lanes of each cell in `cursors`; if there are `entries`, write them where the cursors stand."""
     rows, columns = cursors.shape
     newest = np.full((rows, columns), -1, dtype=np.int64)
-    reach = REACH + CELL * math.sqrt(0.5) + SLACK  # from the centre of a cell
+    reach = CELL_REACH + GRID_CELL * math.sqrt(0.5) + SLACK  # from the centre of a cell
     for lane in range(len(offsets) - 1):
         for k in range(offsets[lane], offsets[lane + 1] - 1):
             left, right = min(points[k, 0], points[k + 1, 0]), max(points[k, 0], points[k + 1, 0])
             low, high = min(points[k, 1], points[k + 1, 1]), max(points[k, 1], points[k + 1, 1])
-            first_row = max(int((low - y0 - REACH) / CELL) - 1, 0)
-            last_row = min(int((high - y0 + REACH) / CELL) + 1, rows - 1)
-            first_column = max(int((left - x0 - REACH) / CELL) - 1, 0)
-            last_column = min(int((right - x0 + REACH) / CELL) + 1, columns - 1)
+            first_row = max(int((low - y0 - CELL_REACH) / GRID_CELL) - 1, 0)
+            last_row = min(int((high - y0 + CELL_REACH) / GRID_CELL) + 1, rows - 1)
+            first_column = max(int((left - x0 - CELL_REACH) / GRID_CELL) - 1, 0)
+            last_column = min(int((right - x0 + CELL_REACH) / GRID_CELL) + 1, columns - 1)
             for row in range(first_row, last_row + 1):
                 for column in range(first_column, last_column + 1):
                     if newest[row, column] == lane:
                         continue
-                    x, y = x0 + (column + 0.5) * CELL, y0 + (row + 0.5) * CELL
+                    x, y = x0 + (column + 0.5) * GRID_CELL, y0 + (row + 0.5) * GRID_CELL
                     _, gap = closest_on_segment(points, k, x, y)
                     if gap <= reach * reach:
                         newest[row, column] = lane
@@ -132,7 +132,7 @@ def _closest(arrays: _Arrays, x: float, y: float, heading: float, weight: float,
     points, offsets, ends, boxes, cells, entries, x0, y0 = arrays
     best, found = np.inf, -1
     anywhere = math.isnan(height)
-    column, row = (x - x0) / CELL, (y - y0) / CELL
+    column, row = (x - x0) / GRID_CELL, (y - y0) / GRID_CELL
     if 0.0 <= column < cells.shape[1] and 0.0 <= row < cells.shape[0]:
         i, j = int(row), int(column)
         for e in range(cells[i, j, 0], cells[i, j, 1]):
@@ -142,8 +142,8 @@ def _closest(arrays: _Arrays, x: float, y: float, heading: float, weight: float,
             cost, station = distance(points, offsets, ends, lane, x, y, heading, weight)
             if cost < best and (anywhere or abs(value_at(points, offsets, lane, 4, station) - height) <= SAME_LEVEL):
                 best, found = cost, lane
-        border = CELL * min(column - j, j + 1 - column, row - i, i + 1 - row)
-        if best < REACH + border - SLACK:
+        border = GRID_CELL * min(column - j, j + 1 - column, row - i, i + 1 - row)
+        if best < CELL_REACH + border - SLACK:
             return found
     for lane in range(len(boxes)):
         if _out_of_question(boxes, lane, x, y, best):

@@ -17,7 +17,7 @@ from dorothie_gym.maps.polyline import LaneTable
 
 
 class PolylineLane(AbstractLane):
-    """A lane of a town, as stock highway-env drives on, observes and draws it.
+    """A lane of a town for the vehicles, observations and viewer of highway-env.
 
     Stations and lateral distances are metres along and to the right of the centre line; before the start and after the
     end of the lane they go on straight. A lane never changes after it is built, so copies of it are the lane itself.
@@ -65,7 +65,7 @@ class PolylineLane(AbstractLane):
         self.row = row
         self._points, self._offsets, self._ends = table.points, table.offsets, table.ends
         shape = self._points, self._offsets, self._ends, row
-        # Bound once: stock highway-env calls these for every lane and stripe that it draws.
+        # Bound once: highway-env calls these for every lane and stripe that it draws.
         self._local = functools.partial(polyline.local_coordinates, *shape)
         self._place = functools.partial(polyline.position, *shape)
         self._value = functools.partial(polyline.value_at, self._points, self._offsets, row)

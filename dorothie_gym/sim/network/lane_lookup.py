@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dorothie_gym.compilation import allocating, compiled, inlined
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.polyline import closest_on_segment
-from dorothie_gym.sim.network.grid import SAME_LEVEL
+from dorothie_gym.sim.network.grid import CELL_REACH, SAME_LEVEL, SLACK
 from dorothie_gym.sim.state.codes import NOBODY
 from dorothie_gym.sim.state.records import CellEntryRecord, LaneRecord, RecordArray, empty_records
 
@@ -23,14 +23,8 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
 
 
-CELL = 4.0
+LOOKUP_CELL = 4.0
 """Side of a cell [m]: finer than the network's own grid, so that the stretches are short."""
-
-REACH = 6.0
-"""A cell lists the lanes whose centre line comes this close to it [m]."""
-
-SLACK = 1e-6
-"""Safety of the bounds against rounding [m]."""
 
 TURNED = 1.0
 """A lane that is off a body's heading by more than this [rad] costs more than this [m] in highway-env's ranking."""
@@ -58,9 +52,9 @@ def build_cells(points: Array, lanes: RecordArray[LaneRecord]) -> LaneCells:
         lanes: lanes of the town.
     """
     order = np.argsort(lanes["rank"]).astype(np.int64)
-    low = np.array([lanes["left_edge"].min(), lanes["low_edge"].min()]) - REACH - CELL
-    high = np.array([lanes["right_edge"].max(), lanes["high_edge"].max()]) + REACH + CELL
-    columns, rows = (int(n) for n in np.ceil((high - low) / CELL))
+    low = np.array([lanes["left_edge"].min(), lanes["low_edge"].min()]) - CELL_REACH - LOOKUP_CELL
+    high = np.array([lanes["right_edge"].max(), lanes["high_edge"].max()]) + CELL_REACH + LOOKUP_CELL
+    columns, rows = (int(n) for n in np.ceil((high - low) / LOOKUP_CELL))
     counts = np.zeros((rows, columns), dtype=np.int32)
     none = empty_records(CellEntryRecord, 0)
     _list_lanes(points, lanes, order, low, counts, none)
@@ -88,16 +82,16 @@ def _list_lanes(
         for k in range(lane.first, lane.last):
             left, right = min(points[k, 0], points[k + 1, 0]), max(points[k, 0], points[k + 1, 0])
             low, high = min(points[k, 1], points[k + 1, 1]), max(points[k, 1], points[k + 1, 1])
-            first_row = max(int((low - origin[1] - REACH) / CELL) - 1, 0)
-            last_row = min(int((high - origin[1] + REACH) / CELL) + 1, rows - 1)
-            first_column = max(int((left - origin[0] - REACH) / CELL) - 1, 0)
-            last_column = min(int((right - origin[0] + REACH) / CELL) + 1, columns - 1)
+            first_row = max(int((low - origin[1] - CELL_REACH) / LOOKUP_CELL) - 1, 0)
+            last_row = min(int((high - origin[1] + CELL_REACH) / LOOKUP_CELL) + 1, rows - 1)
+            first_column = max(int((left - origin[0] - CELL_REACH) / LOOKUP_CELL) - 1, 0)
+            last_column = min(int((right - origin[0] + CELL_REACH) / LOOKUP_CELL) + 1, columns - 1)
             for row in range(first_row, last_row + 1):
                 for column in range(first_column, last_column + 1):
                     if newest[row, column] == number:
                         continue
                     newest[row, column] = number
-                    x, y = origin[0] + (column + 0.5) * CELL, origin[1] + (row + 0.5) * CELL
+                    x, y = origin[0] + (column + 0.5) * LOOKUP_CELL, origin[1] + (row + 0.5) * LOOKUP_CELL
                     first, last = _stretch(points, lane.first, lane.last, x, y)
                     if first < 0:
                         continue
@@ -109,13 +103,13 @@ def _list_lanes(
 @allocating
 def _stretch(points: Array, first: int, last: int, x: float, y: float) -> tuple[int, int]:
     """First and last segment that can be closest from within the cell around a place; -1 where the lane is far away."""
-    radius = CELL * math.sqrt(0.5)
+    radius = LOOKUP_CELL * math.sqrt(0.5)
     nearest = math.inf
     for k in range(first, last):
         _, gap = closest_on_segment(points, k, x, y)
         nearest = min(nearest, gap)
     nearest = math.sqrt(nearest)
-    if nearest > REACH + radius + SLACK:
+    if nearest > CELL_REACH + radius + SLACK:
         return -1, -1
     # the distance changes by no more than `radius` between the middle and anywhere in the cell, for every segment
     limit = nearest + 2.0 * radius + SLACK
@@ -225,7 +219,7 @@ def project(town: TownArrays, number: int, x: float, y: float) -> tuple[float, f
     lane = town.lanes[number]
     first, last = lane.first, lane.last - 1
     if last - first > 3:
-        column, row = (x - town.origin[0]) / CELL, (y - town.origin[1]) / CELL
+        column, row = (x - town.origin[0]) / LOOKUP_CELL, (y - town.origin[1]) / LOOKUP_CELL
         if 0.0 <= column < town.cells.shape[1] and 0.0 <= row < town.cells.shape[0]:
             i, j = int(row), int(column)
             for e in range(town.cells[i, j, 0], town.cells[i, j, 1]):
@@ -274,7 +268,7 @@ def closest_lane(
     """
     found, best, rank = NOBODY, math.inf, 0
     station, lateral, segment = 0.0, 0.0, 0
-    column, row = (x - town.origin[0]) / CELL, (y - town.origin[1]) / CELL
+    column, row = (x - town.origin[0]) / LOOKUP_CELL, (y - town.origin[1]) / LOOKUP_CELL
     if 0.0 <= column < town.cells.shape[1] and 0.0 <= row < town.cells.shape[0]:
         i, j = int(row), int(column)
         begin, end = town.cells[i, j, 0], town.cells[i, j, 1]
@@ -298,7 +292,7 @@ def closest_lane(
             c = cost(town.points, lane, at, s, r, heading)
             if (c < best or (c == best and lane.rank < rank)) and is_level(town, lane, at, s, height):
                 found, best, rank, station, lateral, segment = entry.lane, c, lane.rank, s, r, at
-        if best < REACH - SLACK:
+        if best < CELL_REACH - SLACK:
             return found, station, lateral, segment
     return _closest_of_all(town, x, y, heading, height)
 

@@ -20,7 +20,7 @@ from dorothie_gym.sim.network.lane import PolylineLane
 
 LEVEL_ENDS = 3.0
 """Lanes side by side end together when their ends are no farther apart than this along the road [m]."""
-SIDE_BY_SIDE = 1.5
+SIDE_BY_SIDE_WIDTHS = 1.5
 """... and when the distance across is no more than this times their mean width."""
 
 
@@ -67,7 +67,7 @@ def _level(lane: Lane, other: Lane, end: int) -> bool:
     along, across = _offset(lane, other, end)
     width = 0.5 * float(lane.widths[end] + other.widths[end])
     limit = min(LEVEL_ENDS, 0.4 * lane.length, 0.4 * other.length)  # so that no short lane begins where it ends
-    return abs(along) <= limit and abs(across) <= SIDE_BY_SIDE * width
+    return abs(along) <= limit and abs(across) <= SIDE_BY_SIDE_WIDTHS * width
 
 
 def _left_to_right(lanes: Iterable[Lane]) -> list[Lane]:
@@ -106,7 +106,7 @@ LaneIndex: TypeAlias = tuple[str, str, int]
 Route: TypeAlias = list[tuple[str, str, int | None]]
 
 FARTHEST = 1e9
-"""Beyond this [m] rounding makes the index's bounds worthless; the stock scan answers (and for NaN)."""
+"""Coordinate beyond which, as for NaN, highway-env's scan replaces the index, whose bounds rounding invalidates [m]."""
 
 
 class TownNetwork(RoadNetwork):
@@ -212,11 +212,11 @@ class TownNetwork(RoadNetwork):
     # Successors
 
     def successors(self, index: tuple[str, str, int | None]) -> list[LaneIndex]:
-        """Lanes in which a lane goes on by the town's links."""
+        """Lanes that follow a lane by the town's links."""
         return [self.index_of(link.target) for link in self.town.successors(self.lane_id(index))]
 
     def predecessors(self, index: tuple[str, str, int | None]) -> list[LaneIndex]:
-        """Lanes that go on in this one by the town's links."""
+        """Lanes that precede a lane by the town's links."""
         return [self.index_of(lane) for lane in self.town.predecessors(self.lane_id(index))]
 
     def side_lanes(self, lane_index: LaneIndex) -> list[LaneIndex]:
@@ -271,7 +271,7 @@ class TownNetwork(RoadNetwork):
     def next_lane_given_next_road(
         self, _from: str, _to: str, _id: int, next_to: str, next_id: int | None, position: Array
     ) -> tuple[int, float]:
-        """Lane on the next edge, and its distance to a position [m]: one that is linked if there is any, else as stock.
+        """Lane on the next edge and its distance to a position [m]; a linked lane, else highway-env's choice.
 
         Args:
             _from: start of the current edge.

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
 
 
-ASIDE = 0.4
+KEEP_RIGHT = 0.4
 """Offset to the right of the middle at which pedestrians walk [m], so that they pass each other."""
 
 FROM_EDGE = 0.4
@@ -28,7 +28,7 @@ FROM_EDGE = 0.4
 @inlined
 def side_kept(way: WalkwayRecord) -> float:
     """Returns the offset to the right of the middle of a way at which pedestrians walk [m]."""
-    return float(min(ASIDE, max(way.half_width - FROM_EDGE, 0.0)))
+    return float(min(KEEP_RIGHT, max(way.half_width - FROM_EDGE, 0.0)))
 
 
 @inlined
@@ -130,10 +130,10 @@ def closest_walk(town: TownArrays, kind: int, x: float, y: float, reach: float) 
 
 # --- Ways beside streets ----------------------------------------------------------------------------------------------
 
-WIDEST = 45.0
+WIDEST_ROAD = 45.0
 """Width of the widest road that pedestrians cross [m]."""
 
-NARROWEST = 3.0
+NARROWEST_ROAD = 3.0
 """Width of the narrowest road [m]."""
 
 STRAIGHT = 0.01
@@ -219,7 +219,7 @@ def _across(points: Array, lanes: RecordArray[LaneRecord], town: Town, walk: Str
     dx, dy = (kerb[None, :, k] - row[:, None, k] for k in (0, 1))
     cos, sin = np.cos(row[:, 3, None]), np.sin(row[:, 3, None])
     along, left = np.abs(dx * cos + dy * sin), dx * sin - dy * cos
-    along[(left < NARROWEST) | (left > WIDEST)] = np.inf
+    along[(left < NARROWEST_ROAD) | (left > WIDEST_ROAD)] = np.inf
     nearest = along.argmin(axis=1)
     rows = np.arange(len(row))
     crosses = (along[rows, nearest] < 1.0) & (row[:, 2] > FROM_JUNCTION) & (row[:, 2] < own.length - FROM_JUNCTION)

@@ -6,15 +6,15 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.sim.network.lane_lookup import project
 from dorothie_gym.sim.pedestrians.footways import closest_walk
 from dorothie_gym.sim.pedestrians.pacing import (
-    AHEAD,
     CROSSING_RATE,
-    LEVEL,
-    PATIENCE,
+    OBSTACLE_PATIENCE,
     SAFE_DISTANCE,
     SAFE_TIME,
+    WALK_AHEAD,
     walk_towards,
 )
 from dorothie_gym.sim.randomness import draw
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 OVER, BACK, THERE = 0, 1, 2
 """Values of `mouth` while straying: on the way over, on the way back, at a far kerb without a way."""
 
-REST = 5.0
+FAR_KERB_WAIT = 5.0
 """Time at a far kerb without a way before a pedestrian returns [s]."""
 
 JOINED = 2.5
@@ -63,7 +63,7 @@ def _is_clear(world: WorldArrays, walker: PedestrianRecord) -> bool:
     """Returns whether no vehicle is close."""
     for i in range(len(world.vehicles)):
         vehicle = world.vehicles[i]
-        if vehicle.kind == Kind.EMPTY or abs(vehicle.height - walker.height) > LEVEL:
+        if vehicle.kind == Kind.EMPTY or abs(vehicle.height - walker.height) > LEVEL_HEIGHT:
             continue
         dx, dy = vehicle.x - walker.x, vehicle.y - walker.y
         reach = SAFE_DISTANCE + SAFE_TIME * max(vehicle.speed, 0.0)
@@ -87,7 +87,7 @@ def stray(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
     if walker.mouth == THERE:
         walker.speed = 0.0
         walker.waited += time
-        if walker.waited > REST and _is_clear(world, walker):
+        if walker.waited > FAR_KERB_WAIT and _is_clear(world, walker):
             walker.mouth, walker.waited = BACK, 0.0
         return
     if walker.mouth == OVER and gone >= walker.far:
@@ -97,13 +97,13 @@ def stray(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
         walker.state, walker.waited, walker.speed = Walk.WALKING, 0.0, 0.0
         return
     onward = 1.0 if walker.mouth == OVER else -1.0
-    ahead = gone + onward * AHEAD
+    ahead = gone + onward * WALK_AHEAD
     x, y = home_x + ahead * cos, home_y + ahead * sin
     if walk_towards(world, p, x, y, onward * cos, onward * sin, onward * aside, CORRIDOR, time):
         walker.waited = 0.0
         return
     walker.waited += time
-    if walker.waited > PATIENCE:
+    if walker.waited > OBSTACLE_PATIENCE:
         walker.mouth, walker.waited = BACK if walker.mouth == OVER else OVER, 0.0
 
 
@@ -127,7 +127,7 @@ def give_way_to_strayers(town: TownArrays, world: WorldArrays, i: int) -> float:
     reach = CRITICAL_GAP * vehicle.speed + ASKING + 0.5 * vehicle.length
     for p in range(len(world.pedestrians)):
         walker = world.pedestrians[p]
-        if walker.state != Walk.STRAYING or walker.crashed or abs(walker.height - vehicle.height) > LEVEL:
+        if walker.state != Walk.STRAYING or walker.crashed or abs(walker.height - vehicle.height) > LEVEL_HEIGHT:
             continue
         dx, dy = walker.x - vehicle.x, walker.y - vehicle.y
         if dx * dx + dy * dy < reach * reach and dx * vehicle.cos + dy * vehicle.sin > 0.0:

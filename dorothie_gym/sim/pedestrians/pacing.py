@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.records import PedestrianRecord, SizedBody
 
@@ -37,7 +38,7 @@ CROSSING_RATE = 1 / 45
 PERSONAL_SPACE = 0.7
 """Least distance of a step to a vehicle [m]."""
 
-PATIENCE = 2.0
+OBSTACLE_PATIENCE = 2.0
 """Time for which a pedestrian stands before an obstacle that does not move before it turns back [s]."""
 
 ELBOW_ROOM = 0.3
@@ -52,7 +53,7 @@ SAFE_DISTANCE = 14.0
 
 # --- Steps ------------------------------------------------------------------------------------------------------------
 
-AHEAD = 1.0
+WALK_AHEAD = 1.0
 """Distance of the place on the way that a pedestrian walks towards [m]."""
 
 ARRIVED = 0.05
@@ -61,16 +62,16 @@ ARRIVED = 0.05
 AVOIDING = 1.6
 """Distance within which pedestrians step out of each other's way [m]."""
 
-BESIDE = 0.05
+PASSING_OFFSET = 0.05
 """Offset of another pedestrian to the right from which on it is passed on the left [m]."""
 
 SPACE = 0.55
 """Least distance between pedestrians, from middle to middle [m]."""
 
-SIZE = 0.5
-"""Length and width of a pedestrian [m], `Pedestrian.LENGTH`."""
+WALKER_RADIUS, WALKER_SIZE = 0.354, 0.5
+"""Half the diagonal and the side of a pedestrian's outline [m], `Pedestrian.LENGTH`."""
 
-MARGIN = 0.4
+EDGE_MARGIN = 0.4
 """Distance from the edge of the way beyond which pedestrians do not step aside [m]: cars that turn cut corners."""
 
 SIGHT = 4.0
@@ -78,9 +79,6 @@ SIGHT = 4.0
 
 FORESIGHT = 0.3
 """Room beyond a step that is checked for vehicles [m]."""
-
-LEVEL = 2.5
-"""Difference of height from which on a body is on another way [m]."""
 
 PLACE = 3.0
 """Distance within which a pedestrian makes no progress [m]."""
@@ -124,7 +122,7 @@ def walk_towards(
     step = min(walker.pace * time, distance)
     dx, dy = _past_others(world, p, dx / distance, dy / distance, cos, sin, lateral)
     aside = lateral + (dy * cos - dx * sin) * step
-    if abs(aside) > max(half - MARGIN, 0.0) and abs(aside) > abs(lateral):
+    if abs(aside) > max(half - EDGE_MARGIN, 0.0) and abs(aside) > abs(lateral):
         # along the edge of the way instead
         onward = 1.0 if dx * cos + dy * sin > 0.0 else -1.0
         dx, dy = onward * cos, onward * sin
@@ -155,7 +153,7 @@ def _past_others(
         if abs(dx) > AVOIDING or abs(dy) > AVOIDING or q == p or other.state == Walk.EMPTY:
             continue
         push = _push(dx, dy, 0.0, cos, sin)
-        if lateral + dy * way_cos - dx * way_sin > BESIDE:
+        if lateral + dy * way_cos - dx * way_sin > PASSING_OFFSET:
             push = -push
         x, y = x - push * sin, y + push * cos
     for q in range(len(world.props)):
@@ -163,8 +161,8 @@ def _past_others(
         dx, dy = prop.x - walker.x, prop.y - walker.y
         if abs(dx) > SIGHT or abs(dy) > SIGHT or not prop.present:
             continue
-        push = _push(dx, dy, 0.5 * (max(prop.length, prop.width) - SIZE), cos, sin)
-        if lateral + dy * way_cos - dx * way_sin > BESIDE:
+        push = _push(dx, dy, 0.5 * (max(prop.length, prop.width) - WALKER_SIZE), cos, sin)
+        if lateral + dy * way_cos - dx * way_sin > PASSING_OFFSET:
             push = -push
         x, y = x - push * sin, y + push * cos
     length = math.sqrt(x * x + y * y)  # at least 1: others are avoided sideways
@@ -190,7 +188,7 @@ def _bumps(world: WorldArrays, p: int, cos: float, sin: float, step: float, time
         dx, dy = other.x - walker.x, other.y - walker.y
         if abs(dx) > AVOIDING or abs(dy) > AVOIDING or q == p or other.state == Walk.EMPTY:
             continue
-        if abs(other.height - walker.height) > LEVEL:
+        if abs(other.height - walker.height) > LEVEL_HEIGHT:
             continue
         now = dx * dx + dy * dy
         ahead = 0.0 if other.crashed else other.speed * time
@@ -216,7 +214,7 @@ def _touches_vehicle(world: WorldArrays, walker: PedestrianRecord, x: float, y: 
         vehicle = world.vehicles[i]
         if abs(walker.x - vehicle.x) > 6.0 or abs(walker.y - vehicle.y) > 6.0 or vehicle.kind == Kind.EMPTY:
             continue
-        if abs(vehicle.height - walker.height) > LEVEL:
+        if abs(vehicle.height - walker.height) > LEVEL_HEIGHT:
             continue
         room = _room_beside(vehicle, x, y)
         if room < PERSONAL_SPACE and room < _room_beside(vehicle, walker.x, walker.y):

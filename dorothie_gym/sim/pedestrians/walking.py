@@ -1,6 +1,6 @@
 """Pedestrians: along footways, round corners, over crosswalks.
 
-A pedestrian walks towards a place a little ahead on its way and decides anew every `PACE` substeps, not all of them in
+A pedestrian walks towards a place a little ahead on its way and decides again every `PACE` substeps, not all of them in
 the same substep; in between it walks straight on.
 """
 
@@ -10,24 +10,25 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.sim.pedestrians.footways import ASIDE, enter_next, find_segment, locate, place_beside, side_kept
+from dorothie_gym.maps.model import LEVEL_HEIGHT
+from dorothie_gym.sim.pedestrians.footways import KEEP_RIGHT, enter_next, find_segment, locate, place_beside, side_kept
 from dorothie_gym.sim.pedestrians.jaywalking import steps_out, stray
-from dorothie_gym.sim.pedestrians.pacing import AHEAD, LEVEL, PATIENCE, note_progress, walk_towards
+from dorothie_gym.sim.pedestrians.pacing import OBSTACLE_PATIENCE, WALK_AHEAD, note_progress, walk_towards
 from dorothie_gym.sim.randomness import draw
 from dorothie_gym.sim.state.codes import NOBODY, Colour, Footway, Kind, Walk
 from dorothie_gym.sim.state.records import CrossingRecord, PedestrianRecord, VehicleRecord, WalkwayRecord
 from dorothie_gym.sim.traffic.junctions import light
-from dorothie_gym.sim.traffic.parameters import STANDING
+from dorothie_gym.sim.traffic.parameters import TRAFFIC_STANDING
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 
-REACTION = 1.0
+EXPECTED_REACTION = 1.0
 """Reaction time of drivers that pedestrians count on [s]."""
 
-BRAKING = 3.0
+EXPECTED_BRAKING = 3.0
 """Deceleration of vehicles that pedestrians count on [m/s^2]."""
 
 ROOM = 4.0
@@ -42,7 +43,7 @@ CROSSING_SHARE = 0.35
 GIVES_UP = 40.0
 """Wait at a crosswalk after which a pedestrian walks on [s]."""
 
-REST = 5.0
+CROSSING_PAUSE = 5.0
 """Time after leaving a crosswalk without crossing again [s]."""
 
 PLACES, PLACES_APART = 3, 0.7
@@ -60,7 +61,7 @@ READY = 1.0
 HALF_DEPTH = 1.5
 """Half the extent of a crosswalk along the road [m]."""
 
-OVER = 0.1
+CROSSED = 0.1
 """Distance to the end of a crosswalk at which a pedestrian has crossed [m]."""
 
 
@@ -101,7 +102,7 @@ def wait(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
     if abs(walker.x - x) > READY or abs(walker.y - y) > READY:
         ready = False
     else:
-        ready = _may_step(town, world, crossing, (FROM_PAINT + crossing.length + AHEAD) / walker.pace)
+        ready = _may_step(town, world, crossing, (FROM_PAINT + crossing.length + WALK_AHEAD) / walker.pace)
     if ready:
         walker.state, walker.waited, walker.speed = Walk.CROSSING, 0.0, 0.0
         _advance(crossing, walker)
@@ -115,19 +116,19 @@ def cross(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
     walker = world.pedestrians[p]
     crossing = town.crossings[walker.crossing]
     lateral = _advance(crossing, walker)
-    if crossing.length - walker.station < OVER if walker.direction > 0.0 else walker.station < OVER:
+    if crossing.length - walker.station < CROSSED if walker.direction > 0.0 else walker.station < CROSSED:
         walker.mouth = 1 if walker.direction > 0.0 else 0
         _leave(town, walker)
         return
     cos, sin = walker.direction * crossing.cos, walker.direction * crossing.sin
-    ahead = walker.station + walker.direction * AHEAD
-    x = crossing.x[0] + ahead * crossing.cos - ASIDE * sin
-    y = crossing.y[0] + ahead * crossing.sin + ASIDE * cos
+    ahead = walker.station + walker.direction * WALK_AHEAD
+    x = crossing.x[0] + ahead * crossing.cos - KEEP_RIGHT * sin
+    y = crossing.y[0] + ahead * crossing.sin + KEEP_RIGHT * cos
     if walk_towards(world, p, x, y, cos, sin, walker.direction * lateral, HALF_DEPTH, time):
         walker.waited = 0.0
         return
     walker.waited += time
-    if walker.waited > PATIENCE:
+    if walker.waited > OBSTACLE_PATIENCE:
         walker.direction, walker.waited = -walker.direction, 0.0
 
 
@@ -147,7 +148,7 @@ def _leave(town: TownArrays, walker: PedestrianRecord) -> None:
     walker.walk, walker.station = crossing.walk[walker.mouth], crossing.station[walker.mouth]
     find_segment(town, walker)
     walker.direction = 1.0 if draw(walker) < 0.5 else -1.0
-    walker.state, walker.crossing, walker.waited, walker.speed = Walk.WALKING, NOBODY, -REST, 0.0
+    walker.state, walker.crossing, walker.waited, walker.speed = Walk.WALKING, NOBODY, -CROSSING_PAUSE, 0.0
 
 
 @compiled
@@ -177,14 +178,16 @@ def _is_danger(vehicle: VehicleRecord, crossing: CrossingRecord) -> bool:
     along = min(max(dx * crossing.cos + dy * crossing.sin, 0.0), crossing.length)
     dx, dy = crossing.x[0] + along * crossing.cos - vehicle.x, crossing.y[0] + along * crossing.sin - vehicle.y
     away = dx * dx + dy * dy
-    if away > VEHICLES_SIGHT * VEHICLES_SIGHT or abs(vehicle.height - crossing.height) > LEVEL:
+    if away > VEHICLES_SIGHT * VEHICLES_SIGHT or abs(vehicle.height - crossing.height) > LEVEL_HEIGHT:
         return False
     front = math.sqrt(away) - 0.5 * vehicle.length
     if front < HALF_DEPTH:
         return True
-    if vehicle.speed < STANDING or (dx * vehicle.cos + dy * vehicle.sin < 0.0 and front > ROOM):
+    if vehicle.speed < TRAFFIC_STANDING or (dx * vehicle.cos + dy * vehicle.sin < 0.0 and front > ROOM):
         return False  # it stands before it, or has passed
-    return bool(front < ROOM + REACTION * vehicle.speed + vehicle.speed * vehicle.speed / (2.0 * BRAKING))
+    return bool(
+        front < ROOM + EXPECTED_REACTION * vehicle.speed + vehicle.speed * vehicle.speed / (2.0 * EXPECTED_BRAKING)
+    )
 
 
 # --- Walking ----------------------------------------------------------------------------------------------------------
@@ -195,7 +198,7 @@ PACE = 5
 BLOCKED = 3.0
 """Time without a step after which a pedestrian turns round [s]."""
 
-CORNER = 0.5
+CORNER_REACH = 0.5
 """Distance before the end of a footway at which a pedestrian turns the corner [m]."""
 
 
@@ -245,7 +248,7 @@ def _stroll(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
     walker = world.pedestrians[p]
     lateral = locate(town, walker)
     way = town.walks[walker.walk]
-    if walker.station > way.length - CORNER if walker.direction > 0.0 else walker.station < CORNER:
+    if walker.station > way.length - CORNER_REACH if walker.direction > 0.0 else walker.station < CORNER_REACH:
         enter_next(town, walker)
         lateral = locate(town, walker)
         way = town.walks[walker.walk]
@@ -254,7 +257,7 @@ def _stroll(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
             return
     elif walker.waited >= 0.0 and comes_to_crosswalk(town, walker, way, time):
         return
-    x, y, cos, sin = place_beside(town, walker, walker.station + walker.direction * AHEAD, side_kept(way))
+    x, y, cos, sin = place_beside(town, walker, walker.station + walker.direction * WALK_AHEAD, side_kept(way))
     if walk_towards(world, p, x, y, cos, sin, walker.direction * lateral, way.half_width, time):
         walker.waited = min(walker.waited + time, 0.0)
         return

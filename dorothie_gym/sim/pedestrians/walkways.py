@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.lane_neighbours import LaneEdges
-from dorothie_gym.maps.model import Array, Crosswalk, Lane, Sidewalk
+from dorothie_gym.maps.model import LEVEL_HEIGHT, Array, Crosswalk, Lane, Sidewalk
 from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.footways import street_walks
@@ -29,10 +29,10 @@ from dorothie_gym.sim.state.records import (
     filled_records,
 )
 
-JOINT = 0.5
+SAME_END = 0.5
 """Distance within which ends of pavements are one place [m]."""
 
-CORNER = 45.0
+LONGEST_CORNER = 45.0
 """Longest way from the end of one pavement to one of another, if no lane lies between [m]."""
 
 CORNER_WIDTH = 1.4
@@ -41,7 +41,7 @@ CORNER_WIDTH = 1.4
 BOWS = 0.0, 2.0, -2.0, 4.0, -4.0, 6.0, -6.0
 """Offsets from the straight line at which such ways are tried [m]: round the outside of a bend they lead in a bow."""
 
-CLEARANCE = 0.8
+LANE_CLEARANCE = 0.8
 """Least distance of their middles from the lanes' edges [m]."""
 
 STREET_HALF_WIDTH = 0.8
@@ -58,9 +58,6 @@ SAMPLE = 0.5
 
 CROSSWALK_DEPTH = 3.0
 """Along the road (MUTCD 2009, section 3B.18: at least 6 feet) [m]."""
-
-LEVEL = 2.5
-"""Difference of height from which on lanes do not pass a crosswalk [m]."""
 
 
 _End: TypeAlias = tuple[int, int]
@@ -151,7 +148,7 @@ def _corners(sidewalks: Sequence[Sidewalk], edges: LaneEdges) -> _Corners:
             continue
         other, points = way
         pair = min(one, other), max(one, other)
-        if np.hypot(*(places[one] - places[other])[:2]) < JOINT:
+        if np.hypot(*(places[one] - places[other])[:2]) < SAME_END:
             found.onward[ends[one]] = ends[other]
             continue
         if pair not in numbers:
@@ -165,9 +162,9 @@ def _corners(sidewalks: Sequence[Sidewalk], edges: LaneEdges) -> _Corners:
 def _near(ends: Sequence[_End], places: Array) -> list[list[int]]:
     """For each end the others that are not far away, the nearest first; back along one's own pavement is no way on."""
     near: list[list[tuple[float, int]]] = [[] for _ in ends]
-    for one, other in sorted(cKDTree(places[:, :2]).query_pairs(CORNER)):
+    for one, other in sorted(cKDTree(places[:, :2]).query_pairs(LONGEST_CORNER)):
         gap = float(np.hypot(*(places[one] - places[other])[:2]))
-        if abs(places[one, 2] - places[other, 2]) < LEVEL and (ends[one][0] != ends[other][0] or gap < JOINT):
+        if abs(places[one, 2] - places[other, 2]) < LEVEL_HEIGHT and (ends[one][0] != ends[other][0] or gap < SAME_END):
             near[one].append((gap, other))
             near[other].append((gap, one))
     return [[other for _, other in sorted(others)] for others in near]
@@ -180,12 +177,12 @@ def _way_on(places: Array, one: int, others: Sequence[int], edges: LaneEdges) ->
             line = places[[one, other]]
             across = line[1, :2] - line[0, :2]
             length = float(np.hypot(*across))
-            if length < JOINT:
+            if length < SAME_END:
                 return other, line
             if bow != 0.0:
                 aside = bow / length * np.array([-across[1], across[0], 0.0])
                 line = np.array([line[0], *(line[0] + s * (line[1] - line[0]) + aside for s in (0.25, 0.75)), line[1]])
-            if all(edges.is_clear(leg, float(line[0, 2]), CLEARANCE) for leg in itertools.pairwise(line)):
+            if all(edges.is_clear(leg, float(line[0, 2]), LANE_CLEARANCE) for leg in itertools.pairwise(line)):
                 return other, line
     return None
 
@@ -292,7 +289,7 @@ def _passage(lane: Lane, crossing: CrossingRecord) -> tuple[float, float, float]
     along = dx * crossing.cos + dy * crossing.sin
     aside = np.abs(dy * crossing.cos - dx * crossing.sin)
     on = (aside < CROSSWALK_DEPTH / 2) & (along > 0.0) & (along < crossing.length)
-    on &= np.abs(z - crossing.height) < LEVEL
+    on &= np.abs(z - crossing.height) < LEVEL_HEIGHT
     if not on.any():
         return None
     return float(stations[on][0]), float(stations[on][-1]), float(along[on].mean())

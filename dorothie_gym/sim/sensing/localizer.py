@@ -35,7 +35,7 @@ GYRO_NOISE = math.radians(0.05)
 STANDS = 1e-3
 """Movement in a frame below which the car stands [m], and is known not to turn."""
 
-DRAWS = 4
+ODOMETRY_DRAWS = 4
 """Normal numbers that a frame takes: of the bias, the gyro, the slip and the skid."""
 
 STATES = 5
@@ -156,7 +156,7 @@ class Localizer:
             frame: number of the first pose's frame.
             gps_from: there is no GPS before this frame.
         """
-        draws = self._rng.standard_normal((len(track) - 1, DRAWS + 2))
+        draws = self._rng.standard_normal((len(track) - 1, ODOMETRY_DRAWS + 2))
         follow(track, draws, frame, gps_from, 1.0 / FRAME_RATE, self._mean, self._covariance, self._truth)
 
 
@@ -182,7 +182,7 @@ def follow(
         now = frame + k + 1
         if now % FIX_EVERY == 0 and now >= gps_from:
             for axis in range(2):
-                correct(mean, covariance, axis, track[k + 1, axis] + GPS_SIGMA * draws[k, DRAWS + axis])
+                correct(mean, covariance, axis, track[k + 1, axis] + GPS_SIGMA * draws[k, ODOMETRY_DRAWS + axis])
 
 
 @compiled

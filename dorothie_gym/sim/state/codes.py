@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from typing import Any
+from typing import cast
 
 import numpy as np
 
@@ -17,8 +17,9 @@ VEHICLES, PEDESTRIAN_CLASS, STATIC = (
 U_TURN = int(PhysicalAction.U_TURN.value)
 """The manoeuvre U-turn, as a plain number."""
 
-NOBODY: Any = np.int64(-1)
-"""No lane, node or body. With a plain number numba would compile its readers twice: for this value, and for others."""
+NOBODY = cast(int, np.int64(-1))
+"""No lane, node or body: a NumPy integer. For a plain number numba would compile its readers twice, for this value and
+for others."""
 
 
 class Kind(enum.IntEnum):

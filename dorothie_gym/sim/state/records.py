@@ -395,7 +395,7 @@ class EgoRecord:
     at: Int32
     s: Float  # distance along the path, and offset to its right [m]
     offset: Float
-    stop_at: Float  # place of a stop at the path's end [m]; infinite where the path goes on
+    stop_at: Float  # place of a stop at the path's end [m]; infinite where the path continues
     runs: Int32  # number of lanes along the path, and the one of the ego
     run: Int32
     run_lane: Annotated[NDArray[np.int32], "i4", (PLANNED,)]

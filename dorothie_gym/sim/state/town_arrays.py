@@ -33,7 +33,7 @@ from dorothie_gym.sim.state.records import (
 )
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CURVE_ACCELERATION, CYCLIST_ROADS
 
-SIDE_BY_SIDE = 2.5
+PASSING_WIDTH = 2.5
 """Two vehicles whose middles are this far apart across their lanes pass one another [m]: they are 2 m wide."""
 
 CAR_REAR = CAR_LENGTH / 2
@@ -247,7 +247,7 @@ def _siblings(town: Town, lanes: RecordArray[LaneRecord]) -> RecordArray[Sibling
 def _parting(lane: Lane, other: Lane) -> float:
     """Station on the other lane from which on it is clear of a lane that begins where it does [m]."""
     for station in np.arange(0.0, other.length, 1.0):
-        if abs(lane.project(other.position(float(station)))[1]) > SIDE_BY_SIDE:
+        if abs(lane.project(other.position(float(station)))[1]) > PASSING_WIDTH:
             return float(station) + CAR_REAR
     return other.length + CAR_REAR
 

@@ -1,15 +1,16 @@
-"""Arrays of a world: the state that the compiled loops read and write."""
+"""Arrays of a world: the state that the compiled loops read and write, and the log that they keep of the ego."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array
-from dorothie_gym.sim.state.codes import NOBODY
+from dorothie_gym.sim.state.codes import NOBODY, U_TURN
 from dorothie_gym.sim.state.records import (
     POSE,
     TRACE,
@@ -91,23 +92,23 @@ class WorldArrays(NamedTuple):
         """Memory of all arrays [bytes]."""
         return sum(array.nbytes for array in self)
 
-    def plain(self) -> list[NDArray[Any]]:
+    def plain(self) -> list[NDArray[np.generic]]:
         """Returns the arrays as plain NumPy arrays that share their memory."""
         return [np.asarray(array) for array in self]
 
     def copy(self) -> WorldArrays:
         """Returns a copy of the world."""
-        return WorldArrays(*(_copy_of(array) for array in self))
+        return WorldArrays._make(_copy_of(array) for array in self.plain())
 
     def tobytes(self) -> bytes:
         """Returns the state byte by byte, to compare worlds."""
         return b"".join(array.tobytes() for array in self)
 
 
-def _copy_of(array: Any) -> Any:
+def _copy_of(array: NDArray[np.generic]) -> NDArray[np.generic]:
     """Returns a copy with all bytes, also those between the fields of records, which NumPy leaves out."""
     copied = np.frombuffer(bytearray(array.tobytes()), dtype=array.dtype).reshape(array.shape)
-    return copied.view(np.recarray) if isinstance(array, np.recarray) else copied
+    return copied.view(np.recarray) if array.dtype.names else copied
 
 
 def empty_world(
@@ -182,7 +183,45 @@ def grown(town: TownArrays, world: WorldArrays, *, vehicles: int, pedestrians: i
     driven = len(world.path) > 1
     bigger = empty_world(town, vehicles=vehicles, pedestrians=pedestrians, props=props, driven=driven)
     for name, old, new in zip(WorldArrays._fields, world.plain(), bigger.plain(), strict=True):
-        if name not in ("nodes", "heads", "order", "keys"):  # made anew from the bodies, whose numbers they hold
+        if name not in ("nodes", "heads", "order", "keys"):  # rebuilt from the bodies, whose numbers they hold
             new[: len(old)] = old
     rebuild(town, bigger)
     return bigger
+
+
+# --- Log of the ego: trajectory, poses and events ---------------------------------------------------------------------
+
+
+@inlined
+def trace(world: WorldArrays) -> None:
+    """Logs the ego's state after a substep, see `records.TRACE` and `records.POSE`."""
+    car, vehicle = world.car[0], world.vehicles[0]
+    rows, k = world.trace, int(car.frames)
+    car.frames += 1
+    rows[k, 0], rows[k, 1], rows[k, 2] = world.clock[0].frame, vehicle.x, vehicle.y
+    rows[k, 3], rows[k, 4] = vehicle.heading, vehicle.speed
+    rows[k, 5], rows[k, 6], rows[k, 7], rows[k, 8] = car.throttle, car.steer, car.brake, car.run_lane[car.run]
+    rows[k, 9] = car.offset
+    note_pose(world, k + 1)
+
+
+@inlined
+def note_pose(world: WorldArrays, k: int) -> None:
+    """Logs the pose of the ego in a row of its poses."""
+    car, vehicle, rows = world.car[0], world.vehicles[0], world.poses
+    rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = vehicle.x, vehicle.y, vehicle.heading, vehicle.speed
+    rows[k, 4], rows[k, 5] = vehicle.height, 1.0 if car.action == U_TURN and world.path[car.at].manoeuvre else 0.0
+
+
+@compiled
+def log(world: WorldArrays, code: int, kind: int, key: int, value: float) -> int:
+    """Logs an event of the ego; returns its row in `events`."""
+    car, vehicle = world.car[0], world.vehicles[0]
+    if car.events == len(world.events):
+        raise ValueError("the ego had more events in one call than its log has room for")
+    event = world.events[car.events]
+    car.events += 1
+    event.frame, event.code, event.kind, event.key, event.value = world.clock[0].frame, code, kind, key, value
+    event.x, event.y, event.own, event.body = vehicle.x, vehicle.y, False, -1
+    event.lane, event.station = vehicle.plan[0], vehicle.station
+    return int(car.events) - 1

@@ -6,8 +6,9 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.sim.ego.limits import U_TURN_SAMPLES
-from dorothie_gym.sim.network.ahead import HORIZON, LEVEL
+from dorothie_gym.sim.network.ahead import HORIZON
 from dorothie_gym.sim.network.lane_lookup import project
 from dorothie_gym.sim.pedestrians.jaywalking import give_way_to_strayers
 from dorothie_gym.sim.state.codes import NOBODY, Kind, Wait, Walk
@@ -40,9 +41,9 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 NO_ROOM_PATIENCE = 5.0
-"""Wait for room behind a junction after which a vehicle draws its route anew [s]."""
+"""Wait for room behind a junction after which a vehicle draws another route [s]."""
 
-SLOWEST = 0.5
+SLOWEST_BEND = 0.5
 """Least speed in a bend [m/s]."""
 
 CURVES_SIGHT = 40.0
@@ -89,7 +90,7 @@ def _acceleration(town: TownArrays, world: WorldArrays, i: int) -> float:
         lane = town.lanes[vehicle.plan[k]]
         if lane.curve_speed < target:
             reachable = lane.curve_speed * lane.curve_speed + 2.0 * CURVE_BRAKING * max(begin, 0.0)
-            target = min(target, max(math.sqrt(reachable), SLOWEST))
+            target = min(target, max(math.sqrt(reachable), SLOWEST_BEND))
         if front < 0:
             front, place = _first_on(town, world, i, k, lane)
             gap = begin + place
@@ -123,7 +124,7 @@ def _give_way_to_turning(town: TownArrays, world: WorldArrays, vehicle: VehicleR
     if not car.sweeping:
         return math.inf
     dx, dy = other.x - vehicle.x, other.y - vehicle.y
-    if dx * dx + dy * dy > CROSSING_SIGHT * CROSSING_SIGHT or abs(other.height - vehicle.height) > LEVEL:
+    if dx * dx + dy * dy > CROSSING_SIGHT * CROSSING_SIGHT or abs(other.height - vehicle.height) > LEVEL_HEIGHT:
         return math.inf
     gap, start = math.inf, 0.0
     beside = 0.5 * (vehicle.width + other.width) + CROSSING_MARGIN
@@ -135,7 +136,7 @@ def _give_way_to_turning(town: TownArrays, world: WorldArrays, vehicle: VehicleR
                 gap = min(gap, start + station - vehicle.station)
         start += lane.length
     gap -= 0.5 * (vehicle.length + other.length)
-    # a vehicle that is in its way already goes on
+    # a vehicle that is in its way already drives on
     return brake_to(vehicle.speed, gap) if -1.0 < gap < math.inf else math.inf
 
 
@@ -218,7 +219,7 @@ def _approach(town: TownArrays, world: WorldArrays, i: int, k: int, line: float,
 
 @compiled
 def _choose_another_way(town: TownArrays, vehicle: VehicleRecord, k: int, now: float) -> None:
-    """Draws the route beyond the first `k` planned lanes anew after a long wait for room behind the junction.
+    """Draws another route beyond the first `k` planned lanes after a long wait for room behind the junction.
 
     This resolves gridlocks: rings of full lanes in which every vehicle waits for the next one.
     """

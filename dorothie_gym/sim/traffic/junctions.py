@@ -10,6 +10,7 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.maps.traffic_light_programs import YELLOW_BRAKING
 from dorothie_gym.sim.state.codes import NOBODY, Colour, Kind, Relation, TrafficControl, Wait
 from dorothie_gym.sim.state.records import LaneRecord, VehicleRecord
 from dorothie_gym.sim.traffic.parameters import (
@@ -17,7 +18,6 @@ from dorothie_gym.sim.traffic.parameters import (
     AT_LINE,
     CLOSED,
     COMFORT,
-    COMFORTABLE_BRAKING,
     CRITICAL_GAP,
     CYCLIST_ACCELERATION,
     GIVING_WAY_PATIENCE,
@@ -29,8 +29,8 @@ from dorothie_gym.sim.traffic.parameters import (
     ROOM_SIGHT,
     SLOW,
     SNEAKING,
-    STANDING,
     START,
+    TRAFFIC_STANDING,
     UNUSED,
 )
 
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 EARLY = 1e-6
-"""Time before the end of a phase at which it is looked up anew, so that rounding does not matter [s]."""
+"""Time before the end of a phase at which it is looked up again, so that rounding does not matter [s]."""
 
 
 @compiled
@@ -88,7 +88,7 @@ def announce(vehicle: VehicleRecord, lane: int, connector: int, distance: float,
             vehicle.since, vehicle.asked = math.inf, -math.inf
         vehicle.approach, vehicle.approach_lane, vehicle.wait = connector, lane, Wait.NOT
     vehicle.distance, vehicle.seen = distance, now
-    if vehicle.speed < STANDING and distance < AT_LINE:
+    if vehicle.speed < TRAFFIC_STANDING and distance < AT_LINE:
         vehicle.stood = True
 
 
@@ -135,7 +135,7 @@ def note(town: TownArrays, vehicle: VehicleRecord, now: float) -> None:
             vehicle.inside, vehicle.claim = followed, NOBODY
             forget(vehicle)
         else:
-            if vehicle.speed > STANDING:
+            if vehicle.speed > TRAFFIC_STANDING:
                 vehicle.claim_since = now
             if now - vehicle.claim_since > UNUSED or now - vehicle.claim_asked > LAPSE:
                 vehicle.claim = NOBODY
@@ -243,7 +243,7 @@ def _light_stops(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord, n
     braking = vehicle.speed * vehicle.speed / (2.0 * max(vehicle.distance, 0.1))
     if colour == Colour.RED or vehicle.wait == Wait.LIGHT:
         return bool(braking <= HARDEST_BRAKING)
-    return bool(braking <= COMFORTABLE_BRAKING) and not _may_sneak(town, world, vehicle, now, let_in)
+    return bool(braking <= YELLOW_BRAKING) and not _may_sneak(town, world, vehicle, now, let_in)
 
 
 @compiled
@@ -296,7 +296,7 @@ def _is_coming(town: TownArrays, world: WorldArrays, j: int, now: float) -> bool
         return False  # it waits for others itself
     if other.wait == Wait.CLOSED or other.wait == Wait.NO_ROOM:
         return False
-    if other.speed < STANDING:  # about to start, unless its way is occupied
+    if other.speed < TRAFFIC_STANDING:  # about to start, unless its way is occupied
         return bool(other.distance < AT_LINE) and not _is_occupied(town, world, j)
     return bool(other.distance < CRITICAL_GAP * other.speed)
 

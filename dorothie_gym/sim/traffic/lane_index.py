@@ -1,4 +1,4 @@
-"""Lane index: for every lane the list of bodies on it, ordered by station and made anew each substep.
+"""Lane index: for every lane the list of bodies on it, ordered by station and rebuilt in each substep.
 
 A vehicle is in the list of the lane that is closest and, where that is another one, of the lane that it follows; while
 it changes lanes, of that one as soon as highway-env counts it as on it. A vehicle that follows the closest lane,
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.sim.network.ahead import HORIZON, MARGIN
+from dorothie_gym.sim.network.ahead import HORIZON, LANE_MARGIN
 from dorothie_gym.sim.network.lane_lookup import project
 from dorothie_gym.sim.state.codes import NOBODY, Kind
 from dorothie_gym.sim.state.records import NodeRecord, RecordArray, VehicleRecord
@@ -64,7 +64,7 @@ def _is_on_followed(town: TownArrays, vehicle: VehicleRecord) -> bool:
     beside = lane.left == vehicle.plan[0] or lane.right == vehicle.plan[0]
     if not beside and vehicle.kind != Kind.DRIVEN:  # which may turn round, across both
         return True  # one lane leads into the other, or they cross in a junction
-    return bool(abs(vehicle.lateral) <= town.lanes[vehicle.plan[0]].half_width + MARGIN)
+    return bool(abs(vehicle.lateral) <= town.lanes[vehicle.plan[0]].half_width + LANE_MARGIN)
 
 
 @inlined

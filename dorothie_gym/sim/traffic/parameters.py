@@ -19,7 +19,7 @@ CLOSING = 2.0 * math.sqrt(-IDMVehicle.COMFORT_ACC_MAX * IDMVehicle.COMFORT_ACC_M
 """Twice the root of the product of desired acceleration and deceleration [m/s^2]."""
 
 STANDING_GAP = float(IDMVehicle.DISTANCE_WANTED - IDMVehicle.LENGTH)
-"""Room between two vehicles that stand [m]; stock counts it from middle to middle of vehicles of 5 m."""
+"""Room between two vehicles that stand [m]; highway-env counts it from middle to middle of vehicles of 5 m."""
 
 TIME_WANTED = float(IDMVehicle.TIME_WANTED)
 """Desired time gap [s]."""
@@ -48,7 +48,7 @@ TAU_PURSUIT = float(IDMVehicle.TAU_PURSUIT)
 LARGEST_HEADING = math.pi / 4
 """Largest angle to the lane that is steered for [rad], `ControlledVehicle.steering_control`."""
 
-MAX_SLIP = math.sin(math.atan(0.5 * math.tan(float(IDMVehicle.MAX_STEERING_ANGLE))))
+MAX_SLIP_SINE = math.sin(math.atan(0.5 * math.tan(float(IDMVehicle.MAX_STEERING_ANGLE))))
 """Sine of the slip angle at full lock of the steering wheel."""
 
 MAX_SPEED = float(Vehicle.MAX_SPEED)
@@ -147,9 +147,6 @@ CLEAR_OF_BODIES = 6.0
 
 # --- Junctions --------------------------------------------------------------------------------------------------------
 
-COMFORTABLE_BRAKING = 3.0
-"""Deceleration up to which a vehicle stops before a yellow light [m/s^2] (ITE's 10 ft/s^2 for yellow times)."""
-
 HARDEST_BRAKING = 6.0
 """Deceleration beyond which a vehicle no longer stops before a red light [m/s^2]."""
 
@@ -171,7 +168,7 @@ AT_LINE = 3.5
 OVER_LINE = 0.5
 """Distance over the line from which on a vehicle no longer stops for its light [m]."""
 
-STANDING = 0.3
+TRAFFIC_STANDING = 0.3
 """Speed below which a vehicle of the traffic counts as standing [m/s]."""
 
 UNUSED = 3.0
@@ -205,7 +202,7 @@ ROOM_SIGHT = 60.0
 """Distance behind a junction within which slow vehicles count against its room [m]."""
 
 ROOM_EACH = 10.0
-"""Lane that a vehicle takes up in a queue: its length and the distance that stock's IDM keeps [m]."""
+"""Lane that a vehicle takes up in a queue: its length and the distance that highway-env's IDM keeps [m]."""
 
 SLOW = 4.0
 """Speed below which a vehicle behind a junction may be in the way [m/s]; in a U-turn the ego does 3.5 m/s."""

@@ -22,11 +22,11 @@ from dorothie_gym.sim.traffic.parameters import (
     CLEAR_OF_PEOPLE,
     GOES_HOME,
     OUT_OF_SIGHT,
-    STANDING,
     TOW_BLOCKED,
     TOW_CRASHED,
     TOW_FACING,
     TOW_STUCK,
+    TRAFFIC_STANDING,
 )
 from dorothie_gym.sim.traffic.route import keep_side, take
 
@@ -40,13 +40,13 @@ USUAL_LENGTH = 100.0
 SHORTEST = 12.0
 """Length of the shortest lane on which vehicles appear [m]."""
 
-DRAWS = 200
+RESPAWN_DRAWS = 200
 """Places drawn for a respawn; where none of them is free, a vehicle is removed, a pedestrian tries again."""
 
 LOOK_EVERY = 6
 """Substeps between two checks whether a standing vehicle waits for its light."""
 
-FACING = 6.0
+FACING_DISTANCE = 6.0
 """Distance from a vehicle's outline to the middle of the ego within which it stands before the ego [m]."""
 
 
@@ -66,7 +66,7 @@ def tow(town: TownArrays, world: WorldArrays, dt: float, turning: bool = False) 
         if vehicle.kind == Kind.CAR or vehicle.kind == Kind.CYCLIST:
             if vehicle.crashed:
                 vehicle.crash_age += dt
-            if vehicle.speed >= STANDING:
+            if vehicle.speed >= TRAFFIC_STANDING:
                 vehicle.stuck = 0.0
             elif (frame + i) % LOOK_EVERY == 0 and _may_go(town, world, vehicle):
                 vehicle.stuck += LOOK_EVERY * dt
@@ -116,7 +116,7 @@ def faces_turning_car(world: WorldArrays, vehicle: VehicleRecord, turning: bool)
     if not turning or car.kind != Kind.DRIVEN or car.speed >= EGO_STANDING:
         return False
     dx, dy = vehicle.x - car.x, vehicle.y - car.y
-    reach = FACING + vehicle.radius
+    reach = FACING_DISTANCE + vehicle.radius
     return bool(dx * dx + dy * dy < reach * reach)
 
 
@@ -126,7 +126,7 @@ def _bring_back(town: TownArrays, world: WorldArrays, i: int) -> None:
     vehicle = world.vehicles[i]
     vehicle.key, vehicle.touched = new_key(world), False
     world.clock[0].towed += 1
-    for _ in range(DRAWS):
+    for _ in range(RESPAWN_DRAWS):
         number = choose(vehicle, len(town.lanes))
         lane = town.lanes[number]
         if lane.junction >= 0 or lane.length < SHORTEST or draw(vehicle) * USUAL_LENGTH > lane.length:
@@ -146,7 +146,7 @@ def _come_back(town: TownArrays, world: WorldArrays, p: int) -> None:
     walker = world.pedestrians[p]
     kind = Footway.STREET if town.walks[walker.walk].kind == Footway.STREET else Footway.PAVEMENT
     before, at, segment, direction = walker.walk, walker.station, walker.segment, walker.direction
-    for _ in range(DRAWS):
+    for _ in range(RESPAWN_DRAWS):
         walker.walk = choose(walker, len(town.walks))
         way = town.walks[walker.walk]
         if way.kind != kind or draw(walker) * USUAL_LENGTH > way.length:

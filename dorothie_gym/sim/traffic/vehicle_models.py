@@ -29,7 +29,7 @@ from dorothie_gym.sim.traffic.parameters import (
     LANE_CHANGE_DELAY,
     LANE_CHANGE_GAIN,
     LARGEST_HEADING,
-    MAX_SLIP,
+    MAX_SLIP_SINE,
     MAX_SPEED,
     STANDING_GAP,
     STOP_BRAKING,
@@ -127,7 +127,7 @@ def slip_towards(
     else:
         back = math.asin(back)
     rate = KP_HEADING * wrap_radians(ahead + back - vehicle.heading)
-    return float(min(max(vehicle.length / 2.0 / speed * rate, -MAX_SLIP), MAX_SLIP))
+    return float(min(max(vehicle.length / 2.0 / speed * rate, -MAX_SLIP_SINE), MAX_SLIP_SINE))
 
 
 @compiled

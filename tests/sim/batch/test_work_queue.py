@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import concurrent
-from dorothie_gym.sim.batch.work_queue import take, turns_of
+from dorothie_gym.sim.batch.threads import take, turns_of
 
 NUMBERS = 20_000
 

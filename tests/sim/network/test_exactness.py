@@ -10,7 +10,7 @@ from highway_env.road.road import RoadNetwork
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.polyline import distance, value_at
-from dorothie_gym.sim.network.grid import CELL, SAME_LEVEL
+from dorothie_gym.sim.network.grid import GRID_CELL, SAME_LEVEL
 from dorothie_gym.sim.network.network import TownNetwork
 
 from .towns import EVERY_TOWN, find_town
@@ -112,7 +112,7 @@ def at_cell_borders(network: TownNetwork, rng: np.random.Generator, count: int) 
     """On the lines where one cell of the index ends and the next begins."""
     places = on_roads(network, rng, count)
     origin = np.array(network._grid.origin)
-    snapped = origin + CELL * np.round((places[:, :2] - origin) / CELL)
+    snapped = origin + GRID_CELL * np.round((places[:, :2] - origin) / GRID_CELL)
     places[:, :2] = np.where(rng.random((count, 2)) < 0.6, snapped, places[:, :2])
     return places
 

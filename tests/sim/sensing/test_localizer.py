@@ -16,10 +16,10 @@ from dorothie_gym.sim.sensing.localizer import (
     BIAS_SIGMA,
     BIAS_WALK,
     DEPARTURE_SIGMAS,
-    DRAWS,
     FIX_EVERY,
     GPS_SIGMA,
     GYRO_NOISE,
+    ODOMETRY_DRAWS,
     SCALE_SIGMA,
     SKID,
     SLIP,
@@ -216,14 +216,14 @@ def test_estimates_are_those_of_filterpy() -> None:
     reference = Reference(track[0])
     scale, bias = numbers.standard_normal(2)
     truth = np.array([1.0 + SCALE_SIGMA * scale, BIAS_SIGMA * bias])
-    draws = numbers.standard_normal((len(track) - 1, DRAWS + 2))
+    draws = numbers.standard_normal((len(track) - 1, ODOMETRY_DRAWS + 2))
     for k in range(0, len(track) - 1, FIX_EVERY):
         gps_from = 5400 if 4500 <= k < 5400 else 0
         localizer.localize(track[k : k + FIX_EVERY + 1], k, gps_from=gps_from)
         for frame in range(k, k + FIX_EVERY):
             reference.go(*measure(track, draws, frame, DT, truth))
         if k + FIX_EVERY >= gps_from:
-            fix = track[k + FIX_EVERY, :2] + GPS_SIGMA * draws[k + FIX_EVERY - 1, DRAWS:]
+            fix = track[k + FIX_EVERY, :2] + GPS_SIGMA * draws[k + FIX_EVERY - 1, ODOMETRY_DRAWS:]
             reference.update(fix, lambda _: np.eye(2, 5), lambda state: state[:2])
         np.testing.assert_allclose(localizer.pose, reference.x[:3], rtol=0.0, atol=1e-9)
         np.testing.assert_allclose(localizer.covariance, reference.P[:3, :3], rtol=0.0, atol=1e-9)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.sim.sensing.localizer import BIAS_WALK, DRAWS, STATES, measure, reckon
+from dorothie_gym.sim.sensing.localizer import BIAS_WALK, ODOMETRY_DRAWS, STATES, measure, reckon
 
 DT = 1 / 30
 
@@ -17,7 +17,7 @@ def curve(frames: int = 90) -> Array:
 
 
 def exact(frames: int = 90) -> Array:
-    return np.zeros((frames, DRAWS))
+    return np.zeros((frames, ODOMETRY_DRAWS))
 
 
 def dead_reckon(
@@ -80,7 +80,7 @@ def test_covariance_moves_as_the_derivatives_of_dead_reckoning_have_it(believed:
 
 
 def test_a_standing_car_counts_neither_way_nor_turn() -> None:
-    draws = np.random.default_rng(0).standard_normal((30, DRAWS))
+    draws = np.random.default_rng(0).standard_normal((30, ODOMETRY_DRAWS))
     mean, covariance = dead_reckon(np.tile([1.0, 2.0, 0.3], (31, 1)), draws, (1.02, 0.01), (0.3, 1.0, 0.0))
     np.testing.assert_array_equal(mean, [0.0, 0.0, 0.3, 1.0, 0.0])
     assert covariance[4, 4] == pytest.approx(BIAS_WALK**2 * 1.0)
@@ -89,7 +89,7 @@ def test_a_standing_car_counts_neither_way_nor_turn() -> None:
 
 def test_covariance_has_the_spread_of_what_dead_reckoning_makes() -> None:
     track = curve(45)
-    draws = np.random.default_rng(2).standard_normal((6000, 45, DRAWS))
+    draws = np.random.default_rng(2).standard_normal((6000, 45, ODOMETRY_DRAWS))
     ends = np.array([dead_reckon(track, draw, (1.0, 0.0), (0.7, 1.0, 0.0))[0][:3] for draw in draws])
     covariance = dead_reckon(track, exact(45), (1.0, 0.0), (0.7, 1.0, 0.0))[1][:3, :3]
     found, spread = np.cov(ends.T), np.sqrt(np.diag(covariance))

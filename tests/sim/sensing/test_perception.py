@@ -10,8 +10,7 @@ import pytest
 
 from dorothie_gym.ontology import ObjectClass, PropKind, Sensor, WeatherParameter
 from dorothie_gym.sim.ego.obstacles import PerceivedBody
-from dorothie_gym.sim.sensing.perception import Perception, detection_probability, position_error
-from dorothie_gym.sim.sensing.seeing import see
+from dorothie_gym.sim.sensing.perception import Perception, detection_probability, position_error, see
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT, Visibility
 from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.state.records import (

@@ -11,8 +11,15 @@ import pytest
 
 from dorothie_gym.ontology import ObjectClass, PropKind, WeatherParameter
 from dorothie_gym.sim.ego.obstacles import PerceivedBody
-from dorothie_gym.sim.sensing.perception import BODY, Perception, detection_probability, position_error
-from dorothie_gym.sim.sensing.seeing import GLANCE, MOST_SIGMAS, see
+from dorothie_gym.sim.sensing.perception import (
+    BODY,
+    GLANCE,
+    MOST_SIGMAS,
+    Perception,
+    detection_probability,
+    position_error,
+    see,
+)
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT, Visibility
 from dorothie_gym.sim.state.codes import Group, Kind, Walk
 from dorothie_gym.sim.state.records import (

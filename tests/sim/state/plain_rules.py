@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from dorothie_gym.maps.model import Array, Signal, SignalKind
+from dorothie_gym.maps.model import LEVEL_HEIGHT, Array, Signal, SignalKind
 from dorothie_gym.maps.right_of_way import right_of_way
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import ObjectClass
@@ -15,8 +15,8 @@ from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.infractions import Breach, Infraction
 from dorothie_gym.sim.network.lane import PolylineLane
 from dorothie_gym.sim.network.network import TownNetwork
-from dorothie_gym.sim.traffic.parameters import AT_LINE, STANDING
-from dorothie_gym.sim.traffic_rules import AGAINST, FORGET, LEVEL, NEARBY, OFF_ROAD, OVER
+from dorothie_gym.sim.traffic.parameters import AT_LINE, TRAFFIC_STANDING
+from dorothie_gym.sim.traffic_rules import AGAINST, BREACH_PAUSE, FORGET, NEARBY, OFF_ROAD_MARGIN
 
 LENGTH = 5.0
 NOT_YET = -(10**9)
@@ -61,9 +61,11 @@ class PlainWatch:
         beyond = (off * self.along).sum(axis=1)
         across = off[:, 1] * self.along[:, 0] - off[:, 0] * self.along[:, 1]
         on = (
-            (self.along @ facing > 0.5) & (np.abs(across) <= self.halves) & (np.abs(pose[4] - self.ends[:, 2]) <= LEVEL)
+            (self.along @ facing > 0.5)
+            & (np.abs(across) <= self.halves)
+            & (np.abs(pose[4] - self.ends[:, 2]) <= LEVEL_HEIGHT)
         )
-        return beyond, np.abs(across), on, bool(pose[3] < STANDING)
+        return beyond, np.abs(across), on, bool(pose[3] < TRAFFIC_STANDING)
 
     def _at_lines(
         self, pose: Array, before: tuple[Array, Array, Array, bool], now: tuple[Array, Array, Array, bool], frame: int
@@ -93,11 +95,11 @@ class PlainWatch:
         places = [(*self._on(lane, x, y, heading), lane) for lane in self.lanes if self._near(lane, x, y, height)]
         on = [runs_with for out, _, runs_with, _ in places if out <= 0.0]
         outside = min((out for out, *_ in places), default=math.inf)
-        broken = {Infraction.OFF_ROAD: outside > OFF_ROAD, Infraction.WRONG_WAY: bool(on) and not any(on)}
+        broken = {Infraction.OFF_ROAD: outside > OFF_ROAD_MARGIN, Infraction.WRONG_WAY: bool(on) and not any(on)}
         found = []
         for kind in (kind for kind, is_broken in broken.items() if is_broken):
             last, self.last[kind] = self.last[kind], frame
-            if frame - last <= OVER:
+            if frame - last <= BREACH_PAUSE:
                 continue
             if places:
                 _, station, _, lane = min(places, key=lambda place: place[0])
@@ -115,7 +117,7 @@ class PlainWatch:
         if not (left - NEARBY <= x <= right + NEARBY and low - NEARBY <= y <= high + NEARBY):
             return False
         station = lane.local_coordinates(np.array([x, y]))[0]
-        return bool(abs(lane.height_at(station) - height) <= LEVEL)
+        return bool(abs(lane.height_at(station) - height) <= LEVEL_HEIGHT)
 
     def _on(self, lane: PolylineLane, x: float, y: float, heading: float) -> tuple[float, float, bool]:
         """Returns distance outside of a lane, station, and whether the heading is not against the lane."""

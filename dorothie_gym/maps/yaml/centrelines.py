@@ -11,7 +11,7 @@ import numpy as np
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.yaml.geometry import LINE_SPACING, Curve, Point, bend_stations, line, rounded, turn_at
-from dorothie_gym.maps.yaml.stretches import Stretch
+from dorothie_gym.maps.yaml.segments import Stretch
 
 STEEPEST = 0.12
 """Largest slope of a street."""
@@ -85,7 +85,7 @@ def height_profile(stations: Sequence[float], heights: Sequence[float | None]) -
 
 # --- Lines -----------------------------------------------------------------------------------------------------------
 
-SMALLEST_RADIUS = 5.5
+SMALLEST_BEND = 5.5
 """Smallest radius of the centre line of a lane [m]."""
 SMALLEST_STRETCH = 10.0
 """Shortest street between two junctions [m]."""
@@ -185,7 +185,7 @@ def _radii(stretch: Stretch, points: Sequence[Point]) -> list[float]:
         turn = max(abs(signed), 1e-6)
         fits = min(rooms[k - 1], rooms[k]) / math.tan(min(turn, math.radians(179.0)) / 2.0)
         radius = fits if street.radius is None else street.radius
-        tightest = stretch.section.tightest(signed > 0.0, SMALLEST_RADIUS)
+        tightest = stretch.section.tightest(signed > 0.0, SMALLEST_BEND)
         where = f"the bend at {[round(c, 2) for c in points[k]]} {stretch.label()}"
         if radius < tightest:
             street.entry.fail(

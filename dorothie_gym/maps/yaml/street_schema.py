@@ -6,27 +6,27 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from dorothie_gym.maps.yaml.nodes import YamlEntry
+from dorothie_gym.maps.yaml.entries import YamlEntry
 from dorothie_gym.maps.yaml.plan import Bend, CourseStep, JunctionPlan, StreetPlan
 
 STREET_KEYS = (
     "through", "lanes", "one_way", "ramp", "median", "turn_lanes", "speed", "width", "radius", "sidewalk",
 )  # fmt: skip
-SPEED = (5.0, 130.0)
+SPEED_RANGE = (5.0, 130.0)
 """Range of speed limits [km/h]."""
-WIDTH = (2.5, 6.0)
+WIDTH_RANGE = (2.5, 6.0)
 """Range of lane widths [m]."""
-SIDEWALK = (0.0, 10.0)
+SIDEWALK_RANGE = (0.0, 10.0)
 """Range of pavement widths [m]."""
-MEDIAN = (0.0, 50.0)
+MEDIAN_RANGE = (0.0, 50.0)
 """Range of median widths [m]."""
-LANES = (1, 4)
+LANES_RANGE = (1, 4)
 """Range of lane counts in one direction."""
-RADIUS = (1.0, 20_000.0)
+RADIUS_RANGE = (1.0, 20_000.0)
 """Range of radii of bends [m]."""
-FAR = 20_000.0
+COORDINATE_LIMIT = 20_000.0
 """Largest coordinate [m]."""
-HEIGHT = (-500.0, 9000.0)
+HEIGHT_RANGE = (-500.0, 9000.0)
 """Range of heights [m], from the shore of the Dead Sea to the top of Everest."""
 
 
@@ -45,17 +45,17 @@ class StreetDefaults:
 
 def speed(entry: YamlEntry) -> float:
     """Reads a speed limit [km/h]."""
-    return entry.number(*SPEED, "km/h")
+    return entry.number(*SPEED_RANGE, "km/h")
 
 
 def lane_width(entry: YamlEntry) -> float:
     """Reads the width of a lane [m]."""
-    return entry.number(*WIDTH, "metres")
+    return entry.number(*WIDTH_RANGE, "metres")
 
 
 def pavement(entry: YamlEntry) -> float:
     """Reads the width of a pavement [m]."""
-    return entry.number(*SIDEWALK, "metres")
+    return entry.number(*SIDEWALK_RANGE, "metres")
 
 
 def point(entry: YamlEntry, *, flat: bool = False) -> Bend:
@@ -64,8 +64,8 @@ def point(entry: YamlEntry, *, flat: bool = False) -> Bend:
     numbers = entry.elements(expected)
     if len(numbers) not in ((2,) if flat else (2, 3)):
         entry.fail(f"this must be {expected}, not {entry.shown()}")
-    x, y = (number.number(-FAR, FAR, "metres") for number in numbers[:2])
-    return Bend(at=(x, y), height=numbers[2].number(*HEIGHT, "metres of height") if len(numbers) == 3 else None)
+    x, y = (number.number(-COORDINATE_LIMIT, COORDINATE_LIMIT, "metres") for number in numbers[:2])
+    return Bend(at=(x, y), height=numbers[2].number(*HEIGHT_RANGE, "metres of height") if len(numbers) == 3 else None)
 
 
 def read_street(
@@ -86,7 +86,7 @@ def read_street(
     ramp = "ramp" in fields and fields["ramp"].boolean()
     forward, backward = _lanes(fields, ramp=ramp)
     width = lane_width(fields["width"]) if "width" in fields else defaults.width
-    median = fields["median"].number(*MEDIAN, "metres") if "median" in fields else 0.0
+    median = fields["median"].number(*MEDIAN_RANGE, "metres") if "median" in fields else 0.0
     if not backward and median:
         fields["median"].fail("a median keeps two directions apart and this street has one; remove it")
     turn_lanes: tuple[str, ...] = ()
@@ -104,7 +104,7 @@ def read_street(
         ramp=ramp,
         speed=speed(fields["speed"]) if "speed" in fields else defaults.speed,
         width=width,
-        radius=fields["radius"].number(*RADIUS, "metres") if "radius" in fields else None,
+        radius=fields["radius"].number(*RADIUS_RANGE, "metres") if "radius" in fields else None,
         sidewalk=pavement(fields["sidewalk"]) if "sidewalk" in fields else 0.0 if ramp else defaults.sidewalk,
         entry=here,
     )
@@ -150,7 +150,7 @@ def _lanes(fields: Mapping[str, YamlEntry], *, ramp: bool) -> tuple[int, int]:
     if lanes is None:
         return 1, 0 if one_way else 1
     if not lanes.is_sequence:
-        count = lanes.whole(*LANES, "lanes in one direction")
+        count = lanes.whole(*LANES_RANGE, "lanes in one direction")
         return count, 0 if one_way else count
     if one_way:
         kind = "a ramp" if ramp else "a one-way street"
@@ -158,7 +158,7 @@ def _lanes(fields: Mapping[str, YamlEntry], *, ramp: bool) -> tuple[int, int]:
             f"{kind} has no lanes backward; write one number, or remove the key '{'ramp' if ramp else 'one_way'}'"
         )
     forward, backward = (
-        count.whole(*LANES, "lanes in one direction (a street with one direction: one_way: true)")
+        count.whole(*LANES_RANGE, "lanes in one direction (a street with one direction: one_way: true)")
         for count in lanes.pair("a number of lanes, or [forward, backward]")
     )
     return forward, backward
