@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
@@ -14,7 +14,7 @@ from dorothie_gym.dialogue import load_lexicon
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ExceptionKind, LandmarkName, PropKind, Role, Sensor, WeatherParameter
 from dorothie_gym.policies.observation_parser import place_on_path, read_landmarks, read_subgoals, scalar
-from dorothie_gym.policies.policy import Policy
+from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.spaces import ActionDict, AdWizardAction, LanePosition, ObservationMapping, PropColumn, SpaceLimits
 
 

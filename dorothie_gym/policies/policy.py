@@ -5,13 +5,30 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final, Generic, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.spaces import ActionDict, ObservationMapping, SpaceLimits
+
+if TYPE_CHECKING:
+    from dataclasses import replace as replace
+else:
+
+    def replace(state, **changes):
+        """Returns a copy of a frozen state with other values in some of its fields.
+
+        Does what `dataclasses.replace` does for dataclasses without ``__post_init__``, ``InitVar`` and slots, in a
+        quarter of the time, as agents change a dozen groups of their state in every decision. Type checkers see the
+        original, which checks names and types of the fields.
+        """
+        copy = object.__new__(type(state))
+        copy.__dict__.update(state.__dict__)
+        copy.__dict__.update(changes)
+        return copy
+
 
 State = TypeVar("State")
 

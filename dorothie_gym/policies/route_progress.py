@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.dialogue import Direction
@@ -15,6 +15,7 @@ from dorothie_gym.maps.routing import LaneEntry, Leg, Place, Route, router
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import StreetName
 from dorothie_gym.policies.observation_parser import street_of
+from dorothie_gym.policies.policy import replace
 from dorothie_gym.sim.ego.limits import PLANNED_BRAKING
 from dorothie_gym.spaces import ObservationMapping
 

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Generic, Self, TypeVar
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from dorothie_gym.dialogue import SpeakerStyle, Wording, WordingContext, speech_seconds, word_acts
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, SlotValue
-from dorothie_gym.policies.policy import DecisionClock
+from dorothie_gym.policies.policy import DecisionClock, replace
 from dorothie_gym.spaces import Speech
 
 PAUSE = 0.8

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import PhysicalAction, Role
-from dorothie_gym.policies.policy import Policy
+from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.spaces import (
     ActionDict,
     CoWizardAction,

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from dorothie_gym.dialogue import ParsedText, Wording
 from dorothie_gym.ontology import ActionValue, DialogueMove
 from dorothie_gym.policies.co_wizard.state import CoWizardState
+from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, remark
 
 _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START})

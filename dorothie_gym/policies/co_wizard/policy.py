@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +17,7 @@ from dorothie_gym.policies.co_wizard.obstacles import watch_road
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Intentions
 from dorothie_gym.policies.co_wizard.understanding_update import listen
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.policy import Policy
+from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.speech import SpeechState
 from dorothie_gym.spaces import ActionDict, CoWizardAction, Mental, Motion, ObservationMapping, Physical, SpaceLimits
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.maps.routing import Place
@@ -20,6 +20,7 @@ from dorothie_gym.ontology import (
     StreetName,
 )
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
+from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteState
 from dorothie_gym.policies.speech import SpeakingState
 from dorothie_gym.spaces import LanePosition, Mental

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -16,6 +16,7 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies.guidance_config import STANDING_SPEED
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenObject, read_landmarks, read_objects, scalar
+from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import Choice, is_choice, next_choice
 from dorothie_gym.spaces import ExitColumn, Motion, ObservationMapping
 

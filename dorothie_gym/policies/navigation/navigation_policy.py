@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
@@ -27,7 +27,7 @@ from dorothie_gym.policies.navigation.observation_vector import (
     NavigationEncoder,
     Vector,
 )
-from dorothie_gym.policies.policy import Policy
+from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.route_progress import stopping_distance
 from dorothie_gym.spaces import ActionDict, Motion, ObservationMapping, Physical, SpaceLimits
 

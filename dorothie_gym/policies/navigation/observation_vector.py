@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -28,6 +28,7 @@ from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 from dorothie_gym.policies.navigation.instructor import NavigationInstruction
 from dorothie_gym.policies.navigation.junction_exits import SECTORS, JunctionExits, SectorExit
 from dorothie_gym.policies.observation_parser import street_of
+from dorothie_gym.policies.policy import replace
 from dorothie_gym.sim.ego.limits import MAX_CRUISE
 from dorothie_gym.spaces import ExitColumn, Motion, ObjectColumn, ObservationMapping
 from dorothie_gym.spaces.fields import share, signal, sizes

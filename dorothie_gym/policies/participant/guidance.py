@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.participant.arriving import about_to_arrive, approach
 from dorothie_gym.policies.participant.state import ParticipantState, StepKey
 from dorothie_gym.policies.participant.view import ParticipantView
+from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import END_ROOM, Choice, RouteJunction, find_exit, next_choice
 from dorothie_gym.policies.speech import Remark, remark
 

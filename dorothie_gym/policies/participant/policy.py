@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from dorothie_gym.dialogue import draw_style
@@ -17,7 +15,7 @@ from dorothie_gym.policies.participant.reactions import react, scene_of
 from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.participant.state import ConversationState, ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
-from dorothie_gym.policies.policy import Policy
+from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.route_progress import light_ahead
 from dorothie_gym.policies.speech import SpeechState
 from dorothie_gym.spaces import ActionDict, ObservationMapping, ParticipantAction, SpaceLimits

@@ -104,19 +104,19 @@ def _dtype_of(kind: type) -> np.dtype[np.void]:
 
 def empty_records(kind: type[Record], count: int) -> RecordArray[Record]:
     """Returns an array of `count` records that are all zeros."""
-    return cast(RecordArray[Record], np.zeros(count, dtype=record_dtype(kind)).view(np.recarray))
+    return cast("RecordArray[Record]", np.zeros(count, dtype=record_dtype(kind)).view(np.recarray))
 
 
 def filled_records(kind: type[Record], rows: list[tuple[Any, ...]]) -> RecordArray[Record]:
     """Returns an array of records with given fields; a single record of zeros where there are none."""
     if not rows:
         return empty_records(kind, 1)
-    return cast(RecordArray[Record], np.array(rows, dtype=record_dtype(kind)).view(np.recarray))
+    return cast("RecordArray[Record]", np.array(rows, dtype=record_dtype(kind)).view(np.recarray))
 
 
 def plain(records: RecordArray[Record]) -> NDArray[np.void]:
     """Returns the same records with access by name only, which is several times faster in Python."""
-    array = cast(NDArray[np.void], records)
+    array = cast("NDArray[np.void]", records)
     return array.view(np.dtype((np.void, array.dtype)), np.ndarray)
 
 
@@ -126,7 +126,7 @@ def fields(records: RecordArray[Record], *names: str) -> NDArray[np.void]:
     ``fields(...).item()`` is a tuple of plain numbers, and ``fields(...)[()] = numbers`` takes one, either in about the
     time that a single field of `plain` takes.
     """
-    return cast(NDArray[np.void], records).view(np.ndarray)[list(names)][:1].reshape(())
+    return cast("NDArray[np.void]", records).view(np.ndarray)[list(names)][:1].reshape(())
 
 
 # --- Town -------------------------------------------------------------------------------------------------------------
