@@ -6,7 +6,6 @@ import itertools
 import math
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from gymnasium import spaces
@@ -21,7 +20,7 @@ from dorothie_gym.sim.bodies import Pedestrian
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.records import plain
 from dorothie_gym.sim.world import World
-from dorothie_gym.spaces import ActionDict, SpaceLimits, action_space, noop
+from dorothie_gym.spaces import ActionDict, ActionMapping, SpaceLimits, action_space, noop
 
 _ACTOR_KINDS = np.full(max(Kind) + 1, -1, dtype=np.int64)
 _ACTOR_KINDS[Kind.CAR], _ACTOR_KINDS[Kind.CYCLIST] = ActorKind.VEHICLE, ActorKind.CYCLIST
@@ -104,7 +103,7 @@ def _arrays(role: Role, limits: SpaceLimits) -> frozenset[str]:
     return frozenset(name for name, value in _idle(role, limits).items() if isinstance(value, np.ndarray))
 
 
-def compact(actions: Mapping[str, Mapping[str, Any]], limits: SpaceLimits) -> dict[Role, dict[str, Any]]:
+def compact(actions: Mapping[str, ActionMapping], limits: SpaceLimits) -> dict[Role, ActionDict]:
     """Returns actions in the compact form of `Decision`: fields without effect are left out.
 
     Args:
@@ -114,7 +113,7 @@ def compact(actions: Mapping[str, Mapping[str, Any]], limits: SpaceLimits) -> di
     found = {}
     for role in AGENT_ROLES:
         idle, arrays = _idle(role, limits), _arrays(role, limits)
-        fields: dict[str, Any] = {}
+        fields: ActionDict = {}
         for name, value in actions[str(role)].items():
             if name in arrays:
                 values = np.asarray(value)
@@ -141,7 +140,7 @@ def idle_actions(limits: SpaceLimits) -> dict[str, ActionDict]:
     return {str(role): _idle(role, limits) for role in AGENT_ROLES}
 
 
-def _short(values: np.ndarray[Any, Any], flags: bool) -> list[int]:
+def _short(values: NDArray[np.generic], flags: bool) -> list[int]:
     places = np.flatnonzero(values)
     short: list[int] = places.tolist() if flags else values[: int(places[-1]) + 1].tolist()
     return short
@@ -163,7 +162,7 @@ def _expanded(decision: Decision, role: Role, limits: SpaceLimits) -> ActionDict
     return action
 
 
-def _long(value: Any, idle: np.ndarray[Any, Any], flags: bool, where: str) -> np.ndarray[Any, Any]:
+def _long(value: object, idle: NDArray[np.generic], flags: bool, where: str) -> NDArray[np.generic]:
     array = idle.copy()
     if not isinstance(value, list | tuple) or not all(type(item) is int and 0 <= item < 2**31 for item in value):
         raise SessionError(f"{where} must be a list of whole numbers")
@@ -199,7 +198,7 @@ class SessionRecorder:
         self._frame = engine.session.world.frame
         self._append()
 
-    def record(self, actions: Mapping[str, Mapping[str, Any]]) -> None:
+    def record(self, actions: Mapping[str, ActionMapping]) -> None:
         """Records a decision after the engine has played it.
 
         Args:

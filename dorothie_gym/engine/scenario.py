@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -33,6 +35,22 @@ class Scenario:
     storyboard: Storyboard
     street_names: tuple[StreetName, ...]
     departure: tuple[int, float]
+
+
+ResetOptions: TypeAlias = Mapping[str, object]
+"""Options of an environment's `reset`."""
+
+
+def scenario_option(options: ResetOptions | None) -> Scenario | None:
+    """Returns the option `scenario` of a reset, or None; other options are ignored.
+
+    Raises:
+        ValueError: the option is no `Scenario`.
+    """
+    scenario = (options or {}).get("scenario")
+    if scenario is not None and not isinstance(scenario, Scenario):
+        raise ValueError(f"option 'scenario' is a {type(scenario).__name__}; it must be a Scenario")
+    return scenario
 
 
 def draw_scenario(town: Town, template: StoryboardTemplate | None, seed: int) -> Scenario:

@@ -330,7 +330,6 @@ class SessionEngine:
             scenario: played in place of a drawn one; its seed is then the session's.
 
         Raises:
-            ValueError: `scenario` is no `Scenario`.
             StoryboardError: the template does not fit the town.
         """
         if scenario is None:
@@ -338,8 +337,6 @@ class SessionEngine:
                 self._seeds = np.random.default_rng(seed)
             session_seed = seed if seed is not None else int(self._seeds.integers(2**31))
             scenario = draw_scenario(self.town, self.template, session_seed)
-        elif not isinstance(scenario, Scenario):
-            raise ValueError(f"option 'scenario' is a {type(scenario).__name__}; it must be a Scenario")
         self._session = LiveSession(self.town, self._network, scenario, self.config, self.limits)
         self._observations = None
         return self.observations

@@ -6,23 +6,23 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, ClassVar, TypeAlias, TypeVar
+from typing import TypeVar
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.engine.path_measurements import UpcomingJunction
-from dorothie_gym.engine.scenario import Scenario, draw_scenario
+from dorothie_gym.engine.scenario import ResetOptions, Scenario, draw_scenario, scenario_option
 from dorothie_gym.engine.session_engine import LiveSession
 from dorothie_gym.envs.navigation_config import NavigationConfig
-from dorothie_gym.envs.session_view import RENDER_MODES, SessionView
+from dorothie_gym.envs.session_view import METADATA, SessionView
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import LandmarkName, MentalAction, Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
 from dorothie_gym.policies.navigation.actions import ACTIONS, FIRST_TURN, UNDER_WAY, NavigationAction, prepares
-from dorothie_gym.policies.navigation.instructor import Instructor
+from dorothie_gym.policies.navigation.instructor import Guidance, Instructor
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits
 from dorothie_gym.policies.navigation.observation_vector import HeardInstruction, NavigationEncoder, Vector
 from dorothie_gym.policies.observation_parser import read_landmarks
@@ -39,9 +39,11 @@ from dorothie_gym.spaces import (
     LanePosition,
     Mental,
     Observation,
+    ObservationMapping,
     ParticipantAction,
     RoleAction,
     SpaceLimits,
+    StepInfo,
 )
 from dorothie_gym.tasks import StoryboardTemplate, load_template
 
@@ -73,7 +75,7 @@ class DrivingSession:
     def __init__(self, session: LiveSession, config: NavigationConfig, exits: JunctionExits) -> None:
         self.session, self.exits, self._config = session, exits, config
         town = session.world.town
-        self.instructor = Instructor(town, exits, config.guidance)  # type: ignore[arg-type]
+        self.instructor = Instructor(town, exits, Guidance(config.guidance))
         self._viewpoint = NavigationEncoder(town, exits, config.max_seconds)
         self._decoder = ActionDecoder(Role.AD_WIZARD, session.limits)
         self._adversary = ScriptedAdWizard(session.limits, rate=config.exceptions) if config.exceptions > 0.0 else None
@@ -108,14 +110,9 @@ class DrivingSession:
             config: settings.
             seed: seed of the scenario.
             scenario: scenario to play instead of a drawn one.
-
-        Raises:
-            ValueError: `scenario` is not a `Scenario`.
         """
         if scenario is None:
             scenario = draw_scenario(town, template, seed)
-        elif not isinstance(scenario, Scenario):
-            raise ValueError(f"option 'scenario' is a {type(scenario).__name__}; it must be a Scenario")
         limits = SpaceLimits.for_town(town)
         return cls(LiveSession(town, network, scenario, config.session_config, limits), config, JunctionExits(town))
 
@@ -144,9 +141,9 @@ class DrivingSession:
         """Returns the observation of the driver."""
         return self._viewpoint.observe(self.seen[Role.CO_WIZARD], self.heard, self.instructor.blocked)
 
-    def info(self) -> dict[str, Any]:
+    def info(self) -> StepInfo:
         """Returns the info of the last decision, as a new dictionary."""
-        info: dict[str, Any] = {
+        info: StepInfo = {
             "reward_terms": dict(self.terms),
             "refused": list(self.session.refused[Role.CO_WIZARD]),
             "infractions": dict(self.session.infractions),
@@ -251,17 +248,13 @@ class DrivingSession:
         return sum(infractions[name] for name in _RULES)
 
 
-Info: TypeAlias = dict[str, Any]
 Action = TypeVar("Action")
 
 
 class DrivingEnv(gym.Env[Vector, Action]):
     """Base class of the navigation environments; subclasses define observations and actions."""
 
-    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        "render_modes": list(RENDER_MODES),
-        "render_fps": 2,
-    }
+    metadata = METADATA
 
     def __init__(
         self, town: str | Path | Town, storyboard: str | Path | StoryboardTemplate | None, config: NavigationConfig,
@@ -281,12 +274,13 @@ class DrivingEnv(gym.Env[Vector, Action]):
             raise gym.error.ResetNeeded("no session is being played: call reset() first")
         return self._drive
 
-    def begin(self, seed: int | None, options: Mapping[str, Any] | None) -> DrivingSession:
+    def begin(self, seed: int | None, options: ResetOptions | None) -> DrivingSession:
         """Begins a session, see `reset`."""
         super().reset(seed=seed)
         session = seed if seed is not None else int(self.np_random.integers(2**31))
-        scenario = (options or {}).get("scenario")
-        self._drive = DrivingSession.begin(self.town, self._network, self.template, self.config, session, scenario)
+        self._drive = DrivingSession.begin(
+            self.town, self._network, self.template, self.config, session, scenario_option(options)
+        )
         if self.render_mode == "human":
             self.render()
         return self._drive
@@ -317,7 +311,7 @@ class NavigationMask:
         options = self._junction.options()
         return (options.lane, options.distance) if options.exits else None
 
-    def mask(self, seen: Mapping[str, Any]) -> NDArray[np.int8]:
+    def mask(self, seen: ObservationMapping) -> NDArray[np.int8]:
         """Returns the mask (18,), 1 for feasible actions; `seen` is the observation of the Co-Wizard."""
         world, planner = self._world, self._world.planner
         speed, cruise = float(world.car.speed), world.ego.cruise

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import deepcopy
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
@@ -14,15 +14,25 @@ from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.scenario import Scenario
+from dorothie_gym.engine.scenario import ResetOptions, Scenario, scenario_option
 from dorothie_gym.engine.session_engine import LiveSession, SessionEngine
 from dorothie_gym.engine.session_log import SessionSummary
-from dorothie_gym.envs.session_view import RENDER_MODES, SessionView
+from dorothie_gym.envs.session_view import METADATA, SessionView
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.recording import Event, SessionHeader
-from dorothie_gym.spaces import ActionDict, Observation, SpaceLimits, action_space, observation_space
+from dorothie_gym.spaces import (
+    ActionDict,
+    ActionMapping,
+    Observation,
+    SpaceLimits,
+    StepInfo,
+    action_space,
+    observation_space,
+)
 from dorothie_gym.tasks import StoryboardTemplate
+
+_METADATA: dict[str, object] = {"name": "duo_wizard_v0", **METADATA, "is_parallelizable": True}
 
 
 class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
@@ -70,12 +80,7 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
     - v0: first version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
-        "name": "duo_wizard_v0",
-        "render_modes": list(RENDER_MODES),
-        "render_fps": 2,
-        "is_parallelizable": True,
-    }
+    metadata = _METADATA
 
     def __init__(
         self,
@@ -106,8 +111,8 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
         return self.action_spaces[agent]
 
     def reset(
-        self, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+        self, seed: int | None = None, options: ResetOptions | None = None
+    ) -> tuple[dict[str, Observation], dict[str, StepInfo]]:
         """Begins a session.
 
         Args:
@@ -117,14 +122,14 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
         Returns:
             Observations and infos by agent.
         """
-        observations = self.engine.reset(seed, scenario=(options or {}).get("scenario"))
+        observations = self.engine.reset(seed, scenario=scenario_option(options))
         self.agents = list(self.possible_agents)
         self._render_window()
         return observations.of(), {str(role): self.engine.info(role) for role in AGENT_ROLES}
 
     def step(
-        self, actions: Mapping[str, Mapping[str, Any]]
-    ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+        self, actions: Mapping[str, ActionMapping]
+    ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, StepInfo]]:
         """Plays one decision: the actions of all agents, then the physics until the next decision.
 
         Args:
@@ -226,16 +231,12 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
         return self.engine.summary()
 
 
-def parallel_env(**arguments: Any) -> DuoWizardEnv:
-    """Returns the environment; arguments as of `DuoWizardEnv`."""
-    return DuoWizardEnv(**arguments)
+parallel_env = raw_env = DuoWizardEnv
 
 
 def env(**arguments: Any) -> AECEnv[str, Observation, ActionDict]:
     """Returns the environment in PettingZoo's turn-based form; arguments as of `DuoWizardEnv`."""
     return parallel_to_aec(parallel_env(**arguments))
 
-
-raw_env = parallel_env
 
 __all__ = ["DuoWizardEnv", "env", "parallel_env", "raw_env"]

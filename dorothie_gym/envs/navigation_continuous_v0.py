@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from dorothie_gym.envs.driving_session import DrivingEnv, DrivingSession, Info, NavigationMask
+from dorothie_gym.engine.scenario import ResetOptions
+from dorothie_gym.envs.driving_session import DrivingEnv, DrivingSession, NavigationMask
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ActionValue, ObjectClass, PhysicalAction, Role, WeatherParameter
@@ -29,7 +28,7 @@ from dorothie_gym.policies.navigation.observation_vector import (
 from dorothie_gym.sim.ego.limits import VehicleControl
 from dorothie_gym.sim.state.records import plain
 from dorothie_gym.sim.world import World
-from dorothie_gym.spaces import CoWizardAction, ObjectColumn, Observation, Physical
+from dorothie_gym.spaces import CoWizardAction, ObjectColumn, Observation, Physical, StepInfo
 from dorothie_gym.spaces.fields import share, signal, sizes
 from dorothie_gym.tasks import StoryboardTemplate
 
@@ -234,14 +233,14 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         self.observation_space = spaces.Box(-1.0, 1.0, (sum(CONTINUOUS_FIELDS.values()),), dtype=np.float32)
         self._controls: NavigationMask | None = None
 
-    def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[Vector, Info]:
+    def reset(self, *, seed: int | None = None, options: ResetOptions | None = None) -> tuple[Vector, StepInfo]:
         """Begins a session; see `NavigationEnv.reset`."""
         drive = self.begin(seed, options)
         self._controls = NavigationMask(drive.session.world, drive.exits)
         drive.session.world.ego.manual = VehicleControl(throttle=0.0, steer=0.0, brake=0.0)
         return self._observe(drive), drive.info()
 
-    def step(self, action: NDArray[np.float32]) -> tuple[Vector, float, bool, bool, Info]:
+    def step(self, action: NDArray[np.float32]) -> tuple[Vector, float, bool, bool, StepInfo]:
         """Plays one decision.
 
         Raises:

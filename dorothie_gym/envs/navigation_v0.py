@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from dorothie_gym.envs.driving_session import DrivingEnv, Info, NavigationMask
+from dorothie_gym.engine.scenario import ResetOptions
+from dorothie_gym.envs.driving_session import DrivingEnv, NavigationMask
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.navigation.actions import ACTIONS, NavigationAction, physical_of
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_vector import Vector, navigation_space
-from dorothie_gym.spaces import CoWizardAction
+from dorothie_gym.spaces import CoWizardAction, StepInfo
 from dorothie_gym.tasks import StoryboardTemplate
 
 
@@ -90,7 +89,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
         self._controls: NavigationMask | None = None
         self._mask = np.zeros(len(ACTIONS), dtype=np.int8)
 
-    def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[Vector, Info]:
+    def reset(self, *, seed: int | None = None, options: ResetOptions | None = None) -> tuple[Vector, StepInfo]:
         """Begins a session.
 
         Args:
@@ -101,7 +100,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
         self._controls = NavigationMask(drive.session.world, drive.exits)
         return self._observe(), self._info()
 
-    def step(self, action: np.int64 | int) -> tuple[Vector, float, bool, bool, Info]:
+    def step(self, action: np.int64 | int) -> tuple[Vector, float, bool, bool, StepInfo]:
         """Plays one decision.
 
         Raises:
@@ -126,5 +125,5 @@ class NavigationEnv(DrivingEnv[np.int64]):
         self._mask = self._controls.mask(self.drive.seen[Role.CO_WIZARD])
         return self.drive.observe()
 
-    def _info(self) -> Info:
+    def _info(self) -> StepInfo:
         return {"action_mask": self._mask.copy(), **self.drive.info()}

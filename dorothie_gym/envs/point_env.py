@@ -12,6 +12,7 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
+from dorothie_gym.engine.scenario import ResetOptions
 from dorothie_gym.envs.history_space import (
     act_space,
     check_action,
@@ -124,6 +125,9 @@ RULES: Final[Mapping[Task, PointRules[Any]]] = {
 }
 
 
+_METADATA: dict[str, object] = {"render_modes": ["ansi"], "render_fps": 2}
+
+
 class PointEnv(gym.Env[Observation, ActionDict]):
     """Base class of the task environments on recorded and live sessions.
 
@@ -135,10 +139,10 @@ class PointEnv(gym.Env[Observation, ActionDict]):
         rules: scoring rules of the task.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["ansi"], "render_fps": 2}  # type: ignore[misc]  # gymnasium declares an instance attribute
+    metadata = _METADATA
 
     def __init__(self, task: Task, limits: SpaceLimits | None, render_mode: str | None) -> None:
-        if render_mode not in (None, *self.metadata["render_modes"]):
+        if render_mode not in (None, "ansi"):
             raise ValueError(f"render_mode is {render_mode!r}; it must be None or 'ansi'")
         self.task = task
         self.limits = limits or SpaceLimits()
@@ -149,7 +153,7 @@ class PointEnv(gym.Env[Observation, ActionDict]):
         self._points: Iterator[Point] = iter(())
         self._point: Point | None = None
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, StepInfo]:
+    def reset(self, *, seed: int | None = None, options: ResetOptions | None = None) -> tuple[Observation, StepInfo]:
         """Starts a session and returns the observation of its first point."""
         super().reset(seed=seed)
         self._points = self._begin(seed, options or {})
@@ -189,7 +193,7 @@ class PointEnv(gym.Env[Observation, ActionDict]):
         return "\n".join([*lines, f"{view.frame:6d} {self.task.value:>11}? {view.utterance}"])
 
     @abstractmethod
-    def _begin(self, seed: int | None, options: Mapping[str, object]) -> Iterator[Point]:
+    def _begin(self, seed: int | None, options: ResetOptions) -> Iterator[Point]:
         """Starts a session with at least one point and yields its points in order."""
 
     @abstractmethod

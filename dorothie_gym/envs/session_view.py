@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 RENDER_MODES: Final[tuple[str, ...]] = ("human", "rgb_array")
 """Render modes of the environments that play sessions."""
 
+METADATA: Final[dict[str, object]] = {"render_modes": list(RENDER_MODES), "render_fps": 2}
+"""Metadata of these environments for Gymnasium."""
+
 
 class SessionView:
     """Draws sessions in one render mode; the renderer is created with the first frame.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import deepcopy
 from pathlib import Path
-from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
@@ -13,13 +12,14 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.engine.scenario import ResetOptions, scenario_option
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.envs.session_view import RENDER_MODES, SessionView
+from dorothie_gym.envs.session_view import METADATA, SessionView
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
-from dorothie_gym.spaces import ActionDict, Observation, action_space, noop, observation_space
+from dorothie_gym.spaces import ActionDict, ActionMapping, Observation, StepInfo, action_space, noop, observation_space
 from dorothie_gym.tasks import StoryboardTemplate
 
 
@@ -62,10 +62,7 @@ class SingleRole(gym.Env[Observation, ActionDict]):
     - v0: first version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        "render_modes": list(RENDER_MODES),
-        "render_fps": 2,
-    }
+    metadata = METADATA
 
     def __init__(
         self,
@@ -87,16 +84,14 @@ class SingleRole(gym.Env[Observation, ActionDict]):
         self.action_space = deepcopy(action_space(self.role, limits))
         self.partners = self._cast(partners or {})
         self._observing = (self.role, *(role for role, policy in self.partners.items() if policy.observes))
-        self._states: dict[Role, Any] = {}
+        self._states: dict[Role, object] = {}
 
     @property
     def noop_action(self) -> ActionDict:
         """The action without effect."""
         return noop(self.role, self.engine.limits)
 
-    def reset(
-        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: ResetOptions | None = None) -> tuple[Observation, StepInfo]:
         """Begins a session.
 
         Args:
@@ -105,7 +100,7 @@ class SingleRole(gym.Env[Observation, ActionDict]):
         """
         super().reset(seed=seed)
         session = seed if seed is not None else int(self.np_random.integers(2**31))
-        observations = self.engine.reset(session, scenario=(options or {}).get("scenario"))
+        observations = self.engine.reset(session, scenario=scenario_option(options))
         scenario = self.engine.scenario
         self._states = {
             role: policy.initial_state(policy_seed(scenario.seed, role), self.engine.town)
@@ -114,7 +109,7 @@ class SingleRole(gym.Env[Observation, ActionDict]):
         self._render_window()
         return observations.of(self._observing)[self.role], self.engine.info(self.role)
 
-    def step(self, action: Mapping[str, Any]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+    def step(self, action: ActionMapping) -> tuple[Observation, float, bool, bool, StepInfo]:
         """Plays one decision of all roles.
 
         Raises:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from dorothie_gym.benchmark.metrics import (
     SlotScorePaper,
 )
 from dorothie_gym.benchmark.predictions import ActionPredictions, ActPredictions, act_labels, action_labels
+from dorothie_gym.engine.scenario import ResetOptions
 from dorothie_gym.envs.point_env import PointEnv
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import Town
@@ -33,7 +34,7 @@ from dorothie_gym.recording import (
     task_points,
 )
 from dorothie_gym.recording.towns import find_town
-from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.spaces import ActionMapping, SpaceLimits, StepInfo
 
 DEFAULT: Final = "default"
 """The corpus that is played once and kept in the user's cache folder."""
@@ -99,10 +100,10 @@ class TeacherForcedEnv(PointEnv):
         self._library = _Library(corpus, split, self.of_task, self.limits)
         self._session: Session | None = None
         self._town: Town | None = None
-        self._done: list[tuple[Mapping[str, Any], Any]] = []
+        self._done: list[tuple[ActionMapping, Point]] = []
         self._count = 0
 
-    def _begin(self, seed: int | None, options: Mapping[str, Any]) -> Iterator[Point]:
+    def _begin(self, seed: int | None, options: ResetOptions) -> Iterator[Point]:
         wanted = options.get("session")
         order = self.np_random.permutation(len(self._library)).tolist() if wanted is None else [self._number(wanted)]
         for number in order:
@@ -125,14 +126,17 @@ class TeacherForcedEnv(PointEnv):
         assert self._session is not None  # an episode has begun
         return self._session, self._town
 
-    def _info(self) -> dict[str, Any]:
+    def _info(self) -> StepInfo:
         assert self._session is not None  # an episode has begun
         return {"session": self._session.name, "points_left": self._count - len(self._done)}
 
-    def _judge(self, action: Mapping[str, Any], point: Point) -> dict[str, Any]:
+    def _judge(self, action: ActionMapping, point: Point) -> StepInfo:
         self._done.append((action, point))
-        metrics = _act_metrics if self.task is not Task.NFD else _decision_metrics
-        found = metrics([action for action, _ in self._done], [point for _, point in self._done])
+        actions, points = [action for action, _ in self._done], [point for _, point in self._done]
+        if self.task is Task.NFD:
+            found = _decision_metrics(actions, [point for point in points if isinstance(point, DecisionPoint)])
+        else:
+            found = _act_metrics(actions, [point for point in points if isinstance(point, InferencePoint)])
         return {
             "points_left": self._count - len(self._done),
             "metrics": {key: None if np.isnan(value) else value for key, value in found.items()},
@@ -204,7 +208,7 @@ def _check_size(session: Session, limits: SpaceLimits) -> None:
             raise ValueError(f"session {session.name} has {count} {name}; SpaceLimits.{name} is {size}: raise it")
 
 
-def _act_metrics(actions: Sequence[Mapping[str, Any]], points: Sequence[InferencePoint]) -> dict[str, float]:
+def _act_metrics(actions: Sequence[ActionMapping], points: Sequence[InferencePoint]) -> dict[str, float]:
     predicted = ActPredictions(
         moves=np.array([action["move"] for action in actions], dtype=np.int64),
         slots=np.array([action["slots"] for action in actions], dtype=np.bool_),
@@ -217,7 +221,7 @@ def _act_metrics(actions: Sequence[Mapping[str, Any]], points: Sequence[Inferenc
     }
 
 
-def _decision_metrics(actions: Sequence[Mapping[str, Any]], points: Sequence[DecisionPoint]) -> dict[str, float]:
+def _decision_metrics(actions: Sequence[ActionMapping], points: Sequence[DecisionPoint]) -> dict[str, float]:
     predicted = ActionPredictions(
         actions=np.array([action["action"] for action in actions], dtype=np.int64),
         angles=np.array([action["angle"] for action in actions], dtype=np.float64),

@@ -10,7 +10,7 @@ from typing import Any, Self, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from dorothie_gym.spaces.limits import TEXT_CHARACTERS, UNBOUNDED
 
@@ -166,6 +166,9 @@ def dict_space(fields: Iterable[FieldSpec]) -> spaces.Dict:
 Shape: TypeAlias = tuple[int, ...]
 """Shape of an array."""
 
+Arrays: TypeAlias = dict[str, NDArray[Any]]
+"""Arrays of several types, by name."""
+
 
 class FieldBuffer:
     """Arrays of fixed types and shapes in one block of memory.
@@ -177,7 +180,7 @@ class FieldBuffer:
         template: arrays that the next copies are made of, by name.
     """
 
-    def __init__(self, fields: Mapping[str, tuple[Any, Shape]]) -> None:
+    def __init__(self, fields: Mapping[str, tuple[DTypeLike, Shape]]) -> None:
         """Allocates arrays of zeros.
 
         Args:
@@ -186,7 +189,7 @@ class FieldBuffer:
         self._layout = np.dtype([(name, kind, shape) for name, (kind, shape) in fields.items()], align=True)
         self._block: NDArray[np.uint8] = np.zeros(self._layout.itemsize, dtype=np.uint8)
         self._names = tuple(fields)
-        self.template: dict[str, NDArray[Any]] = self._arrays(self._block)
+        self.template: Arrays = self._arrays(self._block)
 
     @classmethod
     def of_space(cls, space: spaces.Dict) -> Self:
@@ -194,10 +197,10 @@ class FieldBuffer:
         arrays = spaces.Box | spaces.MultiDiscrete | spaces.MultiBinary
         return cls({name: (f.dtype, f.shape) for name, f in space.spaces.items() if isinstance(f, arrays)})
 
-    def copy(self) -> dict[str, Any]:
+    def copy(self) -> Arrays:
         """Returns a copy of the template: arrays by name."""
         return self._arrays(self._block.copy())
 
-    def _arrays(self, block: NDArray[np.uint8]) -> dict[str, NDArray[Any]]:
+    def _arrays(self, block: NDArray[np.uint8]) -> Arrays:
         record = np.ndarray((), self._layout, block)
         return {name: record[name] for name in self._names}

@@ -8,9 +8,10 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import NoReturn, TypeAlias
+from typing import NoReturn
 
 from dorothie_gym.errors import StoryboardError
+from dorothie_gym.files import JsonValue
 from dorothie_gym.tasks.binding import cast
 from dorothie_gym.tasks.catalogue import find_kind
 from dorothie_gym.tasks.storyboard import (
@@ -120,9 +121,6 @@ def _check_order(template: StoryboardTemplate) -> None:
 
 
 # --- parser -----------------------------------------------------------------------------------------------------------
-
-JsonValue: TypeAlias = "bool | int | float | str | list[JsonValue] | dict[str, JsonValue] | None"
-"""Value of a parsed JSON text."""
 
 # Strings are matched as a whole, so that commas inside them are kept.
 _STRING_OR_LAST_COMMA = re.compile(r'"(?:\\.|[^"\\])*"|(?<=[^\s\[{,:])(\s*),(?=\s*[\]}])', re.DOTALL)

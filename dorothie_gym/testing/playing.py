@@ -11,8 +11,9 @@ import numpy as np
 from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.policies import make_policy
+from dorothie_gym.spaces import ActionDict, ActionMapping
 
-ByAgent: TypeAlias = dict[str, dict[str, Any]]
+ByAgent: TypeAlias = dict[str, ActionDict]
 """Observations, infos or actions of all agents."""
 
 ParallelSession: TypeAlias = Any
@@ -65,7 +66,7 @@ def play_scripted(env: ParallelSession, *, seed: int, decisions: int) -> Iterato
 
 
 def play_again(
-    env: ParallelSession, scenario: Scenario, actions: Sequence[Mapping[str, Mapping[str, Any]]]
+    env: ParallelSession, scenario: Scenario, actions: Sequence[Mapping[str, ActionMapping]]
 ) -> Iterator[tuple[ByAgent, ByAgent]]:
     """Plays a scenario with given actions; yields observations and infos, from the reset on."""
     yield env.reset(options={"scenario": scenario})

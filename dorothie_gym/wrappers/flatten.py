@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import Any, SupportsFloat, TypeAlias
 
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
+from gymnasium.core import ActType, ObsType
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
@@ -63,7 +64,7 @@ class FlatActions:
         given = rest or {}
         self._rest = {name: given.get(name, _rest(part)) for name, part in parts.items() if name not in self.sizes}
 
-    def action(self, values: Flat) -> Any:
+    def action(self, values: Flat) -> object:
         """Returns the action of the space for a flat vector (n,)."""
         fields: dict[str, object] = dict(self._rest)
         begin = 0
@@ -93,7 +94,7 @@ class FlatObservations:
         self.low = np.concatenate([low for low, _ in bounds])
         self.high = np.concatenate([high for _, high in bounds])
 
-    def vector(self, observation: Observation | NDArray[np.generic]) -> NDArray[np.float32]:
+    def vector(self, observation: Unflattened) -> NDArray[np.float32]:
         """Returns the flat vector of an observation (n,) float32."""
         fields = observation if isinstance(observation, dict) else {_WHOLE: observation}
         parts = [np.ravel(fields[name]) for name in self._numeric]
@@ -165,8 +166,11 @@ AnyEnv: TypeAlias = gym.Env[Any, Any]
 FlatObservation: TypeAlias = dict[str, NDArray[np.float32] | NDArray[np.int8]]
 """Observation of `FlattenObservation`, by field."""
 
+Unflattened: TypeAlias = Observation | NDArray[np.generic]
+"""Observation of the wrapped environment."""
 
-class FlattenAction(gym.Wrapper[Any, Flat, Any, Any], RecordConstructorArgs):
+
+class FlattenAction(gym.Wrapper[ObsType, Flat, ObsType, Any], RecordConstructorArgs):
     """Wrapper that converts an action space of discrete fields to one `MultiDiscrete`.
 
     The entries are those of `FlatActions`. Texts are empty: the environment generates the words.
@@ -189,13 +193,13 @@ class FlattenAction(gym.Wrapper[Any, Flat, Any, Any], RecordConstructorArgs):
         self.action_space = spaces.MultiDiscrete(self._flat.nvec)
         self._mask: object = {}
 
-    def reset(self, *, seed: int | None = None, options: StepInfo | None = None) -> tuple[Any, StepInfo]:
+    def reset(self, *, seed: int | None = None, options: StepInfo | None = None) -> tuple[ObsType, StepInfo]:
         """Resets the environment and stores the mask of the first action."""
         observation, info = self.env.reset(seed=seed, options=options)
         self._mask = info.get("action_mask", {})
         return observation, info
 
-    def step(self, action: Flat) -> tuple[Any, Any, bool, bool, StepInfo]:
+    def step(self, action: Flat) -> tuple[ObsType, SupportsFloat, bool, bool, StepInfo]:
         """Steps with a flat action and stores the mask of the next one."""
         observation, reward, terminated, truncated, info = self.env.step(self.unflatten(action))
         self._mask = info.get("action_mask", {})
@@ -216,7 +220,7 @@ class FlattenAction(gym.Wrapper[Any, Flat, Any, Any], RecordConstructorArgs):
         return self._flat.mask(self._mask)
 
 
-class FlattenObservation(gym.Wrapper[FlatObservation, Any, Any, Any], RecordConstructorArgs):
+class FlattenObservation(gym.Wrapper[FlatObservation, ActType, Unflattened, ActType], RecordConstructorArgs):
     """Wrapper that converts an observation space to a `Dict` of two vectors.
 
     - `observation`: `Box` float32, all numeric fields in the order of the space; texts are omitted, ids are numbers.
@@ -242,12 +246,12 @@ class FlattenObservation(gym.Wrapper[FlatObservation, Any, Any, Any], RecordCons
         observation, info = self.env.reset(seed=seed, options=options)
         return self.flatten(observation), info
 
-    def step(self, action: Any) -> tuple[FlatObservation, Any, bool, bool, StepInfo]:
+    def step(self, action: ActType) -> tuple[FlatObservation, SupportsFloat, bool, bool, StepInfo]:
         """Steps the environment."""
         observation, reward, terminated, truncated, info = self.env.step(action)
         return self.flatten(observation), reward, terminated, truncated, info
 
-    def flatten(self, observation: Any) -> FlatObservation:
+    def flatten(self, observation: Unflattened) -> FlatObservation:
         """Returns the flat observation for an observation of the environment."""
         flat: FlatObservation = {"observation": self._flat.vector(observation)}
         if self._masked:
@@ -255,7 +259,7 @@ class FlattenObservation(gym.Wrapper[FlatObservation, Any, Any, Any], RecordCons
         return flat
 
 
-def flatten(env: AnyEnv, fields: Sequence[str] | None = None) -> FlattenObservation:
+def flatten(env: AnyEnv, fields: Sequence[str] | None = None) -> FlattenObservation[NDArray[np.generic]]:
     """Flattens both spaces: `FlattenAction` with `fields`, then `FlattenObservation`.
 
     Continuous action spaces are flat already and are kept.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from gymnasium import spaces
@@ -118,10 +118,11 @@ class IdenticalSpaces(ParallelEnv[str, FlatVector, Flat]):
             raise ValueError(f"action of {agent}: the shape is {values.shape}; it must be {self.nvec.shape}")
         own = self._actions[agent].nvec
         mine = values[: len(own)]
-        taken: ActionDict = self._actions[agent].action(np.where((mine >= 0) & (mine < own), mine, 0))
+        taken = self._actions[agent].action(np.where((mine >= 0) & (mine < own), mine, 0))
+        assert isinstance(taken, dict)  # the action space of a role is a Dict
         return taken
 
-    def render(self) -> Any:
+    def render(self) -> NDArray[np.uint8] | None:
         """Draws the aerial view, see `DuoWizardEnv.render`."""
         return self.env.render()
 
